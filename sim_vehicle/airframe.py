@@ -1,0 +1,198 @@
+"""What a vehicle is: masses, lengths, springs, motors, sensors and gains, read from a YAML file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from sim_vehicle.errors import AirframeError
+
+BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(gt=0, lt=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Geometry(_Part):
+    """Lengths in metres, in the body's horizontal plane unless said otherwise."""
+
+    hub_radius_m: Positive
+    """Where the arms begin. The hub is also a solid sphere of `hub_solid_radius_m`."""
+    arm_length_m: Positive
+    """The paper's l_arm: from the hub's edge to the motor's axis."""
+    guard_radius_m: Positive
+    """Radius of the propeller guard's disc around the motor's axis: the contact point lies on its rim."""
+    hub_solid_radius_m: Positive
+    foot_radius_m: Positive
+    """Distance of each of the four feet from the centre, under the arms."""
+    foot_depth_m: Positive
+    """Depth of the feet below the centre of mass."""
+
+    @property
+    def motor_radius_m(self) -> float:
+        """Centre of mass to motor axis: half of the paper's 290 mm."""
+        return self.hub_radius_m + self.arm_length_m
+
+    @property
+    def reach_m(self) -> float:
+        """The furthest any part is from the centre."""
+        return self.motor_radius_m + self.guard_radius_m
+
+
+class Bounce(_Part):
+    """A linear spring and damper stated by what it does when a mass lands on it."""
+
+    contact_time_s: Positive
+    """From first touch until the force is back at zero."""
+    restitution: Fraction
+    """Speed after over speed before; for a linear spring and damper the same at every speed."""
+
+
+class Arms(_Part):
+    """The folding arms of eq. 2; `fold_max_m` = 0 makes the vehicle rigid."""
+
+    damping_per_s: NotNegative
+    """b_s, normalised by the mass of the whole vehicle."""
+    stiffness_per_s2: NotNegative
+    """k_s, normalised by the mass of the whole vehicle."""
+    fold_max_m: NotNegative
+    """l_max: where the arm meets its stop."""
+    hysteresis_m: NotNegative
+    """delta l: the fold that stays after a hit."""
+    stop: Bounce
+    """The stop at l_max (for a rigid vehicle: the frame itself), for half of the vehicle's mass."""
+
+
+class Motors(_Part):
+    max_thrust_n: Positive
+    """Of one motor with its propeller."""
+    idle_fraction: NotNegative
+    """Thrust of an armed, idling motor as a fraction of the maximum."""
+    time_constant_s: Positive
+    moment_per_thrust_m: Positive
+    """Reaction torque about the rotor's axis per newton of thrust."""
+
+
+class Surface(_Part):
+    guard_friction: NotNegative
+    """Coulomb coefficient between a guard and a wall."""
+    ground_friction: NotNegative
+    foot: Bounce
+    """One foot on the ground, for a quarter of the vehicle's mass."""
+
+
+class Imu(_Part):
+    raw_interval_us: Annotated[int, Field(gt=0)]
+    integration_interval_us: Annotated[int, Field(gt=0)]
+    """Averaging interval of one HIGHRES_IMU sample (PX4: 1e6 / IMU_INTEG_RATE)."""
+    accelerometer_range_m_s2: Positive
+    accelerometer_noise_m_s2: NotNegative
+    """Standard deviation of the *mean* over one integration interval: sensor noise and vibration."""
+    accelerometer_bias_m_s2: NotNegative
+    gyroscope_noise_rad_s: NotNegative
+    gyroscope_bias_rad_s: NotNegative
+
+    @model_validator(mode="after")
+    def _whole_samples(self) -> "Imu":
+        if self.integration_interval_us % self.raw_interval_us:
+            raise ValueError("integration_interval_us must be a whole multiple of raw_interval_us")
+        return self
+
+
+class Estimate(_Part):
+    """Errors of the vehicle's own state estimate, as first-order Gauss-Markov processes per axis."""
+
+    delay_s: NotNegative
+    position_noise_m: NotNegative
+    position_correlation_s: Positive
+    velocity_noise_m_s: NotNegative
+    velocity_correlation_s: Positive
+    attitude_noise_rad: NotNegative
+    attitude_correlation_s: Positive
+
+
+class Control(_Part):
+    """Gains of eqs. 4-6. Attitude gains are stated as the closed loop's frequency and damping."""
+
+    position_p_per_s: Positive
+    velocity_p_per_s: Positive
+    velocity_i_per_s2: NotNegative
+    velocity_d: NotNegative
+    attitude_frequency_rad_s: Positive
+    attitude_damping: Positive
+    yaw_frequency_rad_s: Positive
+    tilt_max_rad: Positive
+    speed_max_m_s: Positive
+    climb_max_m_s: Positive
+    descent_max_m_s: Positive
+
+
+class Airframe(_Part):
+    """One vehicle. Frames: body forward-right-down; arms in PX4's quad-x motor order."""
+
+    name: str
+    description: str
+    mass_kg: Positive
+    inertia_kg_m2: tuple[Positive, Positive, Positive]
+    drag_n_s_m: NotNegative
+    """Linear drag of the whole vehicle, the same in every direction."""
+    geometry: Geometry
+    arms: Arms
+    motors: Motors
+    surface: Surface
+    imu: Imu
+    estimate: Estimate
+    control: Control
+
+    @property
+    def hover_fraction(self) -> float:
+        """Thrust to hover over the greatest thrust."""
+        return self.mass_kg * 9.81 / (4 * self.motors.max_thrust_n)
+
+    @model_validator(mode="after")
+    def _can_fly(self) -> "Airframe":
+        if self.hover_fraction > 0.9:
+            raise ValueError(
+                f"hovering would take {100 * self.hover_fraction:.0f} % of the greatest thrust; "
+                "raise motors.max_thrust_n or lower mass_kg so that it takes at most 90 %"
+            )
+        return self
+
+
+def built_in_airframes() -> tuple[str, ...]:
+    """Names of the airframes that come with the package."""
+    return tuple(sorted(path.stem for path in BUILT_IN_FOLDER.glob("*.yaml")))
+
+
+def load_built_in(name: str) -> Airframe:
+    """The airframe of that name; raises AirframeError where there is none."""
+    if name not in built_in_airframes():
+        raise AirframeError(
+            f"no airframe is called '{name}': use one of {', '.join(built_in_airframes())} or a file's path"
+        )
+    data = yaml.safe_load((BUILT_IN_FOLDER / f"{name}.yaml").read_text())
+    return Airframe.model_validate(with_base(data))
+
+
+def with_base(data: Mapping[str, Any]) -> dict[str, Any]:
+    """``data`` of an airframe file laid over the built-in airframe that its `based_on` names, if any."""
+    own = dict(data)
+    base = own.pop("based_on", None)
+    if base is None:
+        return own
+    return _laid_over(load_built_in(str(base)).model_dump(), own)
+
+
+def _laid_over(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(below)
+    for key, value in above.items():
+        lower = merged.get(key)
+        merged[key] = _laid_over(lower, value) if isinstance(lower, dict) and isinstance(value, dict) else value
+    return merged

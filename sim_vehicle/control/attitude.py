@@ -1,0 +1,73 @@
+"""Attitude tracking on SO(3), the paper's eqs. 4 and 5, run at 150 Hz, and the motor commands for it."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, Constants, Gains, State
+from sim_vehicle.physics.rotation import matrix_from_quaternion
+
+Floats = npt.NDArray[np.float64]
+
+ATTITUDE_LOOP_HZ = 150
+
+
+@njit
+def attitude_control(state: State, constants: Constants, yaw_rate_rad_s: float, gains: Gains) -> None:
+    """Set the moment tau of ``state``: tau = -k_R e_R - k_W e_W + W x J W (eq. 5).
+
+    e_R = (R_d^T R - R^T R_d)^vee / 2 and e_W = W - R^T R_d W_d (eq. 4), where the asked rate W_d is the
+    asked yaw rate about the asked b3. The setpoint comes in steps, so its angular acceleration alpha is
+    taken as zero.
+    """
+    r = np.empty((3, 3))
+    matrix_from_quaternion(state.estimate, r)
+    d = state.attitude_setpoint
+    product = d.T @ r
+    error = np.array([product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]])
+    rates = np.empty(3)
+    for i in range(3):
+        rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
+    j = constants.inertia_kg_m2
+    gyroscopic = np.array(
+        [
+            (j[2] - j[1]) * rates[1] * rates[2],
+            (j[0] - j[2]) * rates[2] * rates[0],
+            (j[1] - j[0]) * rates[0] * rates[1],
+        ]
+    )
+    for i in range(3):
+        asked_rate = product[2, i] * yaw_rate_rad_s
+        state.moment_frd_n_m[i] = (
+            -gains.k_r[i] * 0.5 * error[i] - gains.k_omega[i] * (rates[i] - asked_rate) + gyroscopic[i]
+        )
+
+
+@njit
+def allocate_motors(state: State, constants: Constants, motor_radius_m: float) -> None:
+    """Share thrust and moment among the motors: roll and pitch first, then thrust, then yaw.
+
+    A vehicle that cannot have everything must at least stay upright; yaw matters least.
+    """
+    lever = 4 * motor_radius_m / math.sqrt(2)
+    low, high = constants.motor_idle_n, constants.motor_max_n
+    tilt = np.empty(4)
+    smallest, largest = 0.0, 0.0
+    for motor in range(4):
+        roll = -math.copysign(1.0, ARM_DIRECTIONS_FRD[motor, 1]) * state.moment_frd_n_m[0]
+        pitch = math.copysign(1.0, ARM_DIRECTIONS_FRD[motor, 0]) * state.moment_frd_n_m[1]
+        tilt[motor] = (roll + pitch) / lever
+        smallest = min(smallest, tilt[motor])
+        largest = max(largest, tilt[motor])
+    scale = min(1.0, (high - low) / max(largest - smallest, 1e-9))
+    each = min(max(state.collective_n / 4, low - scale * smallest), high - scale * largest)
+    room = high
+    for motor in range(4):
+        thrust = each + scale * tilt[motor]
+        room = min(room, thrust - low, high - thrust)
+    yaw = state.moment_frd_n_m[2] / (4 * constants.moment_per_thrust_m)
+    yaw = min(max(yaw, -max(room, 0.0)), max(room, 0.0))
+    for motor in range(4):
+        state.motor_command_n[motor] = each + scale * tilt[motor] + ROTOR_YAW_SIGNS[motor] * yaw

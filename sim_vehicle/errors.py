@@ -1,0 +1,21 @@
+"""What can go wrong around the simulated vehicle; every message is one sentence for a person."""
+
+
+class SimulationError(Exception):
+    """Root of the family; the command line prints its message and exits non-zero."""
+
+
+class AirframeError(SimulationError):
+    """An airframe that does not exist or cannot fly."""
+
+
+class SceneError(SimulationError):
+    """A simulated world in which the vehicle cannot start."""
+
+
+class PortInUse(SimulationError):  # noqa: N818 - reads as the sentence it is
+    """The UDP port on which the vehicle listens cannot be had."""
+
+
+class TruthFileError(SimulationError):
+    """A truth file that cannot be written or read."""

@@ -1,0 +1,1 @@
+"""Numerical kernels of the plant: motors, contact, rigid body and inertial sensor (numba)."""

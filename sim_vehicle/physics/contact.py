@@ -1,0 +1,258 @@
+"""Contact of guards, hub and feet with the faces of the world: it pushes, it never pulls."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, POINTS, Contact, Scratch
+from sim_vehicle.world import (
+    FACE_ACROSS,
+    FACE_ALONG,
+    FACE_HALF_HEIGHT,
+    FACE_HALF_WIDTH,
+    FACE_NORMAL,
+    FACE_POINT,
+)
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+# A disc lying flat against a face (a ceiling) cannot fold its arm towards it; below this share of the
+# normal in the disc's plane the push is taken as straight through the frame.
+LEAST_IN_PLANE = 0.2
+# Sliding speed over which friction reaches its full value: far below any speed of interest.
+FRICTION_SPEED_M_S = 0.02
+# Room for the travel in one raw interval at any speed the vehicle can fly.
+NEAR_MARGIN_M = 0.01
+
+
+@njit
+def contact_point(
+    point: int, face: int, rotation: Floats, position: Floats, contact: Contact, faces: Floats, out: Floats
+) -> float:
+    """Write the point's position (NED, m) nearest to or deepest in a face into ``out``; return the share of
+    the face's normal that lies in the guard's plane (1 for hub and feet).
+
+    A guard is a disc: its deepest point is on the rim, along the in-plane part of the inward normal.
+    """
+    share = 1.0
+    if point < GUARDS:
+        axis_dot = 0.0
+        for i in range(3):
+            axis_dot -= faces[face, FACE_NORMAL + i] * rotation[i, 2]
+        share = math.sqrt(max(0.0, 1.0 - axis_dot * axis_dot))
+        for i in range(3):
+            arm = rotation[i, 0] * ARM_DIRECTIONS_FRD[point, 0] + rotation[i, 1] * ARM_DIRECTIONS_FRD[point, 1]
+            towards = -faces[face, FACE_NORMAL + i] - axis_dot * rotation[i, 2]
+            rim = contact.guard_radius_m * towards / share if share > 1e-9 else 0.0
+            out[i] = position[i] + contact.motor_radius_m * arm + rim
+    elif point == HUB:
+        for i in range(3):
+            out[i] = position[i] - contact.hub_radius_m * faces[face, FACE_NORMAL + i]
+    else:
+        for i in range(3):
+            arm = (
+                rotation[i, 0] * ARM_DIRECTIONS_FRD[point - FEET, 0]
+                + rotation[i, 1] * ARM_DIRECTIONS_FRD[point - FEET, 1]
+            )
+            out[i] = position[i] + contact.foot_radius_m * arm + contact.foot_depth_m * rotation[i, 2]
+    return share
+
+
+@njit
+def depth_in(face: int, where: Floats, faces: Floats) -> float:
+    """How far a position is behind a face's plane, metres; negative in front of it."""
+    depth = 0.0
+    for i in range(3):
+        depth -= (where[i] - faces[face, FACE_POINT + i]) * faces[face, FACE_NORMAL + i]
+    return depth
+
+
+@njit
+def within(face: int, where: Floats, faces: Floats) -> bool:
+    """Whether a position projects onto the face's rectangle."""
+    across, along = 0.0, 0.0
+    for i in range(3):
+        offset = where[i] - faces[face, FACE_POINT + i]
+        across += offset * faces[face, FACE_ACROSS + i]
+        along += offset * faces[face, FACE_ALONG + i]
+    return bool(abs(across) <= faces[face, FACE_HALF_WIDTH] and abs(along) <= faces[face, FACE_HALF_HEIGHT])
+
+
+@njit
+def arm_force(fold_m: float, fold_speed_m_s: float, contact: Contact) -> float:
+    """Force along an arm at this fold and folding speed, newtons, never negative (eq. 2, then the stop)."""
+    force = contact.arm_stiffness * fold_m + contact.arm_damping * fold_speed_m_s
+    beyond = fold_m - contact.fold_max_m
+    if beyond > 0.0:
+        force += max(0.0, contact.stop_stiffness * beyond + contact.stop_damping * fold_speed_m_s)
+    return max(0.0, force)
+
+
+@njit
+def point_force(point: int, depth: float, speed_in: float, share: float, relaxed_m: float, contact: Contact) -> float:
+    """Normal force on one point at ``depth`` (m) going in at ``speed_in`` (m/s), newtons.
+
+    A guard whose arm is still folded from before touches only when pressed in further than ``relaxed_m``.
+    An arm folds in its own plane, so a slanted push needs 1 / share of the depth and gives 1 / share of
+    the force.
+    """
+    if point < GUARDS:
+        lever = max(share, LEAST_IN_PLANE)
+        fold = depth / lever
+        if fold < relaxed_m:
+            return 0.0
+        return arm_force(fold, speed_in / lever, contact) / lever
+    if depth <= 0.0:
+        return 0.0
+    if point == HUB:
+        return max(0.0, contact.hub_stiffness * depth + contact.hub_damping * speed_in)
+    return max(0.0, contact.foot_stiffness * depth + contact.foot_damping * speed_in)
+
+
+@njit
+def contact_wrench(
+    body: Floats,
+    rotation: Floats,
+    behind: Ints,
+    near: Ints,
+    contact: Contact,
+    faces: Floats,
+    scratch: Scratch,
+    normal_forces: Floats,
+) -> None:
+    """Add the contacts' force (NED, N) and moment (FRD, N m) to the scratch's and list every normal force."""
+    where, lever, speed, rates_ned = scratch.where, scratch.lever, scratch.speed, scratch.rates_ned
+    for i in range(3):
+        rates_ned[i] = rotation[i, 0] * body[10] + rotation[i, 1] * body[11] + rotation[i, 2] * body[12]
+    for face in range(near.shape[0]):
+        for point in range(POINTS):
+            normal_forces[point, face] = 0.0
+            if near[face] == 0 or behind[point, face] == 1 or (point >= FEET and face != 0):
+                continue
+            share = contact_point(point, face, rotation, body, contact, faces, where)
+            depth = depth_in(face, where, faces)
+            if depth <= 0.0 or not within(face, where, faces):
+                continue
+            # The force acts where the face is, not where the unfolded guard would be.
+            for i in range(3):
+                lever[i] = where[i] + depth * faces[face, FACE_NORMAL + i] - body[i]
+            speed[0] = body[3] + rates_ned[1] * lever[2] - rates_ned[2] * lever[1]
+            speed[1] = body[4] + rates_ned[2] * lever[0] - rates_ned[0] * lever[2]
+            speed[2] = body[5] + rates_ned[0] * lever[1] - rates_ned[1] * lever[0]
+            speed_in = 0.0
+            for i in range(3):
+                speed_in -= speed[i] * faces[face, FACE_NORMAL + i]
+            relaxed = scratch.relaxed_m[point] if point < GUARDS else 0.0
+            normal = point_force(point, depth, speed_in, share, relaxed, contact)
+            if normal > 0.0:
+                normal_forces[point, face] = normal
+                _add_push(normal, speed_in, face, rotation, contact, faces, scratch)
+
+
+@njit
+def _add_push(
+    normal: float, speed_in: float, face: int, rotation: Floats, contact: Contact, faces: Floats, scratch: Scratch
+) -> None:
+    """Add one contact's normal force and Coulomb friction, smooth around zero sliding speed."""
+    lever, push = scratch.lever, scratch.where
+    friction = contact.ground_friction if face == 0 else contact.guard_friction
+    slide_squared = FRICTION_SPEED_M_S * FRICTION_SPEED_M_S
+    for i in range(3):
+        slide = scratch.speed[i] + speed_in * faces[face, FACE_NORMAL + i]
+        slide_squared += slide * slide
+    per_speed = friction * normal / math.sqrt(slide_squared)
+    for i in range(3):
+        slide = scratch.speed[i] + speed_in * faces[face, FACE_NORMAL + i]
+        push[i] = normal * faces[face, FACE_NORMAL + i] - per_speed * slide
+        scratch.force_ned[i] += push[i]
+    x = lever[1] * push[2] - lever[2] * push[1]
+    y = lever[2] * push[0] - lever[0] * push[2]
+    z = lever[0] * push[1] - lever[1] * push[0]
+    for i in range(3):
+        scratch.moment_frd[i] += rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z
+
+
+@njit
+def relaxed_folds(fold_m: Floats, step_s: float, contact: Contact, relaxed_m: Floats) -> None:
+    """Write how far each arm would be folded after ``step_s`` with nothing pressing it.
+
+    A free arm returns as fast as its own force is zero, b_s l' = -k_s l (faster out of the stop), until the
+    hysteresis holds it. That is also the fastest that it can follow a vehicle leaving the wall.
+    """
+    for arm in range(4):
+        fold = fold_m[arm]
+        held = min(fold, contact.hysteresis_m)
+        if contact.arm_damping <= 0.0:
+            relaxed_m[arm] = held
+            continue
+        returning_m_s = contact.arm_stiffness * fold / contact.arm_damping
+        beyond = fold - contact.fold_max_m
+        if beyond > 0.0:
+            push_n = contact.arm_stiffness * fold + contact.stop_stiffness * beyond
+            returning_m_s = max(returning_m_s, push_n / (contact.arm_damping + contact.stop_damping))
+        relaxed_m[arm] = max(fold - step_s * returning_m_s, held)
+
+
+@njit
+def settle_contacts(
+    body: Floats, fold_m: Floats, behind: Ints, near: Ints, contact: Contact, faces: Floats, scratch: Scratch
+) -> None:
+    """After a step: how far each arm is folded, and which points are behind a face.
+
+    A point that gets behind a face beside its rectangle has passed it by and is not pushed until it is
+    in front again.
+    """
+    for arm in range(GUARDS):
+        fold_m[arm] = scratch.relaxed_m[arm]
+    for face in range(near.shape[0]):
+        if near[face] == 0:
+            continue
+        for point in range(POINTS):
+            share = contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
+            depth = depth_in(face, scratch.where, faces)
+            if depth <= 0.0:
+                behind[point, face] = 0
+            elif behind[point, face] == 0 and not within(face, scratch.where, faces):
+                behind[point, face] = 1
+            elif behind[point, face] == 0 and point < GUARDS:
+                fold_m[point] = max(fold_m[point], depth / max(share, LEAST_IN_PLANE))
+
+
+@njit
+def find_near(body: Floats, contact: Contact, faces: Floats, near: Ints) -> bool:
+    """Mark the faces that some part could reach; return whether there is any."""
+    found = False
+    for face in range(near.shape[0]):
+        near[face] = 0
+        if abs(depth_in(face, body, faces)) < contact.reach_m + NEAR_MARGIN_M:
+            near[face] = 1
+            found = True
+    return found
+
+
+@njit
+def about_to_touch(
+    body: Floats, behind: Ints, near: Ints, margin_m: float, contact: Contact, faces: Floats, scratch: Scratch
+) -> bool:
+    """Whether a guard or the hub touches, or may touch within ``margin_m`` of travel."""
+    for face in range(near.shape[0]):
+        if near[face] == 0:
+            continue
+        for point in range(FEET):
+            if behind[point, face] == 0:
+                contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
+                if depth_in(face, scratch.where, faces) > -margin_m:
+                    return True
+    return False
+
+
+def points_behind(faces: Floats, centre_ned_m: tuple[float, float, float]) -> Ints:
+    """Which points (POINTS, n faces) start behind a face: no wall passes through a vehicle at its start
+    (the scene checks that), so every point is on its centre's side.
+    """
+    offset = np.array(centre_ned_m) - faces[:, FACE_POINT : FACE_POINT + 3]
+    in_front = (offset * faces[:, FACE_NORMAL : FACE_NORMAL + 3]).sum(axis=1)
+    return np.tile((in_front < 0).astype(np.int64), (POINTS, 1))

@@ -1,0 +1,57 @@
+"""What the vehicle knows of itself: position and velocity late and noisy, attitude nearly true."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import State
+from sim_vehicle.physics.rotation import turn
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+class EstimateErrors(NamedTuple):
+    """First-order Gauss-Markov errors and the ring of past bodies that makes the delay."""
+
+    error: Floats  # (9,) position m, velocity m/s, attitude rad (body axes)
+    keep: Floats  # (9,) share of an error that is left after one interval
+    drive: Floats  # (9,) standard deviation of what is added in one interval
+    past: Floats  # (delay in intervals + 1, 13)
+    cursor: Ints  # (1,)
+
+
+def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) -> EstimateErrors:
+    """Errors in their stationary state, so that the first second is as noisy as the last."""
+    estimate = airframe.estimate
+    interval_s = 1e-6 * airframe.imu.integration_interval_us
+    sigma = np.repeat([estimate.position_noise_m, estimate.velocity_noise_m_s, estimate.attitude_noise_rad], 3)
+    correlation_s = np.repeat(
+        [estimate.position_correlation_s, estimate.velocity_correlation_s, estimate.attitude_correlation_s], 3
+    )
+    keep = np.exp(-interval_s / correlation_s)
+    delay_intervals = round(estimate.delay_s / interval_s)
+    return EstimateErrors(
+        error=sigma * rng.standard_normal(9),
+        keep=keep,
+        drive=sigma * np.sqrt(1 - keep**2),
+        past=np.tile(body, (delay_intervals + 1, 1)),
+        cursor=np.zeros(1, np.int64),
+    )
+
+
+@njit
+def update_estimate(state: State, errors: EstimateErrors, noise: Floats) -> None:
+    """Renew ``state.estimate`` at the end of an interval; ``noise`` is (9,), standard normal."""
+    slots = errors.past.shape[0]
+    errors.past[errors.cursor[0]] = state.body
+    errors.cursor[0] = (errors.cursor[0] + 1) % slots
+    delayed = errors.past[errors.cursor[0]]
+    for i in range(9):
+        errors.error[i] = errors.keep[i] * errors.error[i] + errors.drive[i] * noise[i]
+    for i in range(6):
+        state.estimate[i] = delayed[i] + errors.error[i]
+    turn(state.body, errors.error[6], errors.error[7], errors.error[8], state.estimate)

@@ -1,0 +1,67 @@
+"""Bookkeeping of hits as they happen: when, how fast, how hard, how deep. Truth, never telemetry."""
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import (
+    HIT_ACTIVE,
+    HIT_EXIT_VELOCITY,
+    HIT_FACE,
+    HIT_FOLD_M,
+    HIT_LAST_US,
+    HIT_NORMAL,
+    HIT_PEAK_N,
+    HIT_POSITION,
+    HIT_START_US,
+    HIT_VELOCITY,
+    SAME_HIT_US,
+    State,
+)
+from sim_vehicle.world import FACE_NORMAL
+
+Floats = npt.NDArray[np.float64]
+
+
+@njit
+def note_contact(state: State, offset_us: float, normal_forces: Floats, faces: Floats) -> None:
+    """Open, extend or leave alone the hit in progress; the ground (face 0) does not count."""
+    total_n, most_n, hardest = 0.0, 0.0, 0
+    for face in range(1, normal_forces.shape[1]):
+        on_face = 0.0
+        for point in range(normal_forces.shape[0]):
+            on_face += normal_forces[point, face]
+        total_n += on_face
+        if on_face > most_n:
+            most_n, hardest = on_face, face
+    if total_n <= 0.0:
+        return
+    now_us = state.time_us + offset_us
+    hit = state.hit
+    if hit[HIT_ACTIVE] == 1.0 and now_us - hit[HIT_LAST_US] >= SAME_HIT_US:
+        _finish(state)
+    if hit[HIT_ACTIVE] == 0.0:
+        hit[HIT_ACTIVE], hit[HIT_FACE], hit[HIT_START_US] = 1.0, hardest, now_us
+        hit[HIT_PEAK_N], hit[HIT_FOLD_M] = 0.0, 0.0
+        hit[HIT_POSITION] = state.body[0:3]
+        hit[HIT_VELOCITY] = state.body[3:6]
+        hit[HIT_NORMAL] = faces[hardest, FACE_NORMAL : FACE_NORMAL + 3]
+    hit[HIT_LAST_US] = now_us
+    hit[HIT_PEAK_N] = max(hit[HIT_PEAK_N], total_n)
+    hit[HIT_FOLD_M] = max(hit[HIT_FOLD_M], np.max(state.fold_m))
+    hit[HIT_EXIT_VELOCITY] = state.body[3:6]
+    state.peak_force_n = max(state.peak_force_n, total_n)
+
+
+@njit
+def close_old_hit(state: State) -> None:
+    """End the hit in progress once everything has been clear for long enough."""
+    if state.hit[HIT_ACTIVE] == 1.0 and state.time_us - state.hit[HIT_LAST_US] >= SAME_HIT_US:
+        _finish(state)
+
+
+@njit
+def _finish(state: State) -> None:
+    state.finished_hits[state.finished_count] = state.hit
+    state.finished_count += 1
+    state.hit[HIT_ACTIVE] = 0.0

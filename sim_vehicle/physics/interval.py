@@ -1,0 +1,132 @@
+"""One IMU interval of the plant: loops -> motors -> contact and rigid body -> inertial sensor, raw by raw."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control
+from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
+from sim_vehicle.physics.contact import about_to_touch, find_near, relaxed_folds, settle_contacts
+from sim_vehicle.physics.hits import close_old_hit, note_contact
+from sim_vehicle.physics.imu import add_raw_sample
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import Asked, Constants, Contact, Gains, Scratch, State
+from sim_vehicle.physics.rigid_body import runge_kutta_step
+from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+# Steps in one raw interval (125 us) while something stiff touches or is about to: 12.5 us is 80 steps in
+# the rigid vehicle's 1 ms of contact. Halving it changes no rebound speed by 0.1 %.
+FINE_STEPS = 10
+# A guard this close to a face, beyond the travel of one raw interval, calls for fine steps.
+TOUCH_MARGIN_M = 0.0005
+
+
+@njit
+def advance_interval(
+    state: State,
+    asked: Asked,
+    motors_on: int,
+    noise: Floats,
+    fine_steps: int,
+    constants: Constants,
+    contact: Contact,
+    gains: Gains,
+    faces: Floats,
+    behind: Ints,
+    near: Ints,
+    forces: Floats,
+    scratch: Scratch,
+) -> None:
+    """Advance ``state`` by one integration interval.
+
+    ``motors_on``: 0 off, 1 idling, 2 flying the setpoint. ``noise`` is (raw samples, 6), standard normal.
+    ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
+    the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory.
+    """
+    state.peak_force_n = 0.0
+    state.finished_count = 0
+    state.specific_force_sum[:] = 0.0
+    state.rate_sum[:] = 0.0
+    for raw in range(constants.raw_per_interval):
+        if motors_on == 2:
+            run_loops(state, asked, constants, contact.motor_radius_m, gains)
+        else:
+            rest_loops(state)
+            state.motor_command_n[:] = constants.motor_idle_n if motors_on == 1 else 0.0
+        spin_motors(state, constants)
+        for i in range(3):
+            scratch.velocity_before[i] = state.body[3 + i]
+        move_body(state, fine_steps, constants, contact, faces, behind, near, forces, scratch)
+        add_raw_sample(state, scratch, noise, raw, constants)
+        state.time_us += constants.raw_interval_us
+    close_old_hit(state)
+
+
+@njit
+def run_loops(state: State, asked: Asked, constants: Constants, motor_radius_m: float, gains: Gains) -> None:
+    """Run whichever inner loop is due: position at 100 Hz, attitude at 150 Hz (paper, section V)."""
+    time_us = state.time_us
+    if time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
+        state.position_loops = time_us * POSITION_LOOP_HZ // 1_000_000 + 1
+        position_control(state, constants.mass_kg, asked, gains)
+    if time_us * ATTITUDE_LOOP_HZ >= state.attitude_loops * 1_000_000:
+        state.attitude_loops = time_us * ATTITUDE_LOOP_HZ // 1_000_000 + 1
+        attitude_control(state, constants, asked.yaw[2], gains)
+        allocate_motors(state, constants, motor_radius_m)
+
+
+@njit
+def rest_loops(state: State) -> None:
+    """Start the next flight with clean integrals, facing as the vehicle stands."""
+    state.velocity_integral[:] = 0.0
+    state.yaw_setpoint_rad = yaw_of(state.estimate)
+
+
+@njit
+def spin_motors(state: State, constants: Constants) -> None:
+    """First-order lag of each motor's thrust towards its command over one raw interval."""
+    share = 1.0 - math.exp(-1e-6 * constants.raw_interval_us / constants.motor_time_constant_s)
+    for motor in range(4):
+        command = min(max(state.motor_command_n[motor], 0.0), constants.motor_max_n)
+        state.motor_thrust_n[motor] += share * (command - state.motor_thrust_n[motor])
+
+
+@njit
+def move_body(
+    state: State,
+    fine_steps: int,
+    constants: Constants,
+    contact: Contact,
+    faces: Floats,
+    behind: Ints,
+    near: Ints,
+    forces: Floats,
+    scratch: Scratch,
+) -> None:
+    """Move the body through one raw interval, in fine steps while something stiff may touch."""
+    body = state.body
+    raw_s = 1e-6 * constants.raw_interval_us
+    touches = find_near(body, contact, faces, near)
+    steps = 1
+    if touches:
+        matrix_from_quaternion(body, scratch.rotation)
+        speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
+        tip_speed = contact.reach_m * (abs(body[10]) + abs(body[11]) + abs(body[12]))
+        margin_m = (speed + tip_speed) * raw_s + TOUCH_MARGIN_M
+        if about_to_touch(body, behind, near, margin_m, contact, faces, scratch):
+            steps = fine_steps
+    step_s = raw_s / steps
+    for step in range(steps):
+        relaxed_folds(state.fold_m, step_s, contact, scratch.relaxed_m)
+        runge_kutta_step(
+            body, state.motor_thrust_n, behind, near, touches, step_s, constants, contact, faces, forces, scratch
+        )
+        if touches:
+            settle_contacts(body, state.fold_m, behind, near, contact, faces, scratch)
+            note_contact(state, 1e6 * step * step_s, forces[0], faces)
+        else:
+            state.fold_m[:] = scratch.relaxed_m

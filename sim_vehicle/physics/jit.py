@@ -1,0 +1,39 @@
+"""A typed door to numba, so that strict type checking sees through the decorator."""
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).parent.parent
+
+
+def njit(function: Kernel) -> Kernel:
+    """Compile ``function`` to machine code and keep it for the next start.
+
+    No fast-math: reordering sums would make the answers depend on the compiler's mood, and the
+    same seed has to give the same bytes.
+    """
+    return cast(Kernel, numba.njit(cache=True, fastmath=False)(function))
+
+
+def _keep_code_by_content() -> None:
+    """Keep compiled code in a folder named after the kernels' text.
+
+    Numba looks only at the file of the outermost function, so that a changed callee in another file
+    would go on running as it was. Where the folder cannot be written numba's own place serves.
+    """
+    digest = hashlib.sha256()
+    for path in sorted([*_PACKAGE.glob("physics/*.py"), *_PACKAGE.glob("control/*.py"), _PACKAGE / "world.py"]):
+        digest.update(path.read_bytes())
+    parent = _PACKAGE / "__pycache__"
+    if os.access(parent if parent.exists() else _PACKAGE, os.W_OK):
+        numba.config.CACHE_DIR = str(parent / f"kernels-{digest.hexdigest()[:12]}")
+
+
+_keep_code_by_content()

@@ -1,0 +1,253 @@
+"""The records that the kernels share: what is in them, in which frame and unit."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from sim_vehicle.airframe import Airframe, Bounce
+from sim_vehicle.physics.record import Floats, Matrix3, Vector3, Vector4, new_record
+
+GRAVITY_M_S2 = 9.81
+
+# Size of `State.body`, the rigid body of the paper's eq. 1.
+BODY_SIZE = 13
+
+# Points that can touch something: four guards (motor order), the hub, four feet.
+GUARDS, HUB, FEET, POINTS = 4, 4, 5, 9
+
+# Unit vectors of the arms in the body frame, in PX4's quad-x motor order:
+# front right, rear left, front left, rear right.
+ARM_DIRECTIONS_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) / math.sqrt(2)
+# +1 for rotors that turn counter-clockwise seen from above: their reaction yaws the body right (+).
+ROTOR_YAW_SIGNS = np.array([1.0, 1.0, -1.0, -1.0])
+
+
+class Contact:
+    """Springs and dampers of everything that can touch, in newtons, metres and seconds."""
+
+    arm_stiffness: float
+    arm_damping: float
+    fold_max_m: float
+    hysteresis_m: float
+    stop_stiffness: float
+    stop_damping: float
+    hub_stiffness: float
+    hub_damping: float
+    foot_stiffness: float
+    foot_damping: float
+    guard_friction: float
+    ground_friction: float
+    motor_radius_m: float
+    guard_radius_m: float
+    hub_radius_m: float
+    foot_radius_m: float
+    foot_depth_m: float
+    reach_m: float
+
+
+class Constants:
+    """Everything about the vehicle, but for its contacts, that does not change in a flight."""
+
+    mass_kg: float
+    inertia_kg_m2: Vector3  # principal, body frame
+    drag_n_s_m: float
+    wind_ned_m_s: Vector3
+    motor_max_n: float
+    motor_idle_n: float
+    motor_time_constant_s: float
+    moment_per_thrust_m: float
+    raw_interval_us: int
+    raw_per_interval: int
+    accelerometer_range_m_s2: float
+    accelerometer_raw_noise_m_s2: float
+    accelerometer_bias_frd_m_s2: Vector3
+    gyroscope_raw_noise_rad_s: float
+    gyroscope_bias_frd_rad_s: Vector3
+
+
+class Gains:
+    """Gains and limits of the inner loops (eqs. 4-6)."""
+
+    position_p: float
+    velocity_p: float
+    velocity_i: float
+    velocity_d: float
+    k_r: Vector3  # N m per unit of e_R
+    k_omega: Vector3  # N m per rad/s
+    tilt_max_rad: float
+    speed_max_m_s: float
+    climb_max_m_s: float
+    descent_max_m_s: float
+
+
+class Asked:
+    """A setpoint as the loops read it: rows position, velocity, acceleration, all NED and SI."""
+
+    value: Matrix3
+    given: Matrix3  # 1 where the axis is controlled, else 0
+    yaw: Vector3  # angle (rad), 1 if it is given else 0, rate (rad/s)
+
+
+class State:
+    """Everything about the vehicle that changes, but for which points are behind which faces."""
+
+    time_us: int  # since boot
+    body: Annotated[Floats, (13,)]  # position NED, velocity NED, attitude (w, x, y, z), rates FRD
+    motor_thrust_n: Vector4
+    motor_command_n: Vector4
+    fold_m: Vector4  # of each arm, inward positive
+    estimate: Annotated[Floats, (10,)]  # position NED, velocity NED, attitude: what the vehicle itself knows
+    acceleration_ned_m_s2: Vector3  # low-passed slope of the estimated velocity
+    velocity_integral: Vector3  # of eq. 6, m/s2
+    yaw_setpoint_rad: float
+    attitude_setpoint: Matrix3  # R_d
+    collective_n: float  # thrust f of eq. 1
+    moment_frd_n_m: Vector3  # moment tau of eq. 5
+    position_loops: int  # run so far
+    attitude_loops: int
+    specific_force_sum: Vector3  # of the clipped raw samples in this interval
+    rate_sum: Vector3
+    clip_counts: Annotated[Floats, (3,), int]  # since boot
+    peak_force_n: float  # in this interval
+    hit: Annotated[Floats, (18,)]  # the hit in progress
+    finished_hits: Annotated[Floats, (2, 18)]  # ended in this interval; it is too short for a third
+    finished_count: int
+
+
+class Scratch:
+    """Working memory of the kernels."""
+
+    rotation: Matrix3  # body to NED at the last step's start
+    turned: Matrix3  # the same at a trial state
+    slopes: Annotated[Floats, (4, 13)]  # k1..k4
+    trial: Annotated[Floats, (13,)]
+    force_ned: Vector3
+    moment_frd: Vector3
+    where: Vector3
+    lever: Vector3
+    speed: Vector3
+    rates_ned: Vector3
+    velocity_before: Vector3
+    relaxed_m: Vector4  # folds that arms pressed by nothing would have
+
+
+# Rows of `State.hit`.
+HIT_ACTIVE, HIT_FACE, HIT_START_US, HIT_LAST_US, HIT_PEAK_N, HIT_FOLD_M = range(6)
+HIT_POSITION, HIT_VELOCITY, HIT_NORMAL, HIT_EXIT_VELOCITY = slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 18)
+
+# Contacts closer together than this are one hit: a bounce inside the springs, not a second approach.
+SAME_HIT_US = 20_000
+
+
+def spring_and_damper(bounce: Bounce, mass_kg: float) -> tuple[float, float]:
+    """Stiffness (N/m) and damping (N s/m) with which ``mass_kg`` bounces as stated.
+
+    A mass landing on a linear spring and damper pulls itself free when the force is back at zero.
+    With damping ratio z that is after t = phi / w_d, phi = atan2(2 z sqrt(1 - z^2), 2 z^2 - 1), at
+    exp(-z phi / sqrt(1 - z^2)) of the speed it came with: eq. 2 of the paper (z = 0.671) gives 0.22.
+    """
+    damping_ratio = _ratio_for(bounce.restitution)
+    root = math.sqrt(1 - damping_ratio**2)
+    phase = math.atan2(2 * damping_ratio * root, 2 * damping_ratio**2 - 1)
+    natural_rad_s = phase / (root * bounce.contact_time_s)
+    return mass_kg * natural_rad_s**2, 2 * damping_ratio * natural_rad_s * mass_kg
+
+
+def _ratio_for(restitution: float) -> float:
+    """Damping ratio for a restitution, by bisection: restitution falls as damping grows."""
+    low, high = 0.0, 1.0 - 1e-9
+    for _ in range(60):
+        middle = (low + high) / 2
+        root = math.sqrt(1 - middle**2)
+        phase = math.atan2(2 * middle * root, 2 * middle**2 - 1)
+        if math.exp(-middle * phase / root) > restitution:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+def contact_from(airframe: Airframe) -> Contact:
+    """Contact constants. Two guards share a head-on hit, so each arm carries half of eq. 2's mass."""
+    mass_kg, arms, geometry = airframe.mass_kg, airframe.arms, airframe.geometry
+    stop_stiffness, stop_damping = spring_and_damper(arms.stop, mass_kg / 2)
+    hub_stiffness, hub_damping = spring_and_damper(arms.stop, mass_kg)
+    foot_stiffness, foot_damping = spring_and_damper(airframe.surface.foot, mass_kg / 4)
+    return new_record(
+        Contact,
+        arm_stiffness=arms.stiffness_per_s2 * mass_kg / 2,
+        arm_damping=arms.damping_per_s * mass_kg / 2,
+        fold_max_m=arms.fold_max_m,
+        hysteresis_m=arms.hysteresis_m,
+        stop_stiffness=stop_stiffness,
+        stop_damping=stop_damping,
+        hub_stiffness=hub_stiffness,
+        hub_damping=hub_damping,
+        foot_stiffness=foot_stiffness,
+        foot_damping=foot_damping,
+        guard_friction=airframe.surface.guard_friction,
+        ground_friction=airframe.surface.ground_friction,
+        motor_radius_m=geometry.motor_radius_m,
+        guard_radius_m=geometry.guard_radius_m,
+        hub_radius_m=geometry.hub_solid_radius_m,
+        foot_radius_m=geometry.foot_radius_m,
+        foot_depth_m=geometry.foot_depth_m,
+        reach_m=geometry.reach_m,
+    )
+
+
+def gains_from(airframe: Airframe) -> Gains:
+    """Gains of eqs. 4-6; the attitude's from the closed loop w^2 and 2 z w, scaled by the inertia."""
+    control = airframe.control
+    inertia = np.array(airframe.inertia_kg_m2)
+    frequency = np.array([control.attitude_frequency_rad_s] * 2 + [control.yaw_frequency_rad_s])
+    return new_record(
+        Gains,
+        position_p=control.position_p_per_s,
+        velocity_p=control.velocity_p_per_s,
+        velocity_i=control.velocity_i_per_s2,
+        velocity_d=control.velocity_d,
+        k_r=inertia * frequency**2,
+        k_omega=inertia * 2 * control.attitude_damping * frequency,
+        tilt_max_rad=control.tilt_max_rad,
+        speed_max_m_s=control.speed_max_m_s,
+        climb_max_m_s=control.climb_max_m_s,
+        descent_max_m_s=control.descent_max_m_s,
+    )
+
+
+def constants_from(airframe: Airframe, wind_ned_m_s: tuple[float, float, float], rng: np.random.Generator) -> Constants:
+    """Constants of one flight; the sensor biases are drawn from ``rng``."""
+    imu, motors = airframe.imu, airframe.motors
+    raw_per_interval = imu.integration_interval_us // imu.raw_interval_us
+    return new_record(
+        Constants,
+        mass_kg=airframe.mass_kg,
+        inertia_kg_m2=np.array(airframe.inertia_kg_m2),
+        drag_n_s_m=airframe.drag_n_s_m,
+        wind_ned_m_s=np.array(wind_ned_m_s),
+        motor_max_n=motors.max_thrust_n,
+        motor_idle_n=motors.idle_fraction * motors.max_thrust_n,
+        motor_time_constant_s=motors.time_constant_s,
+        moment_per_thrust_m=motors.moment_per_thrust_m,
+        raw_interval_us=imu.raw_interval_us,
+        raw_per_interval=raw_per_interval,
+        accelerometer_range_m_s2=imu.accelerometer_range_m_s2,
+        accelerometer_raw_noise_m_s2=imu.accelerometer_noise_m_s2 * math.sqrt(raw_per_interval),
+        accelerometer_bias_frd_m_s2=imu.accelerometer_bias_m_s2 * rng.standard_normal(3),
+        gyroscope_raw_noise_rad_s=imu.gyroscope_noise_rad_s * math.sqrt(raw_per_interval),
+        gyroscope_bias_frd_rad_s=imu.gyroscope_bias_rad_s * rng.standard_normal(3),
+    )
+
+
+def initial_state(position_ned_m: tuple[float, float, float], yaw_rad: float) -> State:
+    """A vehicle at rest, level, motors off; ``position_ned_m`` is its centre of mass."""
+    attitude = [math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2)]
+    return new_record(
+        State,
+        body=[*position_ned_m, 0.0, 0.0, 0.0, *attitude, 0.0, 0.0, 0.0],
+        estimate=[*position_ned_m, 0.0, 0.0, 0.0, *attitude],
+        yaw_setpoint_rad=yaw_rad,
+        attitude_setpoint=np.eye(3),
+    )

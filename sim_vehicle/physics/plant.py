@@ -1,0 +1,151 @@
+"""The plant: a state of arrays, moved by the kernels one IMU interval at a time."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.position import update_slope
+from sim_vehicle.physics.contact import points_behind
+from sim_vehicle.physics.estimate import estimate_errors, update_estimate
+from sim_vehicle.physics.interval import FINE_STEPS, advance_interval
+from sim_vehicle.physics.layout import (
+    POINTS,
+    Asked,
+    Scratch,
+    constants_from,
+    contact_from,
+    gains_from,
+    initial_state,
+)
+from sim_vehicle.physics.record import new_record
+from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, MOTORS, REPORT_COLUMNS, SENSED, TRUTH, write_report
+from sim_vehicle.scene import Scene
+from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.world import Vector3
+
+MOTORS_OFF, MOTORS_IDLE, MOTORS_FLYING = range(3)
+
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PlantOutput:
+    """What the vehicle's own software may know at the end of an interval."""
+
+    time_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    """Mean over the interval of the raw samples, each clipped first."""
+    angular_velocity_frd_rad_s: Vector3
+    clipping_counts: tuple[int, int, int]
+    """Clipped raw samples per axis since boot."""
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3
+    attitude_wxyz: Quaternion
+    thrust_fraction: float
+    """Commanded collective thrust over the greatest."""
+    motor_fractions: Quaternion
+    """Thrust commanded of each motor over its greatest, in motor order."""
+
+
+class Plant:
+    """Airframe, world and seed in; one interval a step. The same inputs give the same bits."""
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        scene: Scene,
+        seed: int,
+        keeps_path: bool = True,
+        fine_steps: int = FINE_STEPS,
+    ) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._world = scene.world()
+        self._constants = constants_from(airframe, scene.wind_ned_m_s, self._rng)
+        self._contact = contact_from(airframe)
+        self._gains = gains_from(airframe)
+        self._fine_steps = fine_steps
+        north, east, _ = scene.start.position_ned_m
+        centre: Vector3 = (north, east, -airframe.geometry.foot_depth_m)
+        self.state = initial_state(centre, math.radians(scene.start.yaw_deg))
+        self._errors = estimate_errors(airframe, self.state.body, self._rng)
+        self._report = np.zeros(REPORT_COLUMNS)
+        self._asked = new_record(Asked)
+        self._taken: TrajectorySetpoint | None = None
+        # Views into the records, taken once: looking a field up in Python costs microseconds.
+        self._asked_value, self._asked_given, self._asked_yaw = (
+            self._asked.value,
+            self._asked.given,
+            self._asked.yaw,
+        )
+        self._estimate, self._finished_hits = self.state.estimate, self.state.finished_hits
+        self._behind = points_behind(self._world.faces, centre)
+        self._near = np.zeros(len(self._world.faces), np.int64)
+        self._forces = np.zeros((2, POINTS, len(self._world.faces)))
+        self._scratch = new_record(Scratch)
+        self.interval_us = airframe.imu.integration_interval_us
+        self.truth = TruthRecorder(keeps_path)
+
+    def step(self, setpoint: TrajectorySetpoint | None, armed: bool) -> PlantOutput:
+        """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
+        motors_on = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
+        if setpoint is not None and setpoint is not self._taken:
+            self._take_setpoint(setpoint)
+        velocity_before = self._estimate[3:6].copy()
+        raw_samples = self._constants.raw_per_interval
+        noise = self._rng.standard_normal(6 * raw_samples + 9)
+        advance_interval(
+            self.state,
+            self._asked,
+            motors_on,
+            noise[: 6 * raw_samples].reshape(raw_samples, 6),
+            self._fine_steps,
+            self._constants,
+            self._contact,
+            self._gains,
+            self._world.faces,
+            self._behind,
+            self._near,
+            self._forces,
+            self._scratch,
+        )
+        update_estimate(self.state, self._errors, noise[6 * raw_samples :])
+        update_slope(self.state, velocity_before, 1e-6 * self.interval_us)
+        write_report(self.state, self._constants, self._report)
+        self._record_truth()
+        return self._output()
+
+    def _take_setpoint(self, setpoint: TrajectorySetpoint) -> None:
+        """Write the setpoint where the kernels read it."""
+        rows = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
+        self._asked_value[:] = [[0.0 if value is None else value for value in row] for row in rows]
+        self._asked_given[:] = [[value is not None for value in row] for row in rows]
+        self._asked_yaw[:] = (setpoint.yaw_rad or 0.0, setpoint.yaw_rad is not None, setpoint.yaw_rate_rad_s or 0.0)
+        self._taken = setpoint
+
+    def _record_truth(self) -> None:
+        self.truth.record(self._report[TRUTH])
+        for row in self._finished_hits[: self.state.finished_count]:
+            self.truth.add_hit(row, self._world)
+
+    def _output(self) -> PlantOutput:
+        row: list[float] = self._report.tolist()
+        fx, fy, fz, p, q, r, clip_x, clip_y, clip_z = row[SENSED]
+        px, py, pz, vx, vy, vz, qw, qx, qy, qz = row[ESTIMATE]
+        ax, ay, az = row[ACCELERATION]
+        m1, m2, m3, m4 = row[MOTORS]
+        return PlantOutput(
+            time_boot_us=int(row[0]),
+            specific_force_frd_m_s2=(fx, fy, fz),
+            angular_velocity_frd_rad_s=(p, q, r),
+            clipping_counts=(int(clip_x), int(clip_y), int(clip_z)),
+            position_ned_m=(px, py, pz),
+            velocity_ned_m_s=(vx, vy, vz),
+            acceleration_ned_m_s2=(ax, ay, az),
+            attitude_wxyz=(qw, qx, qy, qz),
+            thrust_fraction=(m1 + m2 + m3 + m4) / 4,
+            motor_fractions=(m1, m2, m3, m4),
+        )

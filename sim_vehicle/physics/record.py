@@ -1,0 +1,40 @@
+"""Records: one block of memory that a kernel gets by reference, described by a class of annotations.
+
+Passing numba a tuple of arrays makes every call copy and count each of them; a record is one pointer.
+"""
+
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+Vector3 = Annotated[Floats, (3,)]
+Vector4 = Annotated[Floats, (4,)]
+Matrix3 = Annotated[Floats, (3, 3)]
+
+RecordType = TypeVar("RecordType")
+
+
+def new_record(kind: type[RecordType], **values: Any) -> RecordType:
+    """A record with the fields that ``kind`` annotates, zero but for ``values``.
+
+    `int` and `float` fields are 64 bits wide; an array field is `Annotated[..., shape]`, of integers if
+    the annotation ends in `int`. Raises ValueError for a value that is no field.
+    """
+    record = np.zeros(1, _layout(kind)).view(np.recarray)[0]
+    for name, value in values.items():
+        record[name] = value
+    return cast(RecordType, record)
+
+
+def _layout(kind: type[Any]) -> np.dtype[Any]:
+    fields = []
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            shape, *rest = get_args(hint)[1:]
+            fields.append((name, np.int64 if int in rest else np.float64, shape))
+        else:
+            fields.append((name, np.int64 if hint is int else np.float64, ()))
+    return np.dtype(fields, align=True)

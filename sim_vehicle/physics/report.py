@@ -1,0 +1,30 @@
+"""One row of numbers out of the kernels at the end of an interval: reading a record in Python is slow."""
+
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import Constants, State
+from sim_vehicle.physics.record import Floats
+
+# What really is: time (us), position, velocity, attitude, folds, contact force. `truth.py` keeps these.
+TRUTH = slice(0, 16)
+# What the vehicle's own software may know: mean specific force, mean rates and clip counts; its estimate.
+SENSED, ESTIMATE = slice(16, 25), slice(25, 35)
+ACCELERATION, MOTORS = slice(35, 38), slice(38, 42)
+REPORT_COLUMNS = 42
+
+
+@njit
+def write_report(state: State, constants: Constants, row: Floats) -> None:
+    """Fill ``row`` (REPORT_COLUMNS,) from the state."""
+    row[0] = state.time_us
+    for i in range(10):
+        row[1 + i] = state.body[i]
+        row[25 + i] = state.estimate[i]
+    for i in range(4):
+        row[11 + i] = state.fold_m[i]
+        row[38 + i] = state.motor_command_n[i] / constants.motor_max_n
+    row[15] = state.peak_force_n
+    for i in range(3):
+        row[16 + i] = state.specific_force_sum[i] / constants.raw_per_interval
+        row[19 + i] = state.rate_sum[i] / constants.raw_per_interval
+        row[22 + i] = state.clip_counts[i]
+        row[35 + i] = state.acceleration_ned_m_s2[i]

@@ -1,0 +1,100 @@
+"""The rigid body of the paper's eq. 1 with drag and contact, and one Runge-Kutta step of it."""
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.physics.contact import contact_wrench
+from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.layout import (
+    ARM_DIRECTIONS_FRD,
+    BODY_SIZE,
+    GRAVITY_M_S2,
+    ROTOR_YAW_SIGNS,
+    Constants,
+    Contact,
+    Scratch,
+)
+from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@njit
+def derivative(
+    body: Floats,
+    thrusts_n: Floats,
+    behind: Ints,
+    near: Ints,
+    touches: bool,
+    constants: Constants,
+    contact: Contact,
+    faces: Floats,
+    rotation: Floats,
+    normal_forces: Floats,
+    scratch: Scratch,
+    slope: Floats,
+) -> None:
+    """Write d(body)/dt of eq. 1 into ``slope``: m v' = m g e3 - f R e3 + drag + contact, J W' = tau - W x J W.
+
+    ``touches`` off skips the contacts: no face is near.
+    """
+    matrix_from_quaternion(body, rotation)
+    force, moment = scratch.force_ned, scratch.moment_frd
+    total_n = thrusts_n[0] + thrusts_n[1] + thrusts_n[2] + thrusts_n[3]
+    for i in range(3):
+        force[i] = -total_n * rotation[i, 2] - constants.drag_n_s_m * (body[3 + i] - constants.wind_ned_m_s[i])
+        moment[i] = 0.0
+    for motor in range(4):
+        thrust = thrusts_n[motor]
+        moment[0] -= contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
+        moment[1] += contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust
+        moment[2] += ROTOR_YAW_SIGNS[motor] * constants.moment_per_thrust_m * thrust
+    if touches:
+        contact_wrench(body, rotation, behind, near, contact, faces, scratch, normal_forces)
+
+    j = constants.inertia_kg_m2
+    p, q, r = body[10], body[11], body[12]
+    for i in range(3):
+        slope[i] = body[3 + i]
+        slope[3 + i] = force[i] / constants.mass_kg
+    slope[5] += GRAVITY_M_S2
+    slope[6] = -0.5 * (body[7] * p + body[8] * q + body[9] * r)
+    slope[7] = 0.5 * (body[6] * p + body[8] * r - body[9] * q)
+    slope[8] = 0.5 * (body[6] * q + body[9] * p - body[7] * r)
+    slope[9] = 0.5 * (body[6] * r + body[7] * q - body[8] * p)
+    slope[10] = (moment[0] - (j[2] - j[1]) * q * r) / j[0]
+    slope[11] = (moment[1] - (j[0] - j[2]) * r * p) / j[1]
+    slope[12] = (moment[2] - (j[1] - j[0]) * p * q) / j[2]
+
+
+@njit
+def runge_kutta_step(
+    body: Floats,
+    thrusts_n: Floats,
+    behind: Ints,
+    near: Ints,
+    touches: bool,
+    step_s: float,
+    constants: Constants,
+    contact: Contact,
+    faces: Floats,
+    forces: Floats,
+    scratch: Scratch,
+) -> None:
+    """Advance ``body`` by ``step_s`` (classical fourth order), thrusts held.
+
+    Leaves the rotation of the step's *start* in the scratch and its normal forces in ``forces[0]``
+    (2, POINTS, n faces).
+    """
+    k, trial, turned = scratch.slopes, scratch.trial, scratch.turned
+    rotation, normal, tried = scratch.rotation, forces[0], forces[1]
+    derivative(body, thrusts_n, behind, near, touches, constants, contact, faces, rotation, normal, scratch, k[0])
+    for stage in range(1, 4):
+        part_s = step_s if stage == 3 else 0.5 * step_s
+        for i in range(BODY_SIZE):
+            trial[i] = body[i] + part_s * k[stage - 1, i]
+        derivative(trial, thrusts_n, behind, near, touches, constants, contact, faces, turned, tried, scratch, k[stage])
+    for i in range(BODY_SIZE):
+        body[i] += step_s / 6 * (k[0, i] + 2 * k[1, i] + 2 * k[2, i] + k[3, i])
+    normalise(body)

@@ -1,0 +1,1 @@
+"""The thin shell of the simulated vehicle: sockets, the clock and files."""

@@ -1,0 +1,104 @@
+"""What really happened: every hit and the path, recorded beside the simulation and never sent by it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.physics.layout import (
+    HIT_EXIT_VELOCITY,
+    HIT_FACE,
+    HIT_FOLD_M,
+    HIT_LAST_US,
+    HIT_NORMAL,
+    HIT_PEAK_N,
+    HIT_POSITION,
+    HIT_START_US,
+    HIT_VELOCITY,
+)
+from sim_vehicle.world import Vector3, World
+
+Floats = npt.NDArray[np.float64]
+
+# Columns of one row of the path: time, position, velocity, attitude, folds, contact force.
+_ROW = 1 + 3 + 3 + 4 + 4 + 1
+_FIRST_ROWS = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """One contact with a wall, from the first touch until everything was clear for 20 ms."""
+
+    obstacle: str
+    contact_at_boot_us: float
+    ended_at_boot_us: float
+    contact_position_ned_m: Vector3
+    """The centre of mass at the first touch."""
+    impact_velocity_ned_m_s: Vector3
+    normal_ned: Vector3
+    """Out of the face that was hit."""
+    max_fold_m: float
+    peak_force_n: float
+    rebound_velocity_ned_m_s: Vector3
+    """The centre of mass's at the last touch."""
+
+    @property
+    def contact_duration_s(self) -> float:
+        """From the first touch to the last."""
+        return 1e-6 * (self.ended_at_boot_us - self.contact_at_boot_us)
+
+    @property
+    def rebound_speed_m_s(self) -> float:
+        """Speed along the face's normal at the last touch, away positive."""
+        return sum(v * n for v, n in zip(self.rebound_velocity_ned_m_s, self.normal_ned, strict=True))
+
+
+@dataclass(slots=True)
+class TruthRecorder:
+    """Grows with the flight; ``keeps_path`` off leaves only the hits, for flights without an end."""
+
+    keeps_path: bool = True
+    hits: list[Hit] = field(default_factory=list)
+    _rows: Floats = field(default_factory=lambda: np.empty((_FIRST_ROWS, _ROW)))
+    _used: int = 0
+
+    def record(self, row: Floats) -> None:
+        """Add the true columns of a report (16,) to the path."""
+        if not self.keeps_path:
+            return
+        if self._used == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[self._used] = row
+        self._used += 1
+
+    def add_hit(self, row: Floats, world: World) -> None:
+        """Add a finished row of `State.finished_hits`."""
+        self.hits.append(
+            Hit(
+                obstacle=world.names[int(row[HIT_FACE])],
+                contact_at_boot_us=float(row[HIT_START_US]),
+                ended_at_boot_us=float(row[HIT_LAST_US]),
+                contact_position_ned_m=_vector(row[HIT_POSITION]),
+                impact_velocity_ned_m_s=_vector(row[HIT_VELOCITY]),
+                normal_ned=_vector(row[HIT_NORMAL]),
+                max_fold_m=float(row[HIT_FOLD_M]),
+                peak_force_n=float(row[HIT_PEAK_N]),
+                rebound_velocity_ned_m_s=_vector(row[HIT_EXIT_VELOCITY]),
+            )
+        )
+
+    def series(self) -> dict[str, Floats]:
+        """The path, one row an IMU interval: arrays by name, each with frame and unit in it."""
+        rows = self._rows[: self._used]
+        return {
+            "time_boot_us": rows[:, 0],
+            "position_ned_m": rows[:, 1:4],
+            "velocity_ned_m_s": rows[:, 4:7],
+            "attitude_wxyz": rows[:, 7:11],
+            "arm_fold_m": rows[:, 11:15],
+            "peak_contact_force_n": rows[:, 15],
+        }
+
+
+def _vector(row: Floats) -> Vector3:
+    return float(row[0]), float(row[1]), float(row[2])

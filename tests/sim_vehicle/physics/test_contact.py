@@ -1,0 +1,151 @@
+"""Contact with walls: eq. 2 and its stop, energy, symmetry, and that a wall never pulls."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.scene import Scene
+from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, quiet, throw
+
+
+@pytest.mark.parametrize("speed_m_s", [0.5, 1.0, 1.4])
+def test_head_on_hit_below_the_stop_follows_eq_2(foldable: Airframe, speed_m_s: float) -> None:
+    hit = throw(foldable, speed_m_s).hit
+    rebound, contact_s, fold_m = closed_form_of_eq_2(foldable, speed_m_s)
+    assert hit.rebound_speed_m_s == pytest.approx(rebound, rel=0.005)
+    assert hit.contact_duration_s == pytest.approx(contact_s, rel=0.005)
+    assert hit.max_fold_m == pytest.approx(fold_m, rel=0.005)
+
+
+def test_the_papers_sample_hit(foldable: Airframe) -> None:
+    """At 1.4 m/s the arm folds 29.4 mm, just short of l_max, and gives back 0.22 of the speed."""
+    hit = throw(foldable, 1.4).hit
+    assert hit.max_fold_m == pytest.approx(0.0294, abs=0.0001)
+    assert hit.rebound_speed_m_s / 1.4 == pytest.approx(0.220, abs=0.002)
+
+
+def test_the_stop_is_met_above_1_43_m_s(foldable: Airframe) -> None:
+    below, above = throw(foldable, 1.42).hit, throw(foldable, 1.45).hit
+    assert below.max_fold_m < foldable.arms.fold_max_m < above.max_fold_m
+    # Without the stop the force never exceeds its first value, m b_s v; the stop is what makes peaks.
+    assert below.peak_force_n == pytest.approx(foldable.mass_kg * foldable.arms.damping_per_s * 1.42, rel=0.01)
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 2.0, 3.0])
+def test_rigid_contact_takes_a_millisecond_and_returns_nine_tenths(rigid: Airframe, speed_m_s: float) -> None:
+    hit = throw(rigid, speed_m_s).hit
+    assert hit.contact_duration_s == pytest.approx(0.001, rel=0.03)
+    assert hit.rebound_speed_m_s / speed_m_s == pytest.approx(0.9, abs=0.01)
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("speed_m_s", [1.0, 2.5, 5.0])
+def test_halving_the_step_changes_the_rebound_by_less_than_a_hundredth(name: str, speed_m_s: float) -> None:
+    airframe = quiet(load_built_in(name))
+    coarse, fine = throw(airframe, speed_m_s).hit, throw(airframe, speed_m_s, fine_steps=20).hit
+    assert coarse.rebound_speed_m_s == pytest.approx(fine.rebound_speed_m_s, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("yaw_deg", [0, 20, 45, 137])
+@pytest.mark.parametrize("offset_m", [0.0, 0.05])
+def test_a_hit_never_makes_energy(name: str, yaw_deg: float, offset_m: float) -> None:
+    airframe = quiet(load_built_in(name))
+    thrown = throw(airframe, 2.5, yaw_rad=math.radians(yaw_deg), offset_m=offset_m)
+    series = thrown.plant.truth.series()
+    velocity, height_m = series["velocity_ned_m_s"], -series["position_ned_m"][:, 2]
+    rates = thrown.plant.state.body[10:13]
+    turning = 0.5 * float(np.array(airframe.inertia_kg_m2) @ rates**2)
+    energy = airframe.mass_kg * (0.5 * (velocity**2).sum(axis=1) + 9.81 * height_m)
+    assert energy[-1] + turning < energy[0]
+
+
+@pytest.mark.parametrize("heading_deg", [0, 30, 90, 180, 251])
+def test_every_wall_direction_gives_the_same_hit(foldable: Airframe, heading_deg: float) -> None:
+    north = throw(foldable, 2.0).hit
+    turned = throw(foldable, 2.0, heading_rad=math.radians(heading_deg)).hit
+    assert turned.rebound_speed_m_s == pytest.approx(north.rebound_speed_m_s, rel=1e-3)
+    assert turned.peak_force_n == pytest.approx(north.peak_force_n, rel=1e-2)
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("yaw_deg", [0, 45, 90])
+def test_a_symmetric_hit_makes_no_yaw(name: str, yaw_deg: float) -> None:
+    thrown = throw(quiet(load_built_in(name)), 2.0, yaw_rad=math.radians(yaw_deg))
+    assert abs(thrown.plant.state.body[12]) < 1e-6
+
+
+def test_mirrored_hits_turn_the_vehicle_opposite_ways(foldable: Airframe) -> None:
+    left = throw(foldable, 1.0, yaw_rad=math.radians(15), duration_s=0.12).plant.state.body
+    right = throw(foldable, 1.0, yaw_rad=math.radians(-15), duration_s=0.12).plant.state.body
+    assert abs(left[12]) > 0.5
+    assert left[12] == pytest.approx(-right[12], rel=1e-6)
+
+
+def test_the_side_that_is_hit_is_pushed_back(foldable: Airframe) -> None:
+    """Nose 15 degrees right of a wall to the north: the front left guard is ahead, meets the wall first and
+    is pushed back, which turns the nose left, negative about down."""
+    body = throw(foldable, 1.0, yaw_rad=math.radians(15), duration_s=0.12).plant.state.body
+    assert body[12] < -0.5
+
+
+def test_a_wall_only_pushes(foldable: Airframe) -> None:
+    """Released arms stay folded for a while; nothing draws the vehicle back to the wall."""
+    series = throw(foldable, 2.0).plant.truth.series()
+    speed_away = -series["velocity_ned_m_s"][:, 0]
+    touching = series["peak_contact_force_n"] > 0
+    assert (np.diff(speed_away)[~touching[1:]] == 0).all()
+    assert (np.diff(speed_away)[touching[1:]] > -1e-9).all()
+
+
+def test_released_arms_return_to_the_hysteresis(foldable: Airframe) -> None:
+    fold = throw(foldable, 2.0, duration_s=0.6).plant.truth.series()["arm_fold_m"]
+    front, rear = fold[:, [0, 2]], fold[:, [1, 3]]
+    assert front.max() > 0.03
+    assert front[-1] == pytest.approx([foldable.arms.hysteresis_m] * 2)
+    assert not rear.any()
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.3])
+def test_friction_along_the_wall_is_coulombs(friction: float) -> None:
+    """A guard hit square on while the vehicle slides east: what the wall takes along is the coefficient times
+    what it gives across (through the centre of mass, so that nothing turns but slowly)."""
+    airframe = quiet(load_built_in("foldable"), surface__guard_friction=friction, inertia_kg_m2=(9.0, 9.0, 9.0))
+    wall = {"point_ned_m": [2, 0, -2], "normal_ned": [-1, 0, 0]}
+    plant = Plant(airframe, Scene.model_validate({"walls": [wall]}), seed=1)
+    plant.state.body[0:6] = [1.5, 0.0, -2.0, 1.0, 2.0, 0.0]
+    for _ in range(125):
+        plant.step(None, armed=False)
+    (hit,) = plant.truth.hits
+    across = hit.impact_velocity_ned_m_s[0] - hit.rebound_velocity_ned_m_s[0]
+    along = hit.impact_velocity_ned_m_s[1] - hit.rebound_velocity_ned_m_s[1]
+    fallen = hit.rebound_velocity_ned_m_s[2] - hit.impact_velocity_ned_m_s[2]
+    upward = 9.81 * hit.contact_duration_s - fallen
+    assert math.hypot(along, upward) == pytest.approx(friction * across, rel=0.02)
+    assert along > 0
+
+
+def test_a_vehicle_beside_a_wall_passes_it(foldable: Airframe) -> None:
+    wall = {"point_ned_m": [2, 1.0, -2], "normal_ned": [-1, 0, 0], "width_m": 1.0, "height_m": 4}
+    plant = Plant(foldable, Scene.model_validate({"walls": [wall]}), seed=1)
+    plant.state.body[0:3] = [1.0, 0.0, -2.0]
+    plant.state.body[3] = 3.0
+    for _ in range(125):
+        plant.step(None, armed=False)
+    assert plant.truth.hits == []
+    assert plant.state.body[0] > 2.4
+
+
+def test_the_back_of_a_wall_is_solid_too(foldable: Airframe) -> None:
+    wall = {"point_ned_m": [2, 0, -2], "normal_ned": [-1, 0, 0], "thickness_m": 0.2}
+    plant = Plant(foldable, Scene.model_validate({"walls": [wall], "start": {"position_ned_m": [3, 0, 0]}}), seed=1)
+    plant.state.body[2] = -2.0
+    plant.state.body[3] = -2.0
+    for _ in range(100):
+        plant.step(None, armed=False)
+    (hit,) = plant.truth.hits
+    assert hit.normal_ned == (1.0, 0.0, 0.0)
+    assert hit.contact_position_ned_m[0] == pytest.approx(2.2 + 0.1825, abs=0.001)

@@ -1,0 +1,153 @@
+"""The plant as a whole: it hovers, it senses as a Pixhawk does, it knows itself as badly as stated."""
+
+import math
+import statistics
+
+import numpy as np
+import pytest
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS
+from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.scene import Scene
+from sim_vehicle.setpoint import TrajectorySetpoint
+from tests.sim_vehicle.physics.throwing import quiet
+
+NONE = (None, None, None)
+
+
+def at(north: float, east: float, down: float, yaw_rad: float = 0.0) -> TrajectorySetpoint:
+    return TrajectorySetpoint((north, east, down), NONE, NONE, yaw_rad, None)
+
+
+def flown(plant: Plant, setpoint: TrajectorySetpoint | None, seconds: float) -> list[PlantOutput]:
+    return [plant.step(setpoint, armed=setpoint is not None) for _ in range(round(seconds / 0.004))]
+
+
+def hovering(airframe: Airframe, seed: int = 1, **scene: object) -> Plant:
+    plant = Plant(airframe, Scene.model_validate(scene), seed)
+    flown(plant, at(0, 0, -2), 8)
+    return plant
+
+
+def test_at_rest_on_the_ground_it_feels_one_g_up() -> None:
+    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
+    last = flown(plant, None, 1.0)[-1]
+    assert last.specific_force_frd_m_s2 == pytest.approx((0, 0, -9.81), abs=0.01)
+    assert plant.state.body[2] == pytest.approx(-0.06, abs=0.002)
+
+
+@pytest.mark.parametrize("yaw_deg", [0, 90, -135])
+def test_it_holds_a_setpoint_and_a_heading(yaw_deg: float) -> None:
+    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
+    flown(plant, at(1.0, -0.5, -2.0, math.radians(yaw_deg)), 12)
+    assert plant.state.body[0:3] == pytest.approx([1.0, -0.5, -2.0], abs=0.02)
+    half = math.radians(yaw_deg) / 2
+    assert abs(plant.state.body[6:10] @ [math.cos(half), 0, 0, math.sin(half)]) > 0.9999
+
+
+def test_a_step_of_the_setpoint_does_not_overshoot() -> None:
+    plant = hovering(quiet(load_built_in("foldable")))
+    flown(plant, at(1.0, 0, -2), 6)
+    assert plant.truth.series()["position_ned_m"][:, 0].max() < 1.02
+
+
+def test_hover_thrust_is_the_stated_share() -> None:
+    airframe = quiet(load_built_in("foldable"))
+    output = flown(hovering(airframe), at(0, 0, -2), 1)[-1]
+    assert output.thrust_fraction == pytest.approx(airframe.hover_fraction, abs=0.005)
+    assert load_built_in("foldable").model_copy(update={"mass_kg": 1.0}).hover_fraction == pytest.approx(
+        0.70, abs=0.001
+    )
+
+
+def test_front_motors_pitch_the_nose_up_and_right_motors_roll_left() -> None:
+    """PX4's quad-x: front right, rear left, front left, rear right; the first two turn counter-clockwise."""
+    assert ARM_DIRECTIONS_FRD[0] == pytest.approx([math.sqrt(0.5), math.sqrt(0.5), 0])
+    for motors, axis, sign in (((0, 2), 1, 1), ((0, 3), 0, -1), ((0, 1), 2, 1)):
+        plant = hovering(quiet(load_built_in("foldable")))
+        plant.state.motor_thrust_n[list(motors)] += 0.5
+        plant.step(None, armed=True)
+        assert sign * plant.state.body[10 + axis] > 0.005
+    assert ROTOR_YAW_SIGNS.sum() == 0
+
+
+def test_raw_samples_are_clipped_before_the_mean() -> None:
+    """A rigid hit of over 3000 m/s2 for 1 ms shows as 16 g for a quarter of the 4 ms mean, not more."""
+    airframe = quiet(load_built_in("rigid"))
+    wall = {"point_ned_m": [1, 0, -2], "normal_ned": [-1, 0, 0]}
+    plant = Plant(airframe, Scene.model_validate({"walls": [wall]}), seed=1)
+    plant.state.body[0:6] = [1 - 0.1825 - 0.002, 0, -2, 2.0, 0, 0]
+    outputs = flown(plant, None, 0.02)
+    seen = sum(output.specific_force_frd_m_s2[0] for output in outputs) * 0.004
+    clip = airframe.imu.accelerometer_range_m_s2
+    assert outputs[-1].clipping_counts[0] == pytest.approx(0.001 / 125e-6, abs=1)
+    assert -0.0012 * clip < seen < -0.0008 * clip
+    assert min(output.specific_force_frd_m_s2[0] for output in outputs) > -0.32 * clip
+
+
+def test_the_mean_has_the_stated_noise() -> None:
+    airframe = load_built_in("foldable")
+    outputs = flown(hovering(airframe, seed=3), at(0, 0, -2), 20)
+    for axis in (0, 1):
+        spread = statistics.pstdev(output.specific_force_frd_m_s2[axis] for output in outputs)
+        assert spread == pytest.approx(airframe.imu.accelerometer_noise_m_s2, rel=0.1)
+
+
+def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
+    airframe = load_built_in("foldable")
+    plant = hovering(airframe, seed=5)
+    start = len(plant.truth.series()["time_boot_us"])
+    outputs = flown(plant, at(0, 0, -2), 60)
+    truth = plant.truth.series()
+    true_velocity = truth["velocity_ned_m_s"][start - 5 : -5]
+    error = np.array([output.velocity_ned_m_s for output in outputs]) - true_velocity
+    assert np.sqrt((error**2).mean(axis=0)) == pytest.approx([0.032] * 3, rel=0.25)
+    assert np.sqrt((error**2).mean()) >= 0.03 * 0.9
+    position_error = np.array([output.position_ned_m for output in outputs]) - truth["position_ned_m"][start - 5 : -5]
+    assert 0.005 < np.sqrt((position_error**2).mean()) < 0.02
+
+
+def test_the_estimate_lags_by_the_stated_delay() -> None:
+    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
+    plant.state.body[2:6] = [-50.0, 3.0, 0.0, 0.0]
+    last = flown(plant, None, 0.4)[-1]
+    assert plant.state.body[0] - last.position_ned_m[0] == pytest.approx(3.0 * 0.02, rel=1e-6)
+
+
+def test_wind_pushes_downwind() -> None:
+    plant = Plant(quiet(load_built_in("foldable"), drag_n_s_m=0.25), Scene(wind_ned_m_s=(0.0, 5.0, 0.0)), seed=1)
+    plant.state.body[2] = -50.0
+    flown(plant, None, 1.0)
+    assert plant.state.body[1] > 0.3
+    assert abs(plant.state.body[0]) < 1e-9
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_does_not() -> None:
+    def path(seed: int) -> bytes:
+        return hovering(load_built_in("foldable"), seed).truth.series()["position_ned_m"].tobytes()
+
+    assert path(1) == path(1)
+    assert path(1) != path(2)
+
+
+def test_the_quaternion_stays_unit_through_a_tumble() -> None:
+    plant = Plant(quiet(load_built_in("foldable")), Scene(), seed=1)
+    plant.state.body[2] = -80.0
+    plant.state.body[10:13] = [15.0, -9.0, 20.0]
+    flown(plant, None, 3.0)
+    assert np.linalg.norm(plant.state.body[6:10]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_tumble_in_free_fall_keeps_its_angular_momentum() -> None:
+    airframe = quiet(load_built_in("foldable"))
+    plant = Plant(airframe, Scene(), seed=1)
+    plant.state.body[2] = -80.0
+    plant.state.body[10:13] = [15.0, -9.0, 20.0]
+
+    def momentum() -> float:
+        return float(np.linalg.norm(np.array(airframe.inertia_kg_m2) * plant.state.body[10:13]))
+
+    before = momentum()
+    flown(plant, None, 2.0)
+    assert momentum() == pytest.approx(before, rel=1e-6)

@@ -1,0 +1,87 @@
+"""A vehicle flown straight at a wall, with nothing between the setpoint and the physics."""
+
+import math
+from dataclasses import dataclass
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.physics.interval import FINE_STEPS
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.scene import Scene
+from sim_vehicle.truth import Hit
+
+HEIGHT_M = 2.0
+
+
+@dataclass(frozen=True)
+class Thrown:
+    """A vehicle after its hit or hits."""
+
+    hit: Hit
+    hits: list[Hit]
+    plant: Plant
+
+
+def quiet(airframe: Airframe, **changes: object) -> Airframe:
+    """The airframe without drag, noise and bias: what is left is eq. 1, eq. 2 and the loops."""
+    data = airframe.model_dump()
+    data["drag_n_s_m"] = 0.0
+    for key in ("accelerometer_noise_m_s2", "accelerometer_bias_m_s2", "gyroscope_noise_rad_s"):
+        data["imu"][key] = 0.0
+    data["imu"]["gyroscope_bias_rad_s"] = 0.0
+    for key in ("position_noise_m", "velocity_noise_m_s", "attitude_noise_rad"):
+        data["estimate"][key] = 0.0
+    for path, value in changes.items():
+        part, _, key = path.partition("__")
+        if key:
+            data[part][key] = value
+        else:
+            data[part] = value
+    return Airframe.model_validate(data)
+
+
+def throw(
+    airframe: Airframe,
+    speed_m_s: float,
+    heading_rad: float = 0.0,
+    yaw_rad: float | None = None,
+    offset_m: float = 0.0,
+    fine_steps: int = FINE_STEPS,
+    gap_m: float = 0.05,
+    rates_frd_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    duration_s: float = 0.4,
+) -> Thrown:
+    """Throw a level vehicle, motors off, at a wall facing it across ``heading_rad``.
+
+    Motors off leave eq. 2 alone (thrust level would only cancel gravity): the vehicle falls as it hits,
+    along the frictionless face.
+    """
+    north, east = math.cos(heading_rad), math.sin(heading_rad)
+    yaw_rad = heading_rad if yaw_rad is None else yaw_rad
+    free = airframe.model_copy(update={"surface": airframe.surface.model_copy(update={"guard_friction": 0.0})})
+    distance = airframe.geometry.reach_m + gap_m
+    scene = Scene.model_validate(
+        {
+            "walls": [{"point_ned_m": [10 * north, 10 * east, -HEIGHT_M], "normal_ned": [-north, -east, 0.0],
+                       "width_m": 20, "height_m": 20}],
+            "start": {"yaw_deg": math.degrees(yaw_rad)},
+        }
+    )  # fmt: skip
+    plant = Plant(free, scene, seed=1, fine_steps=fine_steps)
+    body = plant.state.body
+    body[0:3] = [(10 - distance) * north - offset_m * east, (10 - distance) * east + offset_m * north, -HEIGHT_M]
+    body[3:6] = [speed_m_s * north, speed_m_s * east, 0.0]
+    body[10:13] = rates_frd_rad_s
+    for _ in range(round(duration_s / (1e-6 * plant.interval_us))):
+        plant.step(None, armed=False)
+    return Thrown(plant.truth.hits[0], plant.truth.hits, plant)
+
+
+def closed_form_of_eq_2(airframe: Airframe, speed_m_s: float) -> tuple[float, float, float]:
+    """Rebound speed, contact time and greatest fold of eq. 2, ended where its force is back at zero."""
+    b, k = airframe.arms.damping_per_s, airframe.arms.stiffness_per_s2
+    damped = math.sqrt(k - b * b / 4)
+    contact_s = math.atan2(b * damped, b * b / 2 - k) / damped
+    rebound = speed_m_s * math.exp(-b / 2 * contact_s)
+    peak_s = math.atan2(damped, b / 2) / damped
+    fold_m = speed_m_s / damped * math.exp(-b / 2 * peak_s) * math.sin(damped * peak_s)
+    return rebound, contact_s, fold_m

@@ -1,0 +1,79 @@
+"""The `sim:` part of a mission file and airframe files: what is refused, and with which words."""
+
+import pytest
+from pydantic import ValidationError
+
+from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
+from sim_vehicle.errors import AirframeError, SceneError
+from sim_vehicle.scene import Scene, check_start_is_free, scene_from
+
+
+def test_an_empty_part_is_the_foldable_vehicle_alone() -> None:
+    assert scene_from(None) == Scene(airframe="foldable", seed=1)
+    assert scene_from(None).world().names == ("ground",)
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ({"wals": []}, "Extra inputs"),
+        ({"walls": [{"point_ned_m": [1, 0, 0], "normal_ned": [0, 0, 0]}]}, "no direction"),
+        ({"walls": [{"point_ned_m": [1, 0, float("nan")], "normal_ned": [1, 0, 0]}]}, "finite"),
+        ({"start": {"position_ned_m": [0, 0, -2]}}, "starts standing on the ground"),
+        ({"seed": -1}, "greater than or equal to 0"),
+    ],
+)
+def test_bad_parts_are_refused(part: dict[str, object], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        scene_from(part)
+
+
+@pytest.mark.parametrize(("north_m", "free"), [(0.0, False), (0.2, False), (0.23, True), (2.0, True), (-0.2, False)])
+def test_a_wall_through_the_start_is_refused(north_m: float, free: bool) -> None:
+    scene = Scene.model_validate({"walls": [{"point_ned_m": [north_m, 0, 0], "normal_ned": [-1, 0, 0]}]})
+    airframe = load_built_in("foldable")
+    if free:
+        check_start_is_free(scene, airframe)
+    else:
+        with pytest.raises(SceneError, match=r"sim\.walls\.0: 'wall 1' passes through"):
+            check_start_is_free(scene, airframe)
+
+
+def test_a_small_wall_beside_the_start_is_allowed() -> None:
+    wall = {"point_ned_m": [0, 3, 0], "normal_ned": [-1, 0, 0], "width_m": 1, "height_m": 2}
+    check_start_is_free(Scene.model_validate({"walls": [wall]}), load_built_in("foldable"))
+
+
+def test_every_built_in_airframe_loads_and_is_named_as_its_file() -> None:
+    assert built_in_airframes() == ("foldable", "rigid")
+    for name in built_in_airframes():
+        assert load_built_in(name).name == name
+
+
+def test_the_rigid_vehicle_differs_in_its_arms_alone() -> None:
+    foldable, rigid = load_built_in("foldable").model_dump(), load_built_in("rigid").model_dump()
+    assert {key for key in foldable if foldable[key] != rigid[key]} == {"name", "description", "arms"}
+
+
+def test_the_papers_lengths() -> None:
+    """Motor to motor: 290 mm with the arms out, 230 mm with both folded by l_max."""
+    airframe = load_built_in("foldable")
+    assert 2 * airframe.geometry.motor_radius_m == pytest.approx(0.290)
+    assert 2 * (airframe.geometry.motor_radius_m - airframe.arms.fold_max_m) == pytest.approx(0.230)
+
+
+def test_an_unknown_airframe_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(AirframeError, match="use one of foldable, rigid"):
+        load_built_in("folding")
+
+
+def test_a_file_states_only_what_differs_from_its_base() -> None:
+    own = Airframe.model_validate(with_base({"based_on": "foldable", "name": "mine", "arms": {"fold_max_m": 0.05}}))
+    assert own.arms.fold_max_m == 0.05
+    assert own.arms.stiffness_per_s2 == 500
+    assert own.mass_kg == 1.112
+
+
+def test_an_airframe_that_cannot_hover_is_refused() -> None:
+    with pytest.raises(ValidationError, match=r"raise motors\.max_thrust_n"):
+        Airframe.model_validate(with_base({"based_on": "foldable", "mass_kg": 1.5}))
