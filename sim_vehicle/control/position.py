@@ -12,10 +12,6 @@ from sim_vehicle.physics.rotation import matrix_from_quaternion
 Floats = npt.NDArray[np.float64]
 
 POSITION_LOOP_HZ = 100
-# Low-pass on the slope of the estimated velocity, the D of eq. 6: the noise of an optical-flow velocity
-# differentiated at 100 Hz would otherwise tilt the vehicle by degrees.
-SLOPE_TIME_CONSTANT_S = 0.05
-
 # Rows of `Asked`.
 ASK_POSITION, ASK_VELOCITY, ASK_ACCELERATION = range(3)
 
@@ -62,7 +58,8 @@ def _axis_acceleration(axis: int, state: State, asked: Asked, gains: Gains) -> f
     if abs(proportional) < limit:
         state.velocity_integral[axis] += gains.velocity_i * error / POSITION_LOOP_HZ
     slope: float = gains.velocity_d * state.acceleration_ned_m_s2[axis]
-    return proportional + state.velocity_integral[axis] - slope + feed_forward
+    integral: float = state.velocity_integral[axis]
+    return proportional + integral - slope + feed_forward
 
 
 @njit
@@ -98,12 +95,3 @@ def _thrust_and_attitude(state: State, mass_kg: float, acceleration: Floats) -> 
         state.attitude_setpoint[i, 0] = b1[i]
         state.attitude_setpoint[i, 1] = b2[i]
         state.attitude_setpoint[i, 2] = b3[i]
-
-
-@njit
-def update_slope(state: State, velocity_before: Floats, step_s: float) -> None:
-    """Low-pass the slope of the estimated velocity over one interval."""
-    share = 1.0 - math.exp(-step_s / SLOPE_TIME_CONSTANT_S)
-    for i in range(3):
-        slope = (state.estimate[3 + i] - velocity_before[i]) / step_s
-        state.acceleration_ned_m_s2[i] += share * (slope - state.acceleration_ned_m_s2[i])

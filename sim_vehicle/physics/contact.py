@@ -24,6 +24,8 @@ Ints = npt.NDArray[np.int64]
 LEAST_IN_PLANE = 0.2
 # Sliding speed over which friction reaches its full value: far below any speed of interest.
 FRICTION_SPEED_M_S = 0.02
+# Values of `near`, per face: out of reach, within reach, and so close that guards and hub must be looked at.
+FAR, NEAR, CLOSE = range(3)
 # Room for the travel in one raw interval at any speed the vehicle can fly.
 NEAR_MARGIN_M = 0.01
 
@@ -128,9 +130,9 @@ def contact_wrench(
     for i in range(3):
         rates_ned[i] = rotation[i, 0] * body[10] + rotation[i, 1] * body[11] + rotation[i, 2] * body[12]
     for face in range(near.shape[0]):
-        for point in range(POINTS):
-            normal_forces[point, face] = 0.0
-            if near[face] == 0 or behind[point, face] == 1 or (point >= FEET and face != 0):
+        normal_forces[:, face] = 0.0
+        for point in range(*points_at(face, near)):
+            if behind[point, face] == 1:
                 continue
             share = contact_point(point, face, rotation, body, contact, faces, where)
             depth = depth_in(face, where, faces)
@@ -208,9 +210,7 @@ def settle_contacts(
     for arm in range(GUARDS):
         fold_m[arm] = scratch.relaxed_m[arm]
     for face in range(near.shape[0]):
-        if near[face] == 0:
-            continue
-        for point in range(POINTS):
+        for point in range(*points_at(face, near)):
             share = contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
             depth = depth_in(face, scratch.where, faces)
             if depth <= 0.0:
@@ -226,27 +226,42 @@ def find_near(body: Floats, contact: Contact, faces: Floats, near: Ints) -> bool
     """Mark the faces that some part could reach; return whether there is any."""
     found = False
     for face in range(near.shape[0]):
-        near[face] = 0
+        near[face] = FAR
         if abs(depth_in(face, body, faces)) < contact.reach_m + NEAR_MARGIN_M:
-            near[face] = 1
+            near[face] = NEAR
             found = True
     return found
 
 
 @njit
-def about_to_touch(
+def find_close(
     body: Floats, behind: Ints, near: Ints, margin_m: float, contact: Contact, faces: Floats, scratch: Scratch
 ) -> bool:
-    """Whether a guard or the hub touches, or may touch within ``margin_m`` of travel."""
+    """Raise to CLOSE the near faces that a guard or the hub touches, may touch within ``margin_m`` of travel,
+    or has passed by; return whether anything but passed points made it so.
+    """
+    touching = False
     for face in range(near.shape[0]):
-        if near[face] == 0:
+        if near[face] == FAR:
             continue
         for point in range(FEET):
-            if behind[point, face] == 0:
-                contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
-                if depth_in(face, scratch.where, faces) > -margin_m:
-                    return True
-    return False
+            if behind[point, face] == 1:
+                near[face] = CLOSE
+                continue
+            contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
+            if depth_in(face, scratch.where, faces) > -margin_m:
+                near[face] = CLOSE
+                touching = True
+    return touching
+
+
+@njit
+def points_at(face: int, near: Ints) -> tuple[int, int]:
+    """The range of points worth looking at: feet meet the ground alone, guards and hub what is close."""
+    last = POINTS if face == 0 else FEET
+    if near[face] == FAR:
+        return last, last
+    return (0 if near[face] == CLOSE else FEET), last
 
 
 def points_behind(faces: Floats, centre_ned_m: tuple[float, float, float]) -> Ints:

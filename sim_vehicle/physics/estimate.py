@@ -1,5 +1,6 @@
 """What the vehicle knows of itself: position and velocity late and noisy, attitude nearly true."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,10 @@ from sim_vehicle.physics.rotation import turn
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+# Low-pass on the slope of the estimated velocity, the D of eq. 6: the noise of an optical-flow velocity
+# differentiated at 100 Hz would otherwise tilt the vehicle by degrees.
+SLOPE_TIME_CONSTANT_S = 0.05
+
 
 class EstimateErrors(NamedTuple):
     """First-order Gauss-Markov errors and the ring of past bodies that makes the delay."""
@@ -22,6 +27,7 @@ class EstimateErrors(NamedTuple):
     drive: Floats  # (9,) standard deviation of what is added in one interval
     past: Floats  # (delay in intervals + 1, 13)
     cursor: Ints  # (1,)
+    velocity_before: Floats  # (3,) the estimate's, one interval ago
 
 
 def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) -> EstimateErrors:
@@ -40,6 +46,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         drive=sigma * np.sqrt(1 - keep**2),
         past=np.tile(body, (delay_intervals + 1, 1)),
         cursor=np.zeros(1, np.int64),
+        velocity_before=np.zeros(3),
     )
 
 
@@ -50,8 +57,19 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats) -> None
     errors.past[errors.cursor[0]] = state.body
     errors.cursor[0] = (errors.cursor[0] + 1) % slots
     delayed = errors.past[errors.cursor[0]]
+    for i in range(3):
+        errors.velocity_before[i] = state.estimate[3 + i]
     for i in range(9):
         errors.error[i] = errors.keep[i] * errors.error[i] + errors.drive[i] * noise[i]
     for i in range(6):
         state.estimate[i] = delayed[i] + errors.error[i]
     turn(state.body, errors.error[6], errors.error[7], errors.error[8], state.estimate)
+
+
+@njit
+def update_slope(state: State, errors: EstimateErrors, step_s: float) -> None:
+    """Low-pass the slope of the estimated velocity over one interval."""
+    share = 1.0 - math.exp(-step_s / SLOPE_TIME_CONSTANT_S)
+    for i in range(3):
+        slope = (state.estimate[3 + i] - errors.velocity_before[i]) / step_s
+        state.acceleration_ned_m_s2[i] += share * (slope - state.acceleration_ned_m_s2[i])

@@ -24,12 +24,16 @@ def add_raw_sample(state: State, scratch: Scratch, noise: Floats, raw: int, cons
     limit = constants.accelerometer_range_m_s2
     for i in range(3):
         true = rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z
-        seen = true + constants.accelerometer_bias_frd_m_s2[i] + constants.accelerometer_raw_noise_m_s2 * noise[raw, i]
+        seen = (
+            true
+            + constants.accelerometer_bias_frd_m_s2[i]
+            + constants.accelerometer_raw_noise_m_s2 * noise[6 * raw + i]
+        )
         if abs(seen) >= limit:
             state.clip_counts[i] += 1
         state.specific_force_sum[i] += min(max(seen, -limit), limit)
         state.rate_sum[i] += (
             state.body[10 + i]
             + constants.gyroscope_bias_frd_rad_s[i]
-            + constants.gyroscope_raw_noise_rad_s * noise[raw, 3 + i]
+            + constants.gyroscope_raw_noise_rad_s * noise[6 * raw + 3 + i]
         )

@@ -7,11 +7,13 @@ import numpy.typing as npt
 
 from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
-from sim_vehicle.physics.contact import about_to_touch, find_near, relaxed_folds, settle_contacts
+from sim_vehicle.physics.contact import find_close, find_near, relaxed_folds, settle_contacts
+from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import Asked, Constants, Contact, Gains, Scratch, State
+from sim_vehicle.physics.report import write_report
 from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 
@@ -40,10 +42,13 @@ def advance_interval(
     near: Ints,
     forces: Floats,
     scratch: Scratch,
+    errors: EstimateErrors,
+    report: Floats,
 ) -> None:
-    """Advance ``state`` by one integration interval.
+    """Advance ``state`` by one integration interval, renew the vehicle's estimate, fill ``report``.
 
-    ``motors_on``: 0 off, 1 idling, 2 flying the setpoint. ``noise`` is (raw samples, 6), standard normal.
+    ``motors_on``: 0 off, 1 idling, 2 flying the setpoint. ``noise`` is standard normal: six values a raw
+    sample, then nine for the estimate.
     ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
     the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory.
     """
@@ -64,6 +69,9 @@ def advance_interval(
         add_raw_sample(state, scratch, noise, raw, constants)
         state.time_us += constants.raw_interval_us
     close_old_hit(state)
+    update_estimate(state, errors, noise[6 * constants.raw_per_interval :])
+    update_slope(state, errors, 1e-6 * constants.raw_per_interval * constants.raw_interval_us)
+    write_report(state, constants, report)
 
 
 @njit
@@ -117,7 +125,7 @@ def move_body(
         speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
         tip_speed = contact.reach_m * (abs(body[10]) + abs(body[11]) + abs(body[12]))
         margin_m = (speed + tip_speed) * raw_s + TOUCH_MARGIN_M
-        if about_to_touch(body, behind, near, margin_m, contact, faces, scratch):
+        if find_close(body, behind, near, margin_m, contact, faces, scratch):
             steps = fine_steps
     step_s = raw_s / steps
     for step in range(steps):

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.control.position import update_slope
 from sim_vehicle.physics.contact import points_behind
-from sim_vehicle.physics.estimate import estimate_errors, update_estimate
+from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import FINE_STEPS, advance_interval
 from sim_vehicle.physics.layout import (
     POINTS,
@@ -20,7 +19,7 @@ from sim_vehicle.physics.layout import (
     initial_state,
 )
 from sim_vehicle.physics.record import new_record
-from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, MOTORS, REPORT_COLUMNS, SENSED, TRUTH, write_report
+from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
@@ -68,6 +67,7 @@ class Plant:
         self._contact = contact_from(airframe)
         self._gains = gains_from(airframe)
         self._fine_steps = fine_steps
+        self._raw_samples = int(self._constants.raw_per_interval)
         north, east, _ = scene.start.position_ned_m
         centre: Vector3 = (north, east, -airframe.geometry.foot_depth_m)
         self.state = initial_state(centre, math.radians(scene.start.yaw_deg))
@@ -81,7 +81,7 @@ class Plant:
             self._asked.given,
             self._asked.yaw,
         )
-        self._estimate, self._finished_hits = self.state.estimate, self.state.finished_hits
+        self._finished_hits = self.state.finished_hits
         self._behind = points_behind(self._world.faces, centre)
         self._near = np.zeros(len(self._world.faces), np.int64)
         self._forces = np.zeros((2, POINTS, len(self._world.faces)))
@@ -89,19 +89,21 @@ class Plant:
         self.interval_us = airframe.imu.integration_interval_us
         self.truth = TruthRecorder(keeps_path)
 
+    def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
+        """Put the level vehicle somewhere in flight, for studies of single hits."""
+        self.state.body[0:6] = [*position_ned_m, *velocity_ned_m_s]
+        self._behind[:] = points_behind(self._world.faces, position_ned_m)
+
     def step(self, setpoint: TrajectorySetpoint | None, armed: bool) -> PlantOutput:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
         motors_on = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
         if setpoint is not None and setpoint is not self._taken:
             self._take_setpoint(setpoint)
-        velocity_before = self._estimate[3:6].copy()
-        raw_samples = self._constants.raw_per_interval
-        noise = self._rng.standard_normal(6 * raw_samples + 9)
         advance_interval(
             self.state,
             self._asked,
             motors_on,
-            noise[: 6 * raw_samples].reshape(raw_samples, 6),
+            self._rng.standard_normal(6 * self._raw_samples + 9),
             self._fine_steps,
             self._constants,
             self._contact,
@@ -111,10 +113,9 @@ class Plant:
             self._near,
             self._forces,
             self._scratch,
+            self._errors,
+            self._report,
         )
-        update_estimate(self.state, self._errors, noise[6 * raw_samples :])
-        update_slope(self.state, velocity_before, 1e-6 * self.interval_us)
-        write_report(self.state, self._constants, self._report)
         self._record_truth()
         return self._output()
 
@@ -128,7 +129,7 @@ class Plant:
 
     def _record_truth(self) -> None:
         self.truth.record(self._report[TRUTH])
-        for row in self._finished_hits[: self.state.finished_count]:
+        for row in self._finished_hits[: int(self._report[HITS_ENDED])]:
             self.truth.add_hit(row, self._world)
 
     def _output(self) -> PlantOutput:

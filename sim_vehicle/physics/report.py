@@ -9,7 +9,9 @@ TRUTH = slice(0, 16)
 # What the vehicle's own software may know: mean specific force, mean rates and clip counts; its estimate.
 SENSED, ESTIMATE = slice(16, 25), slice(25, 35)
 ACCELERATION, MOTORS = slice(35, 38), slice(38, 42)
-REPORT_COLUMNS = 42
+# How many hits ended in the interval.
+HITS_ENDED = 42
+REPORT_COLUMNS = 43
 
 
 @njit
@@ -23,6 +25,7 @@ def write_report(state: State, constants: Constants, row: Floats) -> None:
         row[11 + i] = state.fold_m[i]
         row[38 + i] = state.motor_command_n[i] / constants.motor_max_n
     row[15] = state.peak_force_n
+    row[HITS_ENDED] = state.finished_count
     for i in range(3):
         row[16 + i] = state.specific_force_sum[i] / constants.raw_per_interval
         row[19 + i] = state.rate_sum[i] / constants.raw_per_interval

@@ -1,0 +1,177 @@
+"""MAVLink commands and their acknowledgements, in PX4's two layers.
+
+The receiver answers what concerns the link and, for DO_SET_MODE, answers ACCEPTED before anyone has
+looked at it; the commander does the rest and answers once more with the true result. Sources:
+MavlinkReceiver::handle_message_command_both and Commander::handle_command of PX4.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+from sim_vehicle.autopilot.messages import (
+    AUTOPILOT_COMPONENT_ID,
+    EVERY_ID,
+    SYSTEM_ID,
+    Command,
+    CommandAck,
+    Result,
+)
+from sim_vehicle.autopilot.modes import AUTO_MAIN_MODE, CUSTOM_FLAG, Mode, mode_from_request
+
+NAV_RETURN_TO_LAUNCH = 20
+NAV_LAND = 21
+NAV_TAKEOFF = 22
+DO_SET_MODE = 176
+COMPONENT_ARM_DISARM = 400
+GET_MESSAGE_INTERVAL = 510
+SET_MESSAGE_INTERVAL = 511
+REQUEST_MESSAGE = 512
+REQUEST_AUTOPILOT_CAPABILITIES = 520
+
+FORCE = 21196
+"""Param 2 of COMPONENT_ARM_DISARM that skips all checks."""
+AUTOPILOT_VERSION_ID = 148
+MESSAGE_INTERVAL_ID = 244
+
+NO_ID = -1
+"""No message has it: stands for a parameter that is not a number."""
+
+
+class StreamControl(Protocol):
+    """What commands may do to the streams of the link."""
+
+    def set_interval(self, message_id: int, interval_us: float) -> bool:
+        """Ask for an interval: negative stops, 0 restores the default; False where it cannot be."""
+
+    def announce_interval(self, message_id: int) -> None:
+        """Send MESSAGE_INTERVAL with what was asked for."""
+
+    def send_now(self, message_id: int) -> bool:
+        """Send one message at once; False for an unknown one and for one that has nothing new."""
+
+
+class Flight(Protocol):
+    """What commands may do to the flight."""
+
+    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
+        """Change the mode; ``says_so`` is the text for a change that was accepted."""
+
+    def refuse_mode(self, why: str) -> Result:
+        """Turn down a mode that this vehicle does not know."""
+
+    def arm(self, forced: bool) -> Result:
+        """Arm."""
+
+    def disarm(self, forced: bool) -> Result:
+        """Disarm."""
+
+
+def is_for_us(command: Command) -> bool:
+    """Whether PX4 takes the command: others are not answered, nor are its own echoes."""
+    if (command.source_system, command.source_component) == (SYSTEM_ID, AUTOPILOT_COMPONENT_ID):
+        return False
+    if command.target_system not in (SYSTEM_ID, EVERY_ID):
+        return False
+    return (
+        command.target_component in (AUTOPILOT_COMPONENT_ID, EVERY_ID)
+        or command.command == REQUEST_AUTOPILOT_CAPABILITIES
+    )
+
+
+def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bool]:
+    """The receiver's part: its answer, if it has one, and whether the commander gets the command."""
+    if command.command == SET_MESSAGE_INTERVAL:
+        return _set_interval(command, streams), False
+    if command.command == GET_MESSAGE_INTERVAL:
+        streams.announce_interval(_whole(command.param1))
+        return Result.ACCEPTED, False
+    if command.command == REQUEST_MESSAGE:
+        return _request_message(command, streams), False
+    if command.command == REQUEST_AUTOPILOT_CAPABILITIES:
+        return _sent(streams.send_now(AUTOPILOT_VERSION_ID)), False
+    if command.command == DO_SET_MODE:
+        return Result.ACCEPTED, True
+    return None, True
+
+
+def answer(command: Command, result: Result) -> CommandAck:
+    """The acknowledgement for whoever sent the command."""
+    return CommandAck(command.command, result, command.source_system, command.source_component)
+
+
+def execute(command: Command, flight: Flight) -> Result | None:
+    """The commander's part: does it and returns its answer; None leaves the command unanswered."""
+    handler = _HANDLERS.get(command.command)
+    return Result.UNSUPPORTED if handler is None else handler(command, flight)
+
+
+def _set_interval(command: Command, streams: StreamControl) -> Result:
+    # Response target and the two reserved parameters: PX4 supports none of them.
+    if any(_whole(value, unset=0) != 0 for value in (command.param3, command.param4, command.param7)):
+        return Result.FAILED
+    if not math.isfinite(command.param2):
+        return Result.FAILED
+    done = streams.set_interval(_whole(command.param1), command.param2)
+    return Result.ACCEPTED if done else Result.FAILED
+
+
+def _request_message(command: Command, streams: StreamControl) -> Result:
+    message_id = _whole(command.param1)
+    if message_id == MESSAGE_INTERVAL_ID:
+        streams.announce_interval(_whole(command.param2))
+        return Result.ACCEPTED
+    return _sent(streams.send_now(message_id))
+
+
+def _sent(was_sent: bool) -> Result:
+    return Result.ACCEPTED if was_sent else Result.DENIED
+
+
+def _set_mode(command: Command, flight: Flight) -> Result:
+    base, main, sub = _byte(command.param1), _byte(command.param2), _byte(command.param3)
+    mode = mode_from_request(base, main, sub)
+    if mode is not None:
+        return flight.request_mode(mode)
+    kind = "base" if not base & CUSTOM_FLAG else "auto" if main == AUTO_MAIN_MODE else "main"
+    return flight.refuse_mode(f"Unsupported {kind} mode")
+
+
+def _arm_disarm(command: Command, flight: Flight) -> Result | None:
+    action, forced = _whole(command.param1), _whole(command.param2) == FORCE
+    if action == 1:
+        return flight.arm(forced)
+    if action == 0:
+        return flight.disarm(forced)
+    return None
+
+
+def _take_off(command: Command, flight: Flight) -> Result:
+    return flight.request_mode(Mode.TAKEOFF)
+
+
+def _land(command: Command, flight: Flight) -> Result:
+    return flight.request_mode(Mode.LAND, says_so="Landing at current position")
+
+
+def _return(command: Command, flight: Flight) -> Result:
+    return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
+
+
+_HANDLERS: dict[int, Callable[[Command, Flight], Result | None]] = {
+    DO_SET_MODE: _set_mode,
+    COMPONENT_ARM_DISARM: _arm_disarm,
+    NAV_TAKEOFF: _take_off,
+    NAV_LAND: _land,
+    NAV_RETURN_TO_LAUNCH: _return,
+}
+
+
+def _whole(value: float, unset: int = NO_ID) -> int:
+    """The nearest whole number; ``unset`` for NaN and infinity."""
+    return math.floor(value + 0.5) if math.isfinite(value) else unset
+
+
+def _byte(value: float) -> int:
+    """A parameter that PX4 casts to uint8."""
+    return int(value) & 0xFF if math.isfinite(value) else 0

@@ -1,0 +1,115 @@
+"""Whether the vehicle stands on the ground, judged as PX4 does: from its own estimate and its own demand.
+
+Source: PX4's land_detector/MulticopterLandDetector.cpp with the defaults of land_detector_params_mc.yaml.
+It has no sensor for the ground, so a descent that stalls on an obstacle looks like a landing.
+"""
+
+import math
+
+# LNDMC_Z_VEL_MAX and LNDMC_XY_VEL_MAX: slower than this counts as not moving.
+STILL_VERTICAL_M_S = 0.25
+STILL_HORIZONTAL_M_S = 1.5
+# LNDMC_ROT_MAX, about roll and pitch.
+STILL_ROTATION_RAD_S = math.radians(20.0)
+# On the ground the thresholds widen, so that idling motors do not look like a takeoff.
+WIDER_WHEN_LANDED = 2.5
+# A demand faster than this is a commanded descent.
+DESCENT_M_S = 1.1 * STILL_VERTICAL_M_S
+# MPC_THR_MIN, and how far between it and hover thrust still counts as low, and as none.
+MINIMUM_THRUST = 0.12
+LOW_THRUST_SHARE = 0.6
+NO_THRUST_SHARE = 0.1
+# Each of the three stages has to last a third of the detection time of 1 s.
+STAGE_US = 1_000_000 // 3
+# Specific force below this for this long is a fall, never a landing.
+FREE_FALL_M_S2 = 2.0
+FREE_FALL_US = 300_000
+
+Vector3 = tuple[float, float, float]
+
+
+class _Stage:
+    """True once its condition has held for long enough; false at once when it does not."""
+
+    def __init__(self, holds_us: int, state: bool) -> None:
+        self.state = state
+        self._holds_us = holds_us
+        self._since_us: int | None = None
+
+    def update(self, condition: bool, now_us: int) -> None:
+        if not condition:
+            self.state = False
+            self._since_us = None
+            return
+        if self._since_us is None:
+            self._since_us = now_us
+        if now_us - self._since_us >= self._holds_us:
+            self.state = True
+
+
+class LandDetector:
+    """Ground contact, then maybe landed, then landed. A disarmed vehicle is landed."""
+
+    def __init__(self, hover_thrust_fraction: float) -> None:
+        span = hover_thrust_fraction - MINIMUM_THRUST
+        self._low_thrust = MINIMUM_THRUST + LOW_THRUST_SHARE * span
+        self._no_thrust = MINIMUM_THRUST + NO_THRUST_SHARE * span
+        self._contact = _Stage(STAGE_US, True)
+        self._maybe = _Stage(STAGE_US, True)
+        self._landed = _Stage(STAGE_US, True)
+        self._free_fall = _Stage(FREE_FALL_US, False)
+
+    @property
+    def ground_contact(self) -> bool:
+        """First stage: commanded down, yet not moving. The position control gives way here."""
+        return self._contact.state
+
+    @property
+    def maybe_landed(self) -> bool:
+        """Second stage: and next to no thrust. Disarming by command is accepted from here on."""
+        return self._maybe.state
+
+    @property
+    def landed(self) -> bool:
+        """Third stage: all of it for long enough."""
+        return self._landed.state
+
+    def update(
+        self,
+        now_us: int,
+        armed: bool,
+        velocity_ned_m_s: Vector3,
+        angular_velocity_frd_rad_s: Vector3,
+        specific_force_frd_m_s2: Vector3,
+        thrust_fraction: float,
+        asked_down_m_s: float | None,
+    ) -> None:
+        """Take one estimate; ``asked_down_m_s`` is the mode's own demand, None where it has none."""
+        if not armed:
+            for stage in (self._contact, self._maybe, self._landed):
+                stage.update(True, now_us)
+                stage.state = True
+            return
+        on_ground = self._maybe.state or self._landed.state
+        descends = asked_down_m_s is not None and asked_down_m_s >= DESCENT_M_S
+        still = self._is_still(velocity_ned_m_s)
+        self._free_fall.update(math.hypot(*specific_force_frd_m_s2) < FREE_FALL_M_S2, now_us)
+        gives_way = thrust_fraction <= self._low_thrust and (descends or on_ground)
+        self._contact.update(gives_way and still, now_us)
+        self._maybe.update(
+            thrust_fraction <= self._no_thrust
+            and self._contact.state
+            and not self._free_fall.state
+            and not self._rotates(angular_velocity_frd_rad_s),
+            now_us,
+        )
+        self._landed.update(self._maybe.state, now_us)
+
+    def _is_still(self, velocity_ned_m_s: Vector3) -> bool:
+        north, east, down = velocity_ned_m_s
+        vertical = STILL_VERTICAL_M_S * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
+        return abs(down) < vertical and math.hypot(north, east) <= STILL_HORIZONTAL_M_S
+
+    def _rotates(self, angular_velocity_frd_rad_s: Vector3) -> bool:
+        limit = STILL_ROTATION_RAD_S * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
+        return math.hypot(angular_velocity_frd_rad_s[0], angular_velocity_frd_rad_s[1]) > limit

@@ -1,0 +1,98 @@
+"""From armed to flying: the motors spin up, then the climb that is allowed grows from nothing.
+
+Source: PX4's mc_pos_control/Takeoff/Takeoff.cpp and MulticopterPositionControl::Run. It applies in
+every mode, offboard too: a vehicle leaves the ground some 2.4 s after it is armed with a climbing setpoint.
+"""
+
+from enum import IntEnum
+
+from sim_vehicle.setpoint import FREE, TrajectorySetpoint
+
+# COM_SPOOLUP_TIME and MPC_TKO_RAMP_T.
+SPOOL_UP_US = 1_000_000
+RAMP_US = 3_000_000
+# The allowed climb starts where the velocity control would take the whole weight off the motors,
+# g / MPC_Z_VEL_P_ACC, and ends at MPC_Z_VEL_MAX_UP.
+RAMP_START_CLIMB_M_S = -9.80665 / 4.0
+RAMP_END_CLIMB_M_S = 3.0
+# MPC_Z_P turns a height error into a demanded climb.
+HEIGHT_P_PER_S = 1.0
+
+
+class TakeoffState(IntEnum):
+    """In the order in which they are passed."""
+
+    DISARMED = 0
+    SPOOL_UP = 1
+    READY = 2
+    RAMP_UP = 3
+    FLIGHT = 4
+
+
+class Takeoff:
+    """Decides what of a demand may reach the position control."""
+
+    def __init__(self) -> None:
+        self.state = TakeoffState.DISARMED
+        self._since_us = 0
+
+    def update(self, now_us: int, armed: bool, landed: bool, wants_takeoff: bool) -> None:
+        """Move on; call whenever there is a new demand."""
+        if not armed:
+            self.state = TakeoffState.DISARMED
+            return
+        if self.state is TakeoffState.DISARMED:
+            self.state, self._since_us = TakeoffState.SPOOL_UP, now_us
+        if self.state is TakeoffState.SPOOL_UP and now_us - self._since_us >= SPOOL_UP_US:
+            self.state = TakeoffState.READY
+        if self.state is TakeoffState.READY and wants_takeoff:
+            self.state, self._since_us = TakeoffState.RAMP_UP, now_us
+        if self.state is TakeoffState.RAMP_UP and now_us - self._since_us >= RAMP_US:
+            self.state = TakeoffState.FLIGHT
+        elif self.state is TakeoffState.FLIGHT and landed:
+            self.state = TakeoffState.READY
+
+    def allowed(
+        self, demand: TrajectorySetpoint | None, now_us: int, down_m: float, ground_contact: bool
+    ) -> TrajectorySetpoint | None:
+        """What the position control may fly of ``demand``; None lets the motors idle."""
+        if demand is None or self.state < TakeoffState.RAMP_UP:
+            return None
+        if self.state is TakeoffState.FLIGHT:
+            return None if ground_contact else demand
+        progress = (now_us - self._since_us) / RAMP_US
+        climb_m_s = RAMP_START_CLIMB_M_S + progress * (RAMP_END_CLIMB_M_S - RAMP_START_CLIMB_M_S)
+        if climb_m_s <= 0.0:
+            return None
+        return _with_climb_limited(demand, climb_m_s, down_m)
+
+
+def wants_takeoff(demand: TrajectorySetpoint | None, down_m: float) -> bool:
+    """Whether the demand lies above: by its height, or else by its velocity, or its acceleration."""
+    if demand is None:
+        return False
+    height, velocity = demand.position_ned_m[2], demand.velocity_ned_m_s[2]
+    acceleration = demand.acceleration_ned_m_s2[2]
+    return (
+        (height is not None and height < down_m)
+        or (velocity is not None and velocity < 0.0)
+        or (acceleration is not None and acceleration < 0.0)
+    )
+
+
+def _with_climb_limited(demand: TrajectorySetpoint, climb_m_s: float, down_m: float) -> TrajectorySetpoint:
+    north, east, height = demand.position_ned_m
+    v_north, v_east, v_down = demand.velocity_ned_m_s
+    if height is None and v_down is None:
+        return demand
+    asked_down_m_s = (v_down or 0.0) + (HEIGHT_P_PER_S * (height - down_m) if height is not None else 0.0)
+    if asked_down_m_s >= -climb_m_s:
+        return demand
+    a_north, a_east, _ = demand.acceleration_ned_m_s2
+    return TrajectorySetpoint(
+        position_ned_m=(north, east, None),
+        velocity_ned_m_s=(v_north, v_east, -climb_m_s),
+        acceleration_ned_m_s2=(a_north, a_east, None) if a_north is not None else FREE,
+        yaw_rad=demand.yaw_rad,
+        yaw_rate_rad_s=demand.yaw_rate_rad_s,
+    )

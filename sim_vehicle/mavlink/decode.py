@@ -1,0 +1,131 @@
+"""Bytes to messages: whatever arrives, the step goes on."""
+
+import math
+import re
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.messages import Command, PeerHeartbeat, PositionTarget, Received, TimeSyncRequest
+from sim_vehicle.setpoint import Axis3
+
+_MARKER = re.compile(rb"[\xfd\xfe]")
+_MARKER_V2 = 0xFD
+# Header and checksum around the payload, for MAVLink 2 and 1, and what a signature adds.
+_AROUND_V2, _AROUND_V1, _SIGNATURE = 12, 8, 13
+_SIGNED_FLAG = 0x01
+
+_FORCE_BIT = 0x200
+_YAW_IGNORED, _YAW_RATE_IGNORED = 0x400, 0x800
+
+
+class Decoder:
+    """Finds the packets in a stream of bytes that may be split, damaged or anything else."""
+
+    def __init__(self) -> None:
+        self._parser = dialect.MAVLink(None)
+        self._rest = b""
+
+    def push(self, data: bytes) -> list[Received]:
+        """The messages completed by ``data``, in order; kinds that this vehicle does not read are dropped.
+
+        A packet whose checksum is wrong is skipped by one byte only, and one that is not complete
+        holds up nothing that follows: what looked like a packet may have been noise.
+        """
+        if not data:
+            return []
+        buffer = self._rest + data if self._rest else data
+        messages: list[Received] = []
+        kept = len(buffer)
+        position = 0
+        while (found := _MARKER.search(buffer, position)) is not None:
+            start = found.start()
+            end = _end_of_packet(buffer, start)
+            if end is None or end > len(buffer):
+                kept = min(kept, start)
+                position = start + 1
+                continue
+            packet = self._decode(buffer[start:end])
+            if packet is None:
+                position = start + 1
+                continue
+            kept, position = len(buffer), end
+            message = _message(packet)
+            if message is not None:
+                messages.append(message)
+        self._rest = buffer[kept:]
+        return messages
+
+    def _decode(self, packet: bytes) -> dialect.MAVLink_message | None:
+        if packet[0] == _MARKER_V2 and packet[2] & ~_SIGNED_FLAG:
+            return None
+        try:
+            message = self._parser.decode(bytearray(packet))
+        except dialect.MAVError:
+            return None
+        # Without its definition, a packet's checksum cannot be judged.
+        return None if isinstance(message, dialect.MAVLink_unknown) else message
+
+
+def _end_of_packet(buffer: bytes, start: int) -> int | None:
+    """Where the packet that may begin at ``start`` ends; None while its header is not complete."""
+    if len(buffer) < start + 3:
+        return None
+    length = buffer[start + 1]
+    if buffer[start] != _MARKER_V2:
+        return start + length + _AROUND_V1
+    signature = _SIGNATURE if buffer[start + 2] & _SIGNED_FLAG else 0
+    return start + length + _AROUND_V2 + signature
+
+
+def _message(packet: dialect.MAVLink_message) -> Received | None:
+    if isinstance(packet, dialect.MAVLink_set_position_target_local_ned_message):
+        return _position_target(packet)
+    if isinstance(packet, dialect.MAVLink_command_long_message):
+        return _command(packet, packet.param7)
+    if isinstance(packet, dialect.MAVLink_command_int_message):
+        return _command(packet, packet.z)
+    if isinstance(packet, dialect.MAVLink_heartbeat_message):
+        return PeerHeartbeat(packet.get_srcSystem(), packet.get_srcComponent(), packet.type)
+    if isinstance(packet, dialect.MAVLink_timesync_message) and packet.tc1 == 0:
+        return TimeSyncRequest(packet.ts1)
+    return None
+
+
+def _command(
+    packet: dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message, param7: float
+) -> Command:
+    return Command(
+        source_system=packet.get_srcSystem(),
+        source_component=packet.get_srcComponent(),
+        target_system=packet.target_system,
+        target_component=packet.target_component,
+        command=packet.command,
+        param1=packet.param1,
+        param2=packet.param2,
+        param3=packet.param3,
+        param4=packet.param4,
+        param7=param7,
+    )
+
+
+def _position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
+    mask = packet.type_mask
+    return PositionTarget(
+        target_system=packet.target_system,
+        target_component=packet.target_component,
+        frame=packet.coordinate_frame,
+        position_m=_axes(mask, packet.x, packet.y, packet.z),
+        velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
+        acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
+        yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
+        yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
+        is_force=bool(mask & _FORCE_BIT),
+    )
+
+
+def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
+    return _value(mask & 1, x), _value(mask & 2, y), _value(mask & 4, z)
+
+
+def _value(ignored: int, value: float) -> float | None:
+    return None if ignored or not math.isfinite(value) else value

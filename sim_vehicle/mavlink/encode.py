@@ -1,0 +1,262 @@
+"""State to bytes: each message filled as PX4's stream of that name fills it.
+
+Source: PX4's mavlink/streams/*.hpp. All times are the vehicle's boot clock.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.autopilot.estimate import Estimate
+from sim_vehicle.autopilot.messages import (
+    AUTOPILOT_COMPONENT_ID,
+    SYSTEM_ID,
+    CommandAck,
+    StatusText,
+    TimeSyncRequest,
+)
+from sim_vehicle.autopilot.modes import NUMBERS, base_mode
+from sim_vehicle.mavlink.vibration import Vibration
+from sim_vehicle.setpoint import Axis3
+
+# pymavlink's messages carry no types; only `Encoder.packet` looks inside.
+Message: TypeAlias = Any
+
+NAN = math.nan
+_NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
+_TEXT_BYTES = 50
+# HIGHRES_IMU.fields_updated: accelerometer and gyroscope. No magnetometer and no barometer is simulated.
+_INERTIAL_FIELDS = 0x3F
+
+# Between v1.16 and v1.17, the PX4 whose behaviour was measured: version 1.17.0, type alpha (64).
+FLIGHT_VERSION = 1 << 24 | 17 << 16 | 0 << 8 | 64
+# In place of a git hash, so that nobody takes this vehicle for PX4's own build.
+CUSTOM_VERSION = tuple(b"rebound\0")
+
+# MAV_SYS_STATUS_SENSOR: gyro, accelerometer, attitude stabilisation, xy position control, motor outputs.
+_SENSORS = 0x1 | 0x2 | 0x800 | 0x4000 | 0x8000
+_AHRS, _PREARM_CHECK = 0x200000, 0x10000000
+
+
+@dataclass(slots=True)
+class Telemetry:
+    """What the streams send: the newest sample, the last published position, and who flies."""
+
+    sample: Estimate
+    published: Estimate
+    autopilot: Autopilot
+    vibration: Vibration
+    position_variance_m2: float
+    velocity_variance_m2_s2: float
+    attitude_variance_rad2: float
+
+
+class Encoder:
+    """Packets of this vehicle in one sequence of numbers."""
+
+    def __init__(self) -> None:
+        self._link = dialect.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=AUTOPILOT_COMPONENT_ID)
+
+    def packet(self, message: Message) -> bytes:
+        """The message as a MAVLink 2 packet."""
+        link = self._link
+        packet: bytes = message.pack(link)
+        link.seq = (link.seq + 1) & 0xFF
+        return packet
+
+
+def heartbeat(state: Telemetry) -> Message:
+    autopilot = state.autopilot
+    mode = autopilot.modes.shown
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_QUADROTOR,
+        dialect.MAV_AUTOPILOT_PX4,
+        base_mode(mode, autopilot.arming.armed, autopilot.signal.ever_arrived),
+        NUMBERS[mode].custom_mode,
+        autopilot.system_status,
+        3,
+    )
+
+
+def highres_imu(state: Telemetry) -> Message:
+    sample = state.sample
+    ax, ay, az = sample.specific_force_frd_m_s2
+    p, q, r = sample.angular_velocity_frd_rad_s
+    return dialect.MAVLink_highres_imu_message(
+        sample.time_boot_us, ax, ay, az, p, q, r, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _INERTIAL_FIELDS
+    )
+
+
+def local_position_ned(state: Telemetry) -> Message:
+    estimate = state.published
+    x, y, z = estimate.position_ned_m
+    vx, vy, vz = estimate.velocity_ned_m_s
+    return dialect.MAVLink_local_position_ned_message(_boot_ms(estimate), x, y, z, vx, vy, vz)
+
+
+def attitude(state: Telemetry) -> Message:
+    sample = state.sample
+    w, x, y, z = sample.attitude_wxyz
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
+    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    p, q, r = sample.angular_velocity_frd_rad_s
+    return dialect.MAVLink_attitude_message(_boot_ms(sample), roll, pitch, yaw, p, q, r)
+
+
+def attitude_quaternion(state: Telemetry) -> Message:
+    sample = state.sample
+    w, x, y, z = sample.attitude_wxyz
+    p, q, r = sample.angular_velocity_frd_rad_s
+    return dialect.MAVLink_attitude_quaternion_message(_boot_ms(sample), w, x, y, z, p, q, r, _NO_OFFSET)
+
+
+def odometry(state: Telemetry) -> Message:
+    """Velocity is NED too (child frame 1), unlike what the message's definition suggests."""
+    estimate = state.published
+    x, y, z = estimate.position_ned_m
+    vx, vy, vz = estimate.velocity_ned_m_s
+    p, q, r = estimate.angular_velocity_frd_rad_s
+    return dialect.MAVLink_odometry_message(
+        estimate.time_boot_us,
+        dialect.MAV_FRAME_LOCAL_NED,
+        dialect.MAV_FRAME_LOCAL_NED,
+        x,
+        y,
+        z,
+        estimate.attitude_wxyz,
+        vx,
+        vy,
+        vz,
+        p,
+        q,
+        r,
+        _covariance(state.position_variance_m2, state.attitude_variance_rad2),
+        _covariance(state.velocity_variance_m2_s2, 0.0),
+        0,
+        dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT,
+        0,
+    )
+
+
+def extended_sys_state(state: Telemetry) -> Message:
+    return dialect.MAVLink_extended_sys_state_message(dialect.MAV_VTOL_STATE_UNDEFINED, state.autopilot.landed_state)
+
+
+def sys_status(state: Telemetry) -> Message:
+    """No battery and no processor are simulated: their fields say so."""
+    health = _SENSORS | _AHRS | (_PREARM_CHECK if state.autopilot.checks_pass else 0)
+    return dialect.MAVLink_sys_status_message(
+        _SENSORS | _AHRS, _SENSORS | _AHRS, health, 0, 0xFFFF, -1, -1, 0, 0, 0, 0, 0, 0
+    )
+
+
+def vibration(state: Telemetry) -> Message:
+    metrics = state.vibration
+    clipped = sum(state.sample.clipping_counts)
+    return dialect.MAVLink_vibration_message(
+        state.sample.time_boot_us, 0.0, metrics.gyroscope_rad_s, metrics.accelerometer_m_s2, clipped, 0, 0
+    )
+
+
+def timesync(state: Telemetry) -> Message:
+    return dialect.MAVLink_timesync_message(0, state.sample.time_boot_us * 1000)
+
+
+def current_mode(state: Telemetry) -> Message:
+    shown, intended = NUMBERS[state.autopilot.modes.shown], NUMBERS[state.autopilot.modes.intended]
+    return dialect.MAVLink_current_mode_message(shown.standard_mode, shown.custom_mode, intended.custom_mode)
+
+
+def attitude_target(state: Telemetry) -> Message:
+    """Thrust alone; the mask says that attitude and rates are not given."""
+    mask = (
+        dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+        | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
+        | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
+        | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
+    )
+    return dialect.MAVLink_attitude_target_message(
+        _boot_ms(state.sample), mask, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, state.sample.thrust_fraction
+    )
+
+
+def position_target_local_ned(state: Telemetry) -> Message:
+    """What the position control flies; all ignored while the motors idle or stand."""
+    applied = state.autopilot.applied
+    if applied is None:
+        return dialect.MAVLink_position_target_local_ned_message(
+            _boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)
+        )
+    position, velocity = applied.position_ned_m, applied.velocity_ned_m_s
+    acceleration = applied.acceleration_ned_m_s2
+    values = (*position, *velocity, *acceleration)
+    mask = sum(1 << bit for bit, value in enumerate(values) if value is None)
+    mask |= (applied.yaw_rad is None) << 10 | (applied.yaw_rate_rad_s is None) << 11
+    return dialect.MAVLink_position_target_local_ned_message(
+        _boot_ms(state.published),
+        dialect.MAV_FRAME_LOCAL_NED,
+        mask,
+        *_filled(position),
+        *_filled(velocity),
+        *_filled(acceleration),
+        _or_nan(applied.yaw_rad),
+        _or_nan(applied.yaw_rate_rad_s),
+    )
+
+
+def autopilot_version(state: Telemetry) -> Message:
+    capabilities = (
+        dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+        | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    )
+    versions = (FLIGHT_VERSION, FLIGHT_VERSION, 0, 0)
+    hashes = (CUSTOM_VERSION, CUSTOM_VERSION, (0,) * 8)
+    ids = (0, 0, 0, (0,) * 18)
+    return dialect.MAVLink_autopilot_version_message(capabilities, *versions, *hashes, *ids)
+
+
+def message_interval(message_id: int, interval_us: int) -> Message:
+    return dialect.MAVLink_message_interval_message(message_id & 0xFFFF, interval_us)
+
+
+def command_ack(ack: CommandAck) -> Message:
+    return dialect.MAVLink_command_ack_message(ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
+
+
+def timesync_reply(request: TimeSyncRequest, heard_at_us: int) -> Message:
+    return dialect.MAVLink_timesync_message(heard_at_us * 1000, request.peer_time_ns)
+
+
+def status_texts(text: StatusText, number: int) -> Iterator[Message]:
+    """The text in as many messages as its length needs; as in PX4 it ends in a tab."""
+    raw = text.text.encode() + b"\t"
+    for sequence, start in enumerate(range(0, len(raw), _TEXT_BYTES)):
+        yield dialect.MAVLink_statustext_message(
+            text.severity, raw[start : start + _TEXT_BYTES], number & 0xFFFF, sequence
+        )
+
+
+def _boot_ms(estimate: Estimate) -> int:
+    return (estimate.time_boot_us // 1000) & 0xFFFFFFFF
+
+
+def _covariance(first: float, second: float) -> list[float]:
+    """Upper right triangle of a 6x6 matrix, row by row, with ``first`` and ``second`` three times each."""
+    triangle = [0.0] * 21
+    triangle[0] = triangle[6] = triangle[11] = first
+    triangle[15] = triangle[18] = triangle[20] = second
+    return triangle
+
+
+def _filled(vector: Axis3) -> tuple[float, float, float]:
+    return _or_nan(vector[0]), _or_nan(vector[1]), _or_nan(vector[2])
+
+
+def _or_nan(value: float | None) -> float:
+    return NAN if value is None else value

@@ -1,0 +1,127 @@
+"""A vehicle that moves as asked, without noise: a double integrator over flat ground."""
+
+import math
+from dataclasses import dataclass, replace
+
+from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result
+from sim_vehicle.setpoint import FREE, Axis3, TrajectorySetpoint
+
+STEP_US = 4_000
+HOVER = 0.5
+MAX_ACCELERATION_M_S2 = 6.0
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    time_boot_us: int = 0
+    specific_force_frd_m_s2: Vector3 = (0.0, 0.0, -9.81)
+    angular_velocity_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
+    clipping_counts: tuple[int, int, int] = (0, 0, 0)
+    position_ned_m: Vector3 = (0.0, 0.0, 0.0)
+    velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
+    attitude_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    thrust_fraction: float = 0.0
+
+
+def attitude_of_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
+    return math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2)
+
+
+def moved(state: Estimate, setpoint: TrajectorySetpoint | None, armed: bool) -> Estimate:
+    step_s = 1e-6 * STEP_US
+    if setpoint is None:
+        falls = 9.81 if state.position_ned_m[2] < 0.0 else 0.0
+        accelerations = [0.0, 0.0, falls]
+        thrust = 0.05 if armed else 0.0
+    else:
+        accelerations = [_acceleration(state, setpoint, axis) for axis in range(3)]
+        thrust = HOVER * (1 - accelerations[2] / 9.81)
+    velocity = [v + a * step_s for v, a in zip(state.velocity_ned_m_s, accelerations, strict=True)]
+    position = [p + v * step_s for p, v in zip(state.position_ned_m, velocity, strict=True)]
+    if position[2] >= 0.0:
+        position[2] = 0.0
+        velocity = [0.0, 0.0, min(velocity[2], 0.0)]
+    yaw = setpoint.yaw_rad if setpoint is not None else None
+    return replace(
+        state,
+        time_boot_us=state.time_boot_us + STEP_US,
+        position_ned_m=(position[0], position[1], position[2]),
+        velocity_ned_m_s=(velocity[0], velocity[1], velocity[2]),
+        thrust_fraction=max(thrust, 0.0),
+        attitude_wxyz=state.attitude_wxyz if yaw is None else attitude_of_yaw(yaw),
+    )
+
+
+def _acceleration(state: Estimate, setpoint: TrajectorySetpoint, axis: int) -> float:
+    wanted = setpoint.velocity_ned_m_s[axis] or 0.0
+    height = setpoint.position_ned_m[axis]
+    if height is not None:
+        wanted += 2.0 * (height - state.position_ned_m[axis])
+    raw = 5.0 * (wanted - state.velocity_ned_m_s[axis])
+    return min(max(raw, -MAX_ACCELERATION_M_S2), MAX_ACCELERATION_M_S2)
+
+
+class Flight:
+    """An autopilot on the kinematic vehicle, in virtual time."""
+
+    def __init__(self, start: Estimate | None = None) -> None:
+        self.state = start or Estimate()
+        self.autopilot = Autopilot(HOVER, self.state)
+        self.acks: list[CommandAck] = []
+
+    @property
+    def time_s(self) -> float:
+        return 1e-6 * self.state.time_boot_us
+
+    @property
+    def height_m(self) -> float:
+        return -self.state.position_ned_m[2]
+
+    def step(self) -> None:
+        self.acks += self.autopilot.run_commander()
+        setpoint = self.autopilot.run_control()
+        self.state = moved(self.state, setpoint, self.autopilot.arming.armed)
+        self.autopilot.observe(self.state)
+
+    def fly(self, seconds: float, target: PositionTarget | None = None, rate_hz: float = 20.0) -> None:
+        """Let time pass, with ``target`` as a stream if it is given."""
+        period = round(250 / rate_hz)
+        for number in range(round(seconds * 250)):
+            if target is not None and number % period == 0:
+                self.autopilot.setpoint(target)
+            self.step()
+
+    def fly_until(self, condition: object, at_most_s: float, target: PositionTarget | None = None) -> float:
+        """Seconds until ``condition()`` is true."""
+        assert callable(condition)
+        start_s = self.time_s
+        while not condition():
+            assert self.time_s - start_s < at_most_s, f"not within {at_most_s} s"
+            self.fly(0.004, target)
+        return self.time_s - start_s
+
+    def ask(self, command: int, param1: float = 0.0, param2: float = 0.0, param3: float = 0.0) -> Result | None:
+        """Send a command; its answer, or None."""
+        self.acks.clear()
+        self.autopilot.command(Command(255, 190, 1, 1, command, param1, param2, param3))
+        self.step()
+        return self.acks[0].result if self.acks else None
+
+
+def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: object) -> PositionTarget:
+    """A setpoint for this vehicle in the local frame."""
+    fields: dict[str, object] = {
+        "target_system": 1,
+        "target_component": 1,
+        "frame": 1,
+        "position_m": position,
+        "velocity_m_s": velocity,
+        "acceleration_m_s2": FREE,
+        "yaw_rad": None,
+        "yaw_rate_rad_s": None,
+        "is_force": False,
+    }
+    return PositionTarget(**{**fields, **others})  # type: ignore[arg-type]

@@ -1,0 +1,54 @@
+"""Arming, disarming, and doing so by itself."""
+
+from sim_vehicle.autopilot.arming import Arming, Reason
+from sim_vehicle.autopilot.messages import Result
+
+SECOND = 1_000_000
+
+
+def armed_at_zero() -> Arming:
+    arming = Arming()
+    assert arming.arm(0, checks_pass=True, forced=False) is Result.ACCEPTED
+    return arming
+
+
+def test_failing_checks_refuse_arming_and_force_overrides_them():
+    arming = Arming()
+    assert arming.arm(0, checks_pass=False, forced=False) is Result.TEMPORARILY_REJECTED
+    assert not arming.armed
+    assert arming.arm(0, checks_pass=False, forced=True) is Result.ACCEPTED
+    assert arming.armed
+
+
+def test_arming_or_disarming_twice_is_accepted():
+    arming = armed_at_zero()
+    assert arming.arm(5, checks_pass=False, forced=False) is Result.ACCEPTED
+    assert arming.disarm(landed=True, forced=False) is Result.ACCEPTED
+    assert arming.disarm(landed=False, forced=False) is Result.ACCEPTED
+
+
+def test_disarming_in_the_air_needs_force():
+    arming = armed_at_zero()
+    assert arming.disarm(landed=False, forced=False) is Result.TEMPORARILY_REJECTED
+    assert arming.armed
+    assert arming.disarm(landed=False, forced=True) is Result.ACCEPTED
+    assert not arming.armed
+
+
+def test_without_takeoff_it_disarms_after_eleven_seconds():
+    arming = armed_at_zero()
+    assert arming.disarm_by_itself(11 * SECOND - 4000, landed=True) is None
+    assert arming.disarm_by_itself(11 * SECOND, landed=True) is Reason.INACTION
+    assert not arming.armed
+
+
+def test_after_a_flight_it_disarms_two_seconds_after_landing():
+    # Given a flight that landed at 30 s, with a bounce at 31 s
+    arming = armed_at_zero()
+    assert arming.disarm_by_itself(20 * SECOND, landed=False) is None
+    assert arming.disarm_by_itself(30 * SECOND, landed=True) is None
+    assert arming.disarm_by_itself(31 * SECOND, landed=False) is None
+    assert arming.disarm_by_itself(31 * SECOND + 4000, landed=True) is None
+    # Then the two seconds count from the bounce
+    assert arming.disarm_by_itself(33 * SECOND, landed=True) is None
+    assert arming.disarm_by_itself(33 * SECOND + 4000, landed=True) is Reason.LANDING

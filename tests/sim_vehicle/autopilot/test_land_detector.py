@@ -1,0 +1,91 @@
+"""Landing as PX4 detects it, from the estimate and the demand alone."""
+
+import pytest
+
+from sim_vehicle.autopilot.land_detector import LandDetector
+
+STEP_US = 8_000
+STILL = (0.0, 0.0, 0.0)
+HOVER = 0.5
+# 60 % and 10 % of the way from PX4's least thrust, 0.12, to hover.
+LOW, NONE = 0.34, 0.15
+
+
+class Detection:
+    """A detector that has taken off, fed at 125 Hz."""
+
+    def __init__(self) -> None:
+        self.detector = LandDetector(HOVER)
+        self.now_us = 0
+        self.feed(0.1, thrust=HOVER, asked_down=None)
+        assert not self.detector.landed
+
+    def feed(self, seconds, thrust, asked_down=0.7, velocity=STILL, rate=STILL, force=(0, 0, -9.8), armed=True):
+        for _ in range(round(seconds * 1e6 / STEP_US)):
+            self.now_us += STEP_US
+            self.detector.update(self.now_us, armed, velocity, rate, force, thrust, asked_down)
+
+
+def test_a_landing_takes_a_second_in_three_stages():
+    detection = Detection()
+    stages = []
+    for _ in range(200):
+        detection.feed(0.008, thrust=NONE)
+        detector = detection.detector
+        stages.append((detector.ground_contact, detector.maybe_landed, detector.landed))
+    first = [next(i for i, stage in enumerate(stages) if stage[which]) * 0.008 for which in range(3)]
+    assert first == pytest.approx([1 / 3, 2 / 3, 1.0], abs=0.03)
+
+
+@pytest.mark.parametrize(
+    "hinders",
+    [
+        {"asked_down": None},
+        {"asked_down": 0.25},
+        {"asked_down": -1.0},
+        {"velocity": (0.0, 0.0, 0.3)},
+        {"velocity": (1.6, 0.0, 0.0)},
+        {"thrust": LOW + 0.02},
+    ],
+    ids=str,
+)
+def test_what_keeps_it_flying(hinders):
+    detection = Detection()
+    detection.feed(5.0, **{"thrust": NONE, **hinders})
+    assert not detection.detector.ground_contact
+
+
+@pytest.mark.parametrize("hinders", [{"rate": (0.4, 0.0, 0.0)}, {"thrust": LOW}, {"force": (0, 0, -1)}], ids=str)
+def test_ground_contact_alone_is_no_landing(hinders):
+    detection = Detection()
+    detection.feed(5.0, **{"thrust": NONE, **hinders})
+    assert detection.detector.ground_contact
+    assert not detection.detector.maybe_landed
+
+
+def test_turning_about_the_vertical_does_not_count_as_moving():
+    detection = Detection()
+    detection.feed(1.2, thrust=NONE, rate=(0.0, 0.0, 3.0))
+    assert detection.detector.landed
+
+
+def test_a_descent_stalled_on_an_obstacle_looks_like_a_landing():
+    # Given a setpoint that keeps descending while the vehicle rests on something in the air
+    detection = Detection()
+    detection.feed(1.2, thrust=NONE, asked_down=1.0)
+    assert detection.detector.landed
+
+
+def test_landed_lasts_without_a_demand_and_ends_with_thrust():
+    detection = Detection()
+    detection.feed(1.2, thrust=NONE)
+    detection.feed(5.0, thrust=NONE, asked_down=None, velocity=(0.0, 0.0, 0.5), rate=(0.8, 0.0, 0.0))
+    assert detection.detector.landed
+    detection.feed(0.008, thrust=0.2, asked_down=None)
+    assert not detection.detector.landed
+
+
+def test_disarmed_is_landed_at_once():
+    detection = Detection()
+    detection.feed(0.008, thrust=0.0, armed=False, velocity=(0.0, 0.0, 5.0))
+    assert detection.detector.landed

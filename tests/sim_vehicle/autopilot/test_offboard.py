@@ -1,0 +1,205 @@
+"""Which offboard setpoints count, and how the vehicle flies when they stop and come back."""
+
+import math
+from itertools import pairwise
+
+import pytest
+
+from sim_vehicle.autopilot import offboard
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
+from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.setpoint import FREE
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight, attitude_of_yaw, target
+
+NORTH = attitude_of_yaw(0.0)
+EAST = attitude_of_yaw(math.pi / 2)
+UP_THERE = target(position=(0.0, 0.0, -3.0))
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "why"),
+    [
+        (target(position=(1.0, 2.0, 3.0)), None),
+        (target(velocity=(1.0, 2.0, 3.0)), None),
+        (target(position=(None, None, -2.0)), None),
+        (target(acceleration_m_s2=(0.0, 0.0, 1.0)), None),
+        (target(frame=8, velocity=(1.0, 0.0, 0.0)), None),
+        (target(), "SET_POSITION_TARGET_LOCAL_NED invalid"),
+        (target(frame=8, position=(1.0, 0.0, 0.0)), "SET_POSITION_TARGET_LOCAL_NED invalid"),
+        (target(frame=8, velocity=(1.0, None, 0.0)), "SET_POSITION_TARGET_LOCAL_NED invalid"),
+        (
+            target(acceleration_m_s2=(0.0, 0.0, 1.0), is_force=True),
+            "SET_POSITION_TARGET_LOCAL_NED force not supported",
+        ),
+        *(
+            (
+                target(frame=frame, position=(1.0, 0.0, 0.0)),
+                f"SET_POSITION_TARGET_LOCAL_NED coordinate frame {frame} unsupported",
+            )
+            for frame in (0, 7, 9, 12)
+        ),
+    ],
+)
+def test_what_is_refused_and_in_which_words(setpoint, why):
+    refusal = offboard.refusal(setpoint)
+    assert (refusal.text if refusal else None) == why
+
+
+def test_addressed_to_another_or_to_all():
+    assert offboard.is_for_us(target(target_system=0, target_component=0))
+    assert not offboard.is_for_us(target(target_system=2))
+    assert not offboard.is_for_us(target(target_component=191))
+
+
+def test_the_local_frame_is_passed_on_as_it_is():
+    setpoint = target((1.0, 2.0, -3.0), (0.5, 0.0, 0.0), yaw_rad=1.0)
+    flown = offboard.trajectory_setpoint(setpoint, EAST)
+    assert flown.position_ned_m == (1.0, 2.0, -3.0)
+    assert flown.velocity_ned_m_s == (0.5, 0.0, 0.0)
+    assert flown.yaw_rad == 1.0
+
+
+def test_forward_with_the_nose_east_is_east():
+    setpoint = target(frame=8, velocity=(2.0, 0.0, 0.5))
+    assert offboard.trajectory_setpoint(setpoint, NORTH).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.5))
+    assert offboard.trajectory_setpoint(setpoint, EAST).velocity_ned_m_s == pytest.approx((0.0, 2.0, 0.5))
+
+
+def test_a_body_acceleration_turns_with_the_whole_attitude():
+    # Given the right wing down: the body's z axis points left of down, to the west with the nose north
+    rolled = (math.cos(0.25), math.sin(0.25), 0.0, 0.0)
+    setpoint = target(frame=8, acceleration_m_s2=(0.0, 0.0, 1.0))
+    north, east, down = offboard.trajectory_setpoint(setpoint, rolled).acceleration_ned_m_s2
+    assert (north, east, down) == pytest.approx((0.0, -math.sin(0.5), math.cos(0.5)))
+
+
+@pytest.mark.parametrize("incomplete", [(None, None, -2.0), (1.0, None, -2.0)])
+def test_a_setpoint_that_leaves_an_axis_open_means_stop(incomplete):
+    flown = offboard.trajectory_setpoint(target(position=incomplete), NORTH)
+    assert flown.position_ned_m == FREE
+    assert flown.velocity_ned_m_s == (0.0, 0.0, 0.0)
+
+
+def hovering() -> Flight:
+    """In OFFBOARD at 3 m, a setpoint having just been sent."""
+    flight = Flight()
+    flight.fly(0.5, UP_THERE)
+    assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    flight.fly(9.0, UP_THERE)
+    assert flight.height_m == pytest.approx(3.0, abs=0.05)
+    flight.autopilot.setpoint(UP_THERE)
+    return flight
+
+
+def test_without_setpoints_offboard_can_be_chosen_but_not_armed():
+    flight = Flight()
+    assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
+    assert flight.autopilot.system_status == 0
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
+    assert flight.autopilot.texts[-1].text == "Arming denied: Resolve system health failures first"
+    # And with them, it can
+    flight.fly(0.5, UP_THERE)
+    assert flight.autopilot.system_status == 3
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+
+
+def test_one_setpoint_is_enough_to_choose_offboard_in_the_air():
+    # Given a client that sends its first setpoint and the mode at once, as MAVSDK does
+    flight = hovering()
+    flight.ask(DO_SET_MODE, 1, 4, 3)
+    flight.fly(2.0)
+    flight.autopilot.setpoint(UP_THERE)
+    assert flight.ask(DO_SET_MODE, 1, 6) is Result.ACCEPTED
+
+
+def test_in_the_air_offboard_without_setpoints_is_refused():
+    flight = hovering()
+    assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
+    flight.fly(2.0)
+    assert flight.ask(DO_SET_MODE, 1, 6) is Result.TEMPORARILY_REJECTED
+    assert flight.autopilot.modes.mode is Mode.LOITER
+
+
+@pytest.mark.parametrize("extra_steps", range(0, 26, 5))
+def test_lost_setpoints_change_the_mode_after_a_second(extra_steps):
+    flight = hovering()
+    flight.fly(0.004 * extra_steps)
+    flight.autopilot.setpoint(UP_THERE)
+    waited_s = flight.fly_until(lambda: flight.autopilot.modes.shown is Mode.POSCTL, 2.0)
+    assert 1.03 <= waited_s <= 1.11
+    assert flight.autopilot.system_status == 5
+    assert flight.autopilot.texts[-1].text == "Failsafe activated"
+
+
+def test_lost_setpoints_sink_land_and_disarm_and_offboard_is_shown_again():
+    flight = hovering()
+    flight.fly_until(lambda: flight.autopilot.modes.in_failsafe, 2.0)
+    flight.fly(1.5)
+    assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)
+    assert flight.autopilot.modes.shown is Mode.POSCTL
+    flight.fly_until(lambda: not flight.autopilot.arming.armed, 10.0)
+    assert flight.height_m == 0.0
+    assert flight.autopilot.modes.shown is Mode.OFFBOARD
+
+
+def test_setpoints_that_come_back_put_it_into_offboard_again():
+    flight = hovering()
+    flight.fly_until(lambda: flight.autopilot.modes.in_failsafe, 2.0)
+    flight.fly(0.5)
+    waited_s = flight.fly_until(lambda: flight.autopilot.modes.shown is Mode.OFFBOARD, 0.5, UP_THERE)
+    assert waited_s == pytest.approx(0.09, abs=0.01)
+    flight.fly(3.0, UP_THERE)
+    assert flight.height_m == pytest.approx(3.0, abs=0.05)
+    assert flight.autopilot.system_status == 4
+
+
+@pytest.mark.parametrize("rate_hz", [2.0, 1.2])
+def test_a_slow_stream_holds_offboard(rate_hz):
+    flight = hovering()
+    shown = set()
+    for _ in range(10):
+        flight.fly(1 / rate_hz, UP_THERE, rate_hz)
+        shown.add(flight.autopilot.modes.shown)
+    assert shown == {Mode.OFFBOARD}
+
+
+def test_too_slow_a_stream_flips_to_and_fro():
+    flight = hovering()
+    shown = []
+    for _ in range(5):
+        flight.autopilot.setpoint(UP_THERE)
+        for _ in range(round(250 / 0.8)):
+            flight.step()
+            shown.append(flight.autopilot.modes.shown)
+    changes = sum(a is not b for a, b in pairwise(shown))
+    assert changes >= 8
+
+
+def test_a_wrong_target_and_a_refused_frame_do_not_keep_it_alive():
+    for useless in (target((0, 0, -3.0), target_system=2), target((0, 0, -3.0), frame=9), target()):
+        flight = hovering()
+        flight.fly_until(lambda flight=flight: flight.autopilot.modes.in_failsafe, 2.0, useless)
+
+
+def test_only_setpoints_received_in_offboard_are_flown():
+    # Given setpoints streamed while another mode flies
+    flight = hovering()
+    flight.ask(DO_SET_MODE, 1, 4, 3)
+    flight.fly(2.0, target(position=(50.0, 0.0, -3.0)))
+    # When OFFBOARD is entered and no further setpoint comes
+    flight.ask(DO_SET_MODE, 1, 6)
+    flight.fly(0.9)
+    # Then the vehicle stays
+    assert flight.autopilot.modes.mode is Mode.OFFBOARD
+    assert abs(flight.state.position_ned_m[0]) < 0.1
+
+
+def test_a_pilots_change_is_not_undone_by_setpoints():
+    flight = hovering()
+    assert flight.ask(DO_SET_MODE, 1, 3) is Result.ACCEPTED
+    flight.fly(3.0, target(position=(50.0, 0.0, -3.0)))
+    assert flight.autopilot.modes.shown is flight.autopilot.modes.intended is Mode.POSCTL
+    assert abs(flight.state.position_ned_m[0]) < 0.1
+    assert flight.autopilot.system_status == 4

@@ -1,0 +1,200 @@
+"""How the modes fly: takeoff, hold, land, return."""
+
+import math
+
+import pytest
+
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
+from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.autopilot.smoothing import Smoother, stop_point
+from sim_vehicle.autopilot.takeoff import Takeoff, TakeoffState, wants_takeoff
+from sim_vehicle.autopilot.trajectory import land_speed_m_s, return_height_m
+from sim_vehicle.setpoint import TrajectorySetpoint
+from tests.sim_vehicle.autopilot.kinematic_plant import Estimate, Flight, attitude_of_yaw, target
+
+SECOND = 1_000_000
+
+
+def taken_off(start: Estimate | None = None) -> Flight:
+    flight = Flight(start)
+    flight.ask(NAV_TAKEOFF)
+    flight.ask(COMPONENT_ARM_DISARM, 1)
+    flight.fly_until(lambda: flight.autopilot.modes.mode is Mode.LOITER, 12.0)
+    return flight
+
+
+def test_takeoff_climbs_to_two_and_a_half_metres_and_holds():
+    flight = Flight()
+    flight.ask(NAV_TAKEOFF)
+    flight.ask(COMPONENT_ARM_DISARM, 1)
+    fastest = 0.0
+    while flight.autopilot.modes.mode is Mode.TAKEOFF:
+        flight.step()
+        fastest = max(fastest, -flight.state.velocity_ned_m_s[2])
+        assert flight.time_s < 12.0
+    # PX4 counts a height as reached 0.8 m before it
+    assert flight.height_m == pytest.approx(1.7, abs=0.05)
+    assert 1.0 < fastest <= 1.55
+    flight.fly(5.0)
+    assert flight.height_m == pytest.approx(2.5, abs=0.02)
+
+
+def test_nothing_leaves_the_ground_before_the_motors_are_up_to_speed():
+    flight = Flight()
+    flight.ask(NAV_TAKEOFF)
+    flight.ask(COMPONENT_ARM_DISARM, 1)
+    left_after_s = flight.fly_until(lambda: flight.height_m > 0.01, 5.0)
+    # One second of spooling up, then the ramp from -2.45 m/s, which passes zero after 45 % of its 3 s;
+    # the first centimetre takes another 0.2 s at the speed that is allowed then
+    assert left_after_s == pytest.approx(1.0 + 1.35 + 0.2, abs=0.03)
+
+
+def test_offboard_is_held_back_by_the_same_ramp():
+    flight = Flight()
+    climbing = target(position=(0.0, 0.0, -10.0))
+    flight.fly(0.5, climbing)
+    flight.ask(176, 1, 6)
+    flight.ask(COMPONENT_ARM_DISARM, 1)
+    assert flight.fly_until(lambda: flight.height_m > 0.01, 5.0, climbing) == pytest.approx(2.55, abs=0.03)
+    flight.fly(0.5, climbing)
+    # The ramp now allows (0.2 + 0.5) s * (3 + 2.45) / 3 s, and the vehicle follows 0.2 s behind
+    assert -flight.state.velocity_ned_m_s[2] == pytest.approx(1.82 * 0.5, abs=0.1)
+
+
+def test_armed_and_left_alone_it_stays_on_the_ground_and_disarms():
+    for mode_command in (None, NAV_LAND, NAV_RETURN_TO_LAUNCH):
+        flight = Flight()
+        flight.ask(COMPONENT_ARM_DISARM, 1)
+        if mode_command is not None:
+            flight.ask(mode_command)
+        waited_s = flight.fly_until(lambda flight=flight: not flight.autopilot.arming.armed, 12.0)
+        assert waited_s == pytest.approx(11.0, abs=0.02)
+        assert flight.height_m == 0.0
+        assert flight.autopilot.texts[-1].text == "Disarmed by auto preflight disarming"
+
+
+@pytest.mark.parametrize(
+    ("demand", "wants"),
+    [
+        (None, False),
+        (TrajectorySetpoint(position_ned_m=(0.0, 0.0, -1.0)), True),
+        (TrajectorySetpoint(position_ned_m=(0.0, 0.0, 1.0)), False),
+        (TrajectorySetpoint(velocity_ned_m_s=(0.0, 0.0, -0.1)), True),
+        (TrajectorySetpoint(velocity_ned_m_s=(3.0, 0.0, 0.0)), False),
+        (TrajectorySetpoint(acceleration_ned_m_s2=(0.0, 0.0, -1.0)), True),
+    ],
+)
+def test_what_counts_as_wanting_to_take_off(demand, wants):
+    assert wants_takeoff(demand, down_m=0.0) is wants
+
+
+def test_after_a_landing_the_ramp_begins_again():
+    takeoff = Takeoff()
+    takeoff.update(0, armed=True, landed=True, wants_takeoff=True)
+    takeoff.update(SECOND, armed=True, landed=True, wants_takeoff=True)
+    assert takeoff.state is TakeoffState.RAMP_UP
+    takeoff.update(4 * SECOND, armed=True, landed=False, wants_takeoff=True)
+    assert takeoff.state is TakeoffState.FLIGHT
+    takeoff.update(5 * SECOND, armed=True, landed=True, wants_takeoff=True)
+    assert takeoff.state is TakeoffState.READY
+    takeoff.update(6 * SECOND, armed=True, landed=True, wants_takeoff=True)
+    assert takeoff.state is TakeoffState.RAMP_UP
+    takeoff.update(7 * SECOND, armed=False, landed=True, wants_takeoff=True)
+    assert takeoff.state is TakeoffState.DISARMED
+
+
+def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground():
+    flight = taken_off()
+    flight.fly(3.0)
+    flight.ask(NAV_LAND)
+    flight.fly(1.5)
+    assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)
+    flight.fly_until(lambda: flight.height_m == 0.0, 5.0)
+    waited_s = flight.fly_until(lambda: not flight.autopilot.arming.armed, 5.0)
+    # The land detector's second and COM_DISARM_LAND's two
+    assert waited_s == pytest.approx(3.0, abs=0.5)
+    texts = [text.text for text in flight.autopilot.texts]
+    assert texts[-3:] == ["Landing at current position", "Landing detected", "Disarmed by landing"]
+    assert flight.autopilot.modes.mode is Mode.LOITER
+
+
+def test_landing_is_faster_high_up():
+    assert land_speed_m_s(3.0) == land_speed_m_s(5.0) == pytest.approx(0.7)
+    assert land_speed_m_s(7.5) == pytest.approx(1.1)
+    assert land_speed_m_s(10.0) == land_speed_m_s(50.0) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(
+    ("height_m", "distance_m", "expected_m"),
+    [
+        (2.5, 0.0, 2.5),  # above home: nothing to climb for
+        (1.0, 1.5, 3.0),  # within the acceptance radius: twice the distance
+        (1.0, 3.0, 4.0),  # at least twice the acceptance radius
+        (1.0, 8.0, 8.0),  # a cone of 45 degrees up to 10 m away
+        (1.0, 10.1, 30.0),
+        (40.0, 100.0, 40.0),  # never down
+    ],
+)
+def test_return_flies_at_px4s_height(height_m, distance_m, expected_m):
+    assert return_height_m(height_m, distance_m) == pytest.approx(expected_m)
+
+
+def test_return_climbs_comes_home_and_lands_facing_as_it_stood():
+    # Given a takeoff facing east, and a flight 12 m to the north
+    flight = taken_off(Estimate(attitude_wxyz=attitude_of_yaw(math.pi / 2)))
+    away = target(position=(12.0, 0.0, -2.5))
+    flight.fly(0.5, away)
+    flight.ask(176, 1, 6)
+    flight.fly(12.0, away)
+    assert flight.state.position_ned_m[0] == pytest.approx(12.0, abs=0.1)
+    # When it returns
+    flight.ask(NAV_RETURN_TO_LAUNCH)
+    highest, yaws = 0.0, set()
+    while flight.autopilot.arming.armed:
+        flight.step()
+        highest = max(highest, flight.height_m)
+        yaws.add(round(math.degrees(yaw_of(flight.state.attitude_wxyz))))
+        assert flight.time_s < 120.0
+    # Then it went to 30 m, looked home (south), and landed at home facing east
+    assert highest == pytest.approx(30.0, abs=0.3)
+    assert yaws & {180, -180}
+    assert math.hypot(*flight.state.position_ned_m[:2]) < 0.1
+    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(math.pi / 2, abs=0.01)
+
+
+def test_hold_stops_where_braking_ends_and_stays():
+    flight = taken_off()
+    flight.fly(3.0)
+    moving = target(velocity=(2.0, 0.0, 0.0))
+    flight.fly(0.5, moving)
+    flight.ask(176, 1, 6)
+    flight.fly(3.0, moving)
+    place = flight.state.position_ned_m[0]
+    expected = stop_point(flight.state.position_ned_m, flight.state.velocity_ned_m_s)[0]
+    flight.ask(176, 1, 4, 3)
+    flight.fly(6.0)
+    assert flight.state.position_ned_m[0] == pytest.approx(expected, abs=0.1)
+    assert 1.0 < flight.state.position_ned_m[0] - place < 2.5
+    assert math.hypot(*flight.state.velocity_ned_m_s) < 0.02
+
+
+def test_the_stop_point_allows_for_speed_and_for_the_build_up_of_acceleration():
+    # v (v / 2a + 0.6 s) with a = 3 m/s^2
+    assert stop_point((1.0, 2.0, -3.0), (0.0, 3.0, 1.0)) == pytest.approx((1.0, 2.0 + 3 * (0.5 + 0.6), -3.0))
+
+
+def test_a_smoothed_setpoint_keeps_its_limits_and_does_not_run_past():
+    smoother = Smoother()
+    smoother.start((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    step_s, before = 0.008, (0.0, 0.0, 0.0)
+    for _ in range(3000):
+        smoother.advance((30.0, -40.0, -6.0), step_s)
+        velocity = smoother.velocity_ned_m_s
+        assert math.hypot(*velocity[:2]) <= 5.0 + 1e-9
+        assert -3.0 - 1e-9 <= velocity[2] <= 0.01
+        assert math.dist(velocity[:2], before[:2]) <= 3.0 * step_s + 1e-9
+        assert smoother.position_ned_m[2] >= -6.0 - 1e-4
+        before = velocity
+    assert smoother.position_ned_m == pytest.approx((30.0, -40.0, -6.0), abs=1e-3)
+    assert smoother.velocity_ned_m_s == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)

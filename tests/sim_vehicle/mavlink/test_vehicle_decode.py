@@ -1,0 +1,136 @@
+"""Bytes in: one table of cases, whole, split and damaged."""
+
+import math
+import random
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.messages import Command, PeerHeartbeat, PositionTarget, TimeSyncRequest
+from sim_vehicle.mavlink.decode import Decoder
+from sim_vehicle.setpoint import FREE
+
+NAN = math.nan
+
+
+def packet(message, v1=False) -> bytes:
+    link = dialect.MAVLink(None, srcSystem=1, srcComponent=191)
+    return message.pack(link, force_mavlink1=v1)
+
+
+def target_message(frame, mask, *values):
+    return dialect.MAVLink_set_position_target_local_ned_message(7, 1, 1, frame, mask, *values)
+
+
+NUMBERS = (1.0, 2.0, -3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 0.5, 0.25)
+
+
+def target(**fields) -> PositionTarget:
+    nothing = {
+        "target_system": 1,
+        "target_component": 1,
+        "frame": 1,
+        "position_m": FREE,
+        "velocity_m_s": FREE,
+        "acceleration_m_s2": FREE,
+        "yaw_rad": None,
+        "yaw_rate_rad_s": None,
+        "is_force": False,
+    }
+    return PositionTarget(**{**nothing, **fields})
+
+
+CASES = [
+    (dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3), PeerHeartbeat(1, 191, 18)),
+    (dialect.MAVLink_timesync_message(0, 123_456_789_012), TimeSyncRequest(123_456_789_012)),
+    (dialect.MAVLink_timesync_message(5, 123), None),
+    (dialect.MAVLink_param_request_list_message(1, 1), None),
+    (
+        dialect.MAVLink_command_long_message(1, 1, 511, 0, 105.0, 4000.0, 0.5, 0.25, 5.0, 6.0, 7.0),
+        Command(1, 191, 1, 1, 511, 105.0, 4000.0, 0.5, 0.25, 7.0),
+    ),
+    (
+        dialect.MAVLink_command_int_message(1, 1, 6, 22, 0, 0, 1.0, 2.0, 3.0, 4.0, 473977418, 85455939, 12.5),
+        Command(1, 191, 1, 1, 22, 1.0, 2.0, 3.0, 4.0, 12.5),
+    ),
+    (target_message(1, 0xDF8, *NUMBERS), target(position_m=(1.0, 2.0, -3.0))),
+    (target_message(1, 0xDC7, *NUMBERS), target(velocity_m_s=(4.0, 5.0, 6.0))),
+    (
+        target_message(1, 0x9C0, *NUMBERS),
+        target(position_m=(1.0, 2.0, -3.0), velocity_m_s=(4.0, 5.0, 6.0), yaw_rad=0.5),
+    ),
+    (target_message(8, 0x5C7, *NUMBERS), target(frame=8, velocity_m_s=(4.0, 5.0, 6.0), yaw_rate_rad_s=0.25)),
+    (
+        target_message(1, 0xE3F, *NUMBERS),
+        target(acceleration_m_s2=(7.0, 8.0, 9.0), is_force=True),
+    ),
+    (target_message(1, 0xFFF, *NUMBERS), target(is_force=True)),
+    (target_message(1, 0xDFB, *NUMBERS), target(position_m=(None, None, -3.0))),
+    (target_message(1, 0xDF8, NAN, math.inf, -3.0, *NUMBERS[3:]), target(position_m=(None, None, -3.0))),
+]
+
+
+@pytest.mark.parametrize(("message", "expected"), CASES, ids=lambda case: type(case).__name__)
+@pytest.mark.parametrize("v1", [False, True], ids=["mavlink2", "mavlink1"])
+def test_each_message_whole_and_byte_by_byte(message, expected, v1):
+    raw = packet(message, v1)
+    wanted = [] if expected is None else [expected]
+    assert Decoder().push(raw) == wanted
+    decoder = Decoder()
+    assert [got for byte in raw for got in decoder.push(bytes([byte]))] == wanted
+
+
+def test_many_packets_cut_anywhere():
+    raw = b"".join(packet(message) for message, _ in CASES)
+    wanted = [expected for _, expected in CASES if expected is not None]
+    chance = random.Random(1)
+    for _ in range(50):
+        cuts = sorted(chance.sample(range(len(raw)), 6))
+        decoder = Decoder()
+        parts = [raw[a:b] for a, b in zip([0, *cuts], [*cuts, len(raw)], strict=True)]
+        assert [got for part in parts for got in decoder.push(part)] == wanted
+
+
+HEARTBEAT = packet(CASES[0][0])
+TARGET = packet(CASES[6][0])
+
+
+@pytest.mark.parametrize(
+    "noise",
+    [
+        b"\x00\x01garbage",
+        b"\xfd",
+        b"\xfd\xff\x00",
+        b"\xfe\xff",
+        b"\xfd" * 20,
+        TARGET[:-1],
+        TARGET[:5],
+        TARGET[:-1] + bytes([TARGET[-1] ^ 1]),
+        b"\xfd\x09\xf0" + HEARTBEAT[3:],
+        b"\xfd\xff\x00" + TARGET[3:],
+        packet(CASES[0][0], v1=True)[:-1],
+    ],
+    ids=repr,
+)
+def test_what_follows_noise_is_not_held_up(noise):
+    decoder = Decoder()
+    assert decoder.push(noise) == []
+    assert decoder.push(HEARTBEAT) == [PeerHeartbeat(1, 191, 18)]
+    assert decoder.push(HEARTBEAT) == [PeerHeartbeat(1, 191, 18)]
+
+
+def test_noise_for_hours_is_not_kept():
+    decoder = Decoder()
+    chance = random.Random(2)
+    for _ in range(300):
+        decoder.push(chance.randbytes(1000))
+        assert len(decoder._rest) < 600
+    assert decoder.push(HEARTBEAT) == [PeerHeartbeat(1, 191, 18)]
+
+
+def test_a_signed_packet_is_read_without_a_key():
+    link = dialect.MAVLink(None, srcSystem=1, srcComponent=191)
+    link.signing.secret_key = bytes(32)
+    link.signing.sign_outgoing = True
+    link.signing.timestamp = 1
+    assert Decoder().push(CASES[0][0].pack(link)) == [PeerHeartbeat(1, 191, 18)]

@@ -1,0 +1,276 @@
+"""What the messages contain, and the silent rule of STATUSTEXT."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.autopilot.messages import (
+    CommandAck,
+    PeerHeartbeat,
+    Result,
+    Severity,
+    StatusText,
+    TimeSyncRequest,
+)
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.mavlink import encode
+from sim_vehicle.mavlink.encode import Encoder, Telemetry
+from sim_vehicle.mavlink.texts import TextLink
+from sim_vehicle.mavlink.vibration import Vibration
+from sim_vehicle.setpoint import TrajectorySetpoint
+from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate, attitude_of_yaw
+
+SECOND = 1_000_000
+SAMPLE = Estimate(
+    time_boot_us=12_345_678,
+    specific_force_frd_m_s2=(0.5, -0.25, -9.75),
+    angular_velocity_frd_rad_s=(0.125, 0.25, -0.5),
+    clipping_counts=(1, 2, 3),
+    position_ned_m=(1.5, -2.5, -3.25),
+    velocity_ned_m_s=(0.5, 0.75, -0.125),
+    attitude_wxyz=attitude_of_yaw(math.pi / 2),
+    thrust_fraction=0.5,
+)
+
+
+def telemetry() -> Telemetry:
+    return Telemetry(SAMPLE, SAMPLE, Autopilot(HOVER, SAMPLE), Vibration(), 1e-4, 4e-4, 9e-4)
+
+
+def read_back(message):
+    return dialect.MAVLink(None).decode(bytearray(Encoder().packet(message)))
+
+
+def test_packets_are_mavlink_2_from_the_autopilot():
+    raw = Encoder().packet(encode.heartbeat(telemetry()))
+    assert raw[0] == 0xFD
+    message = dialect.MAVLink(None).decode(bytearray(raw))
+    assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("build", "expected"),
+    [
+        (
+            encode.heartbeat,
+            {
+                "type": 2,
+                "autopilot": 12,
+                "base_mode": 0x1D,
+                "custom_mode": 0x03040000,
+                "system_status": 3,
+                "mavlink_version": 3,
+            },
+        ),
+        (
+            encode.highres_imu,
+            {
+                "time_usec": 12_345_678,
+                "xacc": 0.5,
+                "yacc": -0.25,
+                "zacc": -9.75,
+                "xgyro": 0.125,
+                "ygyro": 0.25,
+                "zgyro": -0.5,
+                "fields_updated": 0x3F,
+                "id": 0,
+            },
+        ),
+        (
+            encode.local_position_ned,
+            {
+                "time_boot_ms": 12_345,
+                "x": 1.5,
+                "y": -2.5,
+                "z": -3.25,
+                "vx": 0.5,
+                "vy": 0.75,
+                "vz": -0.125,
+            },
+        ),
+        (
+            encode.attitude,
+            {
+                "time_boot_ms": 12_345,
+                "roll": 0.0,
+                "pitch": 0.0,
+                "yaw": math.pi / 2,
+                "rollspeed": 0.125,
+                "yawspeed": -0.5,
+            },
+        ),
+        (
+            encode.attitude_quaternion,
+            {"q1": math.sqrt(0.5), "q2": 0.0, "q3": 0.0, "q4": math.sqrt(0.5), "pitchspeed": 0.25},
+        ),
+        (
+            encode.odometry,
+            {
+                "time_usec": 12_345_678,
+                "frame_id": 1,
+                "child_frame_id": 1,
+                "z": -3.25,
+                "vx": 0.5,
+                "vy": 0.75,
+                "vz": -0.125,
+                "reset_counter": 0,
+                "estimator_type": 8,
+            },
+        ),
+        (encode.extended_sys_state, {"vtol_state": 0, "landed_state": 1}),
+        (encode.vibration, {"time_usec": 12_345_678, "clipping_0": 6, "clipping_1": 0}),
+        (encode.timesync, {"tc1": 0, "ts1": 12_345_678_000}),
+        (
+            encode.current_mode,
+            {"standard_mode": 0, "custom_mode": 0x03040000, "intended_custom_mode": 0x03040000},
+        ),
+        (encode.attitude_target, {"type_mask": 0x87, "thrust": 0.5}),
+        (encode.sys_status, {"voltage_battery": 0xFFFF, "current_battery": -1, "battery_remaining": -1}),
+    ],
+    ids=lambda case: getattr(case, "__name__", ""),
+)
+def test_each_message_reads_back(build, expected):
+    message = read_back(build(telemetry()))
+    for field, value in expected.items():
+        assert getattr(message, field) == pytest.approx(value, rel=1e-6), field
+
+
+def test_odometrys_covariances_stand_on_the_diagonal():
+    message = read_back(encode.odometry(telemetry()))
+    diagonal = [0, 6, 11, 15, 18, 20]
+    assert [message.pose_covariance[i] for i in diagonal] == pytest.approx([1e-4] * 3 + [9e-4] * 3)
+    assert [message.velocity_covariance[i] for i in diagonal] == pytest.approx([4e-4] * 3 + [0.0] * 3)
+    assert sum(message.pose_covariance) == pytest.approx(3e-4 + 27e-4)
+
+
+def test_pitching_up_is_positive_and_right_wing_down_rolls_positive():
+    nose_up = replace(SAMPLE, attitude_wxyz=(math.cos(0.1), 0.0, math.sin(0.1), 0.0))
+    right_down = replace(SAMPLE, attitude_wxyz=(math.cos(0.1), math.sin(0.1), 0.0, 0.0))
+    state = telemetry()
+    state.sample = nose_up
+    assert encode.attitude(state).pitch == pytest.approx(0.2)
+    state.sample = right_down
+    assert encode.attitude(state).roll == pytest.approx(0.2)
+
+
+def test_the_failsafe_looks_as_in_px4():
+    state = telemetry()
+    state.autopilot.modes.mode = Mode.OFFBOARD_LOST
+    state.autopilot.arming.armed = True
+    message = read_back(encode.heartbeat(state))
+    assert (message.custom_mode, message.system_status) == (0x00030000, 5)
+    assert message.base_mode == 0x51 | 0x80
+    mode = read_back(encode.current_mode(state))
+    assert (mode.custom_mode, mode.intended_custom_mode) == (0x00030000, 0x00060000)
+
+
+def test_prearm_health_follows_the_checks():
+    state = telemetry()
+    prearm = 0x10000000
+    assert encode.sys_status(state).onboard_control_sensors_health & prearm
+    state.autopilot.request_mode(Mode.MANUAL)
+    assert not encode.sys_status(state).onboard_control_sensors_health & prearm
+
+
+@pytest.mark.parametrize(
+    ("applied", "mask", "fields"),
+    [
+        (None, 0xDFF, {}),
+        (TrajectorySetpoint(position_ned_m=(1.0, 2.0, -3.0)), 0xDF8, {"x": 1.0, "z": -3.0}),
+        (
+            TrajectorySetpoint((1.0, 2.0, None), (0.0, 0.0, 0.5), yaw_rad=0.25),
+            0x9C4,
+            {"y": 2.0, "vz": 0.5, "yaw": 0.25},
+        ),
+    ],
+)
+def test_the_position_target_says_what_is_flown(applied, mask, fields):
+    state = telemetry()
+    state.autopilot.applied = applied
+    message = read_back(encode.position_target_local_ned(state))
+    assert (message.coordinate_frame, message.type_mask) == (1, mask)
+    for field, value in fields.items():
+        assert getattr(message, field) == value
+    assert math.isnan(message.afx)
+
+
+def test_version_is_px4s_and_the_hash_is_not():
+    message = read_back(encode.autopilot_version(telemetry()))
+    assert message.flight_sw_version.to_bytes(4, "big") == bytes([1, 17, 0, 64])
+    assert bytes(message.flight_custom_version) == b"rebound\0"
+    assert message.capabilities & dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+
+
+def test_acks_name_whom_they_answer():
+    message = read_back(encode.command_ack(CommandAck(400, Result.TEMPORARILY_REJECTED, 255, 190)))
+    assert (message.command, message.result) == (400, 1)
+    assert (message.target_system, message.target_component) == (255, 190)
+
+
+def test_timesync_is_answered_with_boot_time_in_nanoseconds():
+    message = read_back(encode.timesync_reply(TimeSyncRequest(777), heard_at_us=5_000))
+    assert (message.tc1, message.ts1) == (5_000_000, 777)
+
+
+def test_vibration_is_the_slow_mean_of_the_jumps():
+    metric = Vibration()
+    for number in range(2_000):
+        sign = 1.0 if number % 2 else -1.0
+        metric.update((0.0, sign, -9.81), (0.0, 0.0, 0.25 * sign))
+    assert metric.accelerometer_m_s2 == pytest.approx(2.0, rel=1e-3)
+    assert metric.gyroscope_rad_s == pytest.approx(0.5, rel=1e-3)
+
+
+# --- STATUSTEXT -------------------------------------------------------------------------------------------
+
+ARMED = StatusText(Severity.INFO, "Armed by external command")
+GROUND_STATION = PeerHeartbeat(255, 190, 6)
+COMPANION = PeerHeartbeat(1, 191, 18)
+
+
+def test_without_a_ground_station_there_is_no_text():
+    link = TextLink()
+    link.heard(COMPANION, 0)
+    link.add(ARMED, 0)
+    assert [message for now in range(0, 10 * SECOND, 4_000) for message in link.due(now)] == []
+
+
+def test_with_one_the_text_comes_and_ends_in_a_tab():
+    link = TextLink()
+    link.heard(GROUND_STATION, 0)
+    link.add(ARMED, 0)
+    (message,) = link.due(0)
+    message = read_back(message)
+    assert message.text.rstrip("\0") == "Armed by external command\t"
+    assert (message.severity, message.id, message.chunk_seq) == (6, 0, 0)
+
+
+def test_a_ground_station_that_has_gone_silent_hears_nothing():
+    link = TextLink()
+    link.heard(GROUND_STATION, 0)
+    link.add(ARMED, 3 * SECOND)
+    assert list(link.due(3 * SECOND)) == []
+    # One that comes within five seconds still gets it, a later one does not
+    link.heard(GROUND_STATION, 4 * SECOND)
+    assert len(list(link.due(4 * SECOND))) == 1
+    link.add(ARMED, 5 * SECOND)
+    link.heard(GROUND_STATION, 11 * SECOND)
+    assert list(link.due(11 * SECOND)) == []
+
+
+def test_a_long_text_comes_in_pieces():
+    link = TextLink()
+    link.heard(GROUND_STATION, 0)
+    link.add(ARMED, 0)
+    long = StatusText(Severity.CRITICAL, "SET_POSITION_TARGET_LOCAL_NED coordinate frame 9 unsupported")
+    link.add(long, 0)
+    assert len(list(link.due(0))) == 1
+    # The next text not before 50 ms
+    assert list(link.due(48_000)) == []
+    pieces = [read_back(message) for message in link.due(52_000)]
+    assert [(piece.id, piece.chunk_seq, piece.severity) for piece in pieces] == [(1, 0, 2), (1, 1, 2)]
+    assert "".join(piece.text.rstrip("\0") for piece in pieces) == long.text + "\t"
+    assert len(pieces[0].text) == 50
