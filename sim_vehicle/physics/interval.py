@@ -20,6 +20,8 @@ from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+MOTORS_OFF, MOTORS_IDLE, MOTORS_FLYING, MOTORS_DRIVEN = range(4)
+
 # Steps in one raw interval (125 us) while something stiff touches or is about to: 12.5 us is 80 steps in
 # the rigid vehicle's 1 ms of contact. Halving it changes no rebound speed by 0.1 %.
 FINE_STEPS = 10
@@ -31,7 +33,7 @@ TOUCH_MARGIN_M = 0.0005
 def advance_interval(
     state: State,
     asked: Asked,
-    motors_on: int,
+    motors: int,
     noise: Floats,
     fine_steps: int,
     constants: Constants,
@@ -47,7 +49,7 @@ def advance_interval(
 ) -> None:
     """Advance ``state`` by one integration interval, renew the vehicle's estimate, fill ``report``.
 
-    ``motors_on``: 0 off, 1 idling, 2 flying the setpoint. ``noise`` is standard normal: six values a raw
+    ``motors``: off, idling, flying the setpoint, or driven: as `State.motor_command_n` says. ``noise`` is standard normal: six values a raw
     sample, then nine for the estimate.
     ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
     the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory.
@@ -57,11 +59,11 @@ def advance_interval(
     state.specific_force_sum[:] = 0.0
     state.rate_sum[:] = 0.0
     for raw in range(constants.raw_per_interval):
-        if motors_on == 2:
+        if motors == MOTORS_FLYING:
             run_loops(state, asked, constants, contact.motor_radius_m, gains)
-        else:
+        elif motors != MOTORS_DRIVEN:
             rest_loops(state)
-            state.motor_command_n[:] = constants.motor_idle_n if motors_on == 1 else 0.0
+            state.motor_command_n[:] = constants.motor_idle_n if motors == MOTORS_IDLE else 0.0
         spin_motors(state, constants)
         for i in range(3):
             scratch.velocity_before[i] = state.body[3 + i]

@@ -8,7 +8,14 @@ import numpy as np
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.contact import points_behind
 from sim_vehicle.physics.estimate import estimate_errors
-from sim_vehicle.physics.interval import FINE_STEPS, advance_interval
+from sim_vehicle.physics.interval import (
+    FINE_STEPS,
+    MOTORS_DRIVEN,
+    MOTORS_FLYING,
+    MOTORS_IDLE,
+    MOTORS_OFF,
+    advance_interval,
+)
 from sim_vehicle.physics.layout import (
     POINTS,
     Asked,
@@ -25,9 +32,7 @@ from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Vector3
 
-MOTORS_OFF, MOTORS_IDLE, MOTORS_FLYING = range(3)
-
-Quaternion = tuple[float, float, float, float]
+Quadruple = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +48,10 @@ class PlantOutput:
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
     acceleration_ned_m_s2: Vector3
-    attitude_wxyz: Quaternion
+    attitude_wxyz: Quadruple
     thrust_fraction: float
     """Commanded collective thrust over the greatest."""
-    motor_fractions: Quaternion
+    motor_fractions: Quadruple
     """Thrust commanded of each motor over its greatest, in motor order."""
 
 
@@ -81,6 +86,8 @@ class Plant:
             self._asked.given,
             self._asked.yaw,
         )
+        self._motor_command_n = self.state.motor_command_n
+        self._motor_max_n = airframe.motors.max_thrust_n
         self._finished_hits = self.state.finished_hits
         self._behind = points_behind(self._world.faces, centre)
         self._near = np.zeros(len(self._world.faces), np.int64)
@@ -96,13 +103,22 @@ class Plant:
 
     def step(self, setpoint: TrajectorySetpoint | None, armed: bool) -> PlantOutput:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
-        motors_on = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
+        motors = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
         if setpoint is not None and setpoint is not self._taken:
             self._take_setpoint(setpoint)
+        return self._advance(motors)
+
+    def drive(self, motor_fractions: Quadruple) -> PlantOutput:
+        """Advance one interval under an autopilot from outside: thrust asked of each motor over its greatest."""
+        self._motor_command_n[:] = motor_fractions
+        self._motor_command_n *= self._motor_max_n
+        return self._advance(MOTORS_DRIVEN)
+
+    def _advance(self, motors: int) -> PlantOutput:
         advance_interval(
             self.state,
             self._asked,
-            motors_on,
+            motors,
             self._rng.standard_normal(6 * self._raw_samples + 9),
             self._fine_steps,
             self._constants,

@@ -72,6 +72,18 @@ def test_front_motors_pitch_the_nose_up_and_right_motors_roll_left() -> None:
     assert ROTOR_YAW_SIGNS.sum() == 0
 
 
+def test_driven_motors_do_as_they_are_told() -> None:
+    """With an autopilot from outside, 10 % above hover on every motor climbs at a tenth of gravity."""
+    airframe = quiet(load_built_in("foldable"))
+    plant = Plant(airframe, Scene(), seed=1)
+    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
+    share = 1.1 * airframe.hover_fraction
+    for _ in range(250):
+        output = plant.drive((share, share, share, share))
+    assert output.specific_force_frd_m_s2[2] == pytest.approx(-1.1 * 9.81, rel=1e-3)
+    assert plant.state.body[5] == pytest.approx(-0.981, rel=0.15)
+
+
 def test_raw_samples_are_clipped_before_the_mean() -> None:
     """A rigid hit of over 3000 m/s2 for 1 ms shows as 16 g for a quarter of the 4 ms mean, not more."""
     airframe = quiet(load_built_in("rigid"))
