@@ -1,0 +1,95 @@
+"""Telemetry logs as every MAVLink tool reads them: 8 bytes of big-endian microseconds, then the packet."""
+
+import struct
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+_STAMP = struct.Struct(">Q")
+
+# A killed process must leave a log complete to its last second; half of that leaves room for a slow disk.
+FLUSH_INTERVAL_US = 500_000
+
+_MAGIC_V1 = 0xFE
+_MAGIC_V2 = 0xFD
+_OVERHEAD_V1 = 8
+_OVERHEAD_V2 = 12
+_SIGNATURE_LENGTH = 13
+_SIGNED_FLAG = 0x01
+
+# After foreign bytes the reader looks for the next stamp: no earlier than the last, at most this much later.
+_LONGEST_GAP_US = 3 * 24 * 3600 * 1_000_000
+
+
+class TlogWriter:
+    """Appends packets to a log and hands them to the operating system twice a second."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("wb", buffering=0)
+        self._pending: list[bytes] = []
+        self._flushed_at_us: int | None = None
+
+    def write(self, now_us: int, frames: Iterable[bytes]) -> None:
+        """Log packets received or sent at `now_us` (microseconds since the epoch)."""
+        stamp = _STAMP.pack(now_us)
+        pending = self._pending
+        for frame in frames:
+            pending.append(stamp)
+            pending.append(frame)
+        if self._flushed_at_us is None:
+            self._flushed_at_us = now_us
+        elif now_us - self._flushed_at_us >= FLUSH_INTERVAL_US:
+            self._flushed_at_us = now_us
+            self.flush()
+
+    def flush(self) -> None:
+        if self._pending:
+            self._file.write(b"".join(self._pending))
+            self._pending.clear()
+
+    def close(self) -> None:
+        if not self._file.closed:
+            self.flush()
+            self._file.close()
+
+
+def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Each packet with its stamp in microseconds since the epoch.
+
+    Bytes that belong to no packet are passed over; a last packet cut short by a kill is left out.
+    """
+    content = path.read_bytes()
+    position = 0
+    last_us: int | None = None
+    while position + _STAMP.size < len(content):
+        stamp_us = int(_STAMP.unpack_from(content, position)[0])
+        start = position + _STAMP.size
+        length = _frame_length(content, start)
+        if length is None or not _plausible(stamp_us, last_us) or not _stamp_follows(content, start + length, stamp_us):
+            position += 1
+            continue
+        if start + length > len(content):
+            return
+        yield stamp_us, content[start : start + length]
+        last_us = stamp_us
+        position = start + length
+
+
+def _plausible(stamp_us: int, last_us: int | None) -> bool:
+    return last_us is None or last_us <= stamp_us <= last_us + _LONGEST_GAP_US
+
+
+def _stamp_follows(content: bytes, end: int, stamp_us: int) -> bool:
+    """Whether what comes after a packet is another stamp or the end of the file."""
+    if end + _STAMP.size > len(content):
+        return True
+    return _plausible(int(_STAMP.unpack_from(content, end)[0]), stamp_us)
+
+
+def _frame_length(content: bytes, start: int) -> int | None:
+    magic = content[start]
+    if magic == _MAGIC_V1 and start + 1 < len(content):
+        return _OVERHEAD_V1 + content[start + 1]
+    if magic == _MAGIC_V2 and start + 2 < len(content):
+        signed = content[start + 2] & _SIGNED_FLAG
+        return _OVERHEAD_V2 + content[start + 1] + (_SIGNATURE_LENGTH if signed else 0)
+    return None

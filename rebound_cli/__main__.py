@@ -1,0 +1,5 @@
+import sys
+
+from rebound_cli.main import main
+
+sys.exit(main())

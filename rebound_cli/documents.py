@@ -1,0 +1,240 @@
+"""YAML files with the line of every value, `--set PATH=VALUE`, and errors that name file, line and remedy."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from companion.errors import ConfigurationError
+from rebound_cli.schema_hints import keys_allowed_at, nearest
+
+DocumentPath = tuple[str | int, ...]
+Model = TypeVar("Model", bound=BaseModel)
+
+# A reader repairs the first few faults and runs again; a longer list only hides them.
+_MOST_ERRORS_SHOWN = 5
+
+_ITEM_NUMBER = re.compile(r"\bitem (\d+)\b")
+
+
+class DocumentError(ConfigurationError):
+    """A file, or a value given with --set, that cannot be used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Override:
+    """A value from the command line, put in place of the file's."""
+
+    text: str  # as the person typed it, such as `--set items.1.go_to.speed_m_s=2.5`
+    path: DocumentPath
+    value: Any
+
+
+@dataclass(slots=True)
+class Document:
+    """The content of a YAML file: plain data, where each value stands, and what --set changed."""
+
+    name: str
+    data: dict[str, Any]
+    lines: dict[DocumentPath, int]
+    overrides: list[Override]
+
+    def line_of(self, path: DocumentPath) -> int:
+        """Line of the value, or of the nearest part around it that the file has; 1 for the whole file."""
+        for length in range(len(path), 0, -1):
+            if path[:length] in self.lines:
+                return self.lines[path[:length]]
+        return 1
+
+    def override_of(self, path: DocumentPath) -> Override | None:
+        """The last --set that gave this value, or a part around or inside it."""
+        for override in reversed(self.overrides):
+            shorter = min(len(path), len(override.path))
+            if shorter and path[:shorter] == override.path[:shorter]:
+                return override
+        return None
+
+    def place_of(self, path: DocumentPath) -> str:
+        """Where a person has to look: `--set items.1=...` or `missions/wall.yaml:12`."""
+        override = self.override_of(path)
+        return override.text if override else f"{self.name}:{self.line_of(path)}"
+
+
+def empty_document(name: str) -> Document:
+    return Document(name, {}, {}, [])
+
+
+def load_document(path: Path) -> Document:
+    """Read one YAML file whose top level is a mapping. Raises DocumentError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise DocumentError(f"{path}: no such file{_similar_file(path)}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
+        raise DocumentError(f"{path}: cannot be read: {reason}.") from error
+    return parse_document(text, str(path))
+
+
+def parse_document(text: str, name: str) -> Document:
+    """Read YAML text; `name` is what errors call it. Raises DocumentError."""
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            raise DocumentError(f"{name}: the file is empty.")
+        if not isinstance(node, yaml.MappingNode):
+            raise DocumentError(f"{name}:{_line(node)}: a mapping was expected here, such as 'name: square'.")
+        lines = dict(_lines_below(node, (), name))
+        data = loader.construct_document(node)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = mark.line + 1 if mark else 1
+        raise DocumentError(f"{name}:{line}: not valid YAML: {error.problem or error.context}.") from error
+    except yaml.YAMLError as error:
+        raise DocumentError(f"{name}: not valid YAML: {' '.join(str(error).split())}.") from error
+    return Document(name, data, lines, [])
+
+
+def _line(node: yaml.Node) -> int:
+    return int(node.start_mark.line) + 1
+
+
+def _lines_below(node: yaml.Node, path: DocumentPath, name: str) -> Iterator[tuple[DocumentPath, int]]:
+    if isinstance(node, yaml.MappingNode):
+        seen: dict[str, int] = {}
+        for key_node, value_node in node.value:
+            key = str(key_node.value)
+            if key in seen:
+                first = f"first on line {seen[key]}"
+                raise DocumentError(f"{name}:{_line(key_node)}: '{key}' is given twice ({first}); remove one.")
+            seen[key] = _line(key_node)
+            yield (*path, key), _line(key_node)
+            yield from _lines_below(value_node, (*path, key), name)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            yield (*path, index), _line(item)
+            yield from _lines_below(item, (*path, index), name)
+
+
+def _similar_file(path: Path) -> str:
+    folder = path.parent
+    if not folder.is_dir():
+        return "."
+    match = nearest(path.name, [entry.name for entry in folder.glob("*.yaml")])
+    return f"; did you mean {folder / match}?" if match else "."
+
+
+def parse_override(text: str) -> Override:
+    """Read `items.1.go_to.speed_m_s=2.5`; the value is YAML. Raises DocumentError."""
+    dotted, separator, value_text = text.partition("=")
+    parts = dotted.strip().split(".")
+    if not separator or not all(parts):
+        raise DocumentError(f"--set {text}: give PATH=VALUE, such as items.1.go_to.speed_m_s=2.5.")
+    try:
+        value = yaml.safe_load(value_text)
+    except yaml.YAMLError:
+        raise DocumentError(f"--set {text}: the value {value_text!r} is not valid YAML.") from None
+    return Override(f"--set {text}", tuple(int(part) if part.isdigit() else part for part in parts), value)
+
+
+def apply_override(document: Document, override: Override) -> None:
+    """Change one value; keys that are missing on the way are made, and the model judges them afterwards."""
+    target: Any = document.data
+    for depth, part in enumerate(override.path):
+        last = depth == len(override.path) - 1
+        if isinstance(target, list):
+            if not isinstance(part, int) or part >= len(target):
+                where = ".".join(map(str, override.path[:depth]))
+                raise DocumentError(
+                    f"{override.text}: '{where}' is a list of {len(target)}, counted from 0; it has no '{part}'."
+                )
+        elif isinstance(target, dict):
+            part = str(part)
+        else:
+            where = ".".join(map(str, override.path[:depth]))
+            raise DocumentError(f"{override.text}: '{where}' is a single value and has nothing below it.")
+        if last:
+            target[part] = override.value
+        else:
+            if isinstance(target, dict) and target.get(part) is None:
+                target[part] = {}
+            target = target[part]
+    document.overrides.append(override)
+
+
+def apply_overrides(document: Document, texts: Sequence[str]) -> None:
+    """Apply every `--set` in order. Raises DocumentError."""
+    for text in texts:
+        apply_override(document, parse_override(text))
+
+
+def validated(model: type[Model], document: Document, data: Any, prefix: DocumentPath = ()) -> Model:
+    """`data`, the document below `prefix`, as a model. Raises DocumentError with the place of every fault."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        faults = list(dict.fromkeys(_fault_text(model, document, data, prefix, item) for item in error.errors()))
+        shown = faults[:_MOST_ERRORS_SHOWN]
+        if len(faults) > len(shown):
+            shown.append(f"... and {len(faults) - len(shown)} more.")
+        raise DocumentError("\n".join(shown)) from error
+
+
+def _fault_text(model: type[BaseModel], document: Document, data: Any, prefix: DocumentPath, error: Any) -> str:
+    path = _path_in_data(data, error["loc"], missing=error["type"] == "missing")
+    full = (*prefix, *path)
+    label = ".".join(map(str, full))
+    place = document.place_of(full or _path_in_message(str(error["msg"])))
+    sentence = _sentence(model, path, error)
+    return f"{place}: {label}: {sentence}." if label else f"{place}: {sentence}."
+
+
+def _path_in_data(data: Any, location: Sequence[str | int], missing: bool) -> DocumentPath:
+    """The error's location without the names of union members that pydantic adds to it."""
+    path: list[str | int] = []
+    for depth, part in enumerate(location):
+        is_key = isinstance(data, dict) and part in data
+        is_index = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if is_key or is_index:
+            path.append(part)
+            data = data[part]
+        elif missing and depth == len(location) - 1:
+            path.append(part)
+    return tuple(path)
+
+
+def _path_in_message(message: str) -> DocumentPath:
+    """Rules about the whole mission name the part they mean: "items: item 3 is land, ..."."""
+    if not message.removeprefix("Value error, ").startswith("items:"):
+        return ()
+    item = _ITEM_NUMBER.search(message)
+    return ("items", int(item[1]) - 1) if item else ("items",)
+
+
+def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
+    kind = error["type"]
+    if kind == "extra_forbidden":
+        return _unknown_key(str(path[-1]) if path else "?", keys_allowed_at(model, path[:-1]))
+    if kind == "missing":
+        return "is missing; add it"
+    message = str(error["msg"])
+    for lead in ("Value error, ", "Assertion failed, "):
+        message = message.removeprefix(lead)
+    message = message.replace("Input should be", "must be").rstrip(".")
+    given = error.get("input")
+    if kind != "value_error" and isinstance(given, str | int | float | None):
+        message += f", not {given!r}" if given is not None else ", not empty"
+    return message[:1].lower() + message[1:]
+
+
+def _unknown_key(key: str, allowed: Sequence[str]) -> str:
+    if not allowed:
+        return f"unknown key '{key}'; no keys are allowed here"
+    match = nearest(key, allowed)
+    question = f"did you mean '{match}'? " if match else ""
+    return f"unknown key '{key}'; {question}Allowed here: {', '.join(allowed)}"

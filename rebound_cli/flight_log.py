@@ -1,0 +1,83 @@
+"""A telemetry log as arrays: what was measured and what was asked for."""
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.mavlink.decode import Decoder
+from companion.messages import ImuSample, LocalPosition
+from companion.shell.tlog import read_tlog
+
+Floats = npt.NDArray[np.float64]
+
+_MAGIC_V2 = 0xFD
+_HEADER_LENGTH = 10
+_CHECKSUM_LENGTH = 2
+
+# Only messages with these ids are decoded; a log holds many more.
+_HIGHRES_IMU = 105
+_LOCAL_POSITION_NED = 32
+_SET_POSITION_TARGET_LOCAL_NED = 84
+
+# SET_POSITION_TARGET_LOCAL_NED's payload: time_boot_ms, then x, y, z in metres; MAVLink 2 leaves out
+# the zeros at the end of a payload, which is 53 bytes long in full.
+_SETPOINT_POSITION = struct.Struct("<4x3f")
+_SETPOINT_LENGTH = 53
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLog:
+    """Times are the log's own, microseconds since the epoch, unless named boot times. NED, FRD, SI."""
+
+    imu_at_us: Floats
+    imu_time_boot_us: Floats
+    specific_force_frd_m_s2: Floats
+    position_at_us: Floats
+    position_ned_m: Floats
+    velocity_ned_m_s: Floats
+    setpoint_at_us: Floats
+    setpoint_ned_m: Floats
+
+
+def read_flight_log(path: Path) -> FlightLog:
+    """Read what the figure and the table of results need from a log of MAVLink 2 packets."""
+    decoder = Decoder()
+    imu: list[tuple[float, ...]] = []
+    positions: list[tuple[float, ...]] = []
+    setpoints: list[tuple[float, ...]] = []
+    for at_us, packet in read_tlog(path):
+        message_id = _message_id(packet)
+        if message_id == _SET_POSITION_TARGET_LOCAL_NED:
+            payload = packet[_HEADER_LENGTH : _HEADER_LENGTH + packet[1]].ljust(_SETPOINT_LENGTH, b"\0")
+            setpoints.append((at_us, *_SETPOINT_POSITION.unpack_from(payload)))
+        elif message_id in (_HIGHRES_IMU, _LOCAL_POSITION_NED):
+            decoder.listen_to(system_id=packet[5], component_id=packet[6])
+            for _, sample in decoder.feed(packet):
+                if isinstance(sample, ImuSample):
+                    imu.append((at_us, sample.time_boot_us, *sample.specific_force_frd_m_s2))
+                elif isinstance(sample, LocalPosition):
+                    positions.append((at_us, *sample.position_ned_m, *sample.velocity_ned_m_s))
+    imu_rows, position_rows, setpoint_rows = _rows(imu, 5), _rows(positions, 7), _rows(setpoints, 4)
+    return FlightLog(
+        imu_at_us=imu_rows[:, 0],
+        imu_time_boot_us=imu_rows[:, 1],
+        specific_force_frd_m_s2=imu_rows[:, 2:5],
+        position_at_us=position_rows[:, 0],
+        position_ned_m=position_rows[:, 1:4],
+        velocity_ned_m_s=position_rows[:, 4:7],
+        setpoint_at_us=setpoint_rows[:, 0],
+        setpoint_ned_m=setpoint_rows[:, 1:4],
+    )
+
+
+def _message_id(packet: bytes) -> int | None:
+    if packet[0] != _MAGIC_V2 or len(packet) < _HEADER_LENGTH + _CHECKSUM_LENGTH:
+        return None
+    return packet[7] | packet[8] << 8 | packet[9] << 16
+
+
+def _rows(rows: list[tuple[float, ...]], width: int) -> Floats:
+    return np.array(rows, dtype=np.float64).reshape(len(rows), width)

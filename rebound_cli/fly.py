@@ -1,0 +1,128 @@
+"""`rebound fly`: one mission from file to summary, on a connection, a simulated vehicle or in lockstep."""
+
+import json
+import shutil
+import time
+from argparse import Namespace
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from companion.companion import Companion
+from companion.errors import ConfigurationError
+from companion.mission.model import Mission
+from companion.shell.clock import Clock
+from companion.shell.connection import Connection, UdpInConnection, open_connection
+from rebound_cli import run_folder
+from rebound_cli.console import Console, console_for, summary_text, timeline
+from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
+from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.summary import FlightFacts, Flown, build_summary
+from rebound_cli.truth_match import FlightTruth
+from rebound_cli.vehicle_process import VehicleProcess
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A flight about to begin."""
+
+    mission: Mission
+    world: SimulatedWorld | None
+    folder: Path
+    recorder: FlightRecorder
+    console: Console
+    interrupts: Interrupts
+
+
+def run_fly(options: Namespace) -> int:
+    """Fly, write the run folder, tell the person. 0 only when the mission was completed."""
+    is_simulated = options.connect is None
+    if not is_simulated and (options.airframe is not None or options.seed is not None):
+        raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
+    document = load_mission_document(options.mission, options.set, options.airframe, options.seed)
+    mission = mission_from(document)
+    world = world_from(document) if is_simulated else None
+    console = console_for(options.json)
+    # The address is tried before anything is written: a wrong one leaves no empty folder behind.
+    connection = open_connection(options.connect) if options.connect is not None else None
+    folder = run_folder.create_run_folder(options.out, mission.name)
+    _write_inputs(folder, options.mission, mission, world)
+    recorder = FlightRecorder(folder)
+    with Interrupts() as interrupts:
+        flight = Flight(mission, world, folder, recorder, console, interrupts)
+        try:
+            if connection is not None:
+                confirmation = ConfirmAtOnce(console) if options.yes else AskPerson(console)
+                flown = _fly_connected(flight, connection, confirmation)
+            elif options.lockstep:
+                flown = _fly_lockstep(flight)
+            else:
+                flown = _fly_beside_vehicle(flight)
+        finally:
+            recorder.close()
+    return _finish(flight, flown, options.json)
+
+
+def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
+    if mission_file.resolve() != (folder / run_folder.MISSION_NAME).resolve():
+        shutil.copyfile(mission_file, folder / run_folder.MISSION_NAME)
+    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, world))
+    run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
+    if world is not None:
+        run_folder.write_yaml(folder / run_folder.AIRFRAME_NAME, world.airframe.model_dump(mode="json"))
+
+
+def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirmation) -> Flown:
+    companion = Companion(flight.mission)
+    started_s = time.monotonic()
+    try:
+        fly_realtime(companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts)
+    finally:
+        connection.close()
+    return Flown(companion.report(), time.monotonic() - started_s, None)
+
+
+def _fly_beside_vehicle(flight: Flight) -> Flown:
+    from sim_vehicle.shell.truth_file import load_truth
+
+    connection = UdpInConnection("127.0.0.1", 0)
+    with VehicleProcess(flight.folder, connection.local_port) as vehicle:
+        vehicle.wait_until_ready(flight.interrupts, flight.console)
+        flown = _fly_connected(flight, connection, ConfirmAtOnce())
+        vehicle.check_running()
+    return replace(flown, truth=FlightTruth(*load_truth(flight.folder / run_folder.TRUTH_NAME)))
+
+
+def _fly_lockstep(flight: Flight) -> Flown:
+    from rebound_cli.lockstep import EPOCH_US, fly_mission_lockstep
+    from sim_vehicle.shell.truth_file import save_truth
+
+    assert flight.world is not None, "a lockstep flight has a simulated world"
+    flown, truth = fly_mission_lockstep(
+        flight.mission, flight.world, flight.recorder, flight.interrupts, flight.console
+    )
+    save_truth(flight.folder / run_folder.TRUTH_NAME, truth, EPOCH_US)
+    return flown
+
+
+def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
+    from rebound_cli.figure import draw_flight
+
+    world = flight.world
+    facts = FlightFacts(
+        mission=flight.mission.name,
+        airframe=world.airframe.name if world else None,
+        seed=world.seed if world else None,
+        settled_duration_s=flight.mission.companion.settled.duration_s,
+    )
+    summary = build_summary(flown, facts)
+    run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
+    console = flight.console
+    console.print(timeline(flight.recorder.events, flown.report.started_at_us))
+    console.print("\n" + summary_text(summary))
+    draw_flight(flight.folder, flight.mission, world.scene if world else None, flown.report, flown.truth)
+    console.print(f"\n  everything is in {flight.folder}/")
+    if json_on_stdout:
+        print(json.dumps(summary, indent=2))
+    return 0 if summary["outcome"] == "completed" else 1

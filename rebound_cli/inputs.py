@@ -1,0 +1,97 @@
+"""From a mission file and the command line's options to validated models."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from companion.mission.model import Mission
+from rebound_cli.documents import (
+    Document,
+    DocumentError,
+    Override,
+    apply_override,
+    apply_overrides,
+    empty_document,
+    load_document,
+    validated,
+)
+from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from sim_vehicle.errors import AirframeError, SceneError
+from sim_vehicle.scene import Scene, check_start_is_free
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedWorld:
+    """What the simulated vehicle needs."""
+
+    scene: Scene
+    airframe: Airframe
+
+    @property
+    def seed(self) -> int:
+        return self.scene.seed
+
+
+def load_mission_document(
+    path: Path, sets: Sequence[str], airframe: str | None = None, seed: int | None = None
+) -> Document:
+    """The mission file with every --set, and --airframe and --seed, put in. Raises DocumentError."""
+    document = load_document(path)
+    _apply_options(document, sets, airframe, seed)
+    return document
+
+
+def _apply_options(document: Document, sets: Sequence[str], airframe: str | None, seed: int | None) -> None:
+    apply_overrides(document, sets)
+    for option, value in (("airframe", airframe), ("seed", seed)):
+        if value is not None:
+            apply_override(document, Override(f"--{option} {value}", ("sim", option), value))
+
+
+def mission_from(document: Document) -> Mission:
+    """Raises DocumentError."""
+    return validated(Mission, document, document.data)
+
+
+def world_from(document: Document) -> SimulatedWorld:
+    """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position."""
+    scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
+    airframe = _load_airframe(scene.airframe, document)
+    try:
+        check_start_is_free(scene, airframe)
+    except SceneError as error:
+        raise DocumentError(f"{document.place_of(('sim', 'walls'))}: {_sentence(error)}") from error
+    return SimulatedWorld(scene, airframe)
+
+
+def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, seed: int | None) -> SimulatedWorld:
+    """For the simulated vehicle alone: of the mission file, if there is one, only the `sim:` part counts."""
+    document = load_document(path) if path is not None else empty_document("no mission file")
+    _apply_options(document, sets, airframe, seed)
+    return world_from(document)
+
+
+def _load_airframe(name: str, document: Document) -> Airframe:
+    """A built-in airframe by name, or one from a file when the name looks like a path."""
+    try:
+        if "/" not in name and not name.endswith((".yaml", ".yml")):
+            return load_built_in(name)
+        own = load_document(Path(name))
+        return validated(Airframe, own, with_base(own.data))
+    except AirframeError as error:
+        raise DocumentError(f"{document.place_of(('sim', 'airframe'))}: {_sentence(error)}") from error
+
+
+def resolved(mission: Mission, world: SimulatedWorld | None) -> dict[str, Any]:
+    """The mission with every default and option written out; it is itself a mission file."""
+    data = mission.model_dump(mode="json", exclude_none=True)
+    data["items"] = [{item.name: item.action.model_dump(mode="json", exclude_none=True)} for item in mission.items]
+    if world is not None:
+        data["sim"] = world.scene.model_dump(mode="json", exclude_none=True)
+    return data
+
+
+def _sentence(error: Exception) -> str:
+    text = str(error)
+    return text if text.endswith((".", "!", "?")) else f"{text}."

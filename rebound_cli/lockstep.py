@@ -1,0 +1,122 @@
+"""Companion and simulated vehicle in one process, joined by the same bytes, on virtual time."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from companion.companion import Companion
+from companion.mission.model import GoToItem, HoldItem, Mission, TakeoffItem
+from rebound_cli.console import Console
+from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.summary import Flown
+from rebound_cli.truth_match import FlightTruth
+from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.vehicle import SimulatedVehicle
+
+# When virtual time begins: any fixed moment will do, so that the same seed gives the same bytes.
+EPOCH_US = 1_600_000_000_000_000
+
+# What a mission may take beyond its own distances and durations: connecting, arming, landing.
+_LIMIT_MARGIN_S = 60.0
+# Times the shortest possible duration: ramps, recoveries and detours take longer than flying at full speed.
+_LIMIT_FACTOR = 3.0
+# Climbs are no slower than this; landing a metre takes less than two seconds too.
+_SLOWEST_VERTICAL_M_S = 0.5
+
+# Ctrl-C and the live line are looked at once in so many intervals: often enough at 100 times real time.
+_LOOK_EVERY = 250
+
+
+def virtual_time_limit_s(mission: Mission) -> float:
+    """Longest virtual time a mission may reasonably take; a flight beyond it hangs."""
+    return _LIMIT_MARGIN_S + _LIMIT_FACTOR * _shortest_duration_s(mission)
+
+
+def fly_mission_lockstep(
+    mission: Mission,
+    world: SimulatedWorld,
+    recorder: FlightRecorder,
+    interrupts: Interrupts,
+    console: Console | None = None,
+) -> tuple[Flown, TruthRecorder]:
+    """Fly a whole mission; it fails when it takes much longer than it should."""
+    companion = Companion(mission)
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
+    limit_s = virtual_time_limit_s(mission)
+
+    def look(flight_time_s: float) -> None:
+        # In a file or a pipe the timeline that follows within seconds says the same.
+        if console is not None and console.is_terminal:
+            console.live(companion.status, flight_time_s)
+
+    started_s = time.monotonic()
+    is_finished = run_lockstep(companion, vehicle, recorder, interrupts, limit_s, look)
+    wall_clock_s = time.monotonic() - started_s
+    report = companion.report()
+    if not is_finished:
+        reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
+        report = replace(report, outcome="failed", reason=reason)
+    truth = vehicle.truth
+    return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US)), truth
+
+
+def run_lockstep(
+    companion: Companion,
+    vehicle: SimulatedVehicle,
+    recorder: FlightRecorder,
+    interrupts: Interrupts,
+    limit_s: float,
+    look: Callable[[float], None],
+) -> bool:
+    """Exchange bytes until the companion has finished. False when virtual time ran out first.
+
+    A packet of the companion reaches the vehicle one interval later. `look` is told the virtual time in
+    seconds now and then.
+    """
+    vehicle_step, companion_step, record = vehicle.step, companion.step, recorder.record
+    is_confirmed = is_stopped = False
+    limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
+    pending = b""
+    count = 0
+    while not companion.finished:
+        frames = vehicle_step(pending)
+        time_boot_us = vehicle.time_boot_us
+        now_us = EPOCH_US + time_boot_us
+        result = companion_step(b"".join(frames), now_us)
+        pending = b"".join(result.sent_frames)
+        record(now_us, result)
+        if not is_confirmed and companion.plan_is_ready():
+            is_confirmed = True
+            companion.confirm_plan()
+        count += 1
+        if count % _LOOK_EVERY:
+            continue
+        if time_boot_us > limit_us:
+            return False
+        if interrupts.reason is not None and not is_stopped:
+            is_stopped = True
+            companion.stop(interrupts.reason)
+        look(time_boot_us / 1e6)
+    return True
+
+
+def _shortest_duration_s(mission: Mission) -> float:
+    """Flying every item at its full speed, holding as long as asked, and one hold after a hit per item."""
+    duration_s, place = 0.0, (0.0, 0.0, 0.0)
+    for item in mission.items:
+        action = item.action
+        if isinstance(action, TakeoffItem):
+            duration_s += action.height_m / _SLOWEST_VERTICAL_M_S
+            place = (0.0, 0.0, -action.height_m)
+        elif isinstance(action, GoToItem):
+            duration_s += math.dist(place, action.position_ned_m) / action.speed_m_s
+            duration_s += mission.on_collision.hold_s
+            place = action.position_ned_m
+        elif isinstance(action, HoldItem):
+            duration_s += action.duration_s
+        else:
+            duration_s += -place[2] / _SLOWEST_VERTICAL_M_S
+    return duration_s

@@ -1,0 +1,145 @@
+"""The command `rebound`: reads its arguments and turns expected errors into one sentence."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from companion.errors import ReboundError
+from rebound_cli import __version__
+
+EXIT_ERROR = 1
+# The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
+EXIT_INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    options = build_parser().parse_args(arguments)
+    from sim_vehicle.errors import SimulationError
+
+    try:
+        return int(options.run(options))
+    except (ReboundError, SimulationError) as error:
+        print(f"rebound: {error}", file=sys.stderr)
+        return EXIT_ERROR
+    except KeyboardInterrupt:
+        text = "ended at once; a vehicle in the air does what its autopilot does when setpoints stop."
+        print(f"rebound: {text}", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output has gone (`rebound ... | head`): nobody is left to tell.
+        sys.stderr.close()
+        return EXIT_ERROR
+
+
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rebound",
+        description="Detects a collision of a PX4 multicopter in one IMU sample and recovers from it.",
+    )
+    parser.add_argument("--version", action="version", version=f"rebound {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_fly(commands)
+    _add_sim(commands)
+    _add_results(commands)
+    return parser
+
+
+def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    fly = commands.add_parser("fly", help="fly a mission", description="Fly a mission from take-off to landing.")
+    fly.add_argument("mission", type=Path, metavar="MISSION", help="mission file, such as missions/wall.yaml")
+    how = fly.add_mutually_exclusive_group(required=True)
+    how.add_argument("--sim", action="store_true", help="start the simulated vehicle and fly it in real time over UDP")
+    how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")
+    how.add_argument(
+        "--connect",
+        metavar="URL",
+        help="a vehicle, e.g. udpin://0.0.0.0:14540 or serial:///dev/ttyAMA0:921600",
+    )
+    _add_world_options(fly)
+    fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
+    fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
+    fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
+    fly.set_defaults(run=_fly)
+
+
+def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    sim = commands.add_parser(
+        "sim",
+        help="run the simulated vehicle alone",
+        description="A simulated PX4 quadrotor for any MAVLink client.",
+    )
+    sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
+    _add_world_options(sim)
+    sim.add_argument("--port", type=_port, default=14580, help="UDP port to listen on (default 14580; 0: any free one)")
+    sim.add_argument(
+        "--remote",
+        type=_host_and_port,
+        default=("127.0.0.1", 14540),
+        metavar="HOST:PORT",
+        help="where to send unasked (default 127.0.0.1:14540)",
+    )
+    sim.add_argument(
+        "--truth", type=Path, metavar="FILE", help="write what really happened to this .npz file at the end"
+    )
+    sim.add_argument("--stop-with-stdin", action="store_true", help="end when standard input ends")
+    sim.set_defaults(run=_sim)
+
+
+def _add_results(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    results = commands.add_parser(
+        "results",
+        help="fly the wall hits of the paper and write the table",
+        description="Lockstep wall hits at four speeds with both airframes, as a table in Markdown.",
+    )
+    results.add_argument(
+        "--out", type=Path, default=Path("docs/results.md"), metavar="FILE", help="default: docs/results.md"
+    )
+    results.add_argument("--seeds", type=int, default=20, help="flights for each speed and airframe (default 20)")
+    results.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
+    results.set_defaults(run=_results)
+
+
+def _add_world_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--airframe", metavar="NAME|FILE", help="foldable, rigid or an airframe file")
+    parser.add_argument("--seed", type=int, help="seed of every random number of the simulated vehicle")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="PATH=VALUE",
+        help="change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5",
+    )
+
+
+# The commands' modules are imported when they run: `--help` and errors in arguments come at once.
+def _fly(options: argparse.Namespace) -> int:
+    from rebound_cli.fly import run_fly
+
+    return run_fly(options)
+
+
+def _sim(options: argparse.Namespace) -> int:
+    from rebound_cli.sim import run_sim
+
+    return run_sim(options)
+
+
+def _results(options: argparse.Namespace) -> int:
+    from rebound_cli.results import run_results
+
+    return run_results(options)
+
+
+def _port(text: str) -> int:
+    if not text.isdigit() or int(text) > 65_535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: give a number from 0 to 65535")
+    return int(text)
+
+
+def _host_and_port(text: str) -> tuple[str, int]:
+    host, separator, port = text.rpartition(":")
+    if not separator or not host:
+        raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT")
+    return host, _port(port)

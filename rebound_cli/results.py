@@ -1,0 +1,238 @@
+"""`rebound results`: the paper's comparison, flown in lockstep and written as a table."""
+
+import multiprocessing
+import platform
+import sys
+import tempfile
+from argparse import Namespace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rebound_cli import __version__
+from rebound_cli.flight_log import read_flight_log
+from rebound_cli.inputs import load_mission_document, mission_from, world_from
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.summary import FlightFacts, build_summary
+from rebound_cli.truth_match import match_contacts
+
+MISSION_FILE = Path("missions/wall.yaml")
+SPEED_PATH = "items.1.go_to.speed_m_s"
+AIRFRAMES = ("foldable", "rigid")
+SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
+
+# A sample whose averaging window ends less than this after the first touch has hardly anything to show.
+POSSIBLE_AFTER_US = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One flight of the table."""
+
+    airframe: str
+    speed_m_s: float
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class HitFigures:
+    """One detected hit; speeds in m/s, lengths in m."""
+
+    is_first_possible_sample: bool
+    latency_ms: float
+    speed_error: float
+    rebound_speed_m_s: float
+    overshoot_m: float
+    peak_force_n: float
+
+
+@dataclass(frozen=True, slots=True)
+class CaseFigures:
+    """What one flight adds to the table."""
+
+    case: Case
+    is_completed: bool
+    contacts: int
+    false_detections: int
+    recontacts: int
+    realtime_factor: float
+    hits: tuple[HitFigures, ...]
+
+
+def run_results(options: Namespace) -> int:
+    """Fly every case and write the table. 0 when the file is written, whatever it says."""
+    cases = [
+        Case(airframe, speed_m_s, seed)
+        for airframe in AIRFRAMES
+        for speed_m_s in SPEEDS_M_S
+        for seed in range(1, options.seeds + 1)
+    ]
+    # Compiled kernels are in the cache after one flight; two processes would compile them twice.
+    fly_case(cases[0])
+    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
+        figures = list(_with_progress(pool.imap_unordered(fly_case, cases), len(cases)))
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    options.out.write_text(results_text(figures, options.seeds), encoding="utf-8")
+    print(f"Written to {options.out}.")
+    return 0
+
+
+def fly_case(case: Case) -> CaseFigures:
+    """One lockstep flight with its log on, in a folder of its own that is removed afterwards."""
+    sets = [f"{SPEED_PATH}={case.speed_m_s}"]
+    document = load_mission_document(MISSION_FILE, sets, case.airframe, case.seed)
+    mission, world = mission_from(document), world_from(document)
+    with tempfile.TemporaryDirectory() as name:
+        recorder = FlightRecorder(Path(name))
+        try:
+            flown, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
+        finally:
+            recorder.close()
+        imu_time_boot_us = read_flight_log(Path(name) / TLOG_NAME).imu_time_boot_us
+    settled_duration_s = mission.companion.settled.duration_s
+    summary = build_summary(flown, FlightFacts(mission.name, case.airframe, case.seed, settled_duration_s))
+    assert flown.truth is not None, "a lockstep flight has its truth"
+    matches = match_contacts(flown.report.collisions, flown.truth.hits, settled_duration_s)
+    hits = []
+    for collision, hit, entry in zip(
+        flown.report.collisions, matches.hit_of_collision, summary["collisions"], strict=True
+    ):
+        if hit is None:
+            continue
+        possible = imu_time_boot_us[imu_time_boot_us >= hit.contact_at_boot_us + POSSIBLE_AFTER_US]
+        true_speed_m_s = float(np.linalg.norm(hit.impact_velocity_ned_m_s))
+        hits.append(
+            HitFigures(
+                is_first_possible_sample=bool(collision.sample_time_boot_us <= possible[0]),
+                latency_ms=entry["truth"]["detection_latency_ms"],
+                speed_error=collision.impact_speed_m_s / true_speed_m_s - 1.0,
+                rebound_speed_m_s=hit.rebound_speed_m_s,
+                overshoot_m=entry["truth"]["overshoot_m"],
+                peak_force_n=hit.peak_force_n,
+            )
+        )
+    return CaseFigures(
+        case=case,
+        is_completed=flown.report.outcome == "completed",
+        contacts=len(flown.truth.hits),
+        false_detections=matches.false_detections,
+        recontacts=matches.recontacts,
+        realtime_factor=summary["realtime_factor"],
+        hits=tuple(hits),
+    )
+
+
+def _with_progress(figures: Iterable[CaseFigures], total: int) -> Iterable[CaseFigures]:
+    width = 40
+    for done, item in enumerate(figures, start=1):
+        if sys.stderr.isatty():
+            filled = width * done // total
+            sys.stderr.write(f"\r[{'#' * filled}{'.' * (width - filled)}] {done}/{total} flights")
+            sys.stderr.flush()
+        yield item
+    if sys.stderr.isatty():
+        sys.stderr.write("\n")
+
+
+_INTRODUCTION = """\
+# Results: wall hits at four speeds
+
+Written by `rebound results`{seeds_option} (version {version}, Python {python}, {machine}).
+
+Each row is {seeds} flights of `{mission}`, seeds 1 to {seeds}: whole flights from take-off to landing in
+lockstep, with all MAVLink bytes and the log on. One of them again, with its log, summary and picture:
+
+    rebound fly {mission} --lockstep --airframe foldable --seed 1 --set {path}=2.0
+
+Both airframes fly the same missions with the same gain (gamma = 0.5).
+"""
+
+_COLUMNS = (
+    "m/s",
+    "completed",
+    "hits",
+    "detected",
+    "at the first possible sample",
+    "latency, mean / max [ms]",
+    "false detections",
+    "recontacts",
+    "v_c error, RMS [%]",
+    "speed after the hit, mean [m/s]",
+    "overshoot, max [m]",
+    "peak force, max [N]",
+    "times real time",
+)
+
+_EXPLANATION = """\
+## What the columns mean
+
+- **m/s**: the speed asked for in the mission. **completed**: flights that ended as the mission ends.
+- **hits**: contacts with the wall, by the simulator's truth; a contact ends when all has been clear for 20 ms.
+- **detected**: contacts that the companion reported. **at the first possible sample**: of these, on the first
+  `HIGHRES_IMU` sample on the wire whose averaging window ends 1 ms or more after the first touch, or before.
+- **latency**: from the first touch to the arrival of that sample.
+- **false detections**: reports without a contact. **recontacts**: new contacts before the last was recovered.
+- **v_c error**: the companion's collision speed against the true speed at the first touch.
+- **speed after the hit**: along the wall's normal when the contact ended.
+- **overshoot**: the furthest that the vehicle went past the recovery setpoint, away from the wall.
+- **peak force**: the largest force of the wall on the whole vehicle.
+- **times real time**: virtual time over wall clock of the whole loop, mean, with {jobs_note}.
+"""
+
+
+def results_text(figures: Sequence[CaseFigures], seeds: int) -> str:
+    """The Markdown file."""
+    parts = [
+        _INTRODUCTION.format(
+            seeds_option="" if seeds == 20 else f" --seeds {seeds}",
+            version=__version__,
+            python=platform.python_version(),
+            machine=platform.machine(),
+            seeds=seeds,
+            mission=MISSION_FILE,
+            path=SPEED_PATH,
+        )
+    ]
+    for airframe in AIRFRAMES:
+        rows = [
+            _row(
+                speed_m_s,
+                [item for item in figures if (item.case.airframe, item.case.speed_m_s) == (airframe, speed_m_s)],
+            )
+            for speed_m_s in SPEEDS_M_S
+        ]
+        parts.append(f"## {airframe}\n\n" + _table(rows))
+    parts.append(_EXPLANATION.format(jobs_note="one flight on each core at a time"))
+    return "\n".join(parts)
+
+
+def _row(speed_m_s: float, figures: Sequence[CaseFigures]) -> list[str]:
+    hits = [hit for item in figures for hit in item.hits]
+    latencies = [hit.latency_ms for hit in hits]
+    errors = [hit.speed_error for hit in hits]
+    has_hits = bool(hits)
+    return [
+        f"{speed_m_s:g}",
+        f"{sum(item.is_completed for item in figures)} of {len(figures)}",
+        f"{sum(item.contacts for item in figures)}",
+        f"{len(hits)}",
+        f"{sum(hit.is_first_possible_sample for hit in hits)}",
+        f"{np.mean(latencies):.1f} / {max(latencies):.1f}" if has_hits else "",
+        f"{sum(item.false_detections for item in figures)}",
+        f"{sum(item.recontacts for item in figures)}",
+        f"{100 * np.sqrt(np.mean(np.square(errors))):.1f}" if has_hits else "",
+        f"{np.mean([hit.rebound_speed_m_s for hit in hits]):.2f}" if has_hits else "",
+        f"{max(hit.overshoot_m for hit in hits):.3f}" if has_hits else "",
+        f"{max(hit.peak_force_n for hit in hits):.0f}" if has_hits else "",
+        f"{np.mean([item.realtime_factor for item in figures]):.0f}" if figures else "",
+    ]
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(_COLUMNS) + " |", "|" + "---:|" * len(_COLUMNS)]
+    lines.extend("| " + " | ".join(row) + " |" for row in rows)
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,115 @@
+"""The folder of one flight: what was flown, with what, and every byte and event of it."""
+
+import json
+import platform
+import re
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from companion.errors import ReboundError
+from companion.shell.tlog import TlogWriter
+from rebound_cli import __version__
+
+if TYPE_CHECKING:
+    from companion.companion import StepResult
+    from companion.report import Event
+
+RUNS_FOLDER = Path("runs")
+
+TLOG_NAME = "flight.tlog"
+EVENTS_NAME = "events.jsonl"
+SUMMARY_NAME = "summary.json"
+FIGURE_NAME = "flight.png"
+TRUTH_NAME = "truth.npz"
+MISSION_NAME = "mission.yaml"
+RESOLVED_NAME = "resolved.yaml"
+AIRFRAME_NAME = "airframe.yaml"
+VERSIONS_NAME = "versions.json"
+VEHICLE_LOG_NAME = "vehicle.log"
+
+# The packages whose version can change the bytes or the figures of a flight.
+_VERSIONED_PACKAGES = (
+    "pymavlink",
+    "fastcrc",
+    "numpy",
+    "numba",
+    "filterpy",
+    "pydantic",
+    "pyserial",
+    "matplotlib",
+)
+
+
+class RunFolderError(ReboundError):
+    """The folder cannot be made, or already holds a flight."""
+
+
+def create_run_folder(out: Path | None, mission_name: str) -> Path:
+    """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError."""
+    try:
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            if (out / TLOG_NAME).exists():
+                raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
+            return out
+        slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
+        stem = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}"
+        RUNS_FOLDER.mkdir(parents=True, exist_ok=True)
+        for attempt in range(1, 1000):
+            folder = RUNS_FOLDER / (stem if attempt == 1 else f"{stem}-{attempt}")
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            return folder
+    except OSError as error:
+        text = f"The run folder {out or RUNS_FOLDER} cannot be made: {error.strerror}."
+        raise RunFolderError(text) from error
+    raise RunFolderError(f"The run folder {RUNS_FOLDER / stem} cannot be made: too many have that name.")
+
+
+class FlightRecorder:
+    """Writes packets and events as they happen and keeps the events for the timeline."""
+
+    def __init__(self, folder: Path) -> None:
+        self._tlog = TlogWriter(folder / TLOG_NAME)
+        # Line-buffered: events are few, and the last one before a kill is the one that matters.
+        self._events_file = (folder / EVENTS_NAME).open("w", encoding="utf-8", buffering=1)
+        self.events: list[Event] = []
+
+    def record(self, now_us: int, result: "StepResult") -> None:
+        if result.received_frames:
+            self._tlog.write(now_us, result.received_frames)
+        if result.sent_frames:
+            self._tlog.write(now_us, result.sent_frames)
+        for event in result.events:
+            self.events.append(event)
+            self._events_file.write(json.dumps(_event_record(event)) + "\n")
+
+    def close(self) -> None:
+        self._tlog.close()
+        self._events_file.close()
+
+
+def _event_record(event: "Event") -> dict[str, Any]:
+    return {"time_us": event.time_us, "kind": event.kind, "text": event.text, "data": dict(event.data)}
+
+
+def write_yaml(path: Path, data: Any) -> None:
+    path.write_text(yaml.safe_dump(data, sort_keys=False, allow_unicode=True), encoding="utf-8")
+
+
+def write_json(path: Path, data: Any) -> None:
+    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+
+
+def versions() -> dict[str, str]:
+    """What a replay needs to match: the program, Python, the machine and the packages."""
+    found = {"px4-rebound": __version__, "python": platform.python_version(), "machine": platform.platform()}
+    for package in _VERSIONED_PACKAGES:
+        found[package] = metadata.version(package)
+    return found

@@ -1,0 +1,126 @@
+"""`summary.json`: what the companion says of a flight beside what the simulator knows; docs/summary.md."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from companion.report import FlightReport
+from rebound_cli.truth_match import FlightTruth, match_contacts
+
+if TYPE_CHECKING:
+    from sim_vehicle.truth import Hit
+
+SCHEMA = 1
+
+# Sizes are written to a tenth of a millimetre, times to a microsecond: finer digits are noise.
+_DIGITS = 4
+_TIME_DIGITS = 6
+
+# How long overshoot and loss of height are looked at when a recovery has not ended before.
+LONGEST_RECOVERY_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A flight that is over; without truth when the vehicle was a real one."""
+
+    report: FlightReport
+    wall_clock_s: float
+    truth: FlightTruth | None
+
+
+@dataclass(frozen=True, slots=True)
+class FlightFacts:
+    """What was flown; airframe and seed are None for a real vehicle."""
+
+    mission: str
+    airframe: str | None
+    seed: int | None
+    settled_duration_s: float  # how long a vehicle must have stayed settled to count as recovered
+
+
+def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
+    """The content of summary.json. Without truth everything that needs it is null."""
+    report, truth = flown.report, flown.truth
+    duration_s = (report.ended_at_us - report.started_at_us) / 1e6
+    matches = match_contacts(report.collisions, truth.hits, facts.settled_duration_s) if truth else None
+    hits = matches.hit_of_collision if matches else (None,) * len(report.collisions)
+    return {
+        "schema": SCHEMA,
+        "mission": facts.mission,
+        "outcome": report.outcome,
+        "reason": report.reason,
+        "autopilot": report.autopilot,
+        "seed": facts.seed,
+        "airframe": facts.airframe,
+        "duration_s": round(duration_s, _TIME_DIGITS),
+        "wall_clock_s": round(flown.wall_clock_s, 3),
+        "realtime_factor": round(duration_s / flown.wall_clock_s, 3) if flown.wall_clock_s > 0 else None,
+        "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
+        "false_detections": matches.false_detections if matches else None,
+        "missed_contacts": matches.missed_contacts if matches else None,
+        "recontacts": matches.recontacts if matches else None,
+        "collisions": [
+            {
+                **_collision(report, number),
+                "truth": _truth(report, number, facts, hit, truth) if truth and hit else None,
+            }
+            for number, hit in enumerate(hits)
+        ],
+    }
+
+
+def _collision(report: FlightReport, number: int) -> dict[str, Any]:
+    collision = report.collisions[number]
+    settled_s = collision.settled_after_s
+    return {
+        "detected_at_s": _seconds(collision.detected_at_us - report.started_at_us),
+        "detector": collision.detector,
+        "impact_velocity_ned_m_s": _rounded(collision.impact_velocity_ned_m_s),
+        "impact_speed_m_s": round(collision.impact_speed_m_s, _DIGITS),
+        "normal_ned": _rounded(collision.normal_ned),
+        "peak_specific_force_m_s2": round(collision.peak_specific_force_m_s2, _DIGITS),
+        "recovery_setpoint_ned_m": _rounded(collision.recovery_setpoint_ned_m),
+        "settled_after_s": None if settled_s is None else round(settled_s, _TIME_DIGITS),
+        "overshoot_m": round(collision.overshoot_m, _DIGITS),
+        "rebound_speed_m_s": round(collision.rebound_speed_m_s, _DIGITS),
+    }
+
+
+def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", truth: FlightTruth) -> Mapping[str, Any]:
+    collision = report.collisions[number]
+    contact_at_us = truth.epoch_at_boot_us + hit.contact_at_boot_us
+    end_boot_us = _recovery_end_us(report, number, facts) - truth.epoch_at_boot_us
+    overshoot_m, height_lost_m = truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, end_boot_us)
+    return {
+        "contact_at_s": _seconds(contact_at_us - report.started_at_us),
+        "detection_latency_ms": round((collision.detected_at_us - contact_at_us) / 1e3, 3),
+        "impact_velocity_ned_m_s": _rounded(hit.impact_velocity_ned_m_s),
+        "normal_ned": _rounded(hit.normal_ned),
+        "contact_duration_s": round(hit.contact_duration_s, _TIME_DIGITS),
+        "max_fold_m": round(hit.max_fold_m, _TIME_DIGITS),
+        "rebound_speed_m_s": round(hit.rebound_speed_m_s, _DIGITS),
+        "peak_force_n": round(hit.peak_force_n, 2),
+        "overshoot_m": round(overshoot_m, _DIGITS),
+        "height_lost_m": round(height_lost_m, _DIGITS),
+    }
+
+
+def _recovery_end_us(report: FlightReport, number: int, facts: FlightFacts) -> float:
+    """When it was called recovered, or the next hit was detected, or the longest time looked at was over."""
+    collision = report.collisions[number]
+    lasted_s = LONGEST_RECOVERY_S
+    if collision.settled_after_s is not None:
+        lasted_s = collision.settled_after_s + facts.settled_duration_s
+    end_us = min(collision.detected_at_us + lasted_s * 1e6, report.ended_at_us)
+    if number + 1 < len(report.collisions):
+        end_us = min(end_us, report.collisions[number + 1].detected_at_us)
+    return end_us
+
+
+def _seconds(time_us: float) -> float:
+    return round(time_us / 1e6, _TIME_DIGITS)
+
+
+def _rounded(vector: tuple[float, float, float]) -> list[float]:
+    return [round(component, _DIGITS) for component in vector]

@@ -1,0 +1,97 @@
+"""The companion's collisions beside the simulator's contacts. Definitions in docs/summary.md."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.report import CollisionReport
+
+if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulator's compiled kernels
+    from sim_vehicle.truth import Hit
+
+# An IMU sample seen after a contact's end can still cover part of it: samples of PX4's default
+# 50 Hz stream are 20 ms apart.
+LATE_SAMPLE_US = 20_000
+
+Series = dict[str, npt.NDArray[np.float64]]
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class FlightTruth:
+    """What the simulator knows of a flight. `epoch_at_boot_us` is when the vehicle's boot clock read 0."""
+
+    hits: "Sequence[Hit]"
+    series: Series
+    epoch_at_boot_us: float
+
+    def past_setpoint_and_below(self, hit: "Hit", setpoint_ned_m: Vector3, until_boot_us: float) -> tuple[float, float]:
+        """Furthest distance past the setpoint along the wall's normal and greatest loss of height, in metres.
+
+        Looked at from the contact until `until_boot_us`; the setpoint is in the world's NED.
+        """
+        time_us = self.series["time_boot_us"]
+        during = (time_us >= hit.contact_at_boot_us) & (time_us <= until_boot_us)
+        position_ned_m = self.series["position_ned_m"][during]
+        if len(position_ned_m) == 0:
+            return 0.0, 0.0
+        past_m = (position_ned_m - np.array(setpoint_ned_m)) @ np.array(hit.normal_ned)
+        lost_m = position_ned_m[:, 2] - hit.contact_position_ned_m[2]
+        return max(float(past_m.max()), 0.0), max(float(lost_m.max()), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Which contact each collision of the report was, and the counts of what did not fit."""
+
+    hit_of_collision: "tuple[Hit | None, ...]"
+    false_detections: int
+    missed_contacts: int
+    recontacts: int
+
+
+def match_contacts(collisions: Sequence[CollisionReport], hits: "Sequence[Hit]", settled_duration_s: float) -> Matches:
+    """Match on the vehicle's boot clock: a detection belongs to the contact that its IMU sample covers.
+
+    One contact explains one detection; `settled_duration_s` is how long a vehicle must have stayed
+    settled before the companion calls it recovered.
+    """
+    collision_of_hit: dict[int, CollisionReport] = {}
+    hit_of_collision: list[Hit | None] = []
+    for collision in collisions:
+        index = _index_of_hit(collision.sample_time_boot_us, hits)
+        if index is None or index in collision_of_hit:
+            hit_of_collision.append(None)
+            continue
+        collision_of_hit[index] = collision
+        hit_of_collision.append(hits[index])
+    recontacts = sum(
+        not _is_recovered(collision_of_hit.get(index - 1), hits[index].contact_at_boot_us, settled_duration_s)
+        for index in range(1, len(hits))
+    )
+    return Matches(
+        tuple(hit_of_collision),
+        false_detections=hit_of_collision.count(None),
+        missed_contacts=len(hits) - len(collision_of_hit),
+        recontacts=recontacts,
+    )
+
+
+def _index_of_hit(sample_time_boot_us: int, hits: "Sequence[Hit]") -> int | None:
+    """The latest contact that had begun when the sample's window ended and was not long over."""
+    for index in range(len(hits) - 1, -1, -1):
+        hit = hits[index]
+        if hit.contact_at_boot_us <= sample_time_boot_us <= hit.ended_at_boot_us + LATE_SAMPLE_US:
+            return index
+    return None
+
+
+def _is_recovered(collision: CollisionReport | None, at_boot_us: float, settled_duration_s: float) -> bool:
+    """Whether the companion had called the collision recovered by then; an unseen one never is."""
+    if collision is None or collision.settled_after_s is None:
+        return False
+    recovered_after_us = (collision.settled_after_s + settled_duration_s) * 1e6
+    return at_boot_us >= collision.sample_time_boot_us + recovered_after_us

@@ -1,0 +1,94 @@
+"""The simulated vehicle as a process of its own, which never outlives the flight."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from companion.errors import ReboundError
+from rebound_cli.console import Console
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.run_folder import RESOLVED_NAME, TRUTH_NAME, VEHICLE_LOG_NAME
+
+# Writing the truth of a long flight takes well under a second; a process that takes longer is stuck.
+STOP_TIMEOUT_S = 5.0
+
+# What `rebound sim` prints once it is on the air.
+READY_WORDS = "Simulated vehicle"
+
+_READY_POLL_S = 0.02
+# A start with everything compiled takes about a second.
+_EXPLAIN_AFTER_S = 3.0
+
+
+class VehicleProcessError(ReboundError):
+    """The simulated vehicle ended before the flight did."""
+
+
+class VehicleProcess:
+    """`rebound sim` on a free port, talking to `companion_port`; its stdin is the leash that ends it."""
+
+    def __init__(self, folder: Path, companion_port: int) -> None:
+        self._folder = folder
+        command = [sys.executable, "-m", "rebound_cli", "sim", "--mission", str(folder / RESOLVED_NAME)]
+        command += ["--port", "0", "--remote", f"127.0.0.1:{companion_port}"]
+        command += ["--truth", str(folder / TRUTH_NAME), "--stop-with-stdin"]
+        with (folder / VEHICLE_LOG_NAME).open("wb") as log:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                # Ctrl-C goes to the companion alone: the vehicle has to fly on until it has landed or holds.
+                start_new_session=True,
+            )
+
+    def wait_until_ready(self, interrupts: Interrupts, console: Console) -> None:
+        """Return when the vehicle is on the air, or when the person has had enough.
+
+        The companion waits ten seconds for a vehicle; compiling the physics may take longer.
+        """
+        started_s = time.monotonic()
+        is_explained = False
+        while not self._is_ready() and interrupts.reason is None:
+            self.check_running()
+            time.sleep(_READY_POLL_S)
+            if not is_explained and time.monotonic() - started_s > _EXPLAIN_AFTER_S:
+                is_explained = True
+                console.print("Compiling the simulated vehicle's physics, which is done once for this machine ...")
+
+    def check_running(self) -> None:
+        """Raise VehicleProcessError with the process's last words if it has ended."""
+        if self._process.poll() is not None:
+            last = self._said() or [f"exit code {self._process.returncode}"]
+            raise VehicleProcessError(f"The simulated vehicle ended by itself: {last[-1].removeprefix('rebound: ')}")
+
+    def _is_ready(self) -> bool:
+        return any(line.startswith(READY_WORDS) for line in self._said())
+
+    def _said(self) -> list[str]:
+        return (self._folder / VEHICLE_LOG_NAME).read_text(errors="replace").strip().splitlines()
+
+    def stop(self) -> None:
+        """End the process; its truth file is complete when this returns."""
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        for harsher in (self._process.terminate, self._process.kill):
+            try:
+                self._process.wait(STOP_TIMEOUT_S)
+                return
+            except subprocess.TimeoutExpired:
+                harsher()
+        self._process.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is KeyboardInterrupt:
+            self._process.kill()
+        self.stop()

@@ -1,0 +1,152 @@
+"""Connection addresses on real sockets and a pseudo terminal."""
+
+import os
+import pty
+import socket
+import threading
+
+import pytest
+
+from companion.errors import ConnectionSetupError
+from companion.shell.connection import UdpInConnection, open_connection
+
+LOCAL = "127.0.0.1"
+
+
+@pytest.fixture
+def peer():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bound:
+        bound.bind((LOCAL, 0))
+        bound.settimeout(2)
+        yield bound
+
+
+def test_udpin_answers_the_last_sender_one_packet_a_datagram(peer):
+    # Given a listening connection and a vehicle that sent first
+    connection = UdpInConnection(LOCAL, 0)
+    peer.sendto(b"hello", (LOCAL, connection.local_port))
+    assert connection.receive(2.0) == b"hello"
+    # When two packets are sent
+    connection.send(b"one")
+    connection.send(b"two")
+    # Then each arrives as a datagram of its own
+    assert [peer.recv(100), peer.recv(100)] == [b"one", b"two"]
+    # And a second sender takes the first one's place
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.settimeout(2)
+        other.sendto(b"me too", (LOCAL, connection.local_port))
+        connection.receive(2.0)
+        connection.send(b"three")
+        assert other.recv(100) == b"three"
+    connection.close()
+
+
+def test_udpin_drops_what_nobody_is_there_to_take():
+    connection = UdpInConnection(LOCAL, 0)
+    connection.send(b"nobody")
+    assert connection.receive(0.0) == b""
+    connection.close()
+
+
+@pytest.mark.parametrize("scheme", ["udpout", "udp"])
+def test_udpout_sends_first(peer, scheme):
+    connection = open_connection(f"{scheme}://{LOCAL}:{peer.getsockname()[1]}")
+    connection.send(b"first")
+    content, address = peer.recvfrom(100)
+    assert content == b"first"
+    peer.sendto(b"answer", address)
+    assert connection.receive(2.0) == b"answer"
+    connection.close()
+
+
+def test_udpout_to_a_closed_port_is_silence_not_an_error(peer):
+    port = peer.getsockname()[1]
+    peer.close()
+    connection = open_connection(f"udpout://{LOCAL}:{port}")
+    connection.send(b"anyone?")
+    assert connection.receive(0.05) == b""
+    connection.close()
+
+
+def test_tcpout_and_tcpin_meet_and_fall_silent_when_the_other_end_goes():
+    # Given a server and a client
+    server = open_connection(f"tcpin://{LOCAL}:0")
+    client = open_connection(f"tcpout://{LOCAL}:{server.local_port}")
+    server.receive(2.0)  # takes the client
+    # When both send
+    client.send(b"from client")
+    server.send(b"from server")
+    # Then both receive
+    assert server.receive(2.0) == b"from client"
+    assert client.receive(2.0) == b"from server"
+    # And when the server goes, the client hears nothing and may still send
+    server.close()
+    assert client.receive(0.1) == b""
+    assert client.receive(0.01) == b""
+    client.send(b"gone?")
+    client.close()
+
+
+def test_serial_port_carries_bytes_both_ways():
+    controller, device = pty.openpty()
+    connection = open_connection(f"serial://{os.ttyname(device)}:115200")
+    os.write(controller, b"\xfd\x00\x11\x13")  # 0x11 and 0x13 would be eaten by software flow control
+    assert connection.receive(2.0) == b"\xfd\x00\x11\x13"
+    connection.send(b"\x0a\xfd")
+    assert os.read(controller, 100) == b"\x0a\xfd"
+    connection.close()
+    os.close(controller)
+    os.close(device)
+
+
+def test_a_packet_that_a_full_pipe_cannot_take_does_not_stall_the_loop():
+    # Given a server whose client never reads
+    server = open_connection(f"tcpin://{LOCAL}:0")
+    client = socket.create_connection((LOCAL, server.local_port))
+    server.receive(2.0)
+    # When much more is sent than the buffers hold
+    done = threading.Event()
+
+    def flood():
+        for _ in range(200):
+            server.send(b"\0" * 65_536)
+        done.set()
+
+    threading.Thread(target=flood, daemon=True).start()
+    # Then sending returns all the same
+    assert done.wait(15)
+    client.close()
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("url", "named"),
+    [
+        ("14540", "14540"),
+        ("mavlink://x:1", "mavlink"),
+        ("udpin://0.0.0.0", "udpin"),
+        ("udpin://0.0.0.0:99999", "99999"),
+        ("udpout://:14580", "remote host"),
+        ("serial:///dev/ttyS0", "baud"),
+        ("serial:///dev/does-not-exist:57600", "/dev/does-not-exist"),
+        ("serial:///dev/null:57600", "/dev/null"),
+        ("udpin://203.0.113.9:14540", "203.0.113.9"),
+    ],
+)
+def test_a_bad_address_is_one_sentence_that_names_the_fault(url, named):
+    with pytest.raises(ConnectionSetupError) as caught:
+        open_connection(url)
+    text = str(caught.value)
+    assert named in text
+    assert "\n" not in text and text.endswith((".", "?"))
+
+
+def test_a_port_in_use_is_said_so(peer):
+    port = peer.getsockname()[1]
+    with pytest.raises(ConnectionSetupError, match=f"{port} is already in use"):
+        open_connection(f"udpin://{LOCAL}:{port}")
+
+
+def test_a_refused_connection_is_said_so(peer):
+    with pytest.raises(ConnectionSetupError, match="refused"):
+        open_connection(f"tcpout://{LOCAL}:{peer.getsockname()[1]}")

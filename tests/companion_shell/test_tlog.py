@@ -1,0 +1,93 @@
+"""The telemetry log against pymavlink's own reader, and after a kill."""
+
+import struct
+
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.shell.clock import Clock, round_down_to_stamp_us
+from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, read_tlog
+
+EPOCH_US = 1_600_000_000_000_000
+
+
+def heartbeats(count):
+    mavlink = dialect.MAVLink(None, 1, 1)
+    packets = []
+    for number in range(count):
+        message = dialect.MAVLink_heartbeat_message(2, 12, 0, number, 3, 3)
+        packets.append(bytes(message.pack(mavlink)))
+    return packets
+
+
+def write(path, packets):
+    writer = TlogWriter(path)
+    for number, packet in enumerate(packets):
+        writer.write(EPOCH_US + 4000 * number, [packet])
+    writer.close()
+
+
+def test_a_log_reads_back_as_it_was_written(tmp_path):
+    packets = heartbeats(5)
+    write(tmp_path / "flight.tlog", packets)
+    expected = [(EPOCH_US + 4000 * number, packet) for number, packet in enumerate(packets)]
+    assert list(read_tlog(tmp_path / "flight.tlog")) == expected
+
+
+def test_pymavlinks_reader_finds_every_packet_and_its_time(tmp_path):
+    # Given a log written by us
+    write(tmp_path / "flight.tlog", heartbeats(5))
+    # When the usual tools' reader opens it
+    log = mavutil.mavlink_connection(str(tmp_path / "flight.tlog"))
+    messages = [log.recv_match(blocking=False) for _ in range(5)]
+    # Then it finds all of them, on link 0, at their times
+    assert [message.custom_mode for message in messages] == [0, 1, 2, 3, 4]
+    assert [round(1e6 * (message._timestamp - EPOCH_US / 1e6)) for message in messages] == [
+        0,
+        4000,
+        8000,
+        12000,
+        16000,
+    ]
+    assert log.recv_match(blocking=False) is None
+
+
+def test_foreign_bytes_and_a_cut_end_lose_no_whole_packet(tmp_path):
+    # Given a log with line noise recorded as it came and a last packet cut short
+    first, second, third = heartbeats(3)
+    path = tmp_path / "flight.tlog"
+    writer = TlogWriter(path)
+    writer.write(EPOCH_US, [first, b"\xfd\x03noise\x00\xfe", second])
+    writer.write(EPOCH_US + 4000, [third])
+    writer.close()
+    path.write_bytes(path.read_bytes()[:-4])
+    # When it is read, then the whole packets are there
+    assert [packet for _, packet in read_tlog(path)] == [first, second]
+
+
+def test_a_killed_writer_leaves_all_but_the_last_moment(tmp_path):
+    # Given a writer that is never closed
+    path = tmp_path / "flight.tlog"
+    writer = TlogWriter(path)
+    packets = heartbeats(1000)
+    for number, packet in enumerate(packets):
+        writer.write(EPOCH_US + 4000 * number, [packet])
+    # When the file is read as a kill would leave it
+    last_us = list(read_tlog(path))[-1][0]
+    # Then at most the flush interval is missing
+    assert EPOCH_US + 4000 * 999 - last_us <= FLUSH_INTERVAL_US
+    writer.close()
+
+
+def test_stamps_are_big_endian_microseconds_on_link_0(tmp_path):
+    write(tmp_path / "flight.tlog", heartbeats(1))
+    stamp = struct.unpack(">Q", (tmp_path / "flight.tlog").read_bytes()[:8])[0]
+    assert stamp == EPOCH_US and stamp % 4 == 0
+
+
+def test_the_clock_gives_stamps_that_never_go_back():
+    clock = Clock()
+    times_us = [clock.now_us() for _ in range(1000)]
+    assert times_us == sorted(times_us)
+    assert all(time_us % 4 == 0 for time_us in times_us)
+    assert round_down_to_stamp_us(1007) == 1004

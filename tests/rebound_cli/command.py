@@ -1,0 +1,81 @@
+"""Runs the command as a person does, in a process of its own."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+WALL = ROOT / "missions" / "wall.yaml"
+SQUARE = ROOT / "missions" / "square.yaml"
+
+# Measure the streams for half a second instead of two: real time is dear in tests.
+QUICK = ("--set", "companion.streams.window_s=0.5")
+# The shortest mission there is: up half a metre and down again.
+HOP = ("--set", "items=[{takeoff: {height_m: 0.6}}, {land: {}}]", *QUICK)
+
+
+def start(*arguments, stdin=subprocess.DEVNULL):
+    command = [sys.executable, "-m", "rebound_cli", *map(str, arguments)]
+    return subprocess.Popen(
+        command,
+        cwd=ROOT,
+        text=True,
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+
+
+def run(*arguments, timeout_s=60):
+    process = start(*arguments)
+    stdout, stderr = process.communicate(timeout=timeout_s)
+    return subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
+
+
+def events_of(folder):
+    path = folder / "events.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def wait_for_event(folder, kind, timeout_s=30.0):
+    """Wait until the flight in `folder` has told of an event of that kind."""
+    end_s = time.monotonic() + timeout_s
+    while time.monotonic() < end_s:
+        if any(event["kind"] == kind for event in events_of(folder)):
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"no event '{kind}' within {timeout_s} s: {events_of(folder)}")
+
+
+def processes_naming(text):
+    """Ids of the running processes whose command line contains `text`."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                command = (entry / "cmdline").read_bytes()
+            except OSError:
+                continue
+            if str(text).encode() in command:
+                found.append(int(entry.name))
+    return found
+
+
+def wait_until_gone(text, timeout_s=5.0):
+    end_s = time.monotonic() + timeout_s
+    while processes_naming(text):
+        assert time.monotonic() < end_s, f"still running: {processes_naming(text)}"
+        time.sleep(0.05)
+
+
+def assert_one_clear_sentence(result, *words):
+    """One line on stderr that names what is wrong, a non-zero exit, no traceback, nothing on stdout."""
+    assert result.returncode not in (0, None)
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("rebound: ")
+    for word in words:
+        assert str(word) in lines[0], lines[0]
+    assert "Traceback" not in result.stderr

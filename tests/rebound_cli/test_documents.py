@@ -1,0 +1,157 @@
+"""Errors in files and in --set: each names the place and the remedy."""
+
+import pytest
+
+from companion.mission.model import Mission
+from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
+from rebound_cli.inputs import mission_from, resolved, world_from
+
+MISSION = """\
+name: demo
+items:
+  - takeoff: {height_m: 1.5}
+  - go_to:
+      position_ned_m: [1, 0, -1.5]
+      speed_m_s: 1.0
+  - land: {}
+sim:
+  walls:
+    - {point_ned_m: [4, 0, 0], normal_ned: [-1, 0, 0]}
+"""
+
+
+def document(old="", new="", sets=()):
+    assert old in MISSION
+    parsed = parse_document(MISSION.replace(old, new) if old else MISSION, "demo.yaml")
+    apply_overrides(parsed, sets)
+    return parsed
+
+
+def complaint(action, *arguments):
+    with pytest.raises(DocumentError) as caught:
+        action(*arguments)
+    return str(caught.value)
+
+
+def test_a_value_out_of_range_names_file_line_and_path():
+    text = complaint(mission_from, document("speed_m_s: 1.0", "speed_m_s: -1"))
+    assert text == "demo.yaml:6: items.1.go_to.speed_m_s: must be greater than 0, not -1."
+
+
+def test_an_unknown_key_suggests_the_close_one_and_lists_all():
+    text = complaint(mission_from, document("speed_m_s", "sped_m_s"))
+    assert "demo.yaml:6: items.1.go_to.sped_m_s: unknown key 'sped_m_s'; did you mean 'speed_m_s'?" in text
+    assert "position_ned_m, speed_m_s, acceleration_m_s2, yaw_deg" in text
+
+
+def test_a_missing_key_is_named_at_the_part_that_lacks_it():
+    text = complaint(mission_from, document("      speed_m_s: 1.0\n"))
+    assert text == "demo.yaml:4: items.1.go_to.speed_m_s: is missing; add it."
+
+
+def test_a_rule_about_the_whole_mission_points_at_the_item():
+    text = complaint(mission_from, document("[1, 0, -1.5]", "[99, 0, -1.5]"))
+    assert text.startswith("demo.yaml:4: ") and "fence.radius_m" in text
+
+
+def test_the_sim_part_is_checked_like_the_rest():
+    text = complaint(world_from, document("normal_ned", "nomal_ned"))
+    assert "demo.yaml:10: sim.walls.0.nomal_ned: unknown key" in text and "did you mean 'normal_ned'?" in text
+
+
+def test_a_wall_through_the_start_position_is_refused():
+    text = complaint(world_from, document("[4, 0, 0]", "[0.1, 0, 0]"))
+    assert text.startswith("demo.yaml:9: ") and "start position" in text and "\n" not in text
+
+
+def test_an_unknown_airframe_lists_the_known_ones():
+    text = complaint(world_from, document(sets=["sim.airframe=rigit"]))
+    assert text.startswith("--set sim.airframe=rigit: ") and "foldable, rigid" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name: [", "demo.yaml:1: not valid YAML"),
+        ("name: a\n\tb: c", "demo.yaml:2: not valid YAML"),
+        ("name: a\nname: b", "demo.yaml:2: 'name' is given twice"),
+        ("- name", "demo.yaml:1: a mapping was expected"),
+        ("", "the file is empty"),
+        ("a: !!python/object:os.system {}", "demo.yaml:1: not valid YAML"),
+        ("a: \x00", "not valid YAML"),
+    ],
+)
+def test_bad_yaml_is_one_sentence(text, said):
+    message = complaint(parse_document, text, "demo.yaml")
+    assert said in message and "\n" not in message
+
+
+def test_a_missing_file_suggests_a_similar_one(tmp_path):
+    (tmp_path / "wall.yaml").write_text("name: wall")
+    text = complaint(load_document, tmp_path / "wal.yaml")
+    assert text == f"{tmp_path}/wal.yaml: no such file; did you mean {tmp_path}/wall.yaml?"
+
+
+def test_a_folder_or_a_binary_file_cannot_be_a_mission(tmp_path):
+    (tmp_path / "picture.yaml").write_bytes(b"\xff\xfe\x00\x80")
+    assert "cannot be read" in complaint(load_document, tmp_path)
+    assert "not UTF-8" in complaint(load_document, tmp_path / "picture.yaml")
+
+
+def test_set_changes_any_value_and_makes_missing_parts():
+    changed = document(
+        sets=[
+            "items.1.go_to.speed_m_s=2.5",
+            "sim.wind_ned_m_s=[0, 1, 0]",
+            "companion.lateral.threshold_m_s2=6",
+        ]
+    )
+    mission, world = mission_from(changed), world_from(changed)
+    assert mission.items[1].go_to.speed_m_s == 2.5
+    assert mission.companion.lateral.threshold_m_s2 == 6
+    assert world.scene.wind_ned_m_s == (0, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("items.1.go_to.sped_m_s=2", "did you mean 'speed_m_s'?"),
+        ("item.1=2", "did you mean 'items'?"),
+        ("items.9.go_to.speed_m_s=2", "'items' is a list of 3, counted from 0; it has no '9'"),
+        ("items.first=2", "it has no 'first'"),
+        ("name.x=2", "'name' is a single value"),
+        ("items.1.go_to.speed_m_s", "give PATH=VALUE"),
+        ("companion.detectr=lateral", "did you mean 'detector'?"),
+        ("companion.detector=psychic", "there is no detector 'psychic'"),
+        ("items.1.go_to.speed_m_s=fast", "must be a valid number, not 'fast'"),
+    ],
+)
+def test_a_wrong_set_names_itself_and_the_remedy(given, said):
+    text = complaint(lambda: mission_from(document(sets=[given])))
+    assert text.startswith(f"--set {given}: ") and said in text
+
+
+def test_the_resolved_mission_is_a_mission_that_means_the_same():
+    given = document(sets=["sim.seed=7"])
+    mission, world = mission_from(given), world_from(given)
+    written = resolved(mission, world)
+    again = Mission.model_validate(written)
+    assert [item.action for item in again.items] == [item.action for item in mission.items]
+    assert again.companion == mission.companion
+    assert written["sim"]["seed"] == 7 and written["sim"]["airframe"] == "foldable"
+
+
+def test_many_faults_are_shown_first_ones_first():
+    parsed = parse_document(MISSION + "".join(f"extra{number}: 1\n" for number in range(8)), "demo.yaml")
+    lines = complaint(validated, Mission, parsed, parsed.data).splitlines()
+    assert len(lines) == 6 and lines[-1] == "... and 3 more."
+
+
+def test_an_airframe_file_is_laid_over_its_base(tmp_path):
+    own = tmp_path / "heavy.yaml"
+    own.write_text("based_on: foldable\nname: heavy\nmass_kg: 1.2\n")
+    world = world_from(document(sets=[f"sim.airframe={own}"]))
+    assert (world.airframe.name, world.airframe.mass_kg) == ("heavy", 1.2)
+    own.write_text("based_on: foldable\nname: heavy\nmas_kg: 1.2\n")
+    text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
+    assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text

@@ -1,0 +1,123 @@
+"""Whole flights on virtual time, as a person starts them."""
+
+import json
+
+import pytest
+from pymavlink import mavutil
+
+from companion.companion import Companion
+from rebound_cli.documents import load_document
+from rebound_cli.flight_log import read_flight_log
+from rebound_cli.inputs import mission_from, world_from
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import run_lockstep, virtual_time_limit_s
+from rebound_cli.run_folder import FlightRecorder
+from sim_vehicle.vehicle import SimulatedVehicle
+from tests.rebound_cli.command import SQUARE, WALL, events_of, run
+
+FILES = {
+    "airframe.yaml",
+    "events.jsonl",
+    "flight.png",
+    "flight.tlog",
+    "mission.yaml",
+    "resolved.yaml",
+    "summary.json",
+    "truth.npz",
+    "versions.json",
+}
+
+
+@pytest.fixture(scope="module")
+def wall_flight(tmp_path_factory):
+    """The wall mission, flown once: its folder and what the command printed."""
+    folder = tmp_path_factory.mktemp("flights") / "wall"
+    return folder, run("fly", WALL, "--lockstep", "--json", "--out", folder)
+
+
+def test_one_command_flies_into_the_wall_recovers_and_lands(wall_flight):
+    folder, result = wall_flight
+    assert result.returncode == 0, result.stderr
+    assert {path.name for path in folder.iterdir()} == FILES
+    summary = json.loads(result.stdout)
+    assert summary == json.loads((folder / "summary.json").read_text())
+    assert (summary["outcome"], summary["mission"], summary["airframe"]) == ("completed", "wall", "foldable")
+    assert (summary["false_detections"], summary["missed_contacts"], summary["recontacts"]) == (0, 0, 0)
+    (hit,) = summary["collisions"]
+    assert hit["impact_speed_m_s"] == pytest.approx(2.0, abs=0.15)
+    assert hit["truth"]["normal_ned"] == [-1.0, 0.0, 0.0]
+    assert hit["normal_ned"][0] < -0.95
+    assert 0.0 < hit["truth"]["detection_latency_ms"] < 9.0
+    assert hit["settled_after_s"] is not None
+    kinds = [event["kind"] for event in events_of(folder)]
+    order = [
+        kinds.index(kind) for kind in ("connected", "takeoff", "item", "detection", "recovered", "landing", "done")
+    ]
+    assert order == sorted(order)
+
+
+def test_the_companion_sees_the_hit_and_the_setpoint_goes_back_from_it(wall_flight):
+    folder, result = wall_flight
+    (hit,) = json.loads(result.stdout)["collisions"]
+    log = read_flight_log(folder / "flight.tlog")
+    # Given the setpoints sent before and after the detection
+    start_us = log.position_at_us[0] - 1e6 * json.loads(result.stdout)["duration_s"]
+    assert start_us < log.setpoint_at_us[0]
+    target = hit["recovery_setpoint_ned_m"]
+    at_target = abs(log.setpoint_ned_m - target).max(axis=1) < 0.002
+    # Then the recovery setpoint was sent for some seconds, half a second times 2 m/s in front of the hit
+    assert at_target.sum() > 50
+    assert log.position_ned_m[:, 0].max() - target[0] == pytest.approx(0.5 * 2.0, abs=0.2)
+
+
+def test_the_usual_tools_read_the_log(wall_flight):
+    folder, _ = wall_flight
+    log = mavutil.mavlink_connection(str(folder / "flight.tlog"), dialect="development")
+    senders, kinds, last_s = set(), set(), 0.0
+    while (message := log.recv_match(blocking=False)) is not None:
+        senders.add((message.get_srcSystem(), message.get_srcComponent()))
+        kinds.add(message.get_type())
+        assert message._timestamp >= last_s
+        last_s = message._timestamp
+    assert senders == {(1, 1), (1, 191)}
+    assert "BAD_DATA" not in kinds
+    assert {"HIGHRES_IMU", "COMMAND_ACK", "COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"} <= kinds
+
+
+def test_a_run_folder_can_be_flown_again_to_the_byte(wall_flight, tmp_path):
+    folder, _ = wall_flight
+    # When the resolved mission of a flight is flown
+    again = run("fly", folder / "resolved.yaml", "--lockstep", "--json", "--out", tmp_path / "again")
+    # Then every byte is the same
+    assert again.returncode == 0
+    assert (tmp_path / "again" / "flight.tlog").read_bytes() == (folder / "flight.tlog").read_bytes()
+    # And with another seed it is not
+    other = run("fly", WALL, "--lockstep", "--json", "--seed", "2", "--out", tmp_path / "other")
+    assert other.returncode == 0
+    assert (tmp_path / "other" / "flight.tlog").read_bytes() != (folder / "flight.tlog").read_bytes()
+
+
+def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
+    result = run("fly", WALL, "--lockstep", "--airframe", "rigid", "--out", tmp_path / "run")
+    assert result.stderr == ""
+    assert "detection" in result.stdout and "hit 1: detected at" in result.stdout
+    assert "rigid airframe, seed 1" in result.stdout and str(tmp_path / "run") in result.stdout
+    assert max(map(len, result.stdout.splitlines())) <= 110
+
+
+def test_a_flight_that_hangs_is_ended(tmp_path):
+    # Given a flight and less virtual time than it needs
+    document = load_document(SQUARE)
+    mission, world = mission_from(document), world_from(document)
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
+    recorder = FlightRecorder(tmp_path)
+    # When it runs, then it is given up
+    assert not run_lockstep(Companion(mission), vehicle, recorder, Interrupts(), 3.0, lambda _: None)
+    recorder.close()
+    assert 3e6 < vehicle.time_boot_us < 5e6
+
+
+def test_the_limit_of_virtual_time_leaves_room():
+    mission = mission_from(load_document(SQUARE))
+    # the square takes about 35 s
+    assert 100 < virtual_time_limit_s(mission) < 300

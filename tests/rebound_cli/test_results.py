@@ -1,0 +1,49 @@
+"""The table of results: what one flight adds to it, and what it says of many."""
+
+from rebound_cli.results import Case, CaseFigures, HitFigures, fly_case, results_text
+
+
+def test_one_flight_gives_the_figures_of_its_hit():
+    figures = fly_case(Case("foldable", 1.5, 3))
+    assert figures.is_completed
+    assert (figures.contacts, figures.false_detections, figures.recontacts) == (1, 0, 0)
+    (hit,) = figures.hits
+    assert hit.is_first_possible_sample
+    assert 0.0 < hit.latency_ms < 9.0
+    assert abs(hit.speed_error) < 0.15
+    assert figures.realtime_factor > 3.0
+
+
+def hit(**changes):
+    values = {
+        "is_first_possible_sample": True,
+        "latency_ms": 2.0,
+        "speed_error": 0.03,
+        "rebound_speed_m_s": 0.3,
+        "overshoot_m": 0.01,
+        "peak_force_n": 100.0,
+    }
+    return HitFigures(**(values | changes))
+
+
+def case(seed, *hits, **changes):
+    values = {"is_completed": True, "contacts": 1, "false_detections": 0, "recontacts": 0, "realtime_factor": 50.0}
+    return CaseFigures(case=Case("foldable", 2.0, seed), hits=hits, **(values | changes))
+
+
+def test_a_row_counts_all_flights_and_takes_the_worst_where_the_worst_matters():
+    # Given two flights, one with a late detection and one with a missed contact
+    late = hit(is_first_possible_sample=False, latency_ms=6.0, speed_error=-0.04, overshoot_m=0.03)
+    figures = [case(1, hit(), late, contacts=2, recontacts=1), case(2, is_completed=False)]
+    # When the table is written
+    text = results_text(figures, seeds=2)
+    row = next(line for line in text.splitlines() if line.startswith("| 2 |"))
+    # Then nothing is left out
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells == ["2", "1 of 2", "3", "2", "1", "4.0 / 6.0", "0", "1", "3.5", "0.30", "0.030", "100", "50"]
+    assert "--seeds 2" in text
+
+
+def test_flights_without_hits_leave_empty_cells():
+    row = next(line for line in results_text([], seeds=20).splitlines() if line.startswith("| 1 |"))
+    assert [cell.strip() for cell in row.strip("|").split("|")][:3] == ["1", "0 of 0", "0"]

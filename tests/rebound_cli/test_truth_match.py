@@ -1,0 +1,152 @@
+"""Detections beside contacts, by the definitions of docs/summary.md."""
+
+import numpy as np
+import pytest
+
+from companion.report import CollisionReport, FlightReport
+from rebound_cli.summary import FlightFacts, Flown, build_summary
+from rebound_cli.truth_match import FlightTruth, match_contacts
+from sim_vehicle.truth import Hit
+
+EPOCH_US = 1_600_000_000_000_000
+SETTLED_S = 0.5
+
+
+def hit(start_ms, end_ms=None):
+    return Hit(
+        obstacle="wall",
+        contact_at_boot_us=1e3 * start_ms,
+        ended_at_boot_us=1e3 * (end_ms if end_ms is not None else start_ms + 30),
+        contact_position_ned_m=(3.8, 0.0, -1.5),
+        impact_velocity_ned_m_s=(2.0, 0.0, 0.0),
+        normal_ned=(-1.0, 0.0, 0.0),
+        max_fold_m=0.02,
+        peak_force_n=60.0,
+        rebound_velocity_ned_m_s=(-0.3, 0.0, 0.1),
+    )
+
+
+def collision(sample_ms, settled_after_s=2.0, latency_us=500):
+    return CollisionReport(
+        detected_at_us=EPOCH_US + 1000 * sample_ms + latency_us,
+        sample_time_boot_us=1000 * sample_ms,
+        detector="lateral",
+        position_ned_m=(3.8, 0.0, -1.5),
+        impact_velocity_ned_m_s=(1.95, 0.0, 0.0),
+        impact_speed_m_s=1.95,
+        normal_ned=(-1.0, 0.0, 0.0),
+        peak_specific_force_m_s2=55.0,
+        recovery_setpoint_ned_m=(2.8, 0.0, -1.5),
+        settled_after_s=settled_after_s,
+        overshoot_m=0.0,
+        rebound_speed_m_s=0.3,
+    )
+
+
+def counts(collisions, hits):
+    matches = match_contacts(collisions, hits, SETTLED_S)
+    return matches.false_detections, matches.missed_contacts, matches.recontacts
+
+
+@pytest.mark.parametrize(
+    ("collisions", "hits", "expected"),
+    [
+        pytest.param([collision(10_004)], [hit(10_000)], (0, 0, 0), id="seen"),
+        pytest.param([collision(9_996)], [hit(10_000)], (1, 1, 0), id="a sample that ends before contact is false"),
+        pytest.param([collision(10_048)], [hit(10_000, 10_030)], (0, 0, 0), id="a sample just after may cover it"),
+        pytest.param([collision(10_060)], [hit(10_000, 10_030)], (1, 1, 0), id="a sample long after is false"),
+        pytest.param([collision(10_004), collision(10_020)], [hit(10_000)], (1, 0, 0), id="one contact, one detection"),
+        pytest.param([], [hit(10_000)], (0, 1, 0), id="missed"),
+        pytest.param([], [hit(10_000), hit(10_500)], (0, 2, 1), id="after a missed contact the next is a recontact"),
+        pytest.param(
+            [collision(10_004, None), collision(10_504)],
+            [hit(10_000), hit(10_500)],
+            (0, 0, 1),
+            id="before recovery",
+        ),
+        pytest.param(
+            [collision(10_004, 2.0), collision(12_404)],
+            [hit(10_000), hit(12_400)],
+            (0, 0, 1),
+            id="not yet called",
+        ),
+        pytest.param(
+            [collision(10_004, 2.0), collision(12_604)],
+            [hit(10_000), hit(12_600)],
+            (0, 0, 0),
+            id="after recovery",
+        ),
+    ],
+)
+def test_what_counts(collisions, hits, expected):
+    assert counts(collisions, hits) == expected
+
+
+def report_of(*collisions):
+    return FlightReport(
+        outcome="completed",
+        reason="landed",
+        autopilot="PX4 1.15.0",
+        stream_rates_hz={"HIGHRES_IMU": 249.987},
+        collisions=collisions,
+        origin_ned_m=(0.0, 0.0, 0.0),
+        started_at_us=EPOCH_US + 1_000_000,
+        ended_at_us=EPOCH_US + 26_000_000,
+        armed_at_us=EPOCH_US + 5_000_000,
+    )
+
+
+def path_of(rows):
+    times_s, north_m, down_m = np.array(rows, dtype=float).T
+    position = np.column_stack([north_m, np.zeros(len(rows)), down_m])
+    return {"time_boot_us": 1e6 * times_s, "position_ned_m": position}
+
+
+FACTS = FlightFacts("wall", "foldable", 3, SETTLED_S)
+
+
+def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
+    # Given a flight whose path passes the setpoint at 2.8 m north by 4 cm and sinks by 3 cm before it is recovered
+    path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5), (12.6, 2.0, -1.0)])
+    truth = FlightTruth([hit(10_000)], path, EPOCH_US)
+    # When it is summed up
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then what came after the recovery does not count, and times are seconds since the start
+    entry = summary["collisions"][0]
+    assert entry["truth"]["overshoot_m"] == pytest.approx(0.04)
+    assert entry["truth"]["height_lost_m"] == pytest.approx(0.03)
+    assert entry["truth"]["contact_at_s"] == pytest.approx(9.0)
+    assert entry["truth"]["detection_latency_ms"] == pytest.approx(4.5)
+    assert entry["truth"]["rebound_speed_m_s"] == pytest.approx(0.3)
+    assert entry["detected_at_s"] == pytest.approx(9.0045)
+    assert (summary["duration_s"], summary["realtime_factor"]) == (25.0, 50.0)
+
+
+def test_the_summary_has_exactly_the_documented_keys():
+    truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    assert " ".join(summary) == (
+        "schema mission outcome reason autopilot seed airframe duration_s wall_clock_s realtime_factor "
+        "stream_rates_hz false_detections missed_contacts recontacts collisions"
+    )
+    assert " ".join(summary["collisions"][0]) == (
+        "detected_at_s detector impact_velocity_ned_m_s impact_speed_m_s normal_ned peak_specific_force_m_s2 "
+        "recovery_setpoint_ned_m settled_after_s overshoot_m rebound_speed_m_s truth"
+    )
+    assert " ".join(summary["collisions"][0]["truth"]) == (
+        "contact_at_s detection_latency_ms impact_velocity_ned_m_s normal_ned contact_duration_s max_fold_m "
+        "rebound_speed_m_s peak_force_n overshoot_m height_lost_m"
+    )
+
+
+def test_a_real_vehicle_has_no_truth():
+    summary = build_summary(Flown(report_of(collision(10_004)), 25.0, None), FlightFacts("wall", None, None, 0.5))
+    unknown = ("false_detections", "missed_contacts", "recontacts", "seed", "airframe")
+    assert [summary[key] for key in unknown] == [None] * 5
+    assert summary["collisions"][0]["truth"] is None
+
+
+def test_a_flight_with_truth_and_no_contact_counts_zero_not_null():
+    truth = FlightTruth([], path_of([(10.0, 0.0, 0.0)]), EPOCH_US)
+    summary = build_summary(Flown(report_of(), 0.5, truth), FACTS)
+    assert [summary[key] for key in ("false_detections", "missed_contacts", "recontacts")] == [0, 0, 0]
