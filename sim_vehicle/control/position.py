@@ -7,11 +7,15 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Asked, Gains, State
-from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 
 Floats = npt.NDArray[np.float64]
 
 POSITION_LOOP_HZ = 100
+# An off-centre hit spins the vehicle by more than a right angle. Past that e_R of eq. 4 no longer tells tilt
+# from heading, and the vehicle flies off; so R_d asks for at most this much turn at a time.
+YAW_STEP_MAX_RAD = 0.5
+
 # Rows of `Asked`.
 ASK_POSITION, ASK_VELOCITY, ASK_ACCELERATION = range(3)
 
@@ -86,7 +90,10 @@ def _thrust_and_attitude(state: State, mass_kg: float, acceleration: Floats) -> 
     along = b3[0] * rotation[0, 2] + b3[1] * rotation[1, 2] + b3[2] * rotation[2, 2]
     state.collective_n = max(0.0, mass_kg * along)
     b3 /= math.sqrt(b3[0] * b3[0] + b3[1] * b3[1] + b3[2] * b3[2])
-    yaw = state.yaw_setpoint_rad
+    yaw_now = yaw_of(state.estimate)
+    error = state.yaw_setpoint_rad - yaw_now
+    error -= 2 * math.pi * math.floor((error + math.pi) / (2 * math.pi))
+    yaw = yaw_now + min(max(error, -YAW_STEP_MAX_RAD), YAW_STEP_MAX_RAD)
     nose = np.array([math.cos(yaw), math.sin(yaw), 0.0])
     b2 = np.cross(b3, nose)
     b2 /= math.sqrt(b2[0] * b2[0] + b2[1] * b2[1] + b2[2] * b2[2])

@@ -49,8 +49,8 @@ def advance_interval(
 ) -> None:
     """Advance ``state`` by one integration interval, renew the vehicle's estimate, fill ``report``.
 
-    ``motors``: off, idling, flying the setpoint, or driven: as `State.motor_command_n` says. ``noise`` is standard normal: six values a raw
-    sample, then nine for the estimate.
+    ``motors``: off, idling, flying the setpoint, or driven (as `State.motor_command_n` says). ``noise`` is
+    standard normal: six values a raw sample, then nine for the estimate.
     ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
     the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory.
     """

@@ -81,7 +81,8 @@ def test_driven_motors_do_as_they_are_told() -> None:
     for _ in range(250):
         output = plant.drive((share, share, share, share))
     assert output.specific_force_frd_m_s2[2] == pytest.approx(-1.1 * 9.81, rel=1e-3)
-    assert plant.state.body[5] == pytest.approx(-0.981, rel=0.15)
+    # The motors reach their thrust with a lag of 20 ms, which costs that much of the first free fall.
+    assert plant.state.body[5] == pytest.approx(-0.981 + 1.1 * 9.81 * 0.02, rel=0.02)
 
 
 def test_raw_samples_are_clipped_before_the_mean() -> None:

@@ -1,0 +1,123 @@
+"""The companion as a step function: bytes and the time in, bytes and events out."""
+
+import math
+from dataclasses import dataclass
+
+from companion.core import Core, advance, next_deadline_us, start
+from companion.flight.plan import plan_text
+from companion.flight.states import State
+from companion.mavlink.decode import Decoder
+from companion.mavlink.encode import Encoder
+from companion.mission.model import Mission
+from companion.px4_mode import mode_name
+from companion.report import Event, FlightReport, Status
+
+
+@dataclass(frozen=True, slots=True)
+class StepResult:
+    """`received_frames` holds the packets found in what was received, in order; bad bytes as they came.
+
+    A packet that is not complete yet appears in the step that completes it.
+    """
+
+    received_frames: tuple[bytes, ...]
+    sent_frames: tuple[bytes, ...]
+    events: tuple[Event, ...]
+
+
+class Companion:
+    """Joins the codec with the pure core; holds no clock and no socket. Times are microseconds, any epoch."""
+
+    def __init__(self, mission: Mission) -> None:
+        self._mission = mission
+        self._decoder = Decoder()
+        self._encoder = Encoder()
+        self._addressed = False
+        self._core: Core | None = None
+        self._stop_reason: str | None = None
+        self._confirmed = False
+
+    def step(self, received: bytes, now_us: int) -> StepResult:
+        """Call with the bytes received since the last call, or b"" when only time has passed."""
+        core = self._core or self._begin(now_us)
+        frames = self._decoder.feed(received) if received else []
+        samples = [sample for _, sample in frames if sample is not None]
+        outputs = advance(core, samples, now_us)
+        self._address(core)
+        sent = tuple([self._encoder.encode(message) for message in outputs.messages])
+        return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
+
+    def _begin(self, now_us: int) -> Core:
+        self._core = core = start(self._mission, now_us)
+        core.flight.plan_confirmed = self._confirmed
+        core.stop_reason = self._stop_reason
+        return core
+
+    def _address(self, core: Core) -> None:
+        """Once the vehicle is known, listen to it alone and speak to it by name."""
+        identity = core.flight.vehicle.identity
+        if identity is not None and not self._addressed:
+            self._addressed = True
+            self._decoder.listen_to(identity.system_id, identity.component_id)
+            self._encoder.speak_to(identity.system_id, identity.component_id)
+
+    def next_deadline_us(self) -> int:
+        """When `step(b"", now)` is due if nothing arrives before; in the past when it is due at once."""
+        return 0 if self._core is None else next_deadline_us(self._core)
+
+    def confirm_plan(self) -> None:
+        """The person agrees to the plan; may be said beforehand."""
+        self._confirmed = True
+        if self._core is not None:
+            self._core.flight.plan_confirmed = True
+
+    def plan_is_ready(self) -> bool:
+        """Connected, checked, waiting for nothing but the confirmation."""
+        return self._core is not None and self._core.machine.state is State.READY
+
+    def plan_text(self) -> str:
+        """The plan for a person to agree to; complete once `plan_is_ready`."""
+        return "" if self._core is None else plan_text(self._core.flight)
+
+    def stop(self, reason: str) -> None:
+        """End the flight: hand the vehicle to hold or land, as the mission says; done when `finished`."""
+        self._stop_reason = reason
+        if self._core is not None:
+            self._core.stop_reason = reason
+
+    @property
+    def finished(self) -> bool:
+        """Done or aborted, and nothing left to send."""
+        return self._core is not None and self._core.machine.finished
+
+    def status(self) -> Status:
+        """For the live line."""
+        if self._core is None:
+            return Status(State.CONNECT.value, "", False, None, None, "off (connect)")
+        vehicle = self._core.flight.vehicle
+        latest = vehicle.history.latest()
+        return Status(
+            state=self._core.machine.state.value,
+            vehicle_mode="" if vehicle.custom_mode is None else mode_name(vehicle.custom_mode),
+            armed=vehicle.armed is True,
+            position_ned_m=None if latest is None else latest.position_ned_m,
+            speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
+            detector="blind (no HIGHRES_IMU)" if self._core.imu_silent else self._core.detection.describe(),
+        )
+
+    def report(self) -> FlightReport:
+        """The flight so far, or the whole of it once `finished`."""
+        if self._core is None:
+            return FlightReport("failed", "not started", "", {}, (), None, 0, 0, None)
+        core, flight = self._core, self._core.flight
+        return FlightReport(
+            outcome=flight.outcome or "aborted",
+            reason=flight.reason or f"still in state {core.machine.state.value}",
+            autopilot=flight.vehicle.autopilot_text(),
+            stream_rates_hz=flight.streams.rates_hz(),
+            collisions=tuple(record.report() for record in flight.collisions),
+            origin_ned_m=flight.origin_ned_m,
+            started_at_us=core.started_at_us,
+            ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,
+            armed_at_us=flight.armed_at_us,
+        )

@@ -1,0 +1,1 @@
+"""Collision detectors, one file each, behind one interface and selected by name."""

@@ -1,0 +1,16 @@
+"""Detectors by name."""
+
+from collections.abc import Callable, Container
+from typing import Any
+
+from companion.detection.interface import Detector
+from companion.detection.lateral import LateralConfig, LateralDetector
+
+# name -> maker from the detector's own settings and the IMU's averaging interval
+DETECTORS: dict[str, Callable[[LateralConfig, int], Detector[Any]]] = {LateralDetector.name: LateralDetector}
+
+
+def check_known_detector(name: str, known: Container[str]) -> None:
+    """Raise ValueError, naming the choices, for a detector that does not exist."""
+    if name not in known:
+        raise ValueError(f"there is no detector '{name}'; the detectors are: {', '.join(sorted(DETECTORS))}")

@@ -1,0 +1,1 @@
+"""Estimates made from telemetry, in the vehicle's boot clock: motion history, collision velocity, settling."""

@@ -1,0 +1,24 @@
+"""Attitude arithmetic on plain floats; quaternions (w, x, y, z) turn body FRD into NED."""
+
+import math
+
+from companion.messages import Quaternion, Vector3
+
+
+def body_to_ned(attitude_wxyz: Quaternion, vector_frd: Vector3) -> Vector3:
+    """R(q) v."""
+    w, x, y, z = attitude_wxyz
+    a, b, c = vector_frd
+    # t = 2 q_v x v;  v' = v + w t + q_v x t
+    t_x, t_y, t_z = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return (
+        a + w * t_x + y * t_z - z * t_y,
+        b + w * t_y + z * t_x - x * t_z,
+        c + w * t_z + x * t_y - y * t_x,
+    )
+
+
+def yaw_rad(attitude_wxyz: Quaternion) -> float:
+    """Heading of the nose, clockwise from north, in (-pi, pi]."""
+    w, x, y, z = attitude_wxyz
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -1,0 +1,1 @@
+"""The flight itself: states, mission progress, commands, authority, and the setpoint stream."""

@@ -1,0 +1,104 @@
+"""One collision's record: what was known at the hit, and what telemetry has shown since."""
+
+import math
+from dataclasses import dataclass, field
+
+from companion.detection.interface import DetectorState, Phase
+from companion.estimate.rotation import body_to_ned
+from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.recovery.interface import Contact
+from companion.report import CollisionReport
+
+# The estimate lags a few tens of milliseconds behind the end of the contact; later than this the speed back is
+# the vehicle's own controller's doing.
+REBOUND_WINDOW_US = 100_000
+# No contact that ends in a rebound lasts longer.
+REBOUND_KEPT_US = 1_000_000
+# Below this there is no direction in a velocity or a way that noise could not have made.
+LEAST_SPEED_M_S = 0.05
+LEAST_WAY_M = 0.01
+
+# In these phases a detector's state still describes the contact it fired on.
+IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
+
+
+def horizontal_unit(vector: Vector3) -> Vector3:
+    """Direction in the horizontal plane; zero when there is none."""
+    length = math.hypot(vector[0], vector[1])
+    return (vector[0] / length, vector[1] / length, 0.0) if length > 0.0 else (0.0, 0.0, 0.0)
+
+
+@dataclass(slots=True)
+class CollisionRecord:
+    """Positions and velocities in local NED; boot times in the vehicle's clock."""
+
+    detected_at_us: int
+    sample_time_boot_us: int
+    detector: str
+    contact: Contact
+    setpoint_ned_m: Vector3
+    attitude_wxyz: Quaternion
+    normal_ned: Vector3
+    peak_specific_force_m_s2: float
+    contact_ended_boot_us: int
+    settled_at_boot_us: int | None = None
+    overshoot_m: float = 0.0
+    _speeds_away: list[tuple[int, float]] = field(default_factory=list)
+
+    def follow_contact(self, state: DetectorState) -> None:
+        """While the contact lasts: its largest force, the direction of its impulse, its end."""
+        if state.phase not in IN_OR_AFTER_CONTACT or state.last_loud_boot_us <= self.contact_ended_boot_us:
+            return
+        self.contact_ended_boot_us = state.last_loud_boot_us
+        self.peak_specific_force_m_s2 = state.peak_specific_force_m_s2
+        self.normal_ned = horizontal_unit(body_to_ned(self.attitude_wxyz, state.force_sum_frd_m_s2))
+
+    def follow_recovery(self, sample: LocalPosition) -> None:
+        """While the vehicle recovers: how far past the setpoint, how fast back."""
+        if sample.time_boot_us <= self.sample_time_boot_us:
+            return
+        away = self._direction_away()
+        past_m = sum(a * (p - s) for a, p, s in zip(away, sample.position_ned_m, self.setpoint_ned_m, strict=True))
+        self.overshoot_m = max(self.overshoot_m, past_m)
+        if sample.time_boot_us <= self.sample_time_boot_us + REBOUND_KEPT_US:
+            back = self._direction_back()
+            speed_m_s = sum(b * v for b, v in zip(back, sample.velocity_ned_m_s, strict=True))
+            self._speeds_away.append((sample.time_boot_us, speed_m_s))
+
+    def _direction_away(self) -> Vector3:
+        """From the contact towards the setpoint; along the normal when the two coincide."""
+        x, s = self.contact.position_ned_m, self.setpoint_ned_m
+        way = (s[0] - x[0], s[1] - x[1], 0.0)
+        return horizontal_unit(way) if math.hypot(*way) >= LEAST_WAY_M else self.normal_ned
+
+    def _direction_back(self) -> Vector3:
+        """Against the approach; along the normal for a vehicle hit while it hovered."""
+        v = self.contact.velocity_ned_m_s
+        return horizontal_unit((-v[0], -v[1], 0.0)) if math.hypot(v[0], v[1]) >= LEAST_SPEED_M_S else self.normal_ned
+
+    def rebound_speed_m_s(self) -> float:
+        """Largest speed back in the tenth of a second after the contact's last loud sample."""
+        start, end = self.contact_ended_boot_us, self.contact_ended_boot_us + REBOUND_WINDOW_US
+        return max([0.0] + [speed for time_us, speed in self._speeds_away if start < time_us <= end])
+
+    def settled_after_s(self) -> float | None:
+        if self.settled_at_boot_us is None:
+            return None
+        return max(0.0, (self.settled_at_boot_us - self.sample_time_boot_us) * 1e-6)
+
+    def report(self) -> CollisionReport:
+        velocity = self.contact.velocity_ned_m_s
+        return CollisionReport(
+            detected_at_us=self.detected_at_us,
+            sample_time_boot_us=self.sample_time_boot_us,
+            detector=self.detector,
+            position_ned_m=self.contact.position_ned_m,
+            impact_velocity_ned_m_s=velocity,
+            impact_speed_m_s=math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2),
+            normal_ned=self.normal_ned,
+            peak_specific_force_m_s2=self.peak_specific_force_m_s2,
+            recovery_setpoint_ned_m=self.setpoint_ned_m,
+            settled_after_s=self.settled_after_s(),
+            overshoot_m=self.overshoot_m,
+            rebound_speed_m_s=self.rebound_speed_m_s(),
+        )

@@ -1,0 +1,142 @@
+"""Commands to the vehicle: one at a time, repeated until answered, given up in the end."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from companion.messages import (
+    CommandAck,
+    CommandResult,
+    RequestMessage,
+    SendCommand,
+    SetArmed,
+    SetMessageInterval,
+    SetMode,
+    VehicleCommand,
+)
+from companion.px4_mode import mode_name
+
+# PX4 answers in 2 to 10 ms on UDP; a telemetry radio's round trip stays below half a second.
+ACK_TIMEOUT_US = 500_000
+# After ACCEPTED: two of PX4's one-second HEARTBEATs may be needed to see the effect, one of them lost.
+CONFIRMATION_TIMEOUT_US = 2_500_000
+# A temporary refusal (a check still failing) is worth asking about once a second, PX4's own rhythm of checks.
+REFUSAL_PAUSE_US = 1_000_000
+# Five lost or refused in a row are no accident.
+ATTEMPTS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """A command on its way: sent `attempts` times, to be sent again at `repeat_at_us`."""
+
+    command: VehicleCommand
+    attempts: int
+    repeat_at_us: int
+    last_result: CommandResult | None
+
+
+@dataclass(frozen=True, slots=True)
+class CommandOutcome:
+    """How it ended; `text` names the command and, when it failed, the vehicle's last answer."""
+
+    command: VehicleCommand
+    succeeded: bool
+    text: str
+
+
+def describe(command: VehicleCommand) -> str:
+    match command:
+        case SetMode(custom_mode):
+            return f"mode {mode_name(custom_mode)}"
+        case SetArmed(armed):
+            return "arm" if armed else "disarm"
+        case SetMessageInterval(message_id, interval_us):
+            return f"message {message_id} every {interval_us / 1000:g} ms"
+        case RequestMessage(message_id):
+            return f"message {message_id}"
+
+
+def needs_confirmation(command: VehicleCommand) -> bool:
+    """PX4 may accept a mode and reject it in a second answer: modes and arming count when they are seen.
+
+    Disarming does not: before the next HEARTBEAT a vehicle that has just armed still looks disarmed.
+    """
+    return isinstance(command, SetMode) or (isinstance(command, SetArmed) and command.armed)
+
+
+def is_final(command: VehicleCommand, result: CommandResult) -> bool:
+    """Whether asking again is useless; a disarm is refused because the vehicle flies, which will not pass soon."""
+    if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
+        return True
+    return result is CommandResult.TEMPORARILY_REJECTED and command == SetArmed(False)
+
+
+class Commander:
+    """Holds at most one command. `begin`, then `step` with what has arrived until it returns an outcome."""
+
+    def __init__(self) -> None:
+        self._pending: Pending | None = None
+
+    @property
+    def busy(self) -> bool:
+        return self._pending is not None
+
+    @property
+    def requested_mode(self) -> int | None:
+        """The mode asked for and not yet confirmed."""
+        if self._pending is not None and isinstance(self._pending.command, SetMode):
+            return self._pending.command.custom_mode
+        return None
+
+    def begin(self, command: VehicleCommand) -> None:
+        """Take up a command, dropping any other; it goes out in the next `step`."""
+        self._pending = Pending(command, 0, 0, None)
+
+    def cancel(self) -> None:
+        self._pending = None
+
+    def step(
+        self, acks: Sequence[CommandAck], seen: bool, now_us: int
+    ) -> tuple[SendCommand | None, CommandOutcome | None]:
+        """`seen`: the command's effect shows in the vehicle's own messages."""
+        pending = self._pending
+        if pending is None:
+            return None, None
+        if needs_confirmation(pending.command) and seen:
+            return self._end(True, "confirmed")
+        for ack in acks:
+            if ack.command == pending.command.command_id and pending.attempts > 0:
+                pending = self._pending = _answered(pending, ack.result, now_us)
+                if ack.result is CommandResult.ACCEPTED and not needs_confirmation(pending.command):
+                    return self._end(True, "accepted")
+                if is_final(pending.command, ack.result):
+                    return self._end(False, f"the vehicle answered {ack.result.name}")
+        if now_us < pending.repeat_at_us:
+            return None, None
+        if pending.attempts >= ATTEMPTS:
+            return self._end(False, _why_given_up(pending))
+        self._pending = replace(pending, attempts=pending.attempts + 1, repeat_at_us=now_us + ACK_TIMEOUT_US)
+        return SendCommand(pending.command, pending.attempts), None
+
+    def _end(self, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
+        assert self._pending is not None
+        command = self._pending.command
+        self._pending = None
+        return None, CommandOutcome(command, succeeded, f"{describe(command)}: {text}")
+
+
+def _answered(pending: Pending, result: CommandResult, now_us: int) -> Pending:
+    waits_us = {
+        CommandResult.ACCEPTED: CONFIRMATION_TIMEOUT_US,
+        CommandResult.IN_PROGRESS: CONFIRMATION_TIMEOUT_US,
+    }
+    wait_us = waits_us.get(result, REFUSAL_PAUSE_US)
+    return replace(pending, last_result=result, repeat_at_us=now_us + wait_us)
+
+
+def _why_given_up(pending: Pending) -> str:
+    if pending.last_result is None:
+        return f"no answer to {pending.attempts} attempts"
+    if pending.last_result in (CommandResult.ACCEPTED, CommandResult.IN_PROGRESS):
+        return f"answered {pending.last_result.name} but never took effect, {pending.attempts} attempts"
+    return f"the vehicle answered {pending.last_result.name} to {pending.attempts} attempts"

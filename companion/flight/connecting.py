@@ -1,0 +1,103 @@
+"""States connect and ready: who is there, are its streams fast enough, does the person agree."""
+
+from collections import deque
+
+from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.flight.plan import plan_text
+from companion.flight.states import Trigger
+from companion.messages import LandedState, MessageId, RequestMessage, VehicleCommand
+
+
+class Connect:
+    """Wait for the vehicle, ask for the streams, measure them, check what can be checked on the ground."""
+
+    def __init__(self, now_us: int) -> None:
+        self._started_us = now_us
+        self._requests: deque[VehicleCommand] | None = None
+        self._measuring_since_us: int | None = None
+
+    def target(self, now_us: int) -> Target | None:
+        return None
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if flight.vehicle.identity is None:
+            return self._wait_for_heartbeat(flight, now_us)
+        if self._requests is None:
+            self._requests = self._list_requests(flight)
+            flight.tell(now_us, "connected", _connected_text(flight), system_id=flight.vehicle.identity.system_id)
+        if self._measuring_since_us is None:
+            self._send_requests(flight, self._requests, inputs, now_us)
+            return None
+        if now_us - self._measuring_since_us < flight.mission.companion.streams.window_s * 1e6:
+            return None
+        return self._judge(flight, now_us)
+
+    def _wait_for_heartbeat(self, flight: FlightContext, now_us: int) -> Move | None:
+        wait_s = flight.mission.companion.link.heartbeat_wait_s
+        if now_us - self._started_us < wait_s * 1e6:
+            return None
+        return Move(Trigger.REFUSED, f"no HEARTBEAT from an autopilot within {wait_s:g} s; is the address right?")
+
+    def _list_requests(self, flight: FlightContext) -> deque[VehicleCommand]:
+        version: list[VehicleCommand] = [RequestMessage(MessageId.AUTOPILOT_VERSION)]
+        return deque(version + [stream.request() for stream in flight.streams.streams])
+
+    def _send_requests(
+        self, flight: FlightContext, requests: deque[VehicleCommand], inputs: Inputs, now_us: int
+    ) -> None:
+        """A refused request is no reason to stop: what counts is what then arrives."""
+        if flight.commander.busy:
+            flight.command_outcome(inputs, False, now_us)
+        if flight.commander.busy:
+            return
+        if requests:
+            flight.commander.begin(requests.popleft())
+            flight.command_outcome(Inputs(), False, now_us)
+        else:
+            self._measuring_since_us = now_us
+            flight.streams.start(now_us)
+
+    def _judge(self, flight: FlightContext, now_us: int) -> Move | None:
+        rates = flight.streams.rates_hz()
+        text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
+        window_s = flight.mission.companion.streams.window_s
+        flight.tell(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
+        complaint = flight.streams.too_slow() or ground_check(flight)
+        if complaint is not None:
+            return Move(Trigger.REFUSED, complaint)
+        return Move(Trigger.VEHICLE_READY)
+
+
+class Ready:
+    """Show the plan; nothing happens until it is confirmed."""
+
+    def __init__(self) -> None:
+        self._shown = False
+
+    def target(self, now_us: int) -> Target | None:
+        return None
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if not self._shown:
+            self._shown = True
+            flight.tell(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
+        if not flight.plan_confirmed:
+            return None
+        complaint = ground_check(flight)
+        return Move(Trigger.REFUSED, complaint) if complaint is not None else Move(Trigger.PLAN_CONFIRMED)
+
+
+def ground_check(flight: FlightContext) -> str | None:
+    """What stands against a start from here, or None."""
+    vehicle = flight.vehicle
+    if vehicle.armed:
+        return "the vehicle is armed already; land and disarm it first"
+    if vehicle.landed in (LandedState.IN_AIR, LandedState.TAKEOFF, LandedState.LANDING):
+        return "the vehicle says it is not on the ground"
+    return None
+
+
+def _connected_text(flight: FlightContext) -> str:
+    identity = flight.vehicle.identity
+    assert identity is not None
+    return f"connected to a PX4 {identity.vehicle_type}, system {identity.system_id}"

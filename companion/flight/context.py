@@ -1,0 +1,110 @@
+"""What the parts of a flight share: the mission, the vehicle as heard, and what is to be sent and told."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from companion.detection.interface import Impact
+from companion.flight.collision import CollisionRecord
+from companion.flight.commander import Commander, CommandOutcome
+from companion.flight.states import Trigger
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
+from companion.messages import CommandAck, LocalPosition, Outgoing, Vector3
+from companion.mission.model import Mission
+from companion.report import Event, JsonValue, Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3 | None
+    yaw_rad: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A trigger with its story. `hand_over`: give the vehicle to hold or land before going."""
+
+    trigger: Trigger
+    text: str = ""
+    hand_over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """What one step brings to the flight, beyond what the vehicle view already holds."""
+
+    acks: Sequence[CommandAck] = ()
+    positions: Sequence[LocalPosition] = ()
+    impacts: Sequence[Impact] = ()
+    stop_reason: str | None = None
+    refusal: str | None = None  # why the other end cannot be flown
+
+
+@dataclass(slots=True)
+class FlightContext:
+    """Shared and changed by the flight's parts within a step; nothing else holds or changes it."""
+
+    mission: Mission
+    vehicle: Vehicle
+    streams: StreamMonitor
+    commander: Commander = field(default_factory=Commander)
+    events: list[Event] = field(default_factory=list)
+    outbox: list[Outgoing] = field(default_factory=list)
+    target: Target | None = None  # as last streamed
+    origin_ned_m: Vector3 | None = None
+    yaw_rad: float | None = None
+    expected_mode: int | None = None  # the mode the companion has been seen to hold
+    foreign_mode_since_us: int | None = None  # while landing: when the mode was first not ours
+    arming_requested: bool = False
+    armed_at_us: int | None = None
+    item_index: int = 0
+    collisions: list[CollisionRecord] = field(default_factory=list)
+    plan_confirmed: bool = False
+    outcome: Outcome | None = None
+    reason: str = ""
+    ended_at_us: int | None = None
+
+    def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
+        """Add a line to the timeline."""
+        self.events.append(Event(now_us, kind, text, data))
+
+    def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
+        """Let the commander work on its command; failures are told."""
+        send, outcome = self.commander.step(inputs.acks, seen, now_us)
+        if send is not None:
+            self.outbox.append(send)
+        if outcome is not None and not outcome.succeeded:
+            self.tell(now_us, "command", outcome.text)
+        return outcome
+
+    def local_ned_m(self, mission_ned_m: Vector3) -> Vector3:
+        """From mission coordinates (relative to the arming position) to the vehicle's local NED."""
+        assert self.origin_ned_m is not None, "mission coordinates have a meaning only after arming"
+        o, p = self.origin_ned_m, mission_ned_m
+        return (o[0] + p[0], o[1] + p[1], o[2] + p[2])
+
+    def mission_ned_m(self, local_ned_m: Vector3) -> Vector3:
+        """From the vehicle's local NED to mission coordinates; the same before the origin is known."""
+        o, p = self.origin_ned_m or (0.0, 0.0, 0.0), local_ned_m
+        return (p[0] - o[0], p[1] - o[1], p[2] - o[2])
+
+
+class Activity(Protocol):
+    """What the flight does in a state; made anew each time the state is entered."""
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        """Do what is due now; a Move when the state is over."""
+        ...
+
+    def target(self, now_us: int) -> Target | None:
+        """The setpoint for now; None while none must be sent."""
+        ...
+
+
+def as_text(vector: Vector3) -> str:
+    """For people, two decimals and no negative zero."""
+    return "[" + ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in vector) + "]"

@@ -1,0 +1,96 @@
+"""What ends a flight from outside, whatever it is doing: looked at in every step, before anything else."""
+
+from companion.flight.authority import Holder, who_decided
+from companion.flight.context import FlightContext, Inputs, Move
+from companion.flight.states import State, Trigger
+from companion.messages import LandedState
+from companion.px4_mode import AUTO_LAND, mode_name
+
+ON_THE_GROUND = (State.CONNECT, State.READY)
+ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING)
+
+# HEARTBEAT, which alone tells that the vehicle has disarmed, comes once a second; half a second for delays.
+DISARM_NEWS_US = 1_500_000
+
+
+def guard(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
+    """The first reason to end, the pilot's before all others."""
+    return (
+        _control_lost(flight, state, now_us)
+        or _refused(inputs)
+        or _stopped(state, inputs)
+        or _link_silent(flight, state, now_us)
+        or _position_silent(flight, state, now_us)
+    )
+
+
+def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | None:
+    vehicle = flight.vehicle
+    if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
+        return Move(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
+    if flight.expected_mode is None or vehicle.mode is None:
+        return None
+    holder = who_decided(vehicle.mode, flight.expected_mode, flight.commander.requested_mode)
+    if holder is Holder.COMPANION:
+        flight.foreign_mode_since_us = None
+        return None
+    if state is State.LANDING and _may_be_down(flight, now_us):
+        return None
+    mode = mode_name(vehicle.mode.custom_mode)
+    if holder is Holder.FAILSAFE:
+        return Move(Trigger.CONTROL_LOST, f"a failsafe of the vehicle took over in {mode}; setpoints stopped")
+    return Move(Trigger.CONTROL_LOST, f"the pilot took over in {mode}; setpoints stopped")
+
+
+def _may_be_down(flight: FlightContext, now_us: int) -> bool:
+    """PX4 leaves the land mode by itself when it is down and disarms; the heartbeat that says so may be yet to come.
+
+    Nothing is sent meanwhile: the setpoints ended when the land mode was confirmed.
+    """
+    vehicle = flight.vehicle
+    if flight.expected_mode != AUTO_LAND:
+        return False
+    if vehicle.armed is False or vehicle.landed is LandedState.ON_GROUND:
+        return True
+    if flight.foreign_mode_since_us is None:
+        flight.foreign_mode_since_us = now_us
+    return now_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
+
+
+def _refused(inputs: Inputs) -> Move | None:
+    return Move(Trigger.REFUSED, inputs.refusal) if inputs.refusal is not None else None
+
+
+def _stopped(state: State, inputs: Inputs) -> Move | None:
+    if inputs.stop_reason is None:
+        return None
+    return Move(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
+
+
+def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | None:
+    link = flight.mission.companion.link
+    if flight.vehicle.identity is None:
+        return None
+    silent_s = (now_us - flight.vehicle.last_heard_us) * 1e-6
+    if state in ON_THE_GROUND:
+        if silent_s <= link.heartbeat_wait_s:
+            return None
+        return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
+    if silent_s <= link.silence_s:
+        return None
+    # A vehicle that has been told to land is already doing what is safe.
+    landing = state is State.LANDING and flight.expected_mode == AUTO_LAND
+    text = f"the link has been silent for {silent_s:.1f} s"
+    flight.tell(now_us, "link", text, silent_s=round(silent_s, 3))
+    return Move(Trigger.INTERRUPTED, text, hand_over=not landing)
+
+
+def _position_silent(flight: FlightContext, state: State, now_us: int) -> Move | None:
+    heard_us = flight.vehicle.last_position_us
+    if state not in ON_SETPOINTS or heard_us is None:
+        return None
+    silent_s = (flight.vehicle.last_heard_us - heard_us) * 1e-6
+    if silent_s <= flight.mission.companion.link.position_silence_s:
+        return None
+    text = f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive"
+    return Move(Trigger.INTERRUPTED, text, hand_over=True)

@@ -1,0 +1,72 @@
+"""State aborted: give the vehicle to its own hold or land mode where that is wanted, then be silent."""
+
+from companion.flight.authority import Holder, who_decided
+from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.messages import SetArmed, SetMode
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, mode_name
+
+
+class LetGo:
+    """Nothing more to do: the vehicle is not ours, or it was never taken."""
+
+    finished = True
+
+    def target(self, now_us: int) -> Target | None:
+        return None
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        return None
+
+
+class HandOver:
+    """Disarm if the climb has not begun, then request the mode; setpoints go on until it is seen to hold.
+
+    Whoever else takes the vehicle meanwhile may have it. When the commander gives up (about 2.5 s without an
+    answer) the setpoints stop all the same, and PX4's own loss-of-offboard action takes over.
+    """
+
+    def __init__(self, flight: FlightContext) -> None:
+        self.finished = False
+        self._target = flight.target
+        self._previous_mode = flight.expected_mode
+        self._mode = AUTO_LAND if flight.mission.on_interrupt == "land" else AUTO_LOITER
+        # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
+        self._disarming = flight.arming_requested and flight.armed_at_us is None
+        flight.commander.begin(SetArmed(False) if self._disarming else SetMode(self._mode))
+
+    def target(self, now_us: int) -> Target | None:
+        return None if self.finished else self._target
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if self.finished:
+            return None
+        if self._taken_by_another(flight, now_us):
+            self._finish(flight)
+            return None
+        if self._disarming:
+            outcome = flight.command_outcome(inputs, False, now_us)
+            if outcome is None:
+                return None
+            self._disarming = False
+            flight.commander.begin(SetMode(self._mode))
+            inputs = Inputs()
+        outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
+        if outcome is not None:
+            if outcome.succeeded:
+                flight.tell(now_us, "mode", f"handed over to {mode_name(self._mode)}")
+            self._finish(flight)
+        return None
+
+    def _taken_by_another(self, flight: FlightContext, now_us: int) -> bool:
+        report = flight.vehicle.mode
+        if report is None or self._previous_mode is None:
+            return False
+        holder = who_decided(report, self._previous_mode, self._mode)
+        if holder is Holder.COMPANION:
+            return False
+        flight.tell(now_us, "mode", f"{holder.value} took over in {mode_name(report.custom_mode)}")
+        return True
+
+    def _finish(self, flight: FlightContext) -> None:
+        self.finished = True
+        flight.commander.cancel()

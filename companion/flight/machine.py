@@ -1,0 +1,95 @@
+"""Runs the state table: looks for triggers, moves between states, makes each state's activity."""
+
+from dataclasses import dataclass
+
+from companion.flight.connecting import Connect, Ready
+from companion.flight.context import Activity, FlightContext, Inputs, Move
+from companion.flight.guards import guard
+from companion.flight.handover import HandOver, LetGo
+from companion.flight.landing import Land
+from companion.flight.progress import FlyItems, HoldAfterRecovery
+from companion.flight.recovering import Recover, record_collision
+from companion.flight.states import FINAL_STATES, State, Trigger, moves, next_state
+from companion.flight.takeoff import TakeOff
+from companion.mission.model import TakeoffItem
+
+
+@dataclass(slots=True)
+class Machine:
+    """The present state and what is being done in it. The same inputs always give the same moves."""
+
+    flight: FlightContext
+    activity: Activity
+    state: State = State.CONNECT
+
+    @property
+    def finished(self) -> bool:
+        handing_over = isinstance(self.activity, HandOver) and not self.activity.finished
+        return self.state in FINAL_STATES and not handing_over
+
+    def step(self, inputs: Inputs, now_us: int) -> bool:
+        """Take all moves that are due; whether there were any."""
+        before = self.activity
+        if self.state not in FINAL_STATES:
+            self._take(guard(self.flight, self.state, inputs, now_us), now_us)
+        for impact in inputs.impacts:
+            if moves(self.state, Trigger.COLLISION):
+                record_collision(self.flight, impact, now_us)
+                self._take(Move(Trigger.COLLISION), now_us)
+        move = self.activity.step(self.flight, inputs, now_us)
+        while move is not None:
+            self._take(move, now_us)
+            # The answers and positions of this step belong to the state that asked for them.
+            move = self.activity.step(self.flight, Inputs(), now_us)
+        return self.activity is not before
+
+    def _take(self, move: Move | None, now_us: int) -> None:
+        if move is None or not moves(self.state, move.trigger):
+            return
+        if self.state is State.MISSION and move.trigger is Trigger.COLLISION:
+            self.flight.item_index += 1
+        previous, self.state = self.state, next_state(self.state, move.trigger)
+        self.activity = self._begin(previous, move, now_us)
+
+    def _begin(self, previous: State, move: Move, now_us: int) -> Activity:
+        flight = self.flight
+        match self.state:
+            case State.CONNECT:
+                return Connect(now_us)
+            case State.READY:
+                return Ready()
+            case State.TAKEOFF:
+                first = flight.mission.items[0].action
+                assert isinstance(first, TakeoffItem), "the mission model sees to it"
+                return TakeOff(flight, first, now_us)
+            case State.MISSION:
+                if previous is State.TAKEOFF:
+                    flight.item_index = 1
+                return FlyItems(flight, now_us)
+            case State.RECOVERING:
+                return Recover(flight, now_us)
+            case State.HOLDING:
+                return HoldAfterRecovery(flight, now_us)
+            case State.LANDING:
+                return Land(flight, now_us)
+            case State.DONE:
+                return self._done(now_us)
+            case State.ABORTED:
+                return self._aborted(move, now_us)
+
+    def _done(self, now_us: int) -> Activity:
+        flight = self.flight
+        flight.outcome, flight.reason = "completed", "landed and disarmed"
+        flight.tell(now_us, "done", f"done: landed and disarmed, {_hits(len(flight.collisions))}")
+        return LetGo()
+
+    def _aborted(self, move: Move, now_us: int) -> Activity:
+        flight = self.flight
+        flight.outcome = "failed" if move.trigger is Trigger.REFUSED else "aborted"
+        flight.reason = move.text
+        flight.tell(now_us, "aborted", f"{flight.outcome}: {move.text}", outcome=flight.outcome)
+        return HandOver(flight) if move.hand_over else LetGo()
+
+
+def _hits(count: int) -> str:
+    return "no hit" if count == 0 else "1 hit" if count == 1 else f"{count} hits"

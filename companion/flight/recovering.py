@@ -1,0 +1,129 @@
+"""State recovering: from the hit to rest at the recovery setpoint."""
+
+import math
+
+from companion.detection.interface import Impact
+from companion.estimate.collision import BATCH_US, STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
+from companion.estimate.rotation import body_to_ned
+from companion.estimate.settling import SettlingMonitor
+from companion.flight.collision import CollisionRecord, horizontal_unit
+from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
+from companion.flight.states import Trigger
+from companion.messages import Quaternion
+from companion.recovery.envelope import Envelope
+from companion.recovery.interface import Contact
+from companion.recovery.registry import RECOVERY_LAWS
+
+# Attitude streams are required, so this is only for a hit before the first one: level, nose north.
+LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+AFTERWARDS = {
+    "hold": Trigger.RECOVERED_TO_HOLD,
+    "continue": Trigger.RECOVERED_TO_CONTINUE,
+    "land": Trigger.RECOVERED_TO_LAND,
+}
+
+
+class Recover:
+    """Fly to the newest collision's setpoint, which never changes, and wait until the vehicle has settled."""
+
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        self._record = flight.collisions[-1]
+        self._started_us = now_us
+        if flight.target is not None:
+            flight.yaw_rad = flight.target.yaw_rad
+        self._target = Target(self._record.setpoint_ned_m, None, flight.yaw_rad)
+        self._monitor = SettlingMonitor(self._record.setpoint_ned_m, flight.mission.companion.settled)
+
+    def target(self, now_us: int) -> Target | None:
+        return self._target
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        record = self._record
+        for sample in inputs.positions:
+            record.follow_recovery(sample)
+            since_us = self._monitor.settled_since(sample)
+            if since_us is not None:
+                record.settled_at_boot_us = since_us
+                flight.tell(now_us, "recovered", _recovered_text(record), settled_after_s=record.settled_after_s())
+                return Move(AFTERWARDS[flight.mission.on_collision.then])
+        timeout_s = flight.mission.companion.settled.timeout_s
+        if now_us - self._started_us > timeout_s * 1e6:
+            text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
+            flight.tell(now_us, "recovered", text, settled_after_s=None)
+            return Move(AFTERWARDS[flight.mission.on_collision.then])
+        return None
+
+
+def record_collision(flight: FlightContext, impact: Impact, now_us: int) -> None:
+    """A new collision: what was known just before it, and from that the setpoint, set once."""
+    vehicle, mission = flight.vehicle, flight.mission
+    attitude = vehicle.attitude.attitude_wxyz if vehicle.attitude is not None else LEVEL
+    normal = horizontal_unit(body_to_ned(attitude, impact.specific_force_frd_m_s2))
+    motion = _motion_at_contact(flight, impact)
+    contact = Contact(motion.time_boot_us, motion.position_ned_m, motion.velocity_ned_m_s, normal)
+    law = RECOVERY_LAWS[mission.recovery.law](mission.recovery)
+    assert flight.origin_ned_m is not None, "hits are detected only in flight"
+    fence = Envelope(flight.origin_ned_m, mission.fence.radius_m, mission.fence.max_height_m)
+    setpoint = fence.clamp(contact.position_ned_m, law.setpoint_ned_m(contact))
+    strength = math.hypot(*impact.specific_force_frd_m_s2)
+    record = CollisionRecord(
+        detected_at_us=now_us,
+        sample_time_boot_us=impact.sample_time_boot_us,
+        detector=mission.companion.detector,
+        contact=contact,
+        setpoint_ned_m=setpoint,
+        attitude_wxyz=attitude,
+        normal_ned=normal,
+        peak_specific_force_m_s2=strength,
+        contact_ended_boot_us=impact.sample_time_boot_us,
+    )
+    flight.collisions.append(record)
+    _tell_detection(flight, record, now_us)
+
+
+def _motion_at_contact(flight: FlightContext, impact: Impact) -> ContactMotion:
+    """From the history before this contact and after the one before it."""
+    contact_us = impact.contact_free_until_boot_us
+    start_us = contact_us - BATCH_US
+    if flight.collisions:
+        start_us = max(start_us, flight.collisions[-1].contact_ended_boot_us + STAMP_RESOLUTION_US)
+    samples = flight.vehicle.history.between(start_us, contact_us)
+    motion = motion_before_contact(samples, contact_us, flight.mission.companion.estimate)
+    if motion is not None:
+        return motion
+    latest = flight.vehicle.history.latest()
+    assert latest is not None, "a flight begins only with positions arriving"
+    return ContactMotion(latest.time_boot_us, latest.position_ned_m, latest.velocity_ned_m_s)
+
+
+def _tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:
+    report = record.report()
+    text = (
+        f"hit {len(flight.collisions)}: {report.peak_specific_force_m_s2:.1f} m/s^2 sideways, v_c "
+        f"{as_text(report.impact_velocity_ned_m_s)} ({report.impact_speed_m_s:.2f} m/s) at "
+        f"{as_text(flight.mission_ned_m(report.position_ned_m))}; recovery setpoint "
+        f"{as_text(flight.mission_ned_m(record.setpoint_ned_m))}"
+    )
+    flight.tell(
+        now_us,
+        "detection",
+        text,
+        detector=report.detector,
+        sample_time_boot_us=report.sample_time_boot_us,
+        impact_velocity_ned_m_s=report.impact_velocity_ned_m_s,
+        impact_speed_m_s=report.impact_speed_m_s,
+        normal_ned=report.normal_ned,
+        specific_force_m_s2=report.peak_specific_force_m_s2,
+        position_ned_m=report.position_ned_m,
+        recovery_setpoint_ned_m=report.recovery_setpoint_ned_m,
+    )
+
+
+def _recovered_text(record: CollisionRecord) -> str:
+    settled_after_s = record.settled_after_s()
+    assert settled_after_s is not None
+    return (
+        f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {record.overshoot_m * 100:.1f} cm, "
+        f"rebound {record.rebound_speed_m_s():.2f} m/s"
+    )

@@ -1,0 +1,113 @@
+"""State takeoff: setpoints, OFFBOARD, arm, climb."""
+
+import math
+from enum import Enum
+
+from companion.estimate.rotation import yaw_rad
+from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
+from companion.flight.states import Trigger
+from companion.flight.trajectory import LineProfile
+from companion.messages import SetArmed, SetMode, Vector3
+from companion.mission.model import TakeoffItem
+from companion.px4_mode import OFFBOARD
+
+# The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
+ORIGIN_MEAN_US = 1_000_000
+
+
+class Step(Enum):
+    LEAD = "streaming setpoints"
+    MODE = "switching to OFFBOARD"
+    ARM = "arming"
+    CLIMB = "climbing"
+
+
+class TakeOff:
+    """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
+
+    def __init__(self, flight: FlightContext, item: TakeoffItem, now_us: int) -> None:
+        self._item = item
+        self._step = Step.LEAD
+        self._started_us = now_us
+        self._profile: LineProfile | None = None
+        attitude = flight.vehicle.attitude
+        flight.yaw_rad = yaw_rad(attitude.attitude_wxyz) if attitude is not None else None
+        self._yaw_rad = flight.yaw_rad
+        self._ground_ned_m = mean_position(flight)
+        flight.tell(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
+
+    def target(self, now_us: int) -> Target | None:
+        if self._profile is None:
+            return Target(self._ground_ned_m, None, self._yaw_rad)
+        position, velocity = self._profile.at((now_us - self._started_us) * 1e-6)
+        return Target(position, velocity, self._yaw_rad)
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        match self._step:
+            case Step.LEAD:
+                return self._lead(flight, now_us)
+            case Step.MODE:
+                return self._switch(flight, inputs, now_us)
+            case Step.ARM:
+                return self._arm(flight, inputs, now_us)
+            case Step.CLIMB:
+                return self._climb(flight, now_us)
+
+    def _lead(self, flight: FlightContext, now_us: int) -> Move | None:
+        if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
+            self._step = Step.MODE
+            flight.commander.begin(SetMode(OFFBOARD))
+            return self._switch(flight, Inputs(), now_us)
+        return None
+
+    def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
+        if outcome is None:
+            return None
+        if not outcome.succeeded:
+            return Move(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
+        flight.expected_mode = OFFBOARD
+        self._step = Step.ARM
+        flight.arming_requested = True
+        flight.commander.begin(SetArmed(True))
+        return self._arm(flight, Inputs(), now_us)
+
+    def _arm(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        outcome = flight.command_outcome(inputs, flight.vehicle.armed is True, now_us)
+        if outcome is None:
+            return None
+        if not outcome.succeeded:
+            return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
+        self._step = Step.CLIMB
+        self._started_us = flight.armed_at_us = now_us
+        self._ground_ned_m = flight.origin_ned_m = mean_position(flight)
+        limits = flight.mission.companion.flight
+        top = flight.local_ned_m((0.0, 0.0, -self._item.height_m))
+        self._profile = LineProfile(self._ground_ned_m, top, limits.takeoff_speed_m_s, limits.takeoff_acceleration_m_s2)
+        text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
+        flight.tell(now_us, "armed", text, origin_ned_m=self._ground_ned_m)
+        return None
+
+    def _climb(self, flight: FlightContext, now_us: int) -> Move | None:
+        assert self._profile is not None
+        flying_s = (now_us - self._started_us) * 1e-6 - self._profile.duration_s
+        if flying_s < 0.0:
+            return None
+        latest = flight.vehicle.history.latest()
+        limits = flight.mission.companion.flight
+        if latest is not None:
+            distance_m = math.dist(latest.position_ned_m, self._profile.target_m)
+            if distance_m <= limits.acceptance_radius_m:
+                return Move(Trigger.TAKEN_OFF)
+        if flying_s > limits.arrival_timeout_s:
+            return Move(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)
+        return None
+
+
+def mean_position(flight: FlightContext) -> Vector3:
+    """Mean of the last second's positions, local NED."""
+    latest = flight.vehicle.history.latest()
+    assert latest is not None, "a flight begins only with positions arriving"
+    samples = flight.vehicle.history.between(latest.time_boot_us - ORIGIN_MEAN_US, latest.time_boot_us + 1)
+    n, e, d = (sum(s.position_ned_m[axis] for s in samples) / len(samples) for axis in range(3))
+    return (n, e, d)

@@ -1,0 +1,84 @@
+"""The streams the companion needs: what it asks for, and what really arrives."""
+
+from dataclasses import dataclass
+
+from companion.messages import (
+    Attitude,
+    CurrentMode,
+    ExtendedState,
+    ImuSample,
+    LocalPosition,
+    MessageId,
+    SetMessageInterval,
+)
+from companion.mission.config import StreamsConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A wanted stream; a flight does not begin below `min_hz`."""
+
+    message_id: MessageId
+    sample_type: type
+    asked_hz: float
+    min_hz: float
+
+    def request(self) -> SetMessageInterval:
+        return SetMessageInterval(self.message_id, round(1e6 / self.asked_hz))
+
+
+def wanted_streams(config: StreamsConfig) -> tuple[Stream, ...]:
+    """Mode and landed state are wished for, not required: HEARTBEAT tells the mode too, if more slowly."""
+    return (
+        Stream(MessageId.HIGHRES_IMU, ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
+        Stream(
+            MessageId.LOCAL_POSITION_NED,
+            LocalPosition,
+            config.local_position_hz,
+            config.min_local_position_hz,
+        ),
+        Stream(MessageId.ATTITUDE_QUATERNION, Attitude, config.attitude_hz, config.min_attitude_hz),
+        Stream(MessageId.EXTENDED_SYS_STATE, ExtendedState, config.extended_sys_state_hz, 0.0),
+        Stream(MessageId.CURRENT_MODE, CurrentMode, config.current_mode_hz, 0.0),
+    )
+
+
+class StreamMonitor:
+    """Counts what arrives. Rates are means over companion time, so packets lost on the way count as missing."""
+
+    __slots__ = ("_counts", "_started_us", "_until_us", "streams")
+
+    def __init__(self, config: StreamsConfig) -> None:
+        self.streams = wanted_streams(config)
+        self._counts: dict[type, int] = {stream.sample_type: 0 for stream in self.streams}
+        self._started_us: int | None = None
+        self._until_us = 0
+
+    def count(self, sample_type: type, now_us: int) -> None:
+        if self._started_us is not None and sample_type in self._counts:
+            self._counts[sample_type] += 1
+            self._until_us = now_us
+
+    def start(self, now_us: int) -> None:
+        """Begin to measure, from nothing."""
+        self._counts = dict.fromkeys(self._counts, 0)
+        self._started_us = self._until_us = now_us
+
+    def rates_hz(self) -> dict[str, float]:
+        """Mean rates since the start, until something last arrived."""
+        if self._started_us is None or self._until_us <= self._started_us:
+            return {}
+        seconds = (self._until_us - self._started_us) * 1e-6
+        return {s.message_id.name: round(self._counts[s.sample_type] / seconds, 2) for s in self.streams}
+
+    def too_slow(self) -> str | None:
+        """One sentence on the first stream that is below its least rate, or None."""
+        rates = self.rates_hz()
+        for stream in self.streams:
+            rate_hz = rates.get(stream.message_id.name, 0.0)
+            if rate_hz < stream.min_hz:
+                return (
+                    f"{stream.message_id.name} arrives at {rate_hz:.1f} Hz and at least {stream.min_hz:g} Hz are "
+                    "needed; give the link more bandwidth (baud rate, MAV_x_RATE) or check the vehicle's estimate"
+                )
+        return None

@@ -1,0 +1,196 @@
+"""MAVLink bytes to packets and typed samples.
+
+Packets are found by their header here, so that the many the companion has no use for cost no decoding; the
+rest, checksums included, is pymavlink's.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from fastcrc.crc16 import mcrf4xx
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.mavlink.encode import COMPONENT_ID
+from companion.messages import (
+    Attitude,
+    AutopilotVersion,
+    CommandAck,
+    CommandResult,
+    CurrentMode,
+    ExtendedState,
+    Heartbeat,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    Sample,
+    TimeSyncRequest,
+)
+
+Frame = tuple[bytes, Sample | None]
+
+MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
+HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
+FLAG_SIGNED = 0x01
+# HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
+ACCELEROMETER_UPDATED = 0x7
+
+
+def _finite(*values: float) -> bool:
+    """False when any value is NaN or infinite (either makes the difference NaN)."""
+    total = sum(values)
+    return total - total == 0.0
+
+
+def _heartbeat(m: Any) -> Heartbeat:
+    armed = bool(m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+    return Heartbeat(
+        m.get_srcSystem(), m.get_srcComponent(), m.type, m.autopilot, armed, m.custom_mode, m.system_status
+    )
+
+
+def _imu(m: Any) -> ImuSample | None:
+    if m.fields_updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED or not _finite(m.xacc, m.yacc, m.zacc):
+        return None
+    return ImuSample(m.time_usec, (m.xacc, m.yacc, m.zacc), (m.xgyro, m.ygyro, m.zgyro))
+
+
+def _local_position(m: Any) -> LocalPosition | None:
+    if not _finite(m.x, m.y, m.z, m.vx, m.vy, m.vz):
+        return None
+    return LocalPosition(m.time_boot_ms * 1000, (m.x, m.y, m.z), (m.vx, m.vy, m.vz))
+
+
+def _attitude(m: Any) -> Attitude | None:
+    if not _finite(m.q1, m.q2, m.q3, m.q4):
+        return None
+    return Attitude(m.time_boot_ms * 1000, (m.q1, m.q2, m.q3, m.q4))
+
+
+def _extended_state(m: Any) -> ExtendedState | None:
+    known = m.landed_state in LandedState.__members__.values()
+    return ExtendedState(LandedState(m.landed_state)) if known else None
+
+
+def _current_mode(m: Any) -> CurrentMode:
+    # 0 stands for "not known" in the intended mode.
+    return CurrentMode(m.custom_mode, m.intended_custom_mode or None)
+
+
+def _command_ack(m: Any) -> CommandAck | None:
+    # PX4 names whom it answers; other components' conversations pass over the same link.
+    ours = m.target_component in (0, COMPONENT_ID)
+    known = m.result in CommandResult.__members__.values()
+    return CommandAck(m.command, CommandResult(m.result)) if ours and known else None
+
+
+def _timesync(m: Any) -> TimeSyncRequest | None:
+    return TimeSyncRequest(m.ts1) if m.tc1 == 0 else None
+
+
+def _autopilot_version(m: Any) -> AutopilotVersion:
+    # major, minor, patch, type: one byte each, from the top
+    version = m.flight_sw_version
+    return AutopilotVersion((version >> 24 & 0xFF, version >> 16 & 0xFF, version >> 8 & 0xFF))
+
+
+CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
+    dialect.MAVLINK_MSG_ID_HEARTBEAT: _heartbeat,
+    dialect.MAVLINK_MSG_ID_HIGHRES_IMU: _imu,
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude,
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
+    dialect.MAVLINK_MSG_ID_CURRENT_MODE: _current_mode,
+    dialect.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
+    dialect.MAVLINK_MSG_ID_TIMESYNC: _timesync,
+    dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
+}
+
+
+class Decoder:
+    """A byte stream in any chunks, with any damage, to packets; never raises on what it is fed.
+
+    Until `listen_to` names the vehicle only heartbeats are converted; then only what that component sent.
+    """
+
+    def __init__(self) -> None:
+        self._mavlink = dialect.MAVLink(None)
+        self._pending = b""
+        self._vehicle: tuple[int, int] | None = None
+        self.bad_bytes = 0
+
+    def listen_to(self, system_id: int, component_id: int) -> None:
+        self._vehicle = (system_id, component_id)
+
+    def feed(self, received: bytes) -> list[Frame]:
+        """All packets complete by now, with their samples; bytes that are no packet come as they are, with None."""
+        data = self._pending + received if self._pending else received
+        frames: list[Frame] = []
+        start = bad_start = 0
+        end = len(data)
+        while start < end:
+            length = _packet_length(data, start)
+            if length == 0 or (start + length <= end and not _checksum_holds(data, start, length)):
+                start += 1
+                continue
+            if start + length > end:
+                break
+            if bad_start < start:
+                self._note_bad(data[bad_start:start], frames)
+            packet = data[start : start + length]
+            frames.append((packet, self._sample(packet)))
+            start = bad_start = start + length
+        if bad_start < start:
+            self._note_bad(data[bad_start:start], frames)
+        self._pending = data[start:]
+        return frames
+
+    def _note_bad(self, bad: bytes, frames: list[Frame]) -> None:
+        self.bad_bytes += len(bad)
+        frames.append((bad, None))
+
+    def _sample(self, packet: bytes) -> Sample | None:
+        if packet[0] == MAGIC_V2:
+            source, message_id = (packet[5], packet[6]), packet[7] | packet[8] << 8 | packet[9] << 16
+        else:
+            source, message_id = (packet[3], packet[4]), packet[5]
+        converter = CONVERTERS.get(message_id)
+        if converter is None:
+            return None
+        if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
+            return None
+        try:
+            return converter(self._mavlink.decode(bytearray(packet)))
+        except dialect.MAVError:
+            return None
+
+
+def _packet_length(data: bytes, start: int) -> int:
+    """Length of the packet that may begin at `start`: 0 when none can, 1 over the end when not yet known."""
+    magic = data[start]
+    if magic == MAGIC_V2:
+        if len(data) < start + 3:
+            return len(data) - start + 1
+        flags = data[start + 2]
+        if flags & ~FLAG_SIGNED:
+            return 0
+        return HEADER_V2 + data[start + 1] + CHECKSUM + (SIGNATURE if flags else 0)
+    if magic == MAGIC_V1:
+        if len(data) < start + 2:
+            return len(data) - start + 1
+        return HEADER_V1 + data[start + 1] + CHECKSUM
+    return 0
+
+
+def _checksum_holds(data: bytes, start: int, length: int) -> bool:
+    """Whether the packet's own checksum holds; for messages that are not in the dialect, always."""
+    if data[start] == MAGIC_V2:
+        message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
+        end = start + HEADER_V2 + data[start + 1]
+    else:
+        message_id = data[start + 5]
+        end = start + HEADER_V1 + data[start + 1]
+    message = dialect.mavlink_map.get(message_id)
+    if message is None:
+        return start + length == len(data) or data[start + length] in (MAGIC_V1, MAGIC_V2)
+    expected: int = mcrf4xx(data[start + 1 : end] + bytes((message.crc_extra,)))
+    return expected == data[end] | data[end + 1] << 8

@@ -1,0 +1,106 @@
+"""Typed commands to MAVLink 2 bytes. Sequence numbers, type masks and NaN exist only here."""
+
+from typing import Any
+
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.messages import (
+    OnboardHeartbeat,
+    Outgoing,
+    PositionSetpoint,
+    RequestMessage,
+    SendCommand,
+    SetArmed,
+    SetMessageInterval,
+    SetMode,
+    TimeSyncReply,
+    VehicleCommand,
+)
+
+COMPONENT_ID = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
+# Before the vehicle is known: PX4's own default MAV_SYS_ID.
+DEFAULT_SYSTEM_ID = 1
+
+# POSITION_TARGET_TYPEMASK: a set bit tells the vehicle to ignore the part.
+IGNORE_VELOCITY = 0x038
+IGNORE_ACCELERATION = 0x1C0
+IGNORE_YAW = 0x400
+IGNORE_YAW_RATE = 0x800
+
+NAN = float("nan")
+
+
+class Encoder:
+    """Counts the packets it makes; otherwise without memory."""
+
+    def __init__(self) -> None:
+        self._mavlink = dialect.MAVLink(None, DEFAULT_SYSTEM_ID, COMPONENT_ID)
+        self._target = (DEFAULT_SYSTEM_ID, dialect.MAV_COMP_ID_AUTOPILOT1)
+
+    def speak_to(self, system_id: int, component_id: int) -> None:
+        """Address the vehicle, and become a component of its system."""
+        self._mavlink.srcSystem = system_id
+        self._target = (system_id, component_id)
+
+    def encode(self, outgoing: Outgoing) -> bytes:
+        """One packet."""
+        message = self._message(outgoing)
+        packet = bytes(message.pack(self._mavlink))
+        self._mavlink.seq = (self._mavlink.seq + 1) % 256
+        return packet
+
+    def _message(self, outgoing: Outgoing) -> Any:
+        match outgoing:
+            case PositionSetpoint():
+                return self._setpoint(outgoing)
+            case SendCommand(command, confirmation):
+                return dialect.MAVLink_command_long_message(
+                    *self._target, command.command_id, confirmation, *_parameters(command)
+                )
+            case OnboardHeartbeat(active):
+                status = dialect.MAV_STATE_ACTIVE if active else dialect.MAV_STATE_STANDBY
+                return dialect.MAVLink_heartbeat_message(
+                    dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, status, 3
+                )
+            case TimeSyncReply(vehicle_time_ns, companion_time_ns):
+                return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
+
+    def _setpoint(self, setpoint: PositionSetpoint) -> Any:
+        type_mask = IGNORE_ACCELERATION | IGNORE_YAW_RATE
+        velocity = setpoint.velocity_ned_m_s
+        if velocity is None:
+            type_mask |= IGNORE_VELOCITY
+            velocity = (NAN, NAN, NAN)
+        yaw = setpoint.yaw_rad
+        if yaw is None:
+            type_mask |= IGNORE_YAW
+            yaw = NAN
+        return dialect.MAVLink_set_position_target_local_ned_message(
+            setpoint.time_us // 1000 & 0xFFFFFFFF,
+            *self._target,
+            dialect.MAV_FRAME_LOCAL_NED,
+            type_mask,
+            *setpoint.position_ned_m,
+            *velocity,
+            NAN,
+            NAN,
+            NAN,
+            yaw,
+            NAN,
+        )
+
+
+def _parameters(command: VehicleCommand) -> tuple[float, ...]:
+    """COMMAND_LONG's seven parameters; those without a meaning are 0, as PX4 wants them."""
+    match command:
+        case SetMode(custom_mode):
+            # param1 says that param2 and param3 hold PX4's main and sub mode
+            main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+            used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
+        case SetArmed(armed):
+            used = (1.0 if armed else 0.0,)
+        case SetMessageInterval(message_id, interval_us):
+            used = (message_id, interval_us)
+        case RequestMessage(message_id):
+            used = (message_id,)
+    return used + (0.0,) * (7 - len(used))

@@ -1,0 +1,196 @@
+"""Typed samples in and typed commands out: the only language between the codec and the core.
+
+World frame NED, body frame FRD, SI units, quaternions (w, x, y, z) body to NED. Times named `time_boot_us`
+are the vehicle's own boot clock. None means "not given"; MAVLink's NaN and type masks stay in the codec.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar, TypeAlias
+
+Vector3: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+
+
+class CommandResult(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+    CANCELLED = 6
+
+
+class LandedState(IntEnum):
+    """MAV_LANDED_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class MessageId(IntEnum):
+    """MAVLink ids of the streams the companion asks for and of the messages it requests."""
+
+    ATTITUDE_QUATERNION = 31
+    LOCAL_POSITION_NED = 32
+    HIGHRES_IMU = 105
+    AUTOPILOT_VERSION = 148
+    EXTENDED_SYS_STATE = 245
+    CURRENT_MODE = 436
+
+
+# --- samples in -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    system_id: int
+    component_id: int
+    vehicle_type: int  # MAV_TYPE
+    autopilot: int  # MAV_AUTOPILOT
+    armed: bool
+    custom_mode: int
+    system_status: int  # MAV_STATE
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSample:
+    """HIGHRES_IMU: mean over the vehicle's integration interval that ends at `time_boot_us`."""
+
+    time_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    angular_velocity_frd_rad_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class LocalPosition:
+    time_boot_us: int
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    time_boot_us: int
+    attitude_wxyz: Quaternion
+
+
+@dataclass(frozen=True, slots=True)
+class ExtendedState:
+    landed_state: LandedState
+
+
+@dataclass(frozen=True, slots=True)
+class CurrentMode:
+    custom_mode: int
+    intended_custom_mode: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAck:
+    command: int  # MAV_CMD
+    result: CommandResult
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncRequest:
+    """TIMESYNC with tc1 = 0: the vehicle asks for our time."""
+
+    vehicle_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotVersion:
+    flight_version: tuple[int, int, int]
+
+
+Sample: TypeAlias = (
+    Heartbeat
+    | ImuSample
+    | LocalPosition
+    | Attitude
+    | ExtendedState
+    | CurrentMode
+    | CommandAck
+    | TimeSyncRequest
+    | AutopilotVersion
+)
+
+
+# --- commands out -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """MAV_CMD_DO_SET_MODE; `custom_mode` in PX4's packing (main << 16 | sub << 24)."""
+
+    command_id: ClassVar[int] = 176
+    custom_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetArmed:
+    """MAV_CMD_COMPONENT_ARM_DISARM, never forced."""
+
+    command_id: ClassVar[int] = 400
+    armed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetMessageInterval:
+    """MAV_CMD_SET_MESSAGE_INTERVAL."""
+
+    command_id: ClassVar[int] = 511
+    message_id: int
+    interval_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class RequestMessage:
+    """MAV_CMD_REQUEST_MESSAGE."""
+
+    command_id: ClassVar[int] = 512
+    message_id: int
+
+
+VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage
+
+
+@dataclass(frozen=True, slots=True)
+class SendCommand:
+    """A command with its transmission count, as COMMAND_LONG.confirmation wants it."""
+
+    command: VehicleCommand
+    confirmation: int
+
+
+@dataclass(frozen=True, slots=True)
+class PositionSetpoint:
+    """Setpoint in the vehicle's local NED; a None part is left to the vehicle."""
+
+    time_us: int
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3 | None
+    yaw_rad: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class OnboardHeartbeat:
+    """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""
+
+    active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncReply:
+    vehicle_time_ns: int
+    companion_time_ns: int
+
+
+Outgoing: TypeAlias = SendCommand | PositionSetpoint | OnboardHeartbeat | TimeSyncReply

@@ -1,0 +1,1 @@
+"""The mission a person writes, as a validated model."""

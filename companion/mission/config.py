@@ -1,0 +1,106 @@
+"""The mission's `companion:` part: every key optional, every default with its reason."""
+
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from companion.detection.lateral import LateralConfig
+from companion.detection.registry import DETECTORS, check_known_detector
+from companion.written import NotNegative, Positive, Written
+
+Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
+
+
+class StreamsConfig(Written):
+    """Rates asked for, and the least measured rates with which a flight begins, in Hz."""
+
+    # PX4 rounds the interval to whole IMU samples: 200 gives 124, 250 gives all of them (measured on SITL).
+    highres_imu_hz: Rate = 250.0
+    # Twenty-five velocities in the half second before a contact are enough for v_c (see estimate.collision).
+    local_position_hz: Rate = 50.0
+    attitude_hz: Rate = 50.0
+    # Take-off and touchdown last longer than a second.
+    extended_sys_state_hz: Rate = 5.0
+    # Mode changes are acted on within a tenth of a second.
+    current_mode_hz: Rate = 10.0
+    # Long enough to see 80 samples of the slowest acceptable IMU stream.
+    window_s: Positive = 2.0
+    # PX4's onboard default is 50 Hz; below 40 Hz more than 80 % of a 25 ms contact can fall between samples.
+    min_highres_imu_hz: NotNegative = 40.0
+    # A tenth of a second between positions is 0.2 m at 2 m/s, the most a setpoint may be wrong by.
+    min_local_position_hz: Positive = 10.0
+    min_attitude_hz: Positive = 10.0
+
+
+class EstimateConfig(Written):
+    """Numbers of the collision-velocity filter."""
+
+    # IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this.
+    imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
+    # Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated.
+    velocity_noise_m_s: Positive = 0.04
+    position_noise_m: Positive = 0.03
+    # White-jerk density: a go_to's 2 m/s^2 may come or go within any second, (2 m/s^2)^2 / 1 s. It leaves
+    # 0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s.
+    jerk_density_m2_s5: Positive = 4.0
+
+
+class SettledConfig(Written):
+    """When a recovery has ended."""
+
+    distance_m: Positive = 0.10
+    speed_m_s: Positive = 0.10
+    duration_s: Positive = 0.5
+    # A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it.
+    timeout_s: Positive = 10.0
+    # Mean over about five samples at 50 Hz: brings a 0.03 m/s RMS velocity noise per axis to 0.01 m/s, so that
+    # the speed of a vehicle at rest stays clear of `speed_m_s` for the whole of `duration_s`.
+    smoothing_s: NotNegative = 0.1
+
+
+class LinkConfig(Written):
+    """Patience with the other end."""
+
+    # PX4 announces itself once a second; ten misses are not bad luck.
+    heartbeat_wait_s: Positive = 10.0
+    # More than the one-second HEARTBEAT interval, so that a lost packet is not a lost link, and still sooner
+    # than anyone notices a vehicle flying on its own.
+    silence_s: Annotated[Positive, Field(ge=0.2)] = 1.5
+    # A position this old is 2 m wrong at 2 m/s: nothing flown on it is safe.
+    position_silence_s: Annotated[Positive, Field(ge=0.1)] = 1.0
+
+
+class FlightConfig(Written):
+    """How the flight itself is flown."""
+
+    # Well above the 2 Hz that holds OFFBOARD; 50 Hz so that a moving setpoint advances 4 cm a step at 2 m/s.
+    setpoint_hz: Annotated[Rate, Field(ge=20.0)] = 50.0
+    # PX4 wants to see the stream before the switch; its documentation asks for more than a second of it.
+    setpoint_lead_s: Annotated[Positive, Field(ge=1.0)] = 1.0
+    # Below PX4's MPC_Z_VEL_MAX_UP of 3 m/s and near its MPC_TKO_SPEED of 1.5 m/s.
+    takeoff_speed_m_s: Annotated[Positive, Field(le=3.0)] = 1.0
+    takeoff_acceleration_m_s2: Annotated[Positive, Field(le=5.0)] = 1.0
+    # Twice the recovery's distance: a waypoint is passed, not settled on.
+    acceptance_radius_m: Positive = 0.2
+    # Time allowed to arrive after the profile has ended: a wind or a drag it did not know of.
+    arrival_timeout_s: Positive = 15.0
+
+
+class CompanionConfig(Written):
+    """All settings of the companion."""
+
+    detector: str = "lateral"
+    # Ground handling, landing gear and ground effect are below this height above the arming position.
+    min_detection_height_m: NotNegative = 0.5
+    lateral: LateralConfig = LateralConfig()
+    streams: StreamsConfig = StreamsConfig()
+    estimate: EstimateConfig = EstimateConfig()
+    settled: SettledConfig = SettledConfig()
+    link: LinkConfig = LinkConfig()
+    flight: FlightConfig = FlightConfig()
+
+    @field_validator("detector")
+    @classmethod
+    def _known_detector(cls, name: str) -> str:
+        check_known_detector(name, DETECTORS)
+        return name

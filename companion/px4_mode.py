@@ -1,0 +1,26 @@
+"""PX4's flight modes as HEARTBEAT.custom_mode packs them: main << 16 | sub << 24 (PX4's px4_custom_mode.h)."""
+
+OFFBOARD = 6 << 16
+AUTO_LOITER = 4 << 16 | 3 << 24
+AUTO_LAND = 4 << 16 | 6 << 24
+
+_MAIN_NAMES = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 4: "AUTO", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED"}
+_AUTO_NAMES = {
+    1: "READY",
+    2: "TAKEOFF",
+    3: "LOITER",
+    4: "MISSION",
+    5: "RTL",
+    6: "LAND",
+    8: "FOLLOW",
+    9: "PRECLAND",
+}
+
+
+def mode_name(custom_mode: int) -> str:
+    """The mode as PX4's own tools print it, for example OFFBOARD or AUTO.LAND."""
+    main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+    name = _MAIN_NAMES.get(main, f"mode {main}")
+    if name == "AUTO":
+        return f"AUTO.{_AUTO_NAMES.get(sub, str(sub))}"
+    return name

@@ -1,0 +1,1 @@
+"""Recovery laws, one file each, behind one interface and selected by name."""

@@ -1,0 +1,80 @@
+"""What a flight tells: events as they happen, a live status, and the report at the end."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from companion.messages import Vector3
+
+JsonValue: TypeAlias = "bool | int | float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
+
+Outcome: TypeAlias = Literal["completed", "aborted", "failed"]
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something worth a line in the timeline; `text` is for people, `data` for tools."""
+
+    time_us: int
+    kind: str
+    text: str
+    data: Mapping[str, JsonValue]
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The live line. Position is the vehicle's local NED estimate."""
+
+    state: str
+    vehicle_mode: str
+    armed: bool
+    position_ned_m: Vector3 | None
+    speed_m_s: float | None
+    detector: str
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionReport:
+    """One collision, as the companion measured it from telemetry. Positions are the vehicle's local NED.
+
+    `impact_velocity_ned_m_s` is v_c of the paper: the velocity just before contact.
+    `normal_ned` is the horizontal unit direction of the obstacle's push, taken over the whole contact.
+    `peak_specific_force_m_s2` is the largest specific force perpendicular to thrust in one IMU sample.
+    `settled_after_s` runs from the detection to the start of the interval in which the vehicle stayed
+    settled; None when it did not settle.
+    `overshoot_m` is the largest distance past the setpoint, away from the obstacle, until the recovery ended.
+    `rebound_speed_m_s` is the speed back along the approach when the contact ended; 0 when it never moved back.
+    """
+
+    detected_at_us: int
+    sample_time_boot_us: int
+    detector: str
+    position_ned_m: Vector3
+    impact_velocity_ned_m_s: Vector3
+    impact_speed_m_s: float
+    normal_ned: Vector3
+    peak_specific_force_m_s2: float
+    recovery_setpoint_ned_m: Vector3
+    settled_after_s: float | None
+    overshoot_m: float
+    rebound_speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class FlightReport:
+    """The outcome of a flight.
+
+    `failed`: the flight never began (no vehicle, wrong vehicle, streams too slow, refused).
+    `aborted`: it began, or was stopped by the person, and ended before the mission did.
+    `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission coordinates.
+    """
+
+    outcome: Outcome
+    reason: str
+    autopilot: str
+    stream_rates_hz: Mapping[str, float]
+    collisions: tuple[CollisionReport, ...]
+    origin_ned_m: Vector3 | None
+    started_at_us: int
+    ended_at_us: int
+    armed_at_us: int | None

@@ -1,0 +1,16 @@
+"""Number types for files a person writes: finite, never a string or a truth value in disguise."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
+PositionNed = tuple[Number, Number, Number]
+
+
+class Written(BaseModel):
+    """Base of everything a person writes: unknown keys are errors, values never change afterwards."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)

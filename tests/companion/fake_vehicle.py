@@ -1,0 +1,274 @@
+"""A scripted vehicle on the wire: PX4's packets made with pymavlink, obedient point-mass motion, one wall.
+
+It shares no code with the product. What it does on request can be spoiled in the ways a link or a vehicle can
+spoil it: silence, refusals, lost answers, a pilot, a failsafe.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from pymavlink.dialects.v20 import development as mav
+
+from companion.companion import Companion
+from companion.mission.model import Mission
+from companion.report import Event
+
+OFFBOARD, LOITER, LAND, POSCTL = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24, 3 << 16
+INTERVAL_US = 4_000
+EPOCH_US = 1_600_000_000_000_000
+
+SQUARE_ITEMS = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [3, 0, -1.5], "speed_m_s": 2.0}},
+    {"hold": {"duration_s": 0.5}},
+    {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0, "yaw_deg": 90}},
+    {"land": {}},
+]
+
+
+def mission(**changes: object) -> Mission:
+    return Mission.model_validate({"name": "test", "items": SQUARE_ITEMS, **changes})
+
+
+@dataclass
+class FakeVehicle:
+    """Everything scripted is a public field, to be changed at any time."""
+
+    system_id: int = 1
+    autopilot: int = 12
+    vehicle_type: int = 2
+    imu_every: int = 1  # intervals between HIGHRES_IMU
+    silent: bool = False
+    deaf: bool = False  # hears nothing, keeps talking
+    no_positions: bool = False
+    no_imu: bool = False
+    no_current_mode: bool = False
+    ack: Callable[[int, int], list[int]] = lambda command, count: [0]  # (command, how often) -> results
+    obey: Callable[[int, int], bool] = lambda command, count: True
+    wall_north_m: float | None = None
+    restitution_spring: tuple[float, float] = (30.0, 500.0)  # b_s, k_s of eq. 2
+    start_ned_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    time_us: int = 5_000_000
+    mode: int = LOITER
+    intended: int = LOITER
+    armed: bool = False
+    failsafe: bool = False
+    landed: int = 1
+    fold_m: float = 0.0
+    touching: bool = False
+    push_m_s2: tuple[float, float] = (0.0, 0.0)  # scripted lateral force of the next sample, body x and y
+    setpoints: list = field(default_factory=list)  # (time_us, message)
+    commands: list = field(default_factory=list)
+    heartbeats: list = field(default_factory=list)
+    timesyncs: list = field(default_factory=list)
+    contact_times_us: list = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.position = list(self.start_ned_m)
+        self.velocity = [0.0, 0.0, 0.0]
+        self.specific_force = [0.0, 0.0, -9.81]
+        self.target = None
+        self.counts: dict[int, int] = {}
+        self.ticks = 0
+        self.tx = mav.MAVLink(None, self.system_id, 1)
+        self.rx = mav.MAVLink(None)
+        self.rx.robust_parsing = True
+        self.out = b""
+
+    # --- what others do to the vehicle
+
+    def pilot_takes(self, mode: int) -> None:
+        self.mode = self.intended = mode
+
+    def failsafe_takes(self, mode: int) -> None:
+        self.mode, self.failsafe = mode, True
+
+    # --- the wire
+
+    def step(self, received: bytes) -> bytes:
+        self.out = b""
+        if not self.deaf:
+            for message in self.rx.parse_buffer(received) or []:
+                self.hear(message)
+        self.move()
+        self.ticks += 1
+        self.time_us += INTERVAL_US
+        self.stream()
+        return b"" if self.silent else self.out
+
+    def send(self, message) -> None:
+        self.out += bytes(message.pack(self.tx))
+        self.tx.seq = (self.tx.seq + 1) % 256
+
+    def hear(self, message) -> None:
+        kind = message.get_type()
+        if kind == "SET_POSITION_TARGET_LOCAL_NED":
+            self.setpoints.append((self.time_us, message))
+            self.target = message
+        elif kind == "HEARTBEAT":
+            self.heartbeats.append((self.time_us, message))
+        elif kind == "TIMESYNC":
+            self.timesyncs.append(message)
+        elif kind == "COMMAND_LONG":
+            self.obey_command(message)
+
+    def obey_command(self, message) -> None:
+        command = message.command
+        self.commands.append((self.time_us, message))
+        self.counts[command] = count = self.counts.get(command, 0) + 1
+        for result in self.ack(command, count):
+            self.send(mav.MAVLink_command_ack_message(command, result, 0, 0, 1, 191))
+        if not self.obey(command, count):
+            return
+        if command == 176:
+            self.mode = self.intended = int(message.param2) << 16 | int(message.param3) << 24
+        elif command == 400:
+            self.armed = message.param1 == 1.0
+        elif command == 512 and message.param1 == 148:
+            self.send(
+                mav.MAVLink_autopilot_version_message(
+                    0, 1 << 24 | 15 << 16, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
+                )
+            )
+
+    def stream(self) -> None:
+        n, boot_ms = self.ticks, self.time_us // 1000
+        if n % self.imu_every == 0 and not self.no_imu:
+            f = self.specific_force
+            push, self.push_m_s2 = self.push_m_s2, (0.0, 0.0)
+            self.send(
+                mav.MAVLink_highres_imu_message(
+                    self.time_us, f[0] + push[0], f[1] + push[1], f[2], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F
+                )
+            )
+        if n % 5 == 0 and not self.no_positions:
+            self.send(mav.MAVLink_local_position_ned_message(boot_ms, *self.position, *self.velocity))
+        if n % 5 == 1:
+            self.send(mav.MAVLink_attitude_quaternion_message(boot_ms, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        if n % 25 == 2 and not self.no_current_mode:
+            self.send(mav.MAVLink_current_mode_message(0, self.mode, self.intended))
+        if n % 50 == 3:
+            self.send(mav.MAVLink_extended_sys_state_message(0, self.landed))
+        if n % 250 == 4:
+            status = 5 if self.failsafe else 4 if self.armed else 3
+            base = 0x1D | (0x80 if self.armed else 0)
+            self.send(mav.MAVLink_heartbeat_message(self.vehicle_type, self.autopilot, base, self.mode, status, 3))
+        if n % 25 == 5:
+            self.send(mav.MAVLink_timesync_message(0, self.time_us * 1000))
+
+    # --- motion
+
+    def move(self) -> None:
+        dt = INTERVAL_US * 1e-6
+        command = [0.0, 0.0, 0.0]
+        if self.armed and self.mode == OFFBOARD and self.target is not None:
+            t = self.target
+            ahead = [t.x, t.y, t.z]
+            forward = [0.0, 0.0, 0.0] if t.type_mask & 0x038 else [t.vx, t.vy, t.vz]
+            command = [forward[i] + 2.0 * (ahead[i] - self.position[i]) for i in range(3)]
+            if self.landed == 1 and ahead[2] > self.start_ned_m[2] - 0.05:
+                command = [0.0, 0.0, 0.0]  # feet do not slide
+        elif self.armed and self.mode == LAND:
+            command = [0.0, 0.0, 0.7]
+        steps = 40
+        force = 0.0
+        for _ in range(steps):
+            h = dt / steps
+            for i in range(3):
+                self.velocity[i] += max(-8.0, min(8.0, 6.0 * (command[i] - self.velocity[i]))) * h
+            force += self.wall_force(h) / steps
+            for i in range(3):
+                self.position[i] += self.velocity[i] * h
+        self.specific_force = [force, 0.0, -9.81]
+        self.meet_ground()
+
+    def wall_force(self, h: float) -> float:
+        """Eq. 2: the wall pushes, and never pulls; returns the specific force along north."""
+        if self.wall_north_m is None:
+            return 0.0
+        fold = self.position[0] - self.wall_north_m
+        if fold <= 0.0:
+            self.touching = False
+            return 0.0
+        b, k = self.restitution_spring
+        push = -(b * self.velocity[0] + k * fold)
+        if push >= 0.0:
+            return 0.0
+        if not self.touching:
+            self.touching = True
+            self.contact_times_us.append(self.time_us)
+        self.velocity[0] += push * h
+        return push
+
+    def meet_ground(self) -> None:
+        if self.position[2] >= self.start_ned_m[2]:
+            self.position[2] = self.start_ned_m[2]
+            self.velocity[2] = min(0.0, self.velocity[2])
+            if self.mode == LAND and self.armed and self.landed != 1:
+                self.landed, self.armed = 1, False
+        elif self.start_ned_m[2] - self.position[2] > 0.1:
+            self.landed = 2
+
+
+@dataclass
+class Flight:
+    """Companion and fake vehicle joined in memory, on virtual time."""
+
+    companion: Companion
+    vehicle: FakeVehicle
+    now_us: int = EPOCH_US
+    pending: bytes = b""
+    events: list[Event] = field(default_factory=list)
+    sent: list[tuple[int, bytes]] = field(default_factory=list)
+
+    def step(self) -> list[Event]:
+        self.now_us += INTERVAL_US
+        result = self.companion.step(self.vehicle.step(self.pending), self.now_us)
+        self.pending = b"".join(result.sent_frames)
+        self.sent += [(self.now_us, frame) for frame in result.sent_frames]
+        self.events += result.events
+        return list(result.events)
+
+    def run_until(self, condition: Callable[[], bool], limit_s: float = 60.0) -> None:
+        """Step until the condition holds; the test fails when it does not within virtual `limit_s`."""
+        for _ in range(math.ceil(limit_s * 1e6 / INTERVAL_US)):
+            if condition():
+                return
+            self.step()
+        raise AssertionError(f"not within {limit_s} s; state {self.state}, events: {self.texts()}")
+
+    def run_for(self, seconds: float) -> None:
+        for _ in range(round(seconds * 1e6 / INTERVAL_US)):
+            self.step()
+
+    def run_to(self, state: str, limit_s: float = 60.0) -> None:
+        self.run_until(lambda: self.state == state, limit_s)
+
+    def run_to_end(self, limit_s: float = 120.0) -> None:
+        self.run_until(lambda: self.companion.finished, limit_s)
+
+    @property
+    def state(self) -> str:
+        return self.companion.status().state
+
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.events]
+
+    def texts(self) -> list[str]:
+        return [f"{event.kind}: {event.text}" for event in self.events]
+
+    def event(self, kind: str, index: int = 0) -> Event:
+        return [event for event in self.events if event.kind == kind][index]
+
+    def setpoints_since(self, time_us: int) -> list:
+        """Setpoint packets sent after `now_us` = time_us."""
+        return [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == 84]
+
+
+def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes: object) -> Flight:
+    companion = Companion(mission(**changes))
+    if confirmed:
+        companion.confirm_plan()
+    return Flight(companion, vehicle or FakeVehicle())

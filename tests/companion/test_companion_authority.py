@@ -1,0 +1,203 @@
+"""Who flies: own requests, a failsafe and the pilot are told apart, and the companion never fights."""
+
+import pytest
+
+from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, Flight, flight
+
+INTO_WALL = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
+    {"land": {}},
+]
+IN_THE_AIR = ["takeoff", "mission", "recovering", "holding", "landing"]
+ON_SETPOINTS = ["takeoff", "mission", "recovering", "holding"]
+
+
+def flying_in(state: str, vehicle: FakeVehicle | None = None, **changes) -> Flight:
+    """A flight in the middle of the given state, airborne."""
+    vehicle = vehicle or FakeVehicle()
+    vehicle.wall_north_m = 3.0
+    f = flight(vehicle, items=INTO_WALL, **changes)
+    if state == "takeoff":
+        f.run_until(lambda: vehicle.landed == 2)
+    elif state == "landing":
+        f.run_until(lambda: "landing" in f.kinds())
+    else:
+        f.run_to(state)
+    f.run_for(0.1)
+    assert f.state == state
+    return f
+
+
+def assert_silent_from_now(f: Flight) -> None:
+    """No setpoint and no command for three seconds, well beyond PX4's loss time-out."""
+    commands = len(f.vehicle.commands)
+    since = f.now_us
+    f.run_for(3.0)
+    assert f.setpoints_since(since) == []
+    assert len(f.vehicle.commands) == commands
+
+
+@pytest.mark.parametrize("state", IN_THE_AIR)
+def test_a_pilots_mode_change_ends_the_flight_and_the_setpoints_at_once(state):
+    f = flying_in(state)
+
+    f.vehicle.pilot_takes(POSCTL)
+    f.run_to("aborted", 2.0 if state == "landing" else 0.2)
+
+    report = f.companion.report()
+    assert f.companion.finished
+    assert report.outcome == "aborted"
+    assert "pilot" in report.reason
+    assert "POSCTL" in report.reason
+    assert_silent_from_now(f)
+
+
+@pytest.mark.parametrize("state", IN_THE_AIR)
+@pytest.mark.parametrize("seen_in", ["heartbeat", "current_mode"])
+def test_a_failsafe_is_called_a_failsafe_and_not_fought(state, seen_in):
+    f = flying_in(state)
+    f.vehicle.no_current_mode = seen_in == "heartbeat"
+
+    f.vehicle.failsafe_takes(LOITER)
+    f.run_to("aborted", 3.0 if state == "landing" else 1.1)
+
+    report = f.companion.report()
+    assert report.outcome == "aborted"
+    assert "failsafe" in report.reason
+    assert "pilot" not in report.reason
+    assert_silent_from_now(f)
+
+
+@pytest.mark.parametrize("state", ON_SETPOINTS)
+def test_a_disarmed_vehicle_ends_the_flight(state):
+    f = flying_in(state)
+    f.vehicle.armed = False
+    f.run_to("aborted", 1.1)
+    assert "disarmed" in f.companion.report().reason
+    assert_silent_from_now(f)
+
+
+def test_the_pilot_choosing_land_is_still_the_pilot():
+    f = flying_in("mission")
+    f.vehicle.pilot_takes(LAND)
+    f.run_to("aborted", 0.2)
+    assert "pilot" in f.companion.report().reason
+
+
+def test_without_current_mode_the_heartbeat_tells_the_pilot():
+    f = flying_in("mission", FakeVehicle(no_current_mode=True))
+    f.vehicle.pilot_takes(POSCTL)
+    f.run_to("aborted", 1.1)
+    assert "pilot" in f.companion.report().reason
+
+
+def test_own_requests_are_not_taken_for_a_pilot_even_when_confirmed_late():
+    """The vehicle obeys the second request only; until then it stays in the old mode."""
+    vehicle = FakeVehicle(obey=lambda command, count: command != 176 or count % 2 == 0)
+    f = flight(vehicle)
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_a_warning_status_while_still_in_offboard_is_not_a_loss_of_control():
+    f = flying_in("mission")
+    f.vehicle.failsafe = True
+    f.run_for(1.1)
+    assert f.state in ("mission", "recovering")
+
+
+def test_px4_leaving_land_mode_once_it_is_down_is_not_a_pilot():
+    f = flying_in("landing")
+    f.run_until(lambda: f.vehicle.position[2] > -0.05)
+    f.vehicle.landed, f.vehicle.target = 1, None
+    f.vehicle.mode = OFFBOARD  # still armed: PX4 disarms two seconds after touchdown
+    f.run_for(2.5)
+    assert f.state == "landing"
+    f.vehicle.armed = False
+    f.run_to("done", 1.1)
+
+
+@pytest.mark.parametrize("state", IN_THE_AIR)
+@pytest.mark.parametrize(("on_interrupt", "mode"), [("hold", LOITER), ("land", LAND)])
+def test_ctrl_c_hands_the_vehicle_over_as_the_mission_says(state, on_interrupt, mode):
+    f = flying_in(state, on_interrupt=on_interrupt)
+    stopped_at = f.now_us
+
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(2.0)
+
+    report = f.companion.report()
+    assert f.vehicle.mode == mode
+    assert f.vehicle.armed
+    assert (report.outcome, report.reason) == ("aborted", "Ctrl-C")
+    assert f.state == "aborted"
+    if state != "landing":
+        assert f.setpoints_since(stopped_at), "setpoints go on until the mode is seen to hold"
+    assert_silent_from_now(f)
+
+
+def test_the_stop_is_due_at_once():
+    f = flying_in("mission")
+    f.companion.stop("Ctrl-C")
+    assert f.companion.next_deadline_us() <= f.now_us
+
+
+def test_a_vehicle_that_does_not_answer_the_hand_over_is_left_to_its_own_failsafe():
+    f = flying_in("mission")
+    f.vehicle.deaf = True
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(5.0)
+    assert [e for e in f.events if e.kind == "command" and "no answer" in e.text]
+    assert_silent_from_now(f)
+
+
+def test_a_pilot_who_takes_over_during_the_hand_over_keeps_the_vehicle():
+    f = flying_in("mission")
+    f.vehicle.deaf = True
+    f.companion.stop("Ctrl-C")
+    f.run_for(0.2)
+    f.vehicle.pilot_takes(POSCTL)
+    f.run_to_end(0.2)
+    f.vehicle.deaf = False
+    f.pending = b""
+    f.run_for(3.0)
+    assert f.vehicle.mode == POSCTL
+
+
+def test_ctrl_c_while_arming_on_the_ground_disarms():
+    f = flight(FakeVehicle(obey=lambda command, count: command != 400 or count > 1))
+    f.run_until(lambda: f.vehicle.counts.get(400) == 1)
+    f.vehicle.armed = True  # armed after all, but it has not said so yet
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(5.0)
+    assert not f.vehicle.armed
+    assert f.vehicle.mode == LOITER
+    assert f.companion.report().outcome == "aborted"
+
+
+def test_a_vehicle_that_flies_already_is_not_kept_from_the_hand_over_by_a_refused_disarm():
+    f = flight(FakeVehicle(ack=lambda c, n: [1] if c == 400 and n > 1 else [0], obey=lambda c, n: c != 400 or n == 1))
+    f.run_until(lambda: f.vehicle.armed)
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(1.0)
+    assert f.vehicle.mode == LOITER
+
+
+@pytest.mark.parametrize("state", ["connect", "ready"])
+def test_ctrl_c_before_the_flight_asks_nothing_of_the_vehicle(state):
+    f = flight(confirmed=False)
+    f.run_to(state)
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(0.1)
+    assert f.companion.report().outcome == "aborted"
+    assert not [m for _, m in f.vehicle.commands if m.command in (176, 400)]
+
+
+def test_a_second_ctrl_c_changes_nothing():
+    f = flying_in("mission")
+    f.companion.stop("Ctrl-C")
+    f.step()
+    f.companion.stop("Ctrl-C again")
+    f.run_to_end(2.0)
+    assert f.companion.report().reason == "Ctrl-C"

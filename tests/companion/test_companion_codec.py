@@ -1,0 +1,196 @@
+"""MAVLink bytes to samples and commands to bytes, against pymavlink's own packing and parsing."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.mavlink.decode import Decoder
+from companion.mavlink.encode import Encoder
+from companion.messages import (
+    Attitude,
+    AutopilotVersion,
+    CommandAck,
+    CommandResult,
+    CurrentMode,
+    ExtendedState,
+    Heartbeat,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    OnboardHeartbeat,
+    PositionSetpoint,
+    RequestMessage,
+    SendCommand,
+    SetArmed,
+    SetMessageInterval,
+    SetMode,
+    TimeSyncReply,
+    TimeSyncRequest,
+)
+
+HEARTBEAT = (
+    mav.MAVLink_heartbeat_message(2, 12, 0x9D, 4 << 16 | 3 << 24, 4, 3),
+    Heartbeat(1, 1, 2, 12, True, 0x03040000, 4),
+)
+CASES = [
+    HEARTBEAT,
+    (
+        mav.MAVLink_highres_imu_message(123_456_789, 1.0, -2.0, -9.5, 0.5, 0.25, -0.5, 0, 0, 0, 0, 0, 0, 0, 0x3F),
+        ImuSample(123_456_789, (1.0, -2.0, -9.5), (0.5, 0.25, -0.5)),
+    ),
+    (
+        mav.MAVLink_local_position_ned_message(5000, 1.0, 2.0, -3.0, 0.5, -0.5, 0.25),
+        LocalPosition(5_000_000, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25)),
+    ),
+    (
+        mav.MAVLink_attitude_quaternion_message(5000, 0.5, 0.5, -0.5, 0.5, 0, 0, 0),
+        Attitude(5_000_000, (0.5, 0.5, -0.5, 0.5)),
+    ),
+    (mav.MAVLink_extended_sys_state_message(0, 2), ExtendedState(LandedState.IN_AIR)),
+    (mav.MAVLink_current_mode_message(0, 6 << 16, 3 << 16), CurrentMode(6 << 16, 3 << 16)),
+    (mav.MAVLink_current_mode_message(0, 6 << 16, 0), CurrentMode(6 << 16, None)),
+    (mav.MAVLink_command_ack_message(400, 1, 0, 0, 1, 191), CommandAck(400, CommandResult.TEMPORARILY_REJECTED)),
+    (mav.MAVLink_timesync_message(0, 777), TimeSyncRequest(777)),
+    (
+        mav.MAVLink_autopilot_version_message(0, 0x010F02FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),
+        AutopilotVersion((1, 15, 2)),
+    ),
+]
+UNUSED = mav.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0, 0, 0)
+
+
+def packed(message, system=1, component=1, v1=False) -> bytes:
+    return bytes(message.pack(mav.MAVLink(None, system, component), force_mavlink1=v1))
+
+
+def listening_decoder() -> Decoder:
+    decoder = Decoder()
+    decoder.listen_to(1, 1)
+    return decoder
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 100_000])
+def test_every_sample_is_decoded_in_any_chunking(chunk):
+    stream = b"".join(packed(message) for message, _ in CASES)
+    decoder = listening_decoder()
+
+    frames = [f for i in range(0, len(stream), chunk) for f in decoder.feed(stream[i : i + chunk])]
+
+    assert [sample for _, sample in frames] == [sample for _, sample in CASES]
+    assert b"".join(frame for frame, _ in frames) == stream
+
+
+def test_mavlink_1_packets_are_understood():
+    message, expected = CASES[2]
+    assert listening_decoder().feed(packed(message, v1=True)) == [(packed(message, v1=True), expected)]
+
+
+@pytest.mark.parametrize(
+    "junk", [b"\x00\x01\x02", b"\xfd", b"\xfe\x09\x00", b"\xfd\x09\x00\x00\x00\x01", b"\xfd\xff\x02"]
+)
+def test_bad_bytes_cost_no_good_packet_and_none_is_lost(junk):
+    good = b"".join(packed(message) for message, _ in CASES)
+    decoder = listening_decoder()
+
+    frames = decoder.feed(good + junk + good)
+
+    assert [s for _, s in frames if s is not None] == [s for _, s in CASES] * 2
+    assert b"".join(frame for frame, _ in frames) == good + junk + good
+    assert decoder.bad_bytes == len(junk)
+
+
+def test_a_flipped_bit_anywhere_in_a_packet_never_yields_a_sample_or_an_error():
+    packet = packed(CASES[1][0])
+    follower = packed(CASES[2][0])
+    for position in range(len(packet)):
+        damaged = bytearray(packet)
+        damaged[position] ^= 0x10
+        samples = [s for _, s in listening_decoder().feed(bytes(damaged) + follower * 8) if s is not None]
+        assert not [s for s in samples if isinstance(s, ImuSample)], position
+        assert samples[-1] == CASES[2][1]
+
+
+def test_packets_without_use_and_unknown_ids_pass_as_frames():
+    unknown = bytes([0xFD, 1, 0, 0, 0, 1, 1, 0xFF, 0xFF, 0xF0, 7, 0, 0])
+    frames = listening_decoder().feed(packed(UNUSED) + unknown + packed(UNUSED))
+    assert frames == [(packed(UNUSED), None), (unknown, None), (packed(UNUSED), None)]
+
+
+def test_only_heartbeats_are_heard_before_the_vehicle_is_known_and_only_the_vehicle_afterwards():
+    imu = CASES[1][0]
+    decoder = Decoder()
+    assert decoder.feed(packed(imu))[0][1] is None
+    assert decoder.feed(packed(HEARTBEAT[0]))[0][1] == HEARTBEAT[1]
+    decoder.listen_to(1, 1)
+    assert decoder.feed(packed(imu, 1, 1))[0][1] is not None
+    assert decoder.feed(packed(imu, 2, 1))[0][1] is None
+    assert decoder.feed(packed(HEARTBEAT[0], 1, 190))[0][1] is None
+
+
+def test_answers_to_others_replies_to_our_own_requests_and_numberless_values_are_not_samples():
+    nan = float("nan")
+    for message in (
+        mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
+        mav.MAVLink_timesync_message(5, 777),
+        mav.MAVLink_local_position_ned_message(5000, nan, 0, 0, 0, 0, 0),
+        mav.MAVLink_highres_imu_message(1, nan, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F),
+        mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
+    ):
+        assert listening_decoder().feed(packed(message))[0][1] is None
+
+
+def sent(outgoing):
+    encoder = Encoder()
+    encoder.speak_to(7, 1)
+    return mav.MAVLink(None).decode(bytearray(encoder.encode(outgoing)))
+
+
+@pytest.mark.parametrize(
+    ("velocity", "yaw", "mask"),
+    [((0.5, 0.0, -0.5), 1.0, 0x9C0), (None, 1.0, 0x9F8), (None, None, 0xDF8), ((0.0, 0.0, 1.0), None, 0xDC0)],
+)
+def test_setpoint_masks_are_px4s(velocity, yaw, mask):
+    m = sent(PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), velocity, yaw))
+
+    assert (m.type_mask, m.coordinate_frame, m.target_system, m.target_component) == (mask, 1, 7, 1)
+    assert (m.x, m.y, m.z, m.time_boot_ms) == (1.0, 2.0, -3.0, 2000)
+    assert math.isnan(m.afx)
+    assert math.isnan(m.yaw_rate)
+    assert (m.vx, m.vy, m.vz) == velocity if velocity else math.isnan(m.vx)
+    assert m.yaw == yaw if yaw is not None else math.isnan(m.yaw)
+
+
+@pytest.mark.parametrize(
+    ("command", "number", "parameters"),
+    [
+        (SetMode(6 << 16), 176, (1, 6, 0)),
+        (SetMode(4 << 16 | 6 << 24), 176, (1, 4, 6)),
+        (SetArmed(True), 400, (1, 0, 0)),
+        (SetArmed(False), 400, (0, 0, 0)),
+        (SetMessageInterval(105, 4000), 511, (105, 4000, 0)),
+        (RequestMessage(148), 512, (148, 0, 0)),
+    ],
+)
+def test_commands_carry_their_parameters_and_zeros(command, number, parameters):
+    m = sent(SendCommand(command, 3))
+
+    assert (m.command, m.confirmation, m.target_system, m.target_component) == (number, 3, 7, 1)
+    assert (m.param1, m.param2, m.param3) == parameters
+    assert (m.param4, m.param5, m.param6, m.param7) == (0, 0, 0, 0)
+
+
+def test_the_companion_is_an_onboard_computer_of_the_vehicles_system():
+    m = sent(OnboardHeartbeat(True))
+    assert (m.get_srcSystem(), m.get_srcComponent(), m.type, m.autopilot) == (7, 191, 18, 8)
+
+
+def test_time_replies_echo_the_vehicles_time():
+    m = sent(TimeSyncReply(777, 12345))
+    assert (m.ts1, m.tc1) == (777, 12345)
+
+
+def test_sequence_numbers_count_up_and_wrap():
+    encoder = Encoder()
+    numbers = [encoder.encode(OnboardHeartbeat(False))[4] for _ in range(258)]
+    assert numbers == [*range(256), 0, 1]

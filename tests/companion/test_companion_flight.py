@@ -1,0 +1,383 @@
+"""Whole flights on the wire against a scripted vehicle: take-off, items, hits, recoveries, landing."""
+
+import itertools
+import math
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from tests.companion.fake_vehicle import EPOCH_US, LOITER, OFFBOARD, FakeVehicle, Flight, flight
+
+INTO_WALL = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
+    {"go_to": {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}},
+    {"land": {}},
+]
+
+
+def at_wall(**changes) -> Flight:
+    return flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL, **changes)
+
+
+def times_of(f: Flight, kind: str) -> list[int]:
+    return [event.time_us for event in f.events if event.kind == kind]
+
+
+def test_a_mission_without_a_hit_completes():
+    f = flight()
+    f.run_to_end()
+
+    report = f.companion.report()
+    assert (report.outcome, report.autopilot, report.collisions) == ("completed", "PX4 1.15.0", ())
+    assert report.stream_rates_hz["HIGHRES_IMU"] == pytest.approx(250, rel=0.01)
+    assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
+    assert report.started_at_us < report.armed_at_us < report.ended_at_us
+    assert [k for k in f.kinds() if k not in ("mode", "item")] == [
+        *("connected", "streams", "plan", "takeoff", "armed", "landing", "armed", "done")
+    ]
+
+
+def test_coordinates_are_relative_to_the_arming_position():
+    f = flight(FakeVehicle(start_ned_m=(10.0, -4.0, 0.5)))
+    f.run_to("landing")
+
+    assert f.companion.report().origin_ned_m == pytest.approx((10.0, -4.0, 0.5), abs=1e-3)
+    assert f.vehicle.position == pytest.approx([10.0, -2.0, -1.0], abs=0.25)
+    last = f.vehicle.setpoints[-1][1]
+    assert last.yaw == pytest.approx(math.pi / 2)
+
+
+def test_setpoints_lead_the_mode_switch_by_a_second_and_never_pause_in_flight():
+    f = flight()
+    f.run_to("landing")
+
+    times = [t for t, _ in f.vehicle.setpoints]
+    offboard_at = next(t for t, m in f.vehicle.commands if m.command == 176)
+    arm_at = next(t for t, m in f.vehicle.commands if m.command == 400)
+    assert offboard_at - times[0] >= 1_000_000
+    assert arm_at > offboard_at
+    gaps = [b - a for a, b in itertools.pairwise(times)]
+    assert max(gaps) <= 50_000, "20 Hz or faster"
+    assert {m.type_mask for _, m in f.vehicle.setpoints} == {0x9C0, 0x9F8}
+
+
+def test_setpoints_stop_once_the_vehicle_lands_by_itself():
+    f = flight()
+    f.run_until(lambda: "landing" in f.kinds())
+    landing_at = f.now_us
+    f.run_to_end()
+    assert f.setpoints_since(landing_at) == []
+
+
+def test_nothing_arms_before_the_plan_is_confirmed():
+    f = flight(confirmed=False)
+    f.run_until(f.companion.plan_is_ready)
+    f.run_for(20.0)
+    assert f.state == "ready"
+    assert {m.command for _, m in f.vehicle.commands} <= {511, 512}
+    assert f.vehicle.setpoints == []
+    plan = f.companion.plan_text()
+    for words in (
+        "PX4 1.15.0",
+        "quadrotor",
+        "take off to 1.5 m",
+        "15 m",
+        "6 m",
+        "gamma",
+        "hold for 3 s",
+        "HIGHRES_IMU",
+    ):
+        assert words in plan
+
+    f.companion.confirm_plan()
+    f.run_to("takeoff", 0.1)
+
+
+def test_setpoints_stay_on_the_ground_until_the_vehicle_is_armed():
+    f = flight()
+    f.run_until(lambda: f.vehicle.armed)
+    assert {round(m.z, 3) for _, m in f.vehicle.setpoints} == {0.0}
+
+
+def test_the_hit_is_answered_in_the_step_that_hears_of_it():
+    f = at_wall()
+    f.run_until(lambda: "detection" in f.kinds())
+
+    contact_us = f.vehicle.contact_times_us[0]
+    detection = f.event("detection")
+    assert detection.data["sample_time_boot_us"] - contact_us <= 8000, "the first or second IMU sample"
+    recovery = f.setpoints_since(detection.time_us - 1)
+    assert recovery, "the setpoint leaves in the same step"
+    m = mav.MAVLink(None).decode(bytearray(recovery[-1][1]))
+    expected = detection.data["recovery_setpoint_ned_m"]
+    assert (m.x, m.y, m.z) == pytest.approx(expected, abs=1e-4)
+    assert m.type_mask == 0x9F8
+
+
+def test_the_collision_report_tells_what_happened():
+    f = at_wall()
+    f.run_to_end()
+
+    report = f.companion.report()
+    assert report.outcome == "completed"
+    (hit,) = report.collisions
+    assert hit.detector == "lateral"
+    assert hit.impact_velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.1)
+    assert hit.position_ned_m == pytest.approx((3.0, 0.0, -1.5), abs=0.05)
+    assert hit.normal_ned == pytest.approx((-1.0, 0.0, 0.0))
+    v_n = hit.impact_velocity_ned_m_s[0]
+    assert hit.recovery_setpoint_ned_m[0] == pytest.approx(hit.position_ned_m[0] - 0.5 * v_n)
+    assert 45.0 < hit.peak_specific_force_m_s2 < 75.0
+    assert 0.5 < hit.settled_after_s < 4.0
+    assert 0.3 < hit.rebound_speed_m_s < 1.5
+    assert 0.0 <= hit.overshoot_m < 0.1
+
+
+def test_the_setpoint_is_set_once_per_collision():
+    f = at_wall()
+    f.run_to("recovering")
+    began = f.now_us
+    f.run_to("holding")
+    frames = [mav.MAVLink(None).decode(bytearray(frame)) for _, frame in f.setpoints_since(began)]
+    assert len({(m.x, m.y, m.z) for m in frames}) == 1
+
+
+def test_then_hold_goes_on_with_the_next_item_after_the_time():
+    f = at_wall(on_collision={"then": "hold", "hold_s": 2})
+    f.run_to("holding")
+    began = f.now_us
+    f.run_to("mission")
+    assert f.now_us - began == pytest.approx(2_000_000, abs=20_000)
+    assert f.event("item", -1).data["number"] == 3
+    f.run_to_end()
+    assert f.vehicle.position[0] == pytest.approx(0.0, abs=0.3)
+
+
+def test_then_continue_goes_on_at_once():
+    f = at_wall(on_collision={"then": "continue"})
+    f.run_to("recovering")
+    f.run_until(lambda: f.state != "recovering")
+    assert f.state == "mission"
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_then_land_lands_where_it_recovered():
+    f = at_wall(on_collision={"then": "land"})
+    f.run_to("recovering")
+    f.run_until(lambda: f.state != "recovering")
+    assert f.state == "landing"
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    assert f.vehicle.position[0] == pytest.approx(
+        f.companion.report().collisions[0].recovery_setpoint_ned_m[0], abs=0.2
+    )
+
+
+def strike(f: Flight, x_m_s2: float, y_m_s2: float, samples: int = 3) -> None:
+    """Something pushes the vehicle's body for a few IMU samples."""
+    for _ in range(samples):
+        f.vehicle.push_m_s2 = (x_m_s2, y_m_s2)
+        f.step()
+
+
+@pytest.mark.parametrize("state", ["recovering", "holding"])
+def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
+    f = at_wall()
+    f.run_to(state)
+    f.run_for(0.3)
+
+    strike(f, 0.0, 12.0)
+
+    first, second = f.companion.report().collisions
+    assert f.state == "recovering"
+    assert second.normal_ned == pytest.approx((0.0, 1.0, 0.0), abs=0.01)
+    assert second.sample_time_boot_us > first.sample_time_boot_us
+    m = f.vehicle.setpoints[-1][1]
+    f.step()
+    m = f.vehicle.setpoints[-1][1]
+    assert (m.x, m.y) == pytest.approx(second.recovery_setpoint_ned_m[:2], abs=1e-4)
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_v_c_of_a_second_hit_knows_nothing_from_before_the_first():
+    f = at_wall()
+    f.run_to("recovering")
+    f.run_for(0.2)  # flying back by now
+    going_north = f.vehicle.velocity[0]
+    assert going_north < -0.2
+    strike(f, 12.0, 0.0)
+    second = f.companion.report().collisions[1]
+    assert second.impact_velocity_ned_m_s[0] == pytest.approx(going_north, abs=0.25)
+
+
+def test_a_hit_on_a_hovering_vehicle_is_detected():
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f.run_to("mission")
+    f.run_for(1.0)
+    strike(f, -12.0, 0.0)
+    (hit,) = f.companion.report().collisions
+    assert hit.impact_speed_m_s < 0.1
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+@pytest.mark.parametrize("state", ["takeoff", "landing"])
+def test_takeoff_and_landing_shake_without_a_detection(state):
+    f = flight()
+    f.run_to(state)
+    f.run_for(2.2)
+    assert f.companion.status().detector == f"off ({state})"
+    strike(f, 15.0, 15.0)
+    f.run_to_end()
+    assert f.companion.report().collisions == ()
+
+
+def test_below_the_minimum_height_nothing_is_detected():
+    low = [{"takeoff": {"height_m": 0.4}}, {"hold": {"duration_s": 2}}, {"land": {}}]
+    f = flight(items=low)
+    f.run_to("mission")
+    f.run_for(0.5)
+    assert f.companion.status().detector == "off (below 0.5 m)"
+    strike(f, 15.0, 0.0)
+    assert f.companion.report().collisions == ()
+
+
+def test_the_detector_says_armed_in_flight():
+    f = flight()
+    f.run_to("mission")
+    f.run_for(0.5)
+    assert f.companion.status().detector == "armed"
+
+
+def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
+    f = at_wall(companion={"settled": {"speed_m_s": 1e-6, "timeout_s": 2.0}})
+    f.run_to("recovering")
+    f.run_to("holding", 3.0)
+    assert "not settled" in f.event("recovered").text
+    f.run_to_end()
+    report = f.companion.report()
+    assert report.outcome == "completed"
+    assert report.collisions[0].settled_after_s is None
+
+
+def test_the_recovery_stays_inside_the_fence():
+    f = at_wall(recovery={"gamma": [5.0, 0.5]}, fence={"radius_m": 6, "max_height_m": 3})
+    f.run_to("recovering")
+    assert f.companion.report().collisions[0].recovery_setpoint_ned_m[0] == pytest.approx(-6.0, abs=0.01)
+
+
+def test_an_item_that_cannot_be_reached_ends_in_the_vehicles_own_hold():
+    f = at_wall(companion={"lateral": {"threshold_m_s2": 1000.0}, "flight": {"arrival_timeout_s": 3.0}})
+    f.run_to_end()
+    report = f.companion.report()
+    assert report.outcome == "aborted"
+    assert "not arrived" in report.reason
+    assert f.vehicle.mode == LOITER
+
+
+def test_the_same_flight_twice_is_the_same_byte_for_byte():
+    flights = [at_wall(), at_wall()]
+    for f in flights:
+        f.run_to_end()
+    assert flights[0].sent == flights[1].sent
+    assert flights[0].events == flights[1].events
+
+
+def test_imu_packets_that_come_late_or_twice_are_not_new_samples():
+    f = flight()
+    f.run_to("mission")
+    f.run_for(0.5)
+    old = mav.MAVLink_highres_imu_message(f.vehicle.time_us - 8000, 15.0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
+    f.companion.step(bytes(old.pack(mav.MAVLink(None, 1, 1))), f.now_us)
+    assert f.companion.report().collisions == ()
+
+
+def test_packets_that_arrive_in_batches_tell_the_same_of_a_hit():
+    single, batched = at_wall(), at_wall()
+    single.run_to("holding")
+    waiting = b""
+    while batched.state != "holding":
+        waiting += batched.vehicle.step(batched.pending)
+        batched.pending = b""
+        batched.now_us += 4000
+        if batched.vehicle.ticks % 5 == 0:
+            result = batched.companion.step(waiting, batched.now_us)
+            waiting, batched.pending = b"", b"".join(result.sent_frames)
+    ours, theirs = (f.companion.report().collisions[0] for f in (single, batched))
+    assert theirs.peak_specific_force_m_s2 == pytest.approx(ours.peak_specific_force_m_s2, rel=0.1)
+    assert theirs.impact_speed_m_s == pytest.approx(ours.impact_speed_m_s, rel=0.02)
+
+
+def test_headings_turn_the_shorter_way_at_a_limited_rate():
+    items = [{"takeoff": {"height_m": 1.5}}, {"land": {}}]
+    turn = {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0}
+    items[1:1] = [{"go_to": {**turn, "yaw_deg": 170}}, {"go_to": {**turn, "yaw_deg": -170}}]
+    f = flight(items=items)
+    f.run_until(lambda: len([e for e in f.events if e.kind == "item"]) == 2)
+    began = f.vehicle.time_us
+    f.run_to("landing")
+    yaws = [m.yaw for t, m in f.vehicle.setpoints if t > began]
+    assert all(abs(math.remainder(yaw - math.pi, math.tau)) < math.radians(10.5) for yaw in yaws)
+    steps = [abs(math.remainder(b - a, math.tau)) for a, b in itertools.pairwise(yaws)]
+    assert max(steps) <= math.radians(45) * 0.021
+
+
+def test_a_hit_in_the_middle_of_a_turn_stops_the_turn():
+    turn = {"position_ned_m": [0, 0, -1.5], "speed_m_s": 1.0, "yaw_deg": 90}
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"go_to": turn}, {"land": {}}])
+    f.run_to("mission")
+    f.run_for(1.0)
+    strike(f, 12.0, 0.0)
+    f.run_for(0.1)
+    assert f.vehicle.setpoints[-1][1].yaw == pytest.approx(math.radians(45), abs=0.05)
+
+
+def test_the_origin_is_where_the_vehicle_is_when_it_arms():
+    f = flight()
+    f.run_to("takeoff")
+    f.vehicle.position = [0.3, 0.0, 0.0]  # pushed while the setpoints were already streaming
+    f.run_until(lambda: f.companion.report().origin_ned_m is not None)
+    assert f.companion.report().origin_ned_m == pytest.approx((0.3, 0.0, 0.0), abs=1e-3)
+
+
+def test_received_frames_are_all_the_bytes_in_order():
+    f = at_wall()
+    vehicle, companion = f.vehicle, f.companion
+    for _ in range(500):
+        f.now_us += 4000
+        data = vehicle.step(b"") + b"\x01\xfd\x02"
+        result = companion.step(data[: len(data) // 2], f.now_us)
+        again = companion.step(data[len(data) // 2 :], f.now_us)
+        held = companion._decoder._pending
+        got = b"".join(result.received_frames + again.received_frames) + held
+        assert got.endswith(data[-20:])
+
+
+def test_the_deadline_keeps_setpoints_and_heartbeats_on_time_without_any_input():
+    f = flight()
+    f.run_to("mission")
+    deadline = f.companion.next_deadline_us()
+    assert f.now_us < deadline <= f.now_us + 20_000
+    result = f.companion.step(b"", deadline)
+    assert any(frame[7] == 84 for frame in result.sent_frames)
+
+
+def test_status_for_the_live_line():
+    f = flight()
+    f.run_to("mission")
+    status = f.companion.status()
+    assert (status.state, status.vehicle_mode, status.armed) == ("mission", "OFFBOARD", True)
+    assert status.position_ned_m == pytest.approx(f.vehicle.position, abs=0.05)
+    assert status.speed_m_s is not None
+
+
+def test_the_event_times_are_the_companions_clock():
+    f = flight()
+    f.run_to_end()
+    times = [event.time_us for event in f.events]
+    assert times == sorted(times)
+    assert times[0] > EPOCH_US
+    assert f.vehicle.mode != OFFBOARD

@@ -1,0 +1,243 @@
+"""The other end: who it is, how fast it talks, what happens when it does not."""
+
+import itertools
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from tests.companion.fake_vehicle import EPOCH_US, LAND, LOITER, FakeVehicle, flight
+
+
+def failed(vehicle: FakeVehicle, limit_s: float = 40.0, **changes):
+    f = flight(vehicle, **changes)
+    f.run_to_end(limit_s)
+    report = f.companion.report()
+    assert report.outcome == "failed"
+    assert f.state == "aborted"
+    assert not vehicle.armed
+    return f, report
+
+
+def test_no_heartbeat_for_ten_seconds():
+    f, report = failed(FakeVehicle(silent=True))
+    assert "no HEARTBEAT" in report.reason
+    assert f.now_us - EPOCH_US == pytest.approx(10_000_000, abs=50_000)
+
+
+def test_heartbeats_of_other_components_are_not_a_vehicle():
+    f = flight(FakeVehicle(silent=True))
+    camera = bytes(mav.MAVLink_heartbeat_message(30, 8, 0, 0, 4, 3).pack(mav.MAVLink(None, 1, 100)))
+    for _ in range(100):
+        f.now_us += 4000
+        f.companion.step(camera, f.now_us)
+    assert f.state == "connect"
+    assert f.companion.status().vehicle_mode == ""
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "word"),
+    [
+        (FakeVehicle(autopilot=3), "ArduPilot"),
+        (FakeVehicle(vehicle_type=1), "fixed-wing"),
+        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 31"),
+        (FakeVehicle(no_imu=True), "HIGHRES_IMU arrives at 0.0 Hz"),
+        (FakeVehicle(no_positions=True), "LOCAL_POSITION_NED"),
+        (FakeVehicle(armed=True), "armed already"),
+        (FakeVehicle(landed=2), "not on the ground"),
+    ],
+)
+def test_vehicles_that_cannot_be_flown_are_refused_with_the_reason(vehicle, word):
+    _, report = failed_keeping_arms(vehicle)
+    assert word in report.reason
+    assert [m for _, m in vehicle.commands if m.command in (176, 400)] == []
+
+
+def failed_keeping_arms(vehicle):
+    f = flight(vehicle)
+    f.run_to_end(40.0)
+    assert f.companion.report().outcome == "failed"
+    return f, f.companion.report()
+
+
+def test_a_vehicle_armed_by_someone_else_while_the_plan_is_read_is_not_taken():
+    f = flight(confirmed=False)
+    f.run_to("ready")
+    f.vehicle.armed = True
+    f.run_for(1.1)
+    f.companion.confirm_plan()
+    f.run_to_end(0.1)
+    assert "armed already" in f.companion.report().reason
+    assert f.companion.report().outcome == "failed"
+
+
+def test_of_two_vehicles_on_a_link_the_first_is_taken():
+    f = flight()
+    first = bytes(mav.MAVLink_heartbeat_message(2, 12, 0, LOITER, 3, 3).pack(mav.MAVLink(None, 5, 1)))
+    other = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x80, LAND, 4, 3).pack(mav.MAVLink(None, 6, 1)))
+    f.companion.step(first + other, f.now_us)
+    f.companion.step(other, f.now_us + 4000)
+    assert f.companion.status().vehicle_mode == "AUTO.LOITER"
+    assert not f.companion.status().armed
+
+
+def test_the_least_imu_rate_is_the_configurations():
+    f = flight(FakeVehicle(imu_every=8), companion={"streams": {"min_highres_imu_hz": 25.0}})
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_streams_are_asked_for_at_the_stated_rates():
+    f = flight(confirmed=False)
+    f.run_until(f.companion.plan_is_ready)
+    asked = {int(m.param1): m.param2 for _, m in f.vehicle.commands if m.command == 511}
+    assert asked == {105: 4000, 32: 20_000, 31: 20_000, 245: 200_000, 436: 100_000}
+
+
+def test_refused_and_unanswered_stream_requests_do_not_stop_a_vehicle_that_streams_anyway():
+    f = flight(FakeVehicle(ack=lambda command, count: [] if command == 512 else [4] if command == 511 else [0]))
+    f.vehicle.obey = lambda command, count: command != 512
+    f.run_to_end()
+    report = f.companion.report()
+    assert report.outcome == "completed"
+    assert report.autopilot == "PX4", "the version is optional"
+    assert [e.text for e in f.events if e.kind == "command" and "FAILED" in e.text]
+
+
+def test_lost_answers_and_lost_commands_are_repeated():
+    f = flight(FakeVehicle(ack=lambda c, n: [] if n % 2 else [0], obey=lambda c, n: n % 2 == 0))
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    confirmations = [m.confirmation for _, m in f.vehicle.commands if m.command == 400]
+    assert confirmations == [0, 1]
+
+
+def test_px4s_double_answer_to_the_mode_is_believed_only_when_the_mode_is_seen():
+    f = flight(
+        FakeVehicle(ack=lambda c, n: [0, 1] if c == 176 and n == 1 else [0], obey=lambda c, n: c != 176 or n > 1)
+    )
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    assert f.vehicle.counts[176] >= 2
+
+
+def test_arming_refused_to_the_end_fails_with_the_vehicles_answer():
+    f, report = failed(
+        FakeVehicle(ack=lambda c, n: [1] if c == 400 else [0], obey=lambda c, n: c != 400),
+    )
+    assert "not armed" in report.reason
+    assert "TEMPORARILY_REJECTED" in report.reason
+    assert f.vehicle.mode == LOITER, "left in its own hold, not in OFFBOARD"
+
+
+def test_offboard_refused_fails():
+    _, report = failed(FakeVehicle(ack=lambda c, n: [2] if c == 176 else [0], obey=lambda c, n: c != 176))
+    assert "no OFFBOARD" in report.reason
+    assert "DENIED" in report.reason
+
+
+@pytest.mark.parametrize(("on_interrupt", "mode"), [("hold", LOITER), ("land", LAND)])
+def test_a_silent_link_hands_over_all_the_same_and_is_reported(on_interrupt, mode):
+    f = flight(on_interrupt=on_interrupt)
+    f.run_to("mission")
+    f.run_for(0.5)
+    f.vehicle.silent = True
+    silent_at = f.now_us
+
+    f.run_to("aborted", 2.0)
+
+    assert f.now_us - silent_at == pytest.approx(1_500_000, abs=50_000)
+    f.run_to_end(5.0)
+    assert "silent for 1.5 s" in f.companion.report().reason
+    assert f.companion.report().outcome == "aborted"
+    assert f.vehicle.mode == mode, "the request went out though nothing came in"
+    since = f.now_us
+    f.run_for(3.0)
+    assert f.setpoints_since(since) == []
+
+
+def test_a_short_silence_is_survived():
+    f = flight()
+    f.run_to("mission")
+    f.vehicle.silent = True
+    f.run_for(0.9)
+    f.vehicle.silent = False
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_silence_while_the_vehicle_lands_does_not_stop_its_landing():
+    f = flight()
+    f.run_until(lambda: "landing" in f.kinds())
+    f.vehicle.silent = True
+    f.run_to_end(3.0)
+    assert f.companion.report().outcome == "aborted"
+    assert f.vehicle.mode == LAND
+
+
+def test_silence_before_the_flight_fails():
+    f = flight(confirmed=False)
+    f.run_to("ready")
+    f.vehicle.silent = True
+    f.run_to_end(11.0)
+    assert f.companion.report().outcome == "failed"
+    assert "silent" in f.companion.report().reason
+
+
+def test_a_lost_position_hands_over_though_the_link_lives():
+    f = flight()
+    f.run_to("mission")
+    f.vehicle.no_positions = True
+    f.run_to_end(3.0)
+    assert "LOCAL_POSITION_NED" in f.companion.report().reason
+    assert f.vehicle.mode == LOITER
+
+
+def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
+    f = flight()
+    f.run_to("mission")
+    f.vehicle.no_imu = True
+    f.run_for(0.5)
+    assert "blind" in f.companion.status().detector
+    assert "blind" in f.event("link").text
+    f.vehicle.no_imu = False
+    f.run_for(0.1)
+    assert "sees again" in f.event("link", 1).text
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_our_heartbeat_goes_out_every_second_from_the_first_step_to_the_last():
+    f = flight()
+    f.run_to_end()
+    times = [t for t, _ in f.vehicle.heartbeats]
+    gaps = [b - a for a, b in itertools.pairwise(times)]
+    assert times[0] <= 5_000_000 + 2 * 4000
+    assert set(gaps) == {1_000_000}
+    m = f.vehicle.heartbeats[0][1]
+    assert (m.type, m.get_srcComponent()) == (18, 191)
+
+
+def test_the_companion_belongs_to_the_vehicles_system():
+    f = flight(FakeVehicle(system_id=42))
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    assert f.vehicle.heartbeats[-1][1].get_srcSystem() == 42
+    assert {m.target_system for _, m in f.vehicle.commands} == {42}
+
+
+def test_the_vehicles_time_requests_are_answered():
+    f = flight(confirmed=False)
+    f.run_to("ready")
+    assert len(f.vehicle.timesyncs) > 10
+    answer = f.vehicle.timesyncs[-1]
+    assert answer.tc1 // 1000 == pytest.approx(f.now_us, abs=200_000)
+    assert answer.ts1 // 1000 == pytest.approx(f.vehicle.time_us, abs=200_000)
+
+
+def test_a_vehicle_that_never_disarms_is_reported_and_left_alone():
+    f = flight()
+    f.run_until(lambda: "landing" in f.kinds())
+    f.vehicle.meet_ground = lambda: None
+    f.run_to_end(130.0)
+    assert "not disarmed" in f.companion.report().reason
+    assert f.vehicle.mode == LAND

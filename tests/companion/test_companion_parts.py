@@ -1,0 +1,233 @@
+"""The small parts of a flight: line profiles, settling, commands, authority, identity."""
+
+import math
+import random
+
+import pytest
+
+from companion.estimate.settling import SettlingMonitor
+from companion.flight.authority import Holder, who_decided
+from companion.flight.commander import ATTEMPTS, Commander
+from companion.flight.trajectory import LineProfile
+from companion.link.identity import Identity, identify
+from companion.link.vehicle import ModeReport, Vehicle
+from companion.messages import (
+    CommandAck,
+    CommandResult,
+    CurrentMode,
+    Heartbeat,
+    LocalPosition,
+    RequestMessage,
+    SetArmed,
+    SetMode,
+)
+from companion.mission.config import SettledConfig
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, mode_name
+
+# --- trajectory
+
+
+@pytest.mark.parametrize("target", [(6.0, 0.0, -1.5), (0.4, -0.3, -1.5), (0.0, 0.0, -5.0), (-3.0, 4.0, -1.0)])
+def test_profile_stays_on_the_line_and_within_its_limits(target):
+    profile = LineProfile((0.0, 0.0, -1.5), target, 2.0, 1.5)
+    dt = 0.01
+    previous_position, previous_velocity = profile.at(0.0)
+    assert previous_position == (0.0, 0.0, -1.5)
+    assert previous_velocity == (0.0, 0.0, 0.0)
+    for k in range(1, math.ceil(profile.duration_s / dt) + 5):
+        position, velocity = profile.at(k * dt)
+        assert math.hypot(*velocity) <= 2.0 + 1e-9
+        assert math.dist(velocity, previous_velocity) <= 1.5 * dt + 1e-9
+        mean = tuple((v + w) / 2 * dt for v, w in zip(velocity, previous_velocity, strict=True))
+        moved = tuple(p - q for p, q in zip(position, previous_position, strict=True))
+        assert moved == pytest.approx(mean, abs=1e-3), "velocity is the derivative of position"
+        off_line = math.dist((0.0, 0.0, -1.5), position) + math.dist(position, target) - profile.distance_m
+        assert off_line == pytest.approx(0.0, abs=1e-9)
+        previous_position, previous_velocity = position, velocity
+    assert previous_position == target
+    assert previous_velocity == (0.0, 0.0, 0.0)
+
+
+def test_a_line_of_no_length_is_over_at_once():
+    profile = LineProfile((1.0, 2.0, 3.0), (1.0, 2.0, 3.0), 2.0, 2.0)
+    assert profile.duration_s == 0.0
+    assert profile.at(0.0) == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0))
+
+
+# --- settling
+
+
+def positions(offset_m, speed_m_s, seconds, noise_m_s=0.0, start_us=0, seed=3):
+    rng = random.Random(seed)
+    for t_us in range(start_us, start_us + round(seconds * 1e6), 20_000):
+        velocity = tuple(v + rng.gauss(0.0, noise_m_s) for v in (speed_m_s, 0.0, 0.0))
+        yield LocalPosition(t_us, (offset_m, 0.0, -1.5), velocity)
+
+
+def settled(samples, **config):
+    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig(**config))
+    return [monitor.settled_since(sample) for sample in samples]
+
+
+def test_settled_after_half_a_second_at_rest_and_not_before():
+    since = settled(positions(0.05, 0.05, 1.0))
+    assert since[24] is None
+    assert since[25] == 0
+
+
+@pytest.mark.parametrize(("offset_m", "speed_m_s"), [(0.15, 0.0), (0.0, 0.15)])
+def test_too_far_or_too_fast_is_not_settled(offset_m, speed_m_s):
+    assert set(settled(positions(offset_m, speed_m_s, 3.0))) == {None}
+
+
+def test_a_break_starts_the_time_anew():
+    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig(smoothing_s=0.0))
+    samples = [
+        *positions(0.0, 0.0, 0.4),
+        *positions(0.2, 0.0, 0.04, start_us=400_000),
+        *positions(0.0, 0.0, 1.0, start_us=440_000),
+    ]
+    results = [monitor.settled_since(sample) for sample in samples]
+    first = next(i for i, r in enumerate(results) if r is not None)
+    assert results[first] == 440_000
+    assert samples[first].time_boot_us == 940_000
+
+
+def test_the_noise_of_a_good_estimate_does_not_keep_a_vehicle_from_settling():
+    for seed in range(20):
+        since = settled(positions(0.0, 0.0, 1.0, noise_m_s=0.03, seed=seed))
+        assert since[-1] is not None
+
+
+# --- commander
+
+
+def drive(commander, until_us, answers=None, seen_at_us=None, step_us=10_000):
+    """Step on virtual time; `answers`: time -> result. Returns send times and the outcome with its time."""
+    sends, answers = [], dict(answers or {})
+    for now_us in range(0, until_us, step_us):
+        acks = [CommandAck(176, answers.pop(now_us))] if now_us in answers else []
+        send, outcome = commander.step(acks, seen_at_us is not None and now_us >= seen_at_us, now_us)
+        if send is not None:
+            sends.append((now_us, send.confirmation))
+        if outcome is not None:
+            return sends, outcome, now_us
+    return sends, None, until_us
+
+
+def begun(command):
+    commander = Commander()
+    commander.begin(command)
+    return commander
+
+
+def test_an_unanswered_command_is_repeated_and_given_up():
+    sends, outcome, at_us = drive(begun(SetMode(OFFBOARD)), 10_000_000)
+    assert sends == [(k * 500_000, k) for k in range(ATTEMPTS)]
+    assert at_us == ATTEMPTS * 500_000
+    assert not outcome.succeeded
+    assert "no answer" in outcome.text
+
+
+def test_a_mode_counts_when_it_is_seen_not_when_it_is_accepted():
+    sends, outcome, at_us = drive(begun(SetMode(OFFBOARD)), 5_000_000, {10_000: CommandResult.ACCEPTED}, 300_000)
+    assert len(sends) == 1
+    assert outcome.succeeded
+    assert at_us == 300_000
+
+
+def test_accepted_then_rejected_is_a_rejection():
+    answers = {10_000: CommandResult.ACCEPTED, 20_000: CommandResult.TEMPORARILY_REJECTED}
+    sends, _, _ = drive(begun(SetMode(OFFBOARD)), 1_500_000, answers)
+    assert [t for t, _ in sends] == [0, 1_020_000], "asked again a second after the rejection"
+
+
+@pytest.mark.parametrize("result", [CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED])
+def test_a_final_refusal_is_final(result):
+    sends, outcome, _ = drive(begun(SetMode(OFFBOARD)), 5_000_000, {10_000: result})
+    assert len(sends) == 1
+    assert not outcome.succeeded
+    assert result.name in outcome.text
+
+
+def test_other_commands_count_when_accepted_and_answers_to_others_do_not():
+    commander = begun(RequestMessage(148))
+    commander.step([], False, 0)
+    assert commander.step([CommandAck(400, CommandResult.ACCEPTED)], False, 1000) == (None, None)
+    _, outcome = commander.step([CommandAck(512, CommandResult.ACCEPTED)], False, 2000)
+    assert outcome.succeeded
+    assert not commander.busy
+
+
+def test_arming_counts_when_it_is_seen():
+    commander = begun(SetArmed(True))
+    commander.step([], False, 0)
+    assert commander.step([CommandAck(400, CommandResult.ACCEPTED)], False, 1000)[1] is None
+    assert commander.step([], True, 2000)[1].succeeded
+
+
+def test_only_a_mode_on_its_way_is_a_requested_mode():
+    commander = begun(SetMode(AUTO_LAND))
+    assert commander.requested_mode == AUTO_LAND
+    commander.cancel()
+    assert commander.requested_mode is None
+
+
+# --- authority
+
+POSCTL = 3 << 16
+
+
+@pytest.mark.parametrize(
+    ("report", "requested", "holder"),
+    [
+        (ModeReport(OFFBOARD, OFFBOARD, False), None, Holder.COMPANION),
+        (ModeReport(OFFBOARD, None, True), None, Holder.COMPANION),
+        (ModeReport(AUTO_LAND, AUTO_LAND, False), AUTO_LAND, Holder.COMPANION),
+        (ModeReport(OFFBOARD, AUTO_LAND, False), AUTO_LAND, Holder.COMPANION),
+        (ModeReport(AUTO_LAND, AUTO_LAND, False), None, Holder.PILOT),
+        (ModeReport(POSCTL, POSCTL, False), None, Holder.PILOT),
+        (ModeReport(POSCTL, POSCTL, False), AUTO_LAND, Holder.PILOT),
+        (ModeReport(POSCTL, None, False), None, Holder.PILOT),
+        (ModeReport(POSCTL, OFFBOARD, False), None, Holder.FAILSAFE),
+        (ModeReport(AUTO_LOITER, None, True), None, Holder.FAILSAFE),
+    ],
+)
+def test_own_request_failsafe_and_pilot_are_told_apart(report, requested, holder):
+    assert who_decided(report, OFFBOARD, requested) is holder
+
+
+def test_an_intended_mode_is_newer_than_the_last_heartbeats_status():
+    """A failsafe was on at the last HEARTBEAT; what the pilot intends since then is told by CURRENT_MODE."""
+    vehicle = Vehicle()
+    vehicle.hear(Heartbeat(1, 1, 2, 12, True, OFFBOARD, 5), 0)
+    vehicle.hear(CurrentMode(POSCTL, POSCTL), 1)
+    assert who_decided(vehicle.mode, OFFBOARD, None) is Holder.PILOT
+    vehicle.hear(CurrentMode(POSCTL, None), 2)
+    assert who_decided(vehicle.mode, OFFBOARD, None) is Holder.FAILSAFE
+
+
+def test_mode_names_are_px4s():
+    assert [mode_name(m) for m in (OFFBOARD, AUTO_LAND, AUTO_LOITER, POSCTL)] == [
+        "OFFBOARD",
+        "AUTO.LAND",
+        "AUTO.LOITER",
+        "POSCTL",
+    ]
+
+
+# --- identity
+
+
+@pytest.mark.parametrize("vehicle_type", [2, 13, 14, 15, 29])
+def test_px4_multicopters_are_accepted(vehicle_type):
+    assert isinstance(identify(Heartbeat(3, 1, vehicle_type, 12, False, 0, 3)), Identity)
+
+
+@pytest.mark.parametrize(
+    ("vehicle_type", "autopilot", "word"), [(1, 12, "fixed-wing"), (2, 3, "ArduPilot"), (22, 12, "VTOL")]
+)
+def test_others_are_refused_by_name(vehicle_type, autopilot, word):
+    answer = identify(Heartbeat(3, 1, vehicle_type, autopilot, False, 0, 3))
+    assert isinstance(answer, str)
+    assert word in answer

@@ -1,0 +1,69 @@
+"""The one table of the flight: complete, safe, and the source of its own pictures."""
+
+import pytest
+
+from companion.flight.states import FINAL_STATES, TABLE, State, Trigger, markdown_table, mermaid_diagram, next_state
+
+EXPECTED = {
+    (State.CONNECT, Trigger.REFUSED): State.ABORTED,
+    (State.CONNECT, Trigger.INTERRUPTED): State.ABORTED,
+    (State.CONNECT, Trigger.VEHICLE_READY): State.READY,
+    (State.READY, Trigger.REFUSED): State.ABORTED,
+    (State.READY, Trigger.INTERRUPTED): State.ABORTED,
+    (State.READY, Trigger.PLAN_CONFIRMED): State.TAKEOFF,
+    (State.TAKEOFF, Trigger.CONTROL_LOST): State.ABORTED,
+    (State.TAKEOFF, Trigger.REFUSED): State.ABORTED,
+    (State.TAKEOFF, Trigger.INTERRUPTED): State.ABORTED,
+    (State.TAKEOFF, Trigger.TAKEN_OFF): State.MISSION,
+    (State.MISSION, Trigger.CONTROL_LOST): State.ABORTED,
+    (State.MISSION, Trigger.INTERRUPTED): State.ABORTED,
+    (State.MISSION, Trigger.COLLISION): State.RECOVERING,
+    (State.MISSION, Trigger.ITEMS_DONE): State.LANDING,
+    (State.RECOVERING, Trigger.CONTROL_LOST): State.ABORTED,
+    (State.RECOVERING, Trigger.INTERRUPTED): State.ABORTED,
+    (State.RECOVERING, Trigger.COLLISION): State.RECOVERING,
+    (State.RECOVERING, Trigger.RECOVERED_TO_HOLD): State.HOLDING,
+    (State.RECOVERING, Trigger.RECOVERED_TO_CONTINUE): State.MISSION,
+    (State.RECOVERING, Trigger.RECOVERED_TO_LAND): State.LANDING,
+    (State.HOLDING, Trigger.CONTROL_LOST): State.ABORTED,
+    (State.HOLDING, Trigger.INTERRUPTED): State.ABORTED,
+    (State.HOLDING, Trigger.COLLISION): State.RECOVERING,
+    (State.HOLDING, Trigger.HOLD_ENDED): State.MISSION,
+    (State.LANDING, Trigger.CONTROL_LOST): State.ABORTED,
+    (State.LANDING, Trigger.INTERRUPTED): State.ABORTED,
+    (State.LANDING, Trigger.DISARMED): State.DONE,
+}
+
+
+@pytest.mark.parametrize("state", State)
+@pytest.mark.parametrize("trigger", Trigger)
+def test_every_pair_of_state_and_trigger(state, trigger):
+    """A trigger without meaning in a state changes nothing; there is no pair without an answer."""
+    assert next_state(state, trigger) is EXPECTED.get((state, trigger), state)
+
+
+def test_the_table_has_a_row_for_every_state():
+    assert set(TABLE) == set(State)
+
+
+def test_only_done_and_aborted_are_final_and_every_other_state_can_be_interrupted():
+    assert set(FINAL_STATES) == {State.DONE, State.ABORTED}
+    for state in set(State) - FINAL_STATES:
+        assert next_state(state, Trigger.INTERRUPTED) is State.ABORTED
+
+
+def test_every_state_is_reachable_from_connect():
+    reached, frontier = {State.CONNECT}, [State.CONNECT]
+    while frontier:
+        for target in TABLE[frontier.pop()].values():
+            if target not in reached:
+                reached.add(target)
+                frontier.append(target)
+    assert reached == set(State)
+
+
+def test_diagram_and_table_show_every_transition():
+    diagram, table = mermaid_diagram(), markdown_table()
+    for (state, trigger), target in EXPECTED.items():
+        assert f"{state.value} --> {target.value}: {trigger.value}\n" in diagram
+        assert f"| {state.value} | {trigger.value} | {target.value} |\n" in table
