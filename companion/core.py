@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from companion.detection.interface import Detector, DetectorState, Impact
+from companion.detection.interface import Detector, DetectorState, Impact, Phase
 from companion.detection.registry import DETECTORS
 from companion.estimate.history import REBOOT_US
 from companion.flight.connecting import Connect
@@ -65,6 +65,7 @@ class Core:
     last_imu_boot_us: int = 0
     last_imu_us: int = 0
     imu_silent: bool = False
+    detector_told: bool = False
     stop_reason: str | None = None
 
     @property
@@ -125,7 +126,7 @@ def hear(core: Core, samples: Sequence[Sample], now_us: int) -> str | None:
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
         flight.tell(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
-        flight.tell(now_us, "armed", "disarmed")
+        flight.tell(now_us, "disarmed", "disarmed")
     return None
 
 
@@ -144,7 +145,18 @@ def detect(core: Core, samples: Sequence[Sample], now_us: int) -> list[Impact]:
         if impact is not None:
             impacts.append(impact)
     watch_imu(core, now_us)
+    tell_threshold(core, now_us)
     return impacts
+
+
+def tell_threshold(core: Core, now_us: int) -> None:
+    """Once, when the detector is first on the watch: what it takes to be seen as a hit by this vehicle."""
+    if core.detector_told or core.detection.phase is not Phase.ARMED:
+        return
+    core.detector_told = True
+    threshold_m_s2 = core.detection.threshold_m_s2
+    text = f"detector '{core.detector.name}' on the watch: a hit is {threshold_m_s2:.1f} m/s^2 sideways or more"
+    core.flight.tell(now_us, "detector", text, threshold_m_s2=round(threshold_m_s2, 3))
 
 
 def why_not_detecting(core: Core) -> str | None:
@@ -200,7 +212,11 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
         return
     core.flight.target = target
     time_us = now_us - core.started_at_us
-    core.flight.outbox.append(PositionSetpoint(time_us, target.position_ned_m, target.velocity_ned_m_s, target.yaw_rad))
+    core.flight.outbox.append(
+        PositionSetpoint(
+            time_us, target.position_ned_m, target.yaw_rad, target.velocity_ned_m_s, target.acceleration_ned_m_s2
+        )
+    )
 
 
 def beat(core: Core, now_us: int) -> None:

@@ -176,8 +176,9 @@ class PositionSetpoint:
 
     time_us: int
     position_ned_m: Vector3
-    velocity_ned_m_s: Vector3 | None
     yaw_rad: float | None
+    velocity_ned_m_s: Vector3 | None = None
+    acceleration_ned_m_s2: Vector3 | None = None
 
 
 @dataclass(frozen=True, slots=True)

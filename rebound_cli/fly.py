@@ -22,6 +22,9 @@ from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.truth_match import FlightTruth
 from rebound_cli.vehicle_process import VehicleProcess
 
+# Where PX4's SITL sends its onboard streams unasked, plus its instance.
+PX4_COMPANION_PORT = 14540
+
 
 @dataclass(frozen=True, slots=True)
 class Flight:
@@ -57,6 +60,8 @@ def run_fly(options: Namespace) -> int:
                 flown = _fly_connected(flight, connection, confirmation)
             elif options.lockstep:
                 flown = _fly_lockstep(flight)
+            elif options.sim == "px4":
+                flown = _fly_beside_px4(flight, options.instance)
             else:
                 flown = _fly_beside_vehicle(flight)
         finally:
@@ -84,14 +89,39 @@ def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirm
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:
-    from sim_vehicle.shell.truth_file import load_truth
-
     connection = UdpInConnection("127.0.0.1", 0)
-    with VehicleProcess(flight.folder, connection.local_port) as vehicle:
+    options = ["--port", "0", "--remote", f"127.0.0.1:{connection.local_port}"]
+    with VehicleProcess(flight.folder, options) as vehicle:
         vehicle.wait_until_ready(flight.interrupts, flight.console)
         flown = _fly_connected(flight, connection, ConfirmAtOnce())
         vehicle.check_running()
-    return replace(flown, truth=FlightTruth(*load_truth(flight.folder / run_folder.TRUTH_NAME)))
+    return _with_truth(flight, flown)
+
+
+def _fly_beside_px4(flight: Flight, instance: int) -> Flown:
+    """The body of the simulated vehicle for a PX4 that the person starts."""
+    from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS
+    from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
+
+    port = PX4_SIMULATOR_PORT + instance
+    connection = UdpInConnection("0.0.0.0", PX4_COMPANION_PORT + instance)
+    with VehicleProcess(flight.folder, ["--autopilot", "px4", "--port", str(port)], FIRST_ANSWER_WORDS) as vehicle:
+        explanation = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ..."
+        vehicle.wait_until_ready(flight.interrupts, flight.console, explanation, explain_after_s=0)
+        # What PX4 said while it booted is old.
+        while connection.receive(0):
+            pass
+        flown = _fly_connected(flight, connection, ConfirmAtOnce())
+        vehicle.check_running()
+    return _with_truth(flight, flown)
+
+
+def _with_truth(flight: Flight, flown: Flown) -> Flown:
+    """The flight beside what the simulated vehicle's process wrote; without it if PX4 never flew."""
+    from sim_vehicle.shell.truth_file import load_truth
+
+    path = flight.folder / run_folder.TRUTH_NAME
+    return replace(flown, truth=FlightTruth(*load_truth(path))) if path.exists() else flown
 
 
 def _fly_lockstep(flight: Flight) -> Flown:

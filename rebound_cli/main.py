@@ -12,10 +12,12 @@ EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
 
+SIMULATED_AUTOPILOTS = ("builtin", "px4")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    options = build_parser().parse_args(arguments)
+    options = build_parser().parse_args(_with_plain_sim(sys.argv[1:] if arguments is None else arguments))
     from sim_vehicle.errors import SimulationError
 
     try:
@@ -43,6 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_fly(commands)
     _add_sim(commands)
     _add_results(commands)
+    _add_airframe(commands)
     return parser
 
 
@@ -50,7 +53,15 @@ def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     fly = commands.add_parser("fly", help="fly a mission", description="Fly a mission from take-off to landing.")
     fly.add_argument("mission", type=Path, metavar="MISSION", help="mission file, such as missions/wall.yaml")
     how = fly.add_mutually_exclusive_group(required=True)
-    how.add_argument("--sim", action="store_true", help="start the simulated vehicle and fly it in real time over UDP")
+    how.add_argument(
+        "--sim",
+        nargs="?",
+        const="builtin",
+        choices=SIMULATED_AUTOPILOTS,
+        metavar="px4",
+        help="start the simulated vehicle and fly it in real time over UDP; "
+        "px4: with your PX4 as its autopilot, see docs/px4.md",
+    )
     how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")
     how.add_argument(
         "--connect",
@@ -59,6 +70,9 @@ def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     )
     _add_world_options(fly)
     fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
+    fly.add_argument(
+        "--instance", type=_instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
+    )
     fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
     fly.set_defaults(run=_fly)
@@ -72,7 +86,24 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     )
     sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
     _add_world_options(sim)
-    sim.add_argument("--port", type=_port, default=14580, help="UDP port to listen on (default 14580; 0: any free one)")
+    sim.add_argument(
+        "--autopilot",
+        choices=SIMULATED_AUTOPILOTS,
+        default="builtin",
+        help="px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/px4.md",
+    )
+    sim.add_argument(
+        "--port",
+        type=_port,
+        help="UDP port to listen on (default 14580; 0: any free one); with --autopilot px4 the TCP port (4560)",
+    )
+    sim.add_argument(
+        "--speed",
+        type=_speed,
+        default=1.0,
+        metavar="N",
+        help="with --autopilot px4: at most N times real time, 0 for as fast as PX4 answers (default 1)",
+    )
     sim.add_argument(
         "--remote",
         type=_host_and_port,
@@ -99,6 +130,23 @@ def _add_results(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     results.add_argument("--seeds", type=int, default=20, help="flights for each speed and airframe (default 20)")
     results.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
     results.set_defaults(run=_results)
+
+
+def _add_airframe(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    airframe = commands.add_parser(
+        "airframe",
+        help="print an airframe for PX4",
+        description="PX4's parameters for one of our airframes, on standard output.",
+    )
+    airframe.add_argument("target", choices=("px4",), help="for whom")
+    airframe.add_argument("--airframe", default="foldable", metavar="NAME|FILE", help="default: foldable")
+    airframe.add_argument(
+        "--format",
+        choices=("env", "params", "airframe"),
+        default="env",
+        help="env: exports that PX4 SITL reads at start (default); params: for QGroundControl; airframe: for a PX4 tree",
+    )
+    airframe.set_defaults(run=_airframe)
 
 
 def _add_world_options(parser: argparse.ArgumentParser) -> None:
@@ -132,6 +180,21 @@ def _results(options: argparse.Namespace) -> int:
     return run_results(options)
 
 
+def _with_plain_sim(arguments: Sequence[str]) -> list[str]:
+    """`--sim` stands alone before a mission's name too, which argparse would take for its value."""
+    following = [*arguments[1:], ""]
+    return [
+        "--sim=builtin" if word == "--sim" and after not in SIMULATED_AUTOPILOTS else word
+        for word, after in zip(arguments, following, strict=True)
+    ]
+
+
+def _airframe(options: argparse.Namespace) -> int:
+    from rebound_cli.airframe import run_airframe
+
+    return run_airframe(options)
+
+
 def _port(text: str) -> int:
     if not text.isdigit() or int(text) > 65_535:
         raise argparse.ArgumentTypeError(f"{text!r} is not a port: give a number from 0 to 65535")
@@ -143,3 +206,20 @@ def _host_and_port(text: str) -> tuple[str, int]:
     if not separator or not host:
         raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT")
     return host, _port(port)
+
+
+def _instance(text: str) -> int:
+    # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
+    if not text.isdigit() or int(text) > 9:
+        raise argparse.ArgumentTypeError(f"{text!r} is not an instance: give a number from 0 to 9")
+    return int(text)
+
+
+def _speed(text: str) -> float:
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = -1.0
+    if not 0 <= speed <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a speed: give a number from 0 to 1000")
+    return speed

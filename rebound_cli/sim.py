@@ -5,28 +5,50 @@ import sys
 import threading
 from argparse import Namespace
 
-from rebound_cli.inputs import load_world
+from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
-from sim_vehicle.shell.udp import serve
+from sim_vehicle.hil.messages import MOTORS_STOPPED
+from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
+from sim_vehicle.shell.udp import LISTEN_PORT, serve
 from sim_vehicle.vehicle import SimulatedVehicle
 
 
 def run_sim(options: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or until stdin closes when the caller wants to be outlived by nobody."""
     world = load_world(options.mission, options.set, options.airframe, options.seed)
-    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopped.set())
     if options.stop_with_stdin:
         threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
+    if options.autopilot == "px4":
+        _serve_px4(options, world, stopped)
+    else:
+        _serve_builtin(options, world, stopped)
+    return 0
+
+
+def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     host, port = options.remote
     print(
         f"{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.",
         flush=True,
     )
-    serve(vehicle, options.port, options.remote, options.truth, stopped.is_set)
-    return 0
+    listen_port = LISTEN_PORT if options.port is None else options.port
+    serve(vehicle, listen_port, options.remote, options.truth, stopped.is_set)
+
+
+def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
+    def new_vehicle() -> HilVehicle:
+        return HilVehicle(world.airframe, world.scene, world.seed)
+
+    # Compiled, or loaded from numba's cache, before PX4 waits for it.
+    new_vehicle().step(MOTORS_STOPPED)
+    print(f"Body of '{world.airframe.name}' for PX4. Ctrl-C stops it.", flush=True)
+    port = PX4_SIMULATOR_PORT if options.port is None else options.port
+    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, lambda text: print(text, flush=True))
 
 
 def _wait_for_end_of_stdin(stopped: threading.Event) -> None:

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -19,8 +20,7 @@ STOP_TIMEOUT_S = 5.0
 READY_WORDS = "Simulated vehicle"
 
 _READY_POLL_S = 0.02
-# A start with everything compiled takes about a second.
-_EXPLAIN_AFTER_S = 3.0
+COMPILING = "Compiling the simulated vehicle's physics, which is done once for this machine ..."
 
 
 class VehicleProcessError(ReboundError):
@@ -28,13 +28,14 @@ class VehicleProcessError(ReboundError):
 
 
 class VehicleProcess:
-    """`rebound sim` on a free port, talking to `companion_port`; its stdin is the leash that ends it."""
+    """`rebound sim` with the run's world and options of its own; its stdin is the leash that ends it."""
 
-    def __init__(self, folder: Path, companion_port: int) -> None:
+    def __init__(self, folder: Path, options: Sequence[str], ready_words: str = READY_WORDS) -> None:
+        """It is ready when a line of its output begins with ``ready_words``."""
         self._folder = folder
+        self._ready_words = ready_words
         command = [sys.executable, "-m", "rebound_cli", "sim", "--mission", str(folder / RESOLVED_NAME)]
-        command += ["--port", "0", "--remote", f"127.0.0.1:{companion_port}"]
-        command += ["--truth", str(folder / TRUTH_NAME), "--stop-with-stdin"]
+        command += [*options, "--truth", str(folder / TRUTH_NAME), "--stop-with-stdin"]
         with (folder / VEHICLE_LOG_NAME).open("wb") as log:
             self._process = subprocess.Popen(
                 command,
@@ -45,19 +46,22 @@ class VehicleProcess:
                 start_new_session=True,
             )
 
-    def wait_until_ready(self, interrupts: Interrupts, console: Console) -> None:
+    def wait_until_ready(
+        self, interrupts: Interrupts, console: Console, explanation: str = COMPILING, explain_after_s: float = 3.0
+    ) -> None:
         """Return when the vehicle is on the air, or when the person has had enough.
 
-        The companion waits ten seconds for a vehicle; compiling the physics may take longer.
+        The companion waits ten seconds for a vehicle; compiling the physics may take longer. A start with
+        everything compiled takes about a second.
         """
         started_s = time.monotonic()
         is_explained = False
         while not self._is_ready() and interrupts.reason is None:
             self.check_running()
             time.sleep(_READY_POLL_S)
-            if not is_explained and time.monotonic() - started_s > _EXPLAIN_AFTER_S:
+            if not is_explained and time.monotonic() - started_s >= explain_after_s:
                 is_explained = True
-                console.print("Compiling the simulated vehicle's physics, which is done once for this machine ...")
+                console.print(explanation)
 
     def check_running(self) -> None:
         """Raise VehicleProcessError with the process's last words if it has ended."""
@@ -66,7 +70,7 @@ class VehicleProcess:
             raise VehicleProcessError(f"The simulated vehicle ended by itself: {last[-1].removeprefix('rebound: ')}")
 
     def _is_ready(self) -> bool:
-        return any(line.startswith(READY_WORDS) for line in self._said())
+        return any(line.startswith(self._ready_words) for line in self._said())
 
     def _said(self) -> list[str]:
         return (self._folder / VEHICLE_LOG_NAME).read_text(errors="replace").strip().splitlines()

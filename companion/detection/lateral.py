@@ -1,13 +1,15 @@
 """Detector `lateral`: specific force that the thrust cannot explain, because it is perpendicular to it.
 
 By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z, and on x and y only drag and
-noise. A wall pushes sideways. The first sample with hypot(f_x, f_y) at or above the threshold is a hit.
+noise. A wall pushes sideways. The first sample whose sideways force departs from its running mean (the drag) by
+the threshold or more is a hit.
 """
 
 import math
 from dataclasses import dataclass
 
 from companion.detection.interface import DetectorState, Impact, Phase
+from companion.detection.noise import MEMORY_US, NoiseFloor
 from companion.messages import ImuSample, Vector3
 from companion.written import Positive, Written
 
@@ -15,18 +17,26 @@ from companion.written import Positive, Written
 class LateralConfig(Written):
     """Settings of the detector `lateral`."""
 
-    # Above the noise: HIGHRES_IMU noise of 0.25 m/s^2 RMS per axis and a drag of 0.22 m/s^2 per m/s stay below
-    # 2.5 m/s^2 at 5 m/s and five sigma. Below the signal: eq. 2 begins with b_s * v_c = 30 m/s^2 at 1 m/s, of
-    # which a 4 ms mean that saw the last millisecond shows 7.5. Airframes that vibrate need more: healthy
-    # flights of four public PX4 logs peak at 7 to 11 m/s^2.
+    # Above the noise of a quiet vehicle: the simulated HIGHRES_IMU's 0.25 m/s^2 RMS per axis stays below 1.5 at
+    # six sigma, and drag changes by less than 1.1 within the mean's memory. Below the signal: eq. 2 begins with
+    # b_s * v_c = 30 m/s^2 at 1 m/s, of which a 4 ms mean that saw the last millisecond shows 7.5.
     threshold_m_s2: Positive = 4.0
-    # A contact lasts 25 to 60 ms with the force present all through; this long without it, it is over.
+    # A vehicle that shakes more gets a higher threshold: this many times the spread it shows in its own flight.
+    # Of samples with a normal spread not one in 10^8 is beyond six; four public PX4 logs of healthy flights, with
+    # spreads of 1.2 to 4 m/s^2, stay below five but for one sample.
+    noise_factor: Positive = 6.0
+    # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
     rearm_quiet_s: Positive = 0.04
+
+
+NOTHING_LEARNT = NoiseFloor()
 
 
 @dataclass(frozen=True, slots=True)
 class LateralState(DetectorState):
-    """Nothing beyond what every detector shows."""
+    """Adds what the detector has learnt of the vehicle's own shaking."""
+
+    noise: NoiseFloor = NOTHING_LEARNT
 
 
 class LateralDetector:
@@ -35,46 +45,64 @@ class LateralDetector:
     name = "lateral"
 
     def __init__(self, config: LateralConfig, averaging_interval_us: int) -> None:
-        self._threshold_m_s2 = config.threshold_m_s2
+        self._config = config
         self._rearm_quiet_us = round(config.rearm_quiet_s * 1e6)
         self._averaging_interval_us = averaging_interval_us
 
     def initial(self) -> LateralState:
-        return LateralState()
+        return LateralState(threshold_m_s2=self._config.threshold_m_s2)
 
     def step(
         self, state: LateralState, sample: ImuSample, off_reason: str | None
     ) -> tuple[LateralState, Impact | None]:
-        now_us = sample.time_boot_us
-        if off_reason is not None:
-            if state.phase is Phase.OFF and state.off_reason == off_reason:
-                return state, None
-            return LateralState(Phase.OFF, off_reason, now_us), None
         f_x, f_y, _ = sample.specific_force_frd_m_s2
-        lateral_m_s2 = math.hypot(f_x, f_y)
-        if lateral_m_s2 < self._threshold_m_s2:
-            return self._quiet(state, now_us), None
-        return self._loud(state, now_us, (f_x, f_y, 0.0), lateral_m_s2)
+        if off_reason is not None:
+            return self._off(state, sample.time_boot_us, off_reason, f_x, f_y), None
+        x, y = f_x - state.noise.mean_x_m_s2, f_y - state.noise.mean_y_m_s2
+        departure_m_s2 = math.hypot(x, y)
+        if departure_m_s2 < state.threshold_m_s2:
+            return self._quiet(state, sample.time_boot_us, f_x, f_y), None
+        return self._loud(state, sample.time_boot_us, (x, y, 0.0), departure_m_s2)
 
-    def _quiet(self, state: LateralState, now_us: int) -> LateralState:
-        phase = state.phase
+    def _off(self, state: LateralState, now_us: int, off_reason: str, f_x: float, f_y: float) -> LateralState:
+        """Not wanted, but learning: the spread must be known when the detector is switched on."""
+        noise, threshold_m_s2 = self._learnt(state, now_us, f_x, f_y)
+        return LateralState(Phase.OFF, off_reason, now_us, threshold_m_s2=threshold_m_s2, noise=noise)
+
+    def _quiet(self, state: LateralState, now_us: int, f_x: float, f_y: float) -> LateralState:
+        noise, threshold_m_s2 = self._learnt(state, now_us, f_x, f_y)
+        phase, last_loud_us = state.phase, state.last_loud_boot_us
         if phase is Phase.OFF:
-            return LateralState(Phase.QUIET, "", now_us, now_us)
-        if phase is not Phase.ARMED and now_us - state.last_loud_boot_us >= self._rearm_quiet_us:
+            phase, last_loud_us = Phase.QUIET, now_us
+        elif phase is not Phase.ARMED and now_us - last_loud_us >= self._rearm_quiet_us:
             phase = Phase.ARMED
         peak_m_s2, force_sum = state.peak_specific_force_m_s2, state.force_sum_frd_m_s2
-        return LateralState(phase, "", now_us, state.last_loud_boot_us, peak_m_s2, force_sum)
+        return LateralState(phase, "", now_us, last_loud_us, peak_m_s2, force_sum, threshold_m_s2, noise)
+
+    def _learnt(self, state: LateralState, now_us: int, f_x: float, f_y: float) -> tuple[NoiseFloor, float]:
+        """The noise floor with this sample, and the threshold that follows from it."""
+        # A gap says nothing about what was in it: a sample after one weighs as one sample.
+        elapsed_us = min(max(now_us - state.last_sample_boot_us, 0), MEMORY_US // 10)
+        noise = state.noise.learn(f_x, f_y, elapsed_us)
+        return noise, max(self._config.threshold_m_s2, self._config.noise_factor * noise.spread_m_s2)
 
     def _loud(
-        self, state: LateralState, now_us: int, force_frd_m_s2: Vector3, lateral_m_s2: float
+        self, state: LateralState, now_us: int, force_frd_m_s2: Vector3, departure_m_s2: float
     ) -> tuple[LateralState, Impact | None]:
         if state.phase is Phase.ARMED:
             free_until_us = min(now_us - self._averaging_interval_us, state.last_sample_boot_us)
             impact = Impact(now_us, free_until_us, force_frd_m_s2)
-            return LateralState(Phase.CONTACT, "", now_us, now_us, lateral_m_s2, force_frd_m_s2), impact
+            return self._in_contact(state, now_us, departure_m_s2, force_frd_m_s2), impact
         if state.phase is Phase.CONTACT:
-            peak_m_s2 = max(lateral_m_s2, state.peak_specific_force_m_s2)
+            peak_m_s2 = max(departure_m_s2, state.peak_specific_force_m_s2)
             total, force = state.force_sum_frd_m_s2, force_frd_m_s2
             force_sum = (total[0] + force[0], total[1] + force[1], total[2] + force[2])
-            return LateralState(Phase.CONTACT, "", now_us, now_us, peak_m_s2, force_sum), None
-        return LateralState(Phase.QUIET, "", now_us, now_us), None
+            return self._in_contact(state, now_us, peak_m_s2, force_sum), None
+        # Switched on in the middle of a shake: it is learnt too, or a threshold that is too low would never rise.
+        x, y, _ = force_frd_m_s2
+        noise, threshold_m_s2 = self._learnt(state, now_us, x + state.noise.mean_x_m_s2, y + state.noise.mean_y_m_s2)
+        return LateralState(Phase.QUIET, "", now_us, now_us, threshold_m_s2=threshold_m_s2, noise=noise), None
+
+    @staticmethod
+    def _in_contact(state: LateralState, now_us: int, peak_m_s2: float, force_sum: Vector3) -> LateralState:
+        return LateralState(Phase.CONTACT, "", now_us, now_us, peak_m_s2, force_sum, state.threshold_m_s2, state.noise)

@@ -20,8 +20,9 @@ class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position."""
 
     position_ned_m: Vector3
-    velocity_ned_m_s: Vector3 | None
     yaw_rad: float | None
+    velocity_ned_m_s: Vector3 | None = None
+    acceleration_ned_m_s2: Vector3 | None = None
 
 
 @dataclass(frozen=True, slots=True)

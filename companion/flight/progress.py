@@ -37,9 +37,12 @@ class FlyItems:
 
     def target(self, now_us: int) -> Target | None:
         elapsed_s = (now_us - self._started_us) * 1e-6
-        position, velocity = self._line.at(elapsed_s)
-        still = elapsed_s >= self._line.duration_s
-        return Target(position, None if still else velocity, self._yaw_at(elapsed_s))
+        position, velocity, acceleration = self._line.at(elapsed_s)
+        yaw_rad = self._yaw_at(elapsed_s)
+        if elapsed_s >= self._line.duration_s:
+            return Target(position, yaw_rad)
+        # Without the acceleration the vehicle falls behind the line as it speeds up and then overruns the speed.
+        return Target(position, yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         elapsed_s = (now_us - self._started_us) * 1e-6

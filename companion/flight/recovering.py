@@ -32,7 +32,7 @@ class Recover:
         self._started_us = now_us
         if flight.target is not None:
             flight.yaw_rad = flight.target.yaw_rad
-        self._target = Target(self._record.setpoint_ned_m, None, flight.yaw_rad)
+        self._target = Target(self._record.setpoint_ned_m, flight.yaw_rad)
         self._monitor = SettlingMonitor(self._record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:

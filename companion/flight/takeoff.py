@@ -38,9 +38,9 @@ class TakeOff:
 
     def target(self, now_us: int) -> Target | None:
         if self._profile is None:
-            return Target(self._ground_ned_m, None, self._yaw_rad)
-        position, velocity = self._profile.at((now_us - self._started_us) * 1e-6)
-        return Target(position, velocity, self._yaw_rad)
+            return Target(self._ground_ned_m, self._yaw_rad)
+        position, velocity, _ = self._profile.at((now_us - self._started_us) * 1e-6)
+        return Target(position, self._yaw_rad, velocity)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         match self._step:

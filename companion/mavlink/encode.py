@@ -66,11 +66,14 @@ class Encoder:
                 return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
 
     def _setpoint(self, setpoint: PositionSetpoint) -> Any:
-        type_mask = IGNORE_ACCELERATION | IGNORE_YAW_RATE
-        velocity = setpoint.velocity_ned_m_s
+        type_mask = IGNORE_YAW_RATE
+        velocity, acceleration = setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2
         if velocity is None:
             type_mask |= IGNORE_VELOCITY
             velocity = (NAN, NAN, NAN)
+        if acceleration is None:
+            type_mask |= IGNORE_ACCELERATION
+            acceleration = (NAN, NAN, NAN)
         yaw = setpoint.yaw_rad
         if yaw is None:
             type_mask |= IGNORE_YAW
@@ -82,9 +85,7 @@ class Encoder:
             type_mask,
             *setpoint.position_ned_m,
             *velocity,
-            NAN,
-            NAN,
-            NAN,
+            *acceleration,
             yaw,
             NAN,
         )

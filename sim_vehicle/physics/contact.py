@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, POINTS, Contact, Scratch
+from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.world import (
     FACE_ACROSS,
     FACE_ALONG,
@@ -207,11 +208,13 @@ def settle_contacts(
     A point that gets behind a face beside its rectangle has passed it by and is not pushed until it is
     in front again.
     """
+    # The rotation of the step's end: the next step must find the arm exactly where this one leaves it.
+    matrix_from_quaternion(body, scratch.turned)
     for arm in range(GUARDS):
         fold_m[arm] = scratch.relaxed_m[arm]
     for face in range(near.shape[0]):
         for point in range(*points_at(face, near)):
-            share = contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
+            share = contact_point(point, face, scratch.turned, body, contact, faces, scratch.where)
             depth = depth_in(face, scratch.where, faces)
             if depth <= 0.0:
                 behind[point, face] = 0

@@ -147,15 +147,21 @@ def sent(outgoing):
 
 
 @pytest.mark.parametrize(
-    ("velocity", "yaw", "mask"),
-    [((0.5, 0.0, -0.5), 1.0, 0x9C0), (None, 1.0, 0x9F8), (None, None, 0xDF8), ((0.0, 0.0, 1.0), None, 0xDC0)],
+    ("velocity", "acceleration", "yaw", "mask"),
+    [
+        ((0.5, 0.0, -0.5), (0.0, 2.0, 0.0), 1.0, 0x800),
+        ((0.5, 0.0, -0.5), None, 1.0, 0x9C0),
+        (None, None, 1.0, 0x9F8),
+        (None, None, None, 0xDF8),
+        ((0.0, 0.0, 1.0), None, None, 0xDC0),
+    ],
 )
-def test_setpoint_masks_are_px4s(velocity, yaw, mask):
-    m = sent(PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), velocity, yaw))
+def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
+    m = sent(PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), yaw, velocity, acceleration))
 
     assert (m.type_mask, m.coordinate_frame, m.target_system, m.target_component) == (mask, 1, 7, 1)
     assert (m.x, m.y, m.z, m.time_boot_ms) == (1.0, 2.0, -3.0, 2000)
-    assert math.isnan(m.afx)
+    assert (m.afx, m.afy, m.afz) == acceleration if acceleration else math.isnan(m.afx)
     assert math.isnan(m.yaw_rate)
     assert (m.vx, m.vy, m.vz) == velocity if velocity else math.isnan(m.vx)
     assert m.yaw == yaw if yaw is not None else math.isnan(m.yaw)

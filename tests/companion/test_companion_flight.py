@@ -34,7 +34,7 @@ def test_a_mission_without_a_hit_completes():
     assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
     assert report.started_at_us < report.armed_at_us < report.ended_at_us
     assert [k for k in f.kinds() if k not in ("mode", "item")] == [
-        *("connected", "streams", "plan", "takeoff", "armed", "landing", "armed", "done")
+        *("connected", "streams", "plan", "takeoff", "armed", "detector", "landing", "disarmed", "done")
     ]
 
 
@@ -59,7 +59,7 @@ def test_setpoints_lead_the_mode_switch_by_a_second_and_never_pause_in_flight():
     assert arm_at > offboard_at
     gaps = [b - a for a, b in itertools.pairwise(times)]
     assert max(gaps) <= 50_000, "20 Hz or faster"
-    assert {m.type_mask for _, m in f.vehicle.setpoints} == {0x9C0, 0x9F8}
+    assert {m.type_mask for _, m in f.vehicle.setpoints} == {0x800, 0x9C0, 0x9F8}
 
 
 def test_setpoints_stop_once_the_vehicle_lands_by_itself():
@@ -249,7 +249,8 @@ def test_the_detector_says_armed_in_flight():
     f = flight()
     f.run_to("mission")
     f.run_for(0.5)
-    assert f.companion.status().detector == "armed"
+    assert f.companion.status().detector == "armed at 4.0 m/s^2"
+    assert f.event("detector").data["threshold_m_s2"] == 4.0
 
 
 def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():

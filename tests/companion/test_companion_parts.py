@@ -31,11 +31,14 @@ from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, mode_name
 def test_profile_stays_on_the_line_and_within_its_limits(target):
     profile = LineProfile((0.0, 0.0, -1.5), target, 2.0, 1.5)
     dt = 0.01
-    previous_position, previous_velocity = profile.at(0.0)
+    previous_position, previous_velocity, _ = profile.at(0.0)
     assert previous_position == (0.0, 0.0, -1.5)
     assert previous_velocity == (0.0, 0.0, 0.0)
     for k in range(1, math.ceil(profile.duration_s / dt) + 5):
-        position, velocity = profile.at(k * dt)
+        position, velocity, acceleration = profile.at(k * dt)
+        _, next_velocity, _ = profile.at((k + 0.01) * dt)
+        slope = tuple((v - w) / (0.01 * dt) for v, w in zip(next_velocity, velocity, strict=True))
+        assert slope == pytest.approx(acceleration, abs=0.02) or k * dt > profile.duration_s - 0.01
         assert math.hypot(*velocity) <= 2.0 + 1e-9
         assert math.dist(velocity, previous_velocity) <= 1.5 * dt + 1e-9
         mean = tuple((v + w) / 2 * dt for v, w in zip(velocity, previous_velocity, strict=True))
@@ -51,7 +54,7 @@ def test_profile_stays_on_the_line_and_within_its_limits(target):
 def test_a_line_of_no_length_is_over_at_once():
     profile = LineProfile((1.0, 2.0, 3.0), (1.0, 2.0, 3.0), 2.0, 2.0)
     assert profile.duration_s == 0.0
-    assert profile.at(0.0) == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0))
+    assert profile.at(0.0) == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 # --- settling

@@ -1,6 +1,7 @@
 """Detector `lateral` on the specific force of eq. 2, seen through an averaging IMU."""
 
 import math
+import random
 
 import pytest
 
@@ -108,8 +109,49 @@ def test_switched_on_in_the_middle_of_a_shake_it_waits_for_quiet():
     def off(sample):
         return "takeoff" if sample.time_boot_us < 405_000 else None
 
-    impacts, states = run(hits(400_000, 700_000), off=off)
+    impacts, states = run(hits(400_000, 700_000, level=30.0), off=off)
 
     assert [impact.sample_time_boot_us for impact in impacts] == [700_000]
-    assert "quiet" in {s.describe() for s in states}
-    assert states[-1].describe() == "armed"
+    assert Phase.QUIET in {s.phase for s in states}
+    assert states[-1].phase is Phase.ARMED
+
+
+def shaking(spread_m_s2, seconds=4.0, drag_m_s2=0.0, seed=7):
+    """A vehicle in flight that shakes normally on both axes, 250 Hz; the seed is fixed."""
+    rng = random.Random(seed)
+    for t in range(4000, round(seconds * 1e6), 4000):
+        f_x, f_y = rng.gauss(-drag_m_s2, spread_m_s2), rng.gauss(0.0, spread_m_s2)
+        yield ImuSample(t, (f_x, f_y, -9.81), (0.0, 0.0, 0.0))
+
+
+def off_at_first(sample):
+    return "takeoff" if sample.time_boot_us < 1_000_000 else None
+
+
+@pytest.mark.parametrize("spread_m_s2", [0.25, 1.0, 1.7, 3.0])
+def test_a_shaking_vehicle_raises_its_own_threshold_and_sees_nothing(spread_m_s2):
+    impacts, states = run(shaking(spread_m_s2, seconds=40.0), off=off_at_first)
+    assert impacts == []
+    assert states[-1].threshold_m_s2 == pytest.approx(max(4.0, 6 * spread_m_s2), rel=0.35)
+
+
+def test_a_shaking_vehicle_still_sees_a_hit_that_stands_out():
+    quiet = list(shaking(1.7))
+    hit = [ImuSample(4_000_000 + 4000 * i, (-30.0, 0.0, -9.81), (0.0, 0.0, 0.0)) for i in range(5)]
+    impacts, _ = run(quiet + hit, off=off_at_first)
+    assert [impact.sample_time_boot_us for impact in impacts] == [4_000_000]
+
+
+def test_drag_is_no_hit_however_strong():
+    assert run(shaking(0.25, drag_m_s2=6.0), off=off_at_first)[0] == []
+
+
+def test_the_threshold_forgets_the_ground_by_the_top_of_a_take_off():
+    """Still on the ground, shaking once in the air: after a second of climb the threshold knows."""
+    ground = list(shaking(0.05, seconds=3.0))
+    air = [
+        ImuSample(3_000_000 + s.time_boot_us, s.specific_force_frd_m_s2, s.angular_velocity_frd_rad_s)
+        for s in shaking(1.7, seconds=30.0)
+    ]
+    impacts, _ = run(ground + air, off=lambda s: "takeoff" if s.time_boot_us < 4_000_000 else None)
+    assert impacts == []

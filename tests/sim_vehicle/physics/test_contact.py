@@ -79,8 +79,8 @@ def test_a_symmetric_hit_makes_no_yaw(name: str, yaw_deg: float) -> None:
 
 
 def test_mirrored_hits_turn_the_vehicle_opposite_ways(foldable: Airframe) -> None:
-    left = throw(foldable, 1.0, yaw_rad=math.radians(15), duration_s=0.12).plant.state.body
-    right = throw(foldable, 1.0, yaw_rad=math.radians(-15), duration_s=0.12).plant.state.body
+    left = throw(foldable, 1.0, yaw_rad=math.radians(15), duration_s=0.108).plant.state.body
+    right = throw(foldable, 1.0, yaw_rad=math.radians(-15), duration_s=0.108).plant.state.body
     assert abs(left[12]) > 0.5
     assert left[12] == pytest.approx(-right[12], rel=1e-6)
 
@@ -88,7 +88,7 @@ def test_mirrored_hits_turn_the_vehicle_opposite_ways(foldable: Airframe) -> Non
 def test_the_side_that_is_hit_is_pushed_back(foldable: Airframe) -> None:
     """Nose 15 degrees right of a wall to the north: the front left guard is ahead, meets the wall first and
     is pushed back, which turns the nose left, negative about down."""
-    body = throw(foldable, 1.0, yaw_rad=math.radians(15), duration_s=0.12).plant.state.body
+    body = throw(foldable, 1.0, yaw_rad=math.radians(15), duration_s=0.108).plant.state.body
     assert body[12] < -0.5
 
 
@@ -107,6 +107,18 @@ def test_released_arms_return_to_the_hysteresis(foldable: Airframe) -> None:
     assert front.max() > 0.03
     assert front[-1] == pytest.approx([foldable.arms.hysteresis_m] * 2)
     assert not rear.any()
+
+
+@pytest.mark.parametrize("rate_rad_s", [0.0, 0.05, -0.3])
+def test_a_turning_vehicle_is_pushed_from_the_first_touch_on(foldable: Airframe, rate_rad_s: float) -> None:
+    """The force of eq. 2 begins with m b_s v at once, however the vehicle turns as it touches."""
+    thrown = throw(foldable, 1.0, rates_frd_rad_s=(0.0, rate_rad_s, 0.0))
+    series = thrown.plant.truth.series()
+    before = int(np.searchsorted(series["time_boot_us"], thrown.hit.contact_at_boot_us)) - 1
+    slowed_m_s = series["velocity_ned_m_s"][before, 0] - series["velocity_ned_m_s"][before + 1, 0]
+    touched_s = 1e-6 * (series["time_boot_us"][before + 1] - thrown.hit.contact_at_boot_us)
+    assert slowed_m_s == pytest.approx(foldable.arms.damping_per_s * touched_s, rel=0.06, abs=0.001)
+    assert thrown.hit.impact_velocity_ned_m_s[0] == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.3])

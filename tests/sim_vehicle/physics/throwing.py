@@ -16,9 +16,12 @@ HEIGHT_M = 2.0
 class Thrown:
     """A vehicle after its hit or hits."""
 
-    hit: Hit
-    hits: list[Hit]
     plant: Plant
+
+    @property
+    def hit(self) -> Hit:
+        """The first hit, once it is over."""
+        return self.plant.truth.hits[0]
 
 
 def quiet(airframe: Airframe, **changes: object) -> Airframe:
@@ -73,7 +76,7 @@ def throw(
     body[10:13] = rates_frd_rad_s
     for _ in range(round(duration_s / (1e-6 * plant.interval_us))):
         plant.step(None, armed=False)
-    return Thrown(plant.truth.hits[0], plant.truth.hits, plant)
+    return Thrown(plant)
 
 
 def closed_form_of_eq_2(airframe: Airframe, speed_m_s: float) -> tuple[float, float, float]:
