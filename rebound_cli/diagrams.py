@@ -1,0 +1,28 @@
+"""`python -m rebound_cli.diagrams FILE`: writes the state diagrams and tables into a document, from the tables."""
+
+import re
+import sys
+from pathlib import Path
+
+from companion.flight.states import markdown_table, mermaid_diagram
+from sim_vehicle.autopilot.modes import mode_diagram
+
+
+def with_diagrams(text: str) -> str:
+    """The document with everything between its `generated` marks made anew."""
+    contents = {
+        "flight diagram": f"```mermaid\n{mermaid_diagram()}```\n",
+        "flight table": markdown_table(),
+        "mode diagram": f"```mermaid\n{mode_diagram().rstrip()}\n```\n",
+    }
+    for name, content in contents.items():
+        mark = re.compile(rf"(<!-- generated: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        text, found = mark.subn(lambda match, content=content: match[1] + content + match[2], text)
+        if found != 1:
+            raise ValueError(f"the document has {found} places for the {name}, not one")
+    return text
+
+
+if __name__ == "__main__":
+    document = Path(sys.argv[1])
+    document.write_text(with_diagrams(document.read_text()))

@@ -1,0 +1,83 @@
+"""The rooms' rules: who may import whom, and where the world outside may be touched."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rebound_cli.diagrams import with_diagrams
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("companion", "sim_vehicle", "rebound_cli")
+
+# Modules through which code touches the world outside: sockets, ports, clocks, processes, the environment, files.
+OUTSIDE = {
+    *("socket", "select", "serial", "asyncio", "threading", "subprocess", "signal"),
+    *("time", "datetime", "os", "sys", "shutil", "tempfile", "pathlib", "io"),
+}
+# Built-in airframes are read where they lie; compiled kernels are kept beside their source.
+MAY_READ_FILES = {"sim_vehicle/airframe.py", "sim_vehicle/physics/jit.py"}
+
+
+def sources(package: str) -> list[Path]:
+    return sorted((ROOT / package).rglob("*.py"))
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Full names of all that a file imports, wherever in the file."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} imports relatively"
+            yield node.module or ""
+
+
+def name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def breaches(packages: tuple[str, ...], forbidden: set[str]) -> list[str]:
+    return [
+        f"{name(path)} imports {module}"
+        for package in packages
+        for path in sources(package)
+        for module in imported(path)
+        if module.split(".")[0] in forbidden
+    ]
+
+
+def test_there_is_something_to_check() -> None:
+    assert all(len(sources(package)) > 10 for package in PACKAGES)
+
+
+def test_companion_and_vehicle_never_import_each_other_nor_the_command_line() -> None:
+    assert breaches(("companion",), {"sim_vehicle", "rebound_cli"}) == []
+    assert breaches(("sim_vehicle",), {"companion", "rebound_cli"}) == []
+
+
+def test_pymavlink_is_imported_only_where_bytes_become_messages() -> None:
+    outside = [
+        breach for breach in breaches(PACKAGES, {"pymavlink"}) if breach.split("/")[1] != "mavlink" or "cli" in breach
+    ]
+    assert outside == []
+
+
+@pytest.mark.parametrize("package", ["companion", "sim_vehicle"])
+def test_only_the_shell_touches_the_world_outside(package: str) -> None:
+    found = [
+        breach
+        for breach in breaches((package,), OUTSIDE)
+        if not breach.startswith(f"{package}/shell/") and breach.split(" ")[0] not in MAY_READ_FILES
+    ]
+    assert found == []
+
+
+def test_files_stay_short() -> None:
+    assert [name(path) for package in PACKAGES for path in sources(package) if path.read_text().count("\n") > 320] == []
+
+
+def test_the_documented_diagrams_are_those_of_the_tables() -> None:
+    text = (ROOT / "docs/architecture.md").read_text()
+    assert text == with_diagrams(text), "run `make diagrams`"
