@@ -11,5 +11,5 @@ _FORMATS = {"env": as_environment, "params": as_params_file, "airframe": as_airf
 def run_airframe(options: Namespace) -> int:
     """Print them in the format asked for."""
     airframe = load_world(None, (), options.airframe, None).airframe
-    print(_FORMATS[options.format](airframe))
+    print(_FORMATS[options.format](airframe, options.position))
     return 0

@@ -48,25 +48,32 @@ def run_fly(options: Namespace) -> int:
     world = world_from(document) if is_simulated else None
     console = console_for(options.json)
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-    connection = open_connection(options.connect) if options.connect is not None else None
+    connection = _connection_for(options)
     folder = run_folder.create_run_folder(options.out, mission.name)
     _write_inputs(folder, options.mission, mission, world)
     recorder = FlightRecorder(folder)
     with Interrupts() as interrupts:
         flight = Flight(mission, world, folder, recorder, console, interrupts)
         try:
-            if connection is not None:
+            if connection is not None and not is_simulated:
                 confirmation = ConfirmAtOnce(console) if options.yes else AskPerson(console)
                 flown = _fly_connected(flight, connection, confirmation)
             elif options.lockstep:
                 flown = _fly_lockstep(flight)
-            elif options.sim == "px4":
-                flown = _fly_beside_px4(flight, options.instance)
+            elif connection is not None:
+                flown = _fly_beside_px4(flight, connection, options.instance)
             else:
                 flown = _fly_beside_vehicle(flight)
         finally:
             recorder.close()
     return _finish(flight, flown, options.json)
+
+
+def _connection_for(options: Namespace) -> Connection | None:
+    """To a vehicle that is not ours to start; None for one that is."""
+    if options.connect is not None:
+        return open_connection(options.connect)
+    return UdpInConnection("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
 
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
@@ -98,13 +105,12 @@ def _fly_beside_vehicle(flight: Flight) -> Flown:
     return _with_truth(flight, flown)
 
 
-def _fly_beside_px4(flight: Flight, instance: int) -> Flown:
+def _fly_beside_px4(flight: Flight, connection: Connection, instance: int) -> Flown:
     """The body of the simulated vehicle for a PX4 that the person starts."""
     from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS
     from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
 
     port = PX4_SIMULATOR_PORT + instance
-    connection = UdpInConnection("0.0.0.0", PX4_COMPANION_PORT + instance)
     with VehicleProcess(flight.folder, ["--autopilot", "px4", "--port", str(port)], FIRST_ANSWER_WORDS) as vehicle:
         explanation = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ..."
         vehicle.wait_until_ready(flight.interrupts, flight.console, explanation, explain_after_s=0)

@@ -46,6 +46,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_sim(commands)
     _add_results(commands)
     _add_airframe(commands)
+    _add_identify(commands)
     return parser
 
 
@@ -105,6 +106,13 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         help="with --autopilot px4: at most N times real time, 0 for as fast as PX4 answers (default 1)",
     )
     sim.add_argument(
+        "--sensor-rate",
+        type=int,
+        choices=(250, 500, 1000),
+        default=1000,
+        help="with --autopilot px4: HIL_SENSOR a second; 250 is three times as fast and less like a real sensor",
+    )
+    sim.add_argument(
         "--remote",
         type=_host_and_port,
         default=("127.0.0.1", 14540),
@@ -141,12 +149,37 @@ def _add_airframe(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
     airframe.add_argument("target", choices=("px4",), help="for whom")
     airframe.add_argument("--airframe", default="foldable", metavar="NAME|FILE", help="default: foldable")
     airframe.add_argument(
+        "--position",
+        choices=("mocap", "gps"),
+        default="mocap",
+        help="what PX4 flies by: motion capture, as indoors (default), or an RTK GPS",
+    )
+    airframe.add_argument(
         "--format",
         choices=("env", "params", "airframe"),
         default="env",
-        help="env: exports that PX4 SITL reads at start (default); params: for QGroundControl; airframe: for a PX4 tree",
+        help="env: exports that PX4 SITL reads at start (default); params: for QGroundControl; airframe: for PX4",
     )
     airframe.set_defaults(run=_airframe)
+
+
+def _add_identify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    identify = commands.add_parser(
+        "identify",
+        help="find an airframe's springs in recorded hits",
+        description="Fits stiffness, damping and restitution to hits on a wall; see docs/airframes.md.",
+    )
+    identify.add_argument(
+        "data", type=Path, nargs="+", metavar="DATA", help="a CSV file, a .tlog or a run's folder: one hit each"
+    )
+    identify.add_argument("--mass", type=float, metavar="KG", help="of the vehicle; known for simulated runs")
+    identify.add_argument("--axis", choices=("x", "y"), help="CSV: it is square to the wall (default: by the turn)")
+    identify.add_argument("--out", type=Path, metavar="FILE", help="write an airframe file")
+    identify.add_argument("--name", help="name of the airframe (default: the file's)")
+    identify.add_argument(
+        "--based-on", metavar="NAME", help="airframe for all else (default: foldable, rigid where no spring is seen)"
+    )
+    identify.set_defaults(run=_identify)
 
 
 def _add_world_options(parser: argparse.ArgumentParser) -> None:
@@ -193,6 +226,12 @@ def _airframe(options: argparse.Namespace) -> int:
     from rebound_cli.airframe import run_airframe
 
     return run_airframe(options)
+
+
+def _identify(options: argparse.Namespace) -> int:
+    from rebound_cli.identify import run_identify
+
+    return run_identify(options)
 
 
 def _port(text: str) -> int:

@@ -1,7 +1,7 @@
 """`rebound sim`: the simulated vehicle alone, in real time, for any MAVLink client."""
 
+import os
 import signal
-import sys
 import threading
 from argparse import Namespace
 
@@ -42,7 +42,7 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
     def new_vehicle() -> HilVehicle:
-        return HilVehicle(world.airframe, world.scene, world.seed)
+        return HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
 
     # Compiled, or loaded from numba's cache, before PX4 waits for it.
     new_vehicle().step(MOTORS_STOPPED)
@@ -53,6 +53,7 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
 
 def _wait_for_end_of_stdin(stopped: threading.Event) -> None:
     """The pipe's other end closes when the caller closes it or dies, however it dies."""
-    while sys.stdin.buffer.read(1024):
+    # Not sys.stdin: a thread inside its lock when the program ends with an error would abort the interpreter.
+    while os.read(0, 1024):
         pass
     stopped.set()

@@ -14,7 +14,11 @@ class SceneError(SimulationError):
 
 
 class PortInUse(SimulationError):  # noqa: N818 - reads as the sentence it is
-    """The UDP port on which the vehicle listens cannot be had."""
+    """The port on which the vehicle listens cannot be had."""
+
+
+class NotInLockstep(SimulationError):  # noqa: N818 - reads as the sentence it is
+    """A PX4 that keeps its own time instead of the simulator's."""
 
 
 class TruthFileError(SimulationError):

@@ -35,10 +35,10 @@ def serve(
     PX4 does. Raises PortInUse where ``listen_port`` cannot be had.
     """
     with _bound_socket(listen_port) as link:
-        pace, has_peer = _Pace(vehicle), False
+        pace, has_peer = Pace(vehicle.time_boot_us), False
         try:
             while not stop():
-                pace.wait()
+                pace.wait_until(vehicle.time_boot_us + vehicle.interval_us)
                 received, sender = _receive_all(link)
                 if sender is not None and not has_peer:
                     remote, has_peer = sender, True
@@ -51,25 +51,31 @@ def serve(
                 save_truth(truth_path, vehicle.truth, pace.epoch_at_boot_us())
 
 
-class _Pace:
-    """Keeps the vehicle's clock on the machine's monotonic one."""
+class Pace:
+    """Keeps a vehicle's clock on the machine's monotonic one."""
 
-    def __init__(self, vehicle: SimulatedVehicle) -> None:
-        self._vehicle = vehicle
-        self._boot_ns = time.monotonic_ns() - 1000 * vehicle.time_boot_us
+    def __init__(
+        self,
+        time_boot_us: int,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
+        sleep_s: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._monotonic_ns = monotonic_ns
+        self._sleep_s = sleep_s
+        self._boot_ns = monotonic_ns() - 1000 * time_boot_us
 
-    def wait(self) -> None:
-        """Return when the next interval has passed; at once when the vehicle is late."""
-        now_ns = time.monotonic_ns()
-        due_ns = self._boot_ns + 1000 * (self._vehicle.time_boot_us + self._vehicle.interval_us)
+    def wait_until(self, time_boot_us: int) -> None:
+        """Return when the vehicle's clock may show that; at once when it is late."""
+        now_ns = self._monotonic_ns()
+        due_ns = self._boot_ns + 1000 * time_boot_us
         if due_ns > now_ns:
-            time.sleep(1e-9 * (due_ns - now_ns))
+            self._sleep_s(1e-9 * (due_ns - now_ns))
         elif now_ns - due_ns > MOST_CAUGHT_UP_NS:
             self._boot_ns += now_ns - due_ns
 
     def epoch_at_boot_us(self) -> int:
         """Wall clock at the vehicle's boot time 0."""
-        return (time.time_ns() - time.monotonic_ns() + self._boot_ns) // 1000
+        return (time.time_ns() - self._monotonic_ns() + self._boot_ns) // 1000
 
 
 def _bound_socket(port: int) -> socket.socket:

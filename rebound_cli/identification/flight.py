@@ -1,0 +1,141 @@
+"""A hit in a flight's log: the wall's push from HIGHRES_IMU, the speeds from LOCAL_POSITION_NED."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rebound_cli.flight_log import FlightLog, read_flight_log
+from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Push
+
+# A touch: above the lateral specific force of the detector's default, so that drag and vibration are none.
+_TOUCH_M_S2 = 4.0
+# Slower than this the vehicle is hovering or landing, and its estimate's error would be most of the speed.
+_SLOWEST_HIT_M_S = 0.3
+# The release: twice the usual noise and drag at the low speed after a hit.
+_RELEASE_M_S2 = 1.0
+# Quiet for this long ends a contact (the simulated vehicle's own rule for one hit).
+_QUIET_S = 0.02
+# The estimate before the touch is averaged over this: five samples at 50 Hz.
+_BEFORE_S = 0.1
+# After it the greatest speed away is taken within this: the estimate is late by 20 ms or more, and on a real
+# vehicle smoothed over some tens; later the autopilot is already braking.
+_AFTER_S = 0.15
+# Standard deviation of a speed of a good optical-flow or motion-capture estimate.
+_SPEED_SIGMA_M_S = 0.03
+# Two numbers are fitted: with one sample more than that they are at least checked.
+_FEWEST_SAMPLES = 3
+# A sample this near to the usual +-16 g (156.9) has clipped raw samples in it and shows too little.
+_CLIPPED_M_S2 = 140.0
+# A push that rises again to this share over its first decay has met the stop of the arms.
+_STOP_RISE = 1.3
+
+
+def flight_hit(path: Path) -> Hit:
+    """The hardest hit of a log of MAVLink 2 packets. Raises IdentificationError."""
+    try:
+        log = read_flight_log(path)
+    except OSError as error:
+        raise IdentificationError(f"{path}: cannot be read: {error.strerror or 'not a file'}.") from error
+    if len(log.imu_at_us) == 0 or len(log.position_at_us) == 0:
+        raise IdentificationError(f"{path}: no HIGHRES_IMU and LOCAL_POSITION_NED in it; both are needed.")
+    name = path.parent.name if path.name == "flight.tlog" else path.stem
+    hits = [hit for touch, release in _contacts(log) if (hit := _hit(name, log, touch, release)) is not None]
+    if not hits:
+        raise IdentificationError(
+            f"{path}: no hit found: no lateral specific force above {_TOUCH_M_S2:g} m/s2 "
+            f"at a speed above {_SLOWEST_HIT_M_S:g} m/s that turned the vehicle around."
+        )
+    return max(hits, key=lambda hit: hit.normal_change_m_s)
+
+
+def _contacts(log: FlightLog) -> list[tuple[int, int]]:
+    """First and last sample of every contact."""
+    lateral = np.hypot(log.specific_force_frd_m_s2[:, 0], log.specific_force_frd_m_s2[:, 1])
+    time_s = 1e-6 * log.imu_time_boot_us
+    contacts: list[tuple[int, int]] = []
+    for index in np.flatnonzero(lateral > _TOUCH_M_S2).tolist():
+        if contacts and time_s[index] - time_s[contacts[-1][1]] < _QUIET_S:
+            contacts[-1] = contacts[-1][0], index
+        else:
+            contacts.append((index, index))
+    return contacts
+
+
+def _hit(name: str, log: FlightLog, touch: int, release: int) -> Hit | None:
+    horizontal = log.velocity_ned_m_s[:, :2]
+    touch_us, release_us = log.imu_at_us[touch], log.imu_at_us[release]
+    before = (log.position_at_us >= touch_us - 1e6 * _BEFORE_S) & (log.position_at_us < touch_us)
+    after = (log.position_at_us > release_us) & (log.position_at_us <= release_us + 1e6 * _AFTER_S)
+    if not before.any() or not after.any():
+        return None
+    arriving = horizontal[before].mean(axis=0)
+    changes = horizontal[after] - arriving
+    leaving = horizontal[after][int(np.argmax((changes**2).sum(axis=1)))]
+    change = leaving - arriving
+    away = change / np.hypot(*change)
+    speed_in, speed_out = float(-arriving @ away), float(leaving @ away)
+    if speed_in < _SLOWEST_HIT_M_S or speed_out <= 0:
+        return None
+    along = np.array([-away[1], away[0]])
+    towards_body, guards = _direction(log.specific_force_frd_m_s2[touch : release + 1, :2])
+    push, stop_m = _push(log, touch, towards_body, speed_in)
+    return Hit(
+        name=name,
+        at_s=1e-6 * float(log.imu_time_boot_us[touch]),
+        speed_in_m_s=speed_in,
+        speed_out_m_s=speed_out,
+        speed_sigma_m_s=_SPEED_SIGMA_M_S,
+        along_in_m_s=float(arriving @ along),
+        along_out_m_s=float(leaving @ along),
+        guards=guards,
+        push=push,
+        stop_m=stop_m,
+    )
+
+
+def _direction(lateral: Floats) -> tuple[Floats, int]:
+    """Where the push points in the body, and how many guards it comes through: 2 from ahead, 1 diagonally."""
+    mean = lateral.sum(axis=0)
+    unit: Floats = mean / np.hypot(*mean)
+    off_rad = (np.arctan2(unit[1], unit[0]) + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    return unit, 2 if abs(off_rad) < np.pi / 8 else 1
+
+
+def _push(log: FlightLog, touch: int, direction: Floats, speed_m_s: float) -> tuple[Push | None, float | None]:
+    """Depth, speed and push at the middle of every whole sample, integrated from the speed at the touch.
+
+    A sample is the mean over the interval that ends at its time. In the first, the touch lies somewhere:
+    where, its size against the next one's tells.
+    """
+    push = log.specific_force_frd_m_s2[touch:, :2] @ direction
+    interval_s = 1e-6 * float(np.median(np.diff(log.imu_time_boot_us)))
+    if len(push) < 2 or push[1] <= 0:
+        return None, None
+    released = np.flatnonzero(push[1:] < _RELEASE_M_S2)
+    push = push[: 1 + int(released[0])] if len(released) else push
+    pressed_s = interval_s * min(1.0, float(push[0] / push[1])) if len(push) > 1 else 0.0
+    depth, speed = speed_m_s * pressed_s, speed_m_s - push[0] * interval_s
+    rows: list[tuple[float, ...]] = []
+    middle_s = pressed_s + interval_s / 2
+    for value in push[1:]:
+        middle_speed = speed - value * interval_s / 2
+        rows.append((middle_s, depth + (speed + middle_speed) / 2 * interval_s / 2, middle_speed, value))
+        middle_s += interval_s
+        depth += middle_speed * interval_s
+        speed -= value * interval_s
+    if push.max() > _CLIPPED_M_S2:
+        return None, None
+    before_stop = _before_stop(push[1:])
+    if before_stop < _FEWEST_SAMPLES:
+        return None, None
+    table = np.array(rows)
+    stop_m = float(table[before_stop, 1]) if before_stop < len(rows) else None
+    table = table[:before_stop]
+    return Push(*table.T), stop_m
+
+
+def _before_stop(push: Floats) -> int:
+    """Samples before the push rises again after it has begun to decay: there the arms met their stop."""
+    lowest = np.minimum.accumulate(push)
+    rising = np.flatnonzero(push > _STOP_RISE * lowest + _RELEASE_M_S2)
+    return int(rising[0]) - 1 if len(rising) else len(push)

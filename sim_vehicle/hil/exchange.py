@@ -1,0 +1,132 @@
+"""Lockstep with PX4's `simulator_mavlink`, without sockets and clocks: who may speak when.
+
+WAITING   nobody is connected
+STARTING  PX4 is connected and boots; samples go out at their own pace until its first answer
+READY     the last sample is answered: the next may go out
+AWAITING  a sample is out; time stands still on both sides until its answer comes
+"""
+
+from enum import Enum, auto
+
+from sim_vehicle.errors import NotInLockstep
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Quadruple
+
+# Real time between samples while PX4 boots: its modules start on threads of their own, and need some real
+# time, not simulated time, before the first motor command.
+STARTING_PERIOD_US = 4_000
+# PX4 answers in 0.11 ms, and in 100 ms on a machine that is out of breath. Ten times that is a lost answer
+# or a PX4 that somebody has stopped: one more sample sets the first going again and moves a vehicle whose
+# PX4 is stopped by 4 ms a second.
+ANSWER_TIMEOUT_US = 1_000_000
+# Booting takes 2 s; a PX4 with no answer after ten times that has no motors to command.
+STARTING_TIMEOUT_US = 20_000_000
+
+# How the notice begins that PX4 is up, for programs that wait for it.
+FIRST_ANSWER_WORDS = "PX4 answers"
+
+
+class Phase(Enum):
+    WAITING = auto()
+    STARTING = auto()
+    READY = auto()
+    AWAITING = auto()
+
+
+class Event(Enum):
+    CONNECTED = auto()
+    SENT = auto()
+    ANSWERED = auto()
+    OVERDUE = auto()
+    CLOSED = auto()
+
+
+# Every move there is; anything else is a fault of the program around it and raises KeyError.
+MOVES: dict[tuple[Phase, Event], Phase] = {
+    (Phase.WAITING, Event.CONNECTED): Phase.STARTING,
+    (Phase.STARTING, Event.SENT): Phase.STARTING,
+    (Phase.STARTING, Event.ANSWERED): Phase.READY,
+    (Phase.STARTING, Event.CLOSED): Phase.WAITING,
+    (Phase.READY, Event.SENT): Phase.AWAITING,
+    (Phase.READY, Event.CLOSED): Phase.WAITING,
+    (Phase.AWAITING, Event.ANSWERED): Phase.READY,
+    (Phase.AWAITING, Event.OVERDUE): Phase.READY,
+    (Phase.AWAITING, Event.CLOSED): Phase.WAITING,
+}
+
+
+class Exchange:
+    """One PX4 after the other. ``now_us`` is the machine's time, ``time_us`` the vehicle's and PX4's."""
+
+    def __init__(self) -> None:
+        self.phase = Phase.WAITING
+        self.notices: list[str] = []
+        """Sentences for the person at the terminal; whoever shows them clears the list."""
+        self._forget()
+
+    def _forget(self) -> None:
+        self.motor_fractions: Quadruple = MOTORS_STOPPED
+        """PX4's last word, zero before its first and after it has gone."""
+        self.overdue_answers = 0
+        self.late_answers = 0
+        self._sent_time_us = 0
+        self._sent_at_us = 0
+        self._connected_at_us = 0
+        self._is_starting_explained = False
+
+    def connected(self, now_us: int) -> None:
+        """PX4 has connected: the vehicle that it gets must be a new one, with its clock at zero."""
+        self._move(Event.CONNECTED)
+        self._forget()
+        self._connected_at_us = now_us
+        self._sent_at_us = now_us - STARTING_PERIOD_US
+
+    def closed(self) -> None:
+        """The connection has ended; PX4 does not come back to it, only a new PX4 does."""
+        self._move(Event.CLOSED)
+        self._forget()
+
+    def next_sample_at_us(self) -> int | None:
+        """The machine's time from which the next sample may go out; None while an answer is awaited."""
+        if self.phase is Phase.STARTING:
+            return self._sent_at_us + STARTING_PERIOD_US
+        return self._sent_at_us if self.phase is Phase.READY else None
+
+    def sent(self, time_us: int, now_us: int) -> None:
+        """A sample of that time has gone out."""
+        self._move(Event.SENT)
+        self._sent_time_us = time_us
+        self._sent_at_us = now_us
+
+    def received(self, controls: ActuatorControls) -> None:
+        """Take an answer. Raises NotInLockstep for a PX4 whose clock is not ours."""
+        if not controls.is_lockstep or controls.time_us > self._sent_time_us:
+            raise NotInLockstep(
+                "PX4's clock does not follow the simulator's: build PX4 with lockstep, which `make px4_sitl` does."
+            )
+        self.motor_fractions = controls.motor_fractions if controls.armed else MOTORS_STOPPED
+        if self.phase is Phase.STARTING:
+            self.notices.append(f"{FIRST_ANSWER_WORDS}: lockstep from {1e-6 * controls.time_us:.3f} s on.")
+            self._move(Event.ANSWERED)
+        elif self.phase is Phase.AWAITING and controls.time_us == self._sent_time_us:
+            self._move(Event.ANSWERED)
+        else:
+            # An answer to a sample before the last: sent while booting, or given up already.
+            self.late_answers += 1
+
+    def look_at_clock(self, now_us: int) -> None:
+        """Give up an answer that is overdue, and say when PX4 does not begin to answer at all."""
+        if self.phase is Phase.AWAITING and now_us - self._sent_at_us >= ANSWER_TIMEOUT_US:
+            self._move(Event.OVERDUE)
+            if self.overdue_answers == 0:
+                self.notices.append(f"PX4 has not answered for {1e-6 * ANSWER_TIMEOUT_US:.0f} s; waiting for it.")
+            self.overdue_answers += 1
+        is_late = now_us - self._connected_at_us >= STARTING_TIMEOUT_US
+        if self.phase is Phase.STARTING and is_late and not self._is_starting_explained:
+            self._is_starting_explained = True
+            self.notices.append(
+                f"PX4 has sent no motor commands for {1e-6 * STARTING_TIMEOUT_US:.0f} s after connecting: "
+                "look at its console, and whether its airframe is a multicopter with PWM_MAIN_FUNC1..4 set."
+            )
+
+    def _move(self, event: Event) -> None:
+        self.phase = MOVES[self.phase, event]

@@ -1,0 +1,141 @@
+"""PX4's parameters for one of our airframes: control allocation, hover thrust, gains, and what a flight needs.
+
+Gains give the closed loops that the airframe file states for the built-in autopilot, so that what differs
+between the two is PX4 and not its tuning.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS
+
+# PX4 scales a quadrotor's roll and pitch columns so that a torque setpoint of 1 moves every motor by
+# 1/sqrt(2) of its range, and yaw's by the whole (ControlAllocationPseudoInverse.cpp).
+_ROLL_MOTOR_SHARE = 1 / math.sqrt(2)
+_YAW_MOTOR_SHARE = 1.0
+
+# MAV_PARAM_TYPE, as a .params file writes it.
+_INT32, _REAL32 = 6, 9
+
+_FIRST_MOTOR_FUNCTION = 101
+
+Position = Literal["mocap", "gps"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One of PX4's parameters, with the reason for its value."""
+
+    name: str
+    value: int | float
+    reason: str
+
+    @property
+    def text(self) -> str:
+        return str(self.value) if isinstance(self.value, int) else f"{self.value:.5g}"
+
+
+def px4_parameters(airframe: Airframe, position: Position = "mocap") -> tuple[Parameter, ...]:
+    """Everything that must differ from PX4's airframe 10016 (none_iris); ``position``: what PX4 flies by."""
+    return (
+        *_allocation(airframe),
+        *_gains(airframe),
+        *_limits(airframe),
+        *_sensors(airframe, position),
+        *_flight_rules(),
+    )
+
+
+def _allocation(airframe: Airframe) -> Iterable[Parameter]:
+    radius_m, moment_m = airframe.geometry.motor_radius_m, airframe.motors.moment_per_thrust_m
+    yield Parameter("CA_AIRFRAME", 0, "multirotor")
+    yield Parameter("CA_ROTOR_COUNT", 4, "quad-x, in PX4's order")
+    for rotor, (direction, sign) in enumerate(zip(ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, strict=True)):
+        yield Parameter(f"CA_ROTOR{rotor}_PX", float(radius_m * direction[0]), "motor, metres ahead of the centre")
+        yield Parameter(f"CA_ROTOR{rotor}_PY", float(radius_m * direction[1]), "metres to the right")
+        yield Parameter(f"CA_ROTOR{rotor}_KM", float(sign * moment_m), "reaction torque over thrust, metres")
+        yield Parameter(f"PWM_MAIN_FUNC{rotor + 1}", _FIRST_MOTOR_FUNCTION + rotor, "the motor's output")
+    yield Parameter("THR_MDL_FAC", 0.0, "thrust is linear in the motor command")
+
+
+def _gains(airframe: Airframe) -> Iterable[Parameter]:
+    """Attitude as a cascade: w^2 and 2 z w of the airframe's loop are P_angle * P_rate and P_rate."""
+    control, motors = airframe.control, airframe.motors
+    all_n = 4 * motors.max_thrust_n
+    arm_m = airframe.geometry.motor_radius_m / math.sqrt(2)
+    jx, jy, jz = airframe.inertia_kg_m2
+    rate_per_s = 2 * control.attitude_damping * control.attitude_frequency_rad_s
+    for axis, inertia in (("ROLL", jx), ("PITCH", jy)):
+        per_unit = _ROLL_MOTOR_SHARE * all_n * arm_m / inertia
+        p = rate_per_s / per_unit
+        yield Parameter(f"MC_{axis}RATE_P", p, f"rate loop of {rate_per_s:.0f} 1/s")
+        yield Parameter(f"MC_{axis}RATE_I", p, "trim within a second")
+        yield Parameter(f"MC_{axis}RATE_D", p * motors.time_constant_s / 2, "half of the motors' lag")
+        yield Parameter(f"MC_{axis}_P", control.attitude_frequency_rad_s / (2 * control.attitude_damping), "1/s")
+    yaw_rate_per_s = 2 * control.attitude_damping * control.yaw_frequency_rad_s
+    per_unit = _YAW_MOTOR_SHARE * all_n * motors.moment_per_thrust_m / jz
+    yield Parameter("MC_YAWRATE_P", yaw_rate_per_s / per_unit, f"rate loop of {yaw_rate_per_s:.0f} 1/s")
+    yield Parameter("MC_YAWRATE_I", yaw_rate_per_s / per_unit, "trim within a second")
+    yield Parameter("MC_YAW_P", control.yaw_frequency_rad_s / (2 * control.attitude_damping), "1/s")
+
+
+def _limits(airframe: Airframe) -> Iterable[Parameter]:
+    control = airframe.control
+    tilt_deg = math.degrees(control.tilt_max_rad)
+    yield Parameter("MPC_THR_HOVER", airframe.hover_fraction, "weight over greatest thrust")
+    yield Parameter("MPC_THR_MIN", 0.05, "as the motors idle")
+    yield Parameter("MPC_TILTMAX_AIR", tilt_deg, "degrees; more would not carry the weight")
+    yield Parameter("MPC_MAN_TILT_MAX", tilt_deg, "the same for a pilot")
+    yield Parameter("MPC_XY_P", control.position_p_per_s, "1/s")
+
+
+def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
+    interval_us = airframe.imu.integration_interval_us
+    yield Parameter("IMU_INTEG_RATE", round(1e6 / interval_us), "one HIGHRES_IMU a sample of the simulator")
+    # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s. At the default of 0.35 it then
+    # rejects the position for a second and jumps; at 1.0 it is right again after 0.4 s (measured, 2 m/s).
+    yield Parameter("EKF2_ACC_NOISE", 1.0, "m/s2; leaves room for what a hit hides from the accelerometer")
+    if position == "mocap":
+        yield Parameter("EKF2_EV_CTRL", 11, "motion capture's position, height and yaw")
+        yield Parameter("EKF2_HGT_REF", 3, "height from motion capture")
+        yield Parameter("EKF2_EVP_NOISE", 0.01, "m, the least that PX4 takes")
+        yield Parameter("EKF2_EVA_NOISE", 0.05, "rad, the least that PX4 takes")
+        # With both, PX4 takes motion capture as relative to GPS and no better than it.
+        yield Parameter("EKF2_GPS_CTRL", 0, "no GPS indoors")
+    else:
+        yield Parameter("EKF2_EV_CTRL", 0, "no motion capture outdoors")
+        yield Parameter("EKF2_GPS_P_NOISE", 0.05, "m; the fix is an RTK receiver's")
+        yield Parameter("EKF2_GPS_V_NOISE", 0.1, "m/s; PX4 takes no less than 0.25 for a simulated fix")
+
+
+def _flight_rules() -> Iterable[Parameter]:
+    yield Parameter("COM_RC_IN_MODE", 4, "no sticks")
+    yield Parameter("COM_RCL_EXCEPT", 4, "no remote control needed in OFFBOARD")
+    yield Parameter("NAV_DLL_ACT", 0, "no ground station needed")
+    yield Parameter("CBRK_SUPPLY_CHK", 894281, "no power module in a simulation")
+
+
+def as_environment(airframe: Airframe, position: Position = "mocap") -> str:
+    """Lines for a shell: PX4's SITL start script sets every PX4_PARAM_<NAME> that it finds."""
+    lines = [f"# PX4 SITL parameters of '{airframe.name}': source this, then start PX4 from the same shell."]
+    lines += [f"export PX4_PARAM_{p.name}={p.text}  # {p.reason}" for p in px4_parameters(airframe, position)]
+    return "\n".join(lines)
+
+
+def as_params_file(airframe: Airframe, position: Position = "mocap") -> str:
+    """A file that QGroundControl and `param load`'s users read: system, component, name, value, type."""
+    lines = [f"# PX4 parameters of '{airframe.name}'", "# Vehicle-Id Component-Id Name Value Type"]
+    for p in px4_parameters(airframe, position):
+        lines.append(f"1\t1\t{p.name}\t{p.text}\t{_INT32 if isinstance(p.value, int) else _REAL32}")
+    return "\n".join(lines)
+
+
+def as_airframe_file(airframe: Airframe, position: Position = "mocap") -> str:
+    """A file for PX4's ROMFS/px4fmu_common/init.d-posix/airframes/."""
+    lines = ["#!/bin/sh", "#", f"# @name {airframe.name}: {airframe.description}", "#", "# @type Quadrotor x", "#"]
+    lines += ["", ". ${R}etc/init.d/rc.mc_defaults", ""]
+    lines += [f"param set-default {p.name} {p.text}  # {p.reason}" for p in px4_parameters(airframe, position)]
+    return "\n".join(lines)

@@ -1,0 +1,133 @@
+"""Sensors beside the inertial one: magnetometer, barometer, GPS and motion capture, from the body's true state."""
+
+import math
+import random
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.hil.earth import StandardAir, magnetic_field_ned_gauss, place_at
+from sim_vehicle.hil.messages import Air, HilGps, MotionCapture, Quadruple
+from sim_vehicle.world import Vector3
+
+# Rates usual on flight controllers; PX4 asks for no particular ones.
+MAGNETOMETER_PERIOD_US = 20_000
+BAROMETER_PERIOD_US = 20_000
+GPS_PERIOD_US = 100_000
+# PX4 wants external vision at 30 to 50 Hz.
+MOTION_CAPTURE_PERIOD_US = 20_000
+
+# Standard deviation of one sample. An IST8310's 3 mgauss at full rate, averaged down to 50 Hz.
+MAGNETOMETER_NOISE_GAUSS = 0.001
+# A BMP388 at its finest setting has 0.02 Pa, and a flying vehicle's own wind ten times that and more.
+BAROMETER_NOISE_PA = 0.5
+# Camera systems state tenths of a millimetre; a moving vehicle whose markers hide one another has more.
+CAMERA_POSITION_NOISE_M = 0.002
+CAMERA_ATTITUDE_NOISE_RAD = 0.005
+
+
+class Wander:
+    """First-order Gauss-Markov error of one vector, as of a GPS fix."""
+
+    def __init__(self, deviation: float, correlation_s: float, period_s: float, rng: random.Random) -> None:
+        self._keep = math.exp(-period_s / correlation_s)
+        self._kick = deviation * math.sqrt(1 - self._keep**2)
+        self._rng = rng
+        self._value = (rng.gauss(0, deviation), rng.gauss(0, deviation), rng.gauss(0, deviation))
+
+    def next(self) -> Vector3:
+        """The error one period later."""
+        x, y, z = self._value
+        keep, kick, gauss = self._keep, self._kick, self._rng.gauss
+        self._value = (keep * x + gauss(0, kick), keep * y + gauss(0, kick), keep * z + gauss(0, kick))
+        return self._value
+
+
+class Magnetometer:
+    """The world's field in the body's frame."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self._field_ned_gauss = magnetic_field_ned_gauss()
+        self._rng = rng
+
+    def sample(self, attitude_wxyz: Quadruple) -> Vector3:
+        """In gauss, FRD."""
+        x, y, z = to_body(attitude_wxyz, self._field_ned_gauss)
+        gauss, noise = self._rng.gauss, MAGNETOMETER_NOISE_GAUSS
+        return x + gauss(0, noise), y + gauss(0, noise), z + gauss(0, noise)
+
+
+class Barometer:
+    """The standard atmosphere's pressure at the body's height."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self._air = StandardAir()
+        self._rng = rng
+
+    def sample(self, position_ned_m: Vector3) -> Air:
+        return self._air.at(-position_ned_m[2], self._rng.gauss(0, BAROMETER_NOISE_PA))
+
+
+class Gps:
+    """A receiver as good as the estimate that the airframe file states for the built-in autopilot.
+
+    That is an RTK fix: with a plain receiver's metres, no difference between two flights would mean anything.
+    """
+
+    def __init__(self, airframe: Airframe, rng: random.Random) -> None:
+        estimate, period_s = airframe.estimate, 1e-6 * GPS_PERIOD_US
+        self._accuracy_m = estimate.position_noise_m
+        self._position = Wander(estimate.position_noise_m, estimate.position_correlation_s, period_s, rng)
+        self._velocity = Wander(estimate.velocity_noise_m_s, estimate.velocity_correlation_s, period_s, rng)
+
+    def sample(self, time_us: int, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> HilGps:
+        """A fix of the moment; a real receiver's is a tenth of a second late, and PX4's SITL assumes 10 ms."""
+        return HilGps(
+            time_us=time_us,
+            place=place_at(_sum(position_ned_m, self._position.next())),
+            velocity_ned_m_s=_sum(velocity_ned_m_s, self._velocity.next()),
+            accuracy_m=self._accuracy_m,
+        )
+
+
+class Cameras:
+    """A motion-capture system: position and attitude, with errors that are new in every frame."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self._rng = rng
+
+    def sample(self, time_us: int, position_ned_m: Vector3, attitude_wxyz: Quadruple) -> MotionCapture:
+        return MotionCapture(
+            time_us=time_us,
+            position_ned_m=_sum(position_ned_m, self._error(CAMERA_POSITION_NOISE_M)),
+            attitude_wxyz=turned(attitude_wxyz, self._error(CAMERA_ATTITUDE_NOISE_RAD)),
+            position_variance_m2=CAMERA_POSITION_NOISE_M**2,
+            attitude_variance_rad2=CAMERA_ATTITUDE_NOISE_RAD**2,
+        )
+
+    def _error(self, deviation: float) -> Vector3:
+        gauss = self._rng.gauss
+        return gauss(0, deviation), gauss(0, deviation), gauss(0, deviation)
+
+
+def turned(attitude_wxyz: Quadruple, angle_frd_rad: Vector3) -> Quadruple:
+    """An attitude after a small turn about the body's axes."""
+    w, x, y, z = attitude_wxyz
+    a, b, c = (0.5 * angle for angle in angle_frd_rad)
+    turned_w, turned_x = w - x * a - y * b - z * c, x + w * a + y * c - z * b
+    turned_y, turned_z = y + w * b + z * a - x * c, z + w * c + x * b - y * a
+    norm = math.sqrt(turned_w**2 + turned_x**2 + turned_y**2 + turned_z**2)
+    return turned_w / norm, turned_x / norm, turned_y / norm, turned_z / norm
+
+
+def to_body(attitude_wxyz: Quadruple, vector_ned: Vector3) -> Vector3:
+    """A NED vector in the body's FRD frame: the transpose of the attitude's rotation."""
+    w, x, y, z = attitude_wxyz
+    north, east, down = vector_ned
+    return (
+        (1 - 2 * (y * y + z * z)) * north + 2 * (x * y + w * z) * east + 2 * (x * z - w * y) * down,
+        2 * (x * y - w * z) * north + (1 - 2 * (x * x + z * z)) * east + 2 * (y * z + w * x) * down,
+        2 * (x * z + w * y) * north + 2 * (y * z - w * x) * east + (1 - 2 * (x * x + y * y)) * down,
+    )
+
+
+def _sum(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]

@@ -1,0 +1,96 @@
+"""Body, world and sensors of the simulated vehicle, with its motors in the hands of PX4."""
+
+import math
+import random
+
+from sim_vehicle.airframe import Airframe, Imu
+from sim_vehicle.hil.earth import place_at
+from sim_vehicle.hil.messages import HilSensor, HilState, Quadruple, ToPx4
+from sim_vehicle.hil.sensors import (
+    BAROMETER_PERIOD_US,
+    GPS_PERIOD_US,
+    MAGNETOMETER_PERIOD_US,
+    MOTION_CAPTURE_PERIOD_US,
+    Barometer,
+    Cameras,
+    Gps,
+    Magnetometer,
+)
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.world import Vector3
+
+# What PX4 asks for when it connects.
+STATE_PERIOD_US = 5_000
+
+# PX4 integrates samples by the trapezoidal rule: at 4 ms every HIGHRES_IMU would be the mean of two of them
+# and show a hit a sample late. A quarter of its interval comes near the 8 kHz of a real sensor.
+SAMPLE_INTERVAL_US = 1_000
+
+
+def sampled_every(airframe: Airframe, interval_us: int) -> Airframe:
+    """The airframe with an inertial sensor that is read out so often, its noise as white as before."""
+    imu = airframe.imu
+    factor = math.sqrt(imu.integration_interval_us / interval_us)
+    values = imu.model_dump() | {
+        "integration_interval_us": interval_us,
+        "accelerometer_noise_m_s2": factor * imu.accelerometer_noise_m_s2,
+        "gyroscope_noise_rad_s": factor * imu.gyroscope_noise_rad_s,
+    }
+    return airframe.model_copy(update={"imu": Imu.model_validate(values)})
+
+
+class HilVehicle:
+    """One sample of the inertial sensor a step; time begins at 0, as PX4's clock does."""
+
+    def __init__(
+        self, airframe: Airframe, scene: Scene, seed: int, sample_interval_us: int = SAMPLE_INTERVAL_US
+    ) -> None:
+        """Raises SceneError where a wall passes through the start position."""
+        check_start_is_free(scene, airframe)
+        self._plant = Plant(sampled_every(airframe, sample_interval_us), scene, seed)
+        rng = random.Random(seed)
+        self._magnetometer = Magnetometer(rng)
+        self._barometer = Barometer(rng)
+        self._gps = Gps(airframe, rng)
+        self._cameras = Cameras(rng)
+        self.interval_us = self._plant.interval_us
+        self.time_boot_us = 0
+
+    @property
+    def truth(self) -> TruthRecorder:
+        """What really happened, never sent as anything but truth."""
+        return self._plant.truth
+
+    def step(self, motor_fractions: Quadruple) -> tuple[ToPx4, ...]:
+        """Advance one sample; the inertial sensor's sample comes last, because it sets PX4's clock going."""
+        output = self._plant.drive(motor_fractions)
+        now_us = self.time_boot_us = output.time_boot_us
+        px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = self._plant.state.body.tolist()
+        position_ned_m: Vector3 = (px, py, pz)
+        velocity_ned_m_s: Vector3 = (vx, vy, vz)
+        attitude_wxyz: Quadruple = (qw, qx, qy, qz)
+        messages: list[ToPx4] = []
+        if self._is_due(GPS_PERIOD_US):
+            messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
+        if self._is_due(MOTION_CAPTURE_PERIOD_US):
+            messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
+        if self._is_due(STATE_PERIOD_US):
+            place = place_at(position_ned_m)
+            messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))
+        is_magnetometer_due = self._is_due(MAGNETOMETER_PERIOD_US)
+        messages.append(
+            HilSensor(
+                time_us=now_us,
+                specific_force_frd_m_s2=output.specific_force_frd_m_s2,
+                angular_velocity_frd_rad_s=output.angular_velocity_frd_rad_s,
+                magnetic_field_frd_gauss=self._magnetometer.sample(attitude_wxyz) if is_magnetometer_due else None,
+                air=self._barometer.sample(position_ned_m) if self._is_due(BAROMETER_PERIOD_US) else None,
+            )
+        )
+        return tuple(messages)
+
+    def _is_due(self, period_us: int) -> bool:
+        """Whether the interval just simulated contains a multiple of the period."""
+        return self.time_boot_us % period_us < self.interval_us

@@ -1,0 +1,174 @@
+"""Messages of PX4's external simulator to bytes and back.
+
+Source of units, frames and field bits: PX4's simulation/simulator_mavlink/SimulatorMavlink.cpp and .hpp.
+"""
+
+import math
+from typing import Any, TypeAlias
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
+
+Message: TypeAlias = Any
+
+# PX4 reads neither of them.
+_SIMULATOR_SYSTEM, _SIMULATOR_COMPONENT = 1, 51
+
+# HIL_SENSOR.fields_updated; PX4 takes a group only with all of its bits.
+_ACCELEROMETER, _GYROSCOPE, _MAGNETOMETER = 0x7, 0x38, 0x1C0
+# Pressure, pressure altitude and temperature.
+_BAROMETER = 0x1A00
+
+_ARMED_FLAG = 0x80
+_LOCKSTEP_FLAG = 0x1
+_FIX_3D = 3
+_SATELLITES = 16
+_BEST_QUALITY = 100
+_UNKNOWN_VELOCITY_AND_RATES = (math.nan,) * 6
+_DIAGONAL = (0, 6, 11, 15, 18, 20)
+_NO_COURSE = 65_535
+# Below this the course over ground is noise.
+_LEAST_SPEED_FOR_COURSE_M_S = 0.1
+
+
+class HilEncoder:
+    """Packets to PX4 in one sequence of numbers."""
+
+    def __init__(self) -> None:
+        self._link = dialect.MAVLink(None, srcSystem=_SIMULATOR_SYSTEM, srcComponent=_SIMULATOR_COMPONENT)
+
+    def packet(self, message: ToPx4) -> bytes:
+        """The message as a MAVLink 2 packet."""
+        link = self._link
+        packet: bytes = _filled(message).pack(link)
+        link.seq = (link.seq + 1) & 0xFF
+        return packet
+
+
+class HilDecoder:
+    """Finds PX4's answers in its stream, which TCP may have cut anywhere."""
+
+    def __init__(self) -> None:
+        self._link = dialect.MAVLink(None)
+        self._link.robust_parsing = True
+
+    def push(self, data: bytes) -> list[ActuatorControls]:
+        """The answers completed by ``data``; PX4's greeting (HEARTBEAT, COMMAND_LONG) is dropped."""
+        messages = self._link.parse_buffer(data) or []
+        return [_answer(m) for m in messages if isinstance(m, dialect.MAVLink_hil_actuator_controls_message)]
+
+
+def _filled(message: ToPx4) -> Message:
+    if isinstance(message, HilSensor):
+        return _sensor(message)
+    if isinstance(message, HilGps):
+        return _gps(message)
+    if isinstance(message, MotionCapture):
+        return _motion_capture(message)
+    return _state(message)
+
+
+def _sensor(sample: HilSensor) -> Message:
+    fields = _ACCELEROMETER | _GYROSCOPE
+    mag_x = mag_y = mag_z = pressure_hpa = altitude_m = temperature_c = 0.0
+    if sample.magnetic_field_frd_gauss is not None:
+        fields |= _MAGNETOMETER
+        mag_x, mag_y, mag_z = sample.magnetic_field_frd_gauss
+    if sample.air is not None:
+        fields |= _BAROMETER
+        air = sample.air
+        pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
+    return dialect.MAVLink_hil_sensor_message(
+        sample.time_us,
+        *sample.specific_force_frd_m_s2,
+        *sample.angular_velocity_frd_rad_s,
+        mag_x,
+        mag_y,
+        mag_z,
+        pressure_hpa,
+        0.0,
+        altitude_m,
+        temperature_c,
+        fields,
+        0,
+    )
+
+
+def _gps(fix: HilGps) -> Message:
+    north, east, down = fix.velocity_ned_m_s
+    speed_m_s = math.hypot(north, east)
+    course_cdeg = _NO_COURSE
+    if speed_m_s >= _LEAST_SPEED_FOR_COURSE_M_S:
+        course_cdeg = round(100 * math.degrees(math.atan2(east, north))) % 36_000
+    accuracy_cm = max(1, round(100 * fix.accuracy_m))
+    return dialect.MAVLink_hil_gps_message(
+        fix.time_us,
+        _FIX_3D,
+        round(1e7 * fix.place.latitude_deg),
+        round(1e7 * fix.place.longitude_deg),
+        round(1e3 * fix.place.altitude_m),
+        accuracy_cm,
+        accuracy_cm,
+        round(100 * speed_m_s),
+        round(100 * north),
+        round(100 * east),
+        round(100 * down),
+        course_cdeg,
+        _SATELLITES,
+    )
+
+
+def _motion_capture(seen: MotionCapture) -> Message:
+    return dialect.MAVLink_odometry_message(
+        seen.time_us,
+        dialect.MAV_FRAME_LOCAL_NED,
+        dialect.MAV_FRAME_LOCAL_NED,
+        *seen.position_ned_m,
+        list(seen.attitude_wxyz),
+        *_UNKNOWN_VELOCITY_AND_RATES,
+        _covariance(seen.position_variance_m2, seen.attitude_variance_rad2),
+        _covariance(math.nan, math.nan),
+        0,
+        # As MOCAP it would go to a topic that EKF2 does not read.
+        dialect.MAV_ESTIMATOR_TYPE_VISION,
+        _BEST_QUALITY,
+    )
+
+
+def _covariance(first_three: float, last_three: float) -> list[float]:
+    """The upper triangle, row by row, of a 6 x 6 matrix with only a diagonal."""
+    triangle = [0.0] * 21
+    for row, start in enumerate(_DIAGONAL):
+        triangle[start] = first_three if row < 3 else last_three
+    return triangle
+
+
+def _state(state: HilState) -> Message:
+    north, east, down = state.velocity_ned_m_s
+    return dialect.MAVLink_hil_state_quaternion_message(
+        state.time_us,
+        list(state.attitude_wxyz),
+        *state.angular_velocity_frd_rad_s,
+        round(1e7 * state.place.latitude_deg),
+        round(1e7 * state.place.longitude_deg),
+        round(1e3 * state.place.altitude_m),
+        round(100 * north),
+        round(100 * east),
+        round(100 * down),
+        0,
+        0,
+        0,
+        0,
+        0,
+    )
+
+
+def _answer(message: Message) -> ActuatorControls:
+    one, two, three, four = (value if math.isfinite(value) else 0.0 for value in message.controls[:4])
+    return ActuatorControls(
+        time_us=message.time_usec,
+        armed=bool(message.mode & _ARMED_FLAG),
+        is_lockstep=bool(message.flags & _LOCKSTEP_FLAG),
+        motor_fractions=(one, two, three, four),
+    )

@@ -1,0 +1,180 @@
+"""The simulated vehicle's body for a real PX4: a TCP server at `simulator_mavlink`'s port."""
+
+import errno
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from sim_vehicle.errors import PortInUse
+from sim_vehicle.hil.exchange import Exchange, Phase
+from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
+from sim_vehicle.shell.truth_file import save_truth
+
+PX4_SIMULATOR_PORT = 4560
+
+# Lateness up to this is caught up; after a longer stop the flight goes on where it stood.
+MOST_CAUGHT_UP_US = 500_000
+# Ctrl-C and the clock are looked at this often while PX4 says nothing.
+_LONGEST_WAIT_S = 0.1
+_RECEIVE_BYTES = 65_536
+
+
+def serve_px4(
+    new_vehicle: Callable[[], HilVehicle],
+    port: int = PX4_SIMULATOR_PORT,
+    speed: float = 1.0,
+    truth_path: Path | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """Give one PX4 after another a new vehicle until ``stop()``; ``tell`` gets sentences for a person.
+
+    ``speed``: simulated seconds a second at most, 0 for as fast as PX4 answers. The truth of each PX4's
+    vehicle is written when it goes. Raises PortInUse where ``port`` cannot be had, and NotInLockstep.
+    """
+    with _listening_socket(port) as listener:
+        tell(f"Waiting for PX4 at TCP port {listener.getsockname()[1]}.")
+        while not stop():
+            link = _accept(listener)
+            if link is None:
+                continue
+            with link:
+                session = _Session(new_vehicle(), link, speed, tell)
+                try:
+                    session.run(stop)
+                finally:
+                    session.end(truth_path)
+
+
+class _Session:
+    """One PX4 from connecting to going."""
+
+    def __init__(self, vehicle: HilVehicle, link: socket.socket, speed: float, tell: Callable[[str], None]) -> None:
+        self._vehicle = vehicle
+        self._link = link
+        self._tell = tell
+        self._pace = _Pace(speed)
+        self._exchange = Exchange()
+        self._encoder, self._decoder = HilEncoder(), HilDecoder()
+        self._lockstep_from: tuple[int, int] | None = None
+
+    def run(self, stop: Callable[[], bool]) -> None:
+        """Exchange samples and motor commands until PX4 goes or ``stop()``."""
+        exchange = self._exchange
+        self._tell("PX4 has connected.")
+        exchange.connected(_now_us())
+        while not stop():
+            now_us = _now_us()
+            exchange.look_at_clock(now_us)
+            wait_us = self._send_if_due(now_us)
+            try:
+                data = self._receive(wait_us)
+            except ConnectionError:
+                return
+            if data == b"":
+                return
+            for controls in self._decoder.push(data) if data else ():
+                exchange.received(controls)
+            self._tell_notices()
+
+    def end(self, truth_path: Path | None) -> None:
+        """Write the truth and say how it went."""
+        now_us, time_us = _now_us(), self._vehicle.time_boot_us
+        self._exchange.closed()
+        if self._lockstep_from is not None:
+            wall_s, simulated_s = ((a - b) / 1e6 for a, b in zip((now_us, time_us), self._lockstep_from, strict=True))
+            self._tell(f"PX4's flight ends after {simulated_s:.1f} s, flown in {wall_s:.1f} s.")
+        else:
+            self._tell("PX4 went away before it answered.")
+        if truth_path is not None:
+            save_truth(truth_path, self._vehicle.truth, self._pace.epoch_at_boot_us(time_us))
+
+    def _send_if_due(self, now_us: int) -> int:
+        """Send the next sample if it may go; how long, in microseconds, to wait for PX4 then."""
+        exchange, vehicle = self._exchange, self._vehicle
+        allowed_us = exchange.next_sample_at_us()
+        if allowed_us is None:
+            return round(1e6 * _LONGEST_WAIT_S)
+        if exchange.phase is Phase.READY:
+            if self._lockstep_from is None:
+                self._lockstep_from = (now_us, vehicle.time_boot_us)
+            allowed_us = self._pace.due_us(vehicle.time_boot_us + vehicle.interval_us, now_us)
+        if allowed_us > now_us:
+            return allowed_us - now_us
+        messages = vehicle.step(exchange.motor_fractions)
+        # PX4 that has gone is seen at the next receive.
+        try:
+            self._link.sendall(b"".join([self._encoder.packet(message) for message in messages]))
+        except ConnectionError:
+            return 0
+        exchange.sent(vehicle.time_boot_us, now_us)
+        return round(1e6 * _LONGEST_WAIT_S) if exchange.phase is Phase.AWAITING else 0
+
+    def _receive(self, wait_us: int) -> bytes | None:
+        """What PX4 sent, b"" when it has gone, None when nothing came in time."""
+        self._link.settimeout(min(1e-6 * wait_us, _LONGEST_WAIT_S))
+        try:
+            return self._link.recv(_RECEIVE_BYTES)
+        except (TimeoutError, BlockingIOError):
+            return None
+
+    def _tell_notices(self) -> None:
+        for notice in self._exchange.notices:
+            self._tell(notice)
+        self._exchange.notices.clear()
+
+
+class _Pace:
+    """Keeps the vehicle's clock on the machine's, times a speed."""
+
+    def __init__(self, speed: float) -> None:
+        self._speed = speed
+        self._boot_us: int | None = None
+
+    def due_us(self, time_us: int, now_us: int) -> int:
+        """The machine's time at which the vehicle's clock should show ``time_us``."""
+        if self._speed == 0:
+            return now_us
+        since_boot_us = round(time_us / self._speed)
+        if self._boot_us is None or now_us - self._boot_us - since_boot_us > MOST_CAUGHT_UP_US:
+            self._boot_us = now_us - since_boot_us
+        return self._boot_us + since_boot_us
+
+    def epoch_at_boot_us(self, time_us: int) -> int:
+        """Wall clock at the vehicle's boot time 0; at another speed than 1 the last moments fit best."""
+        wall_us, now_us = time.time_ns() // 1000, _now_us()
+        if self._speed == 1 and self._boot_us is not None:
+            return wall_us - now_us + self._boot_us
+        return wall_us - time_us
+
+
+def _now_us() -> int:
+    return time.monotonic_ns() // 1000
+
+
+def _listening_socket(port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        # A PX4 that has just gone leaves its connection in TIME_WAIT, which must not hold up the next start.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(("0.0.0.0", port))
+        listener.listen(1)
+    except OSError as problem:
+        listener.close()
+        reason = "is in use" if problem.errno == errno.EADDRINUSE else f"cannot be opened ({problem.strerror})"
+        raise PortInUse(
+            f"TCP port {port} {reason}: another simulator may be running; stop it or choose another port."
+        ) from problem
+    listener.settimeout(_LONGEST_WAIT_S)
+    return listener
+
+
+def _accept(listener: socket.socket) -> socket.socket | None:
+    try:
+        link, _ = listener.accept()
+    except TimeoutError:
+        return None
+    link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return link

@@ -1,0 +1,106 @@
+"""Messages of the external simulator on the wire, as PX4 reads and writes them."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, HilState, MotionCapture, Place
+from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
+
+ZURICH = Place(47.397742, 8.545594, 488.123)
+
+
+def on_the_wire(message) -> dialect.MAVLink_message:
+    return dialect.MAVLink(None).decode(bytearray(HilEncoder().packet(message)))
+
+
+def controls_packet(controls: list[float], mode: int, flags: int, time_us: int = 4_000) -> bytes:
+    link = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    return dialect.MAVLink_hil_actuator_controls_message(time_us, controls + [0.0] * 12, mode, flags).pack(link)
+
+
+def greeting() -> bytes:
+    """What PX4 sends on connecting: SET_MESSAGE_INTERVAL of its truth, and a heartbeat."""
+    link = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    asked = dialect.MAVLink_command_long_message(0, 0, 511, 0, 115, 5000, 0, 0, 0, 0, 0).pack(link)
+    return asked + dialect.MAVLink_heartbeat_message(0, 12, 0, 0, 0, 0).pack(link)
+
+
+def test_an_inertial_sample_alone():
+    sent = on_the_wire(HilSensor(4_000, (0.1, -0.2, -9.81), (0.01, 0.02, -0.03), None, None))
+    assert (sent.time_usec, sent.id, sent.fields_updated) == (4_000, 0, 0x3F)
+    assert (sent.xacc, sent.yacc, sent.zacc) == pytest.approx((0.1, -0.2, -9.81))
+    assert (sent.xgyro, sent.ygyro, sent.zgyro) == pytest.approx((0.01, 0.02, -0.03))
+
+
+def test_a_sample_with_everything_has_every_bit_of_every_group():
+    air = Air(pressure_hpa=955.8, altitude_m=488.0, temperature_c=11.8)
+    sent = on_the_wire(HilSensor(4_000, (0, 0, -9.81), (0, 0, 0), (0.21, 0.01, 0.43), air))
+    assert sent.fields_updated == 0x3F | 0x1C0 | 0x1A00
+    assert (sent.xmag, sent.ymag, sent.zmag) == pytest.approx((0.21, 0.01, 0.43))
+    assert (sent.abs_pressure, sent.pressure_alt, sent.temperature) == pytest.approx((955.8, 488.0, 11.8))
+
+
+def test_a_fix_in_the_units_of_the_protocol():
+    sent = on_the_wire(HilGps(100_000, ZURICH, (3.0, -4.0, 0.25), 0.03))
+    assert (sent.lat, sent.lon, sent.alt) == (473977420, 85455940, 488123)
+    assert (sent.vn, sent.ve, sent.vd, sent.vel) == (300, -400, 25, 500)
+    assert sent.cog == round(100 * (360 - math.degrees(math.atan2(4, 3))))
+    assert (sent.fix_type, sent.eph, sent.epv) == (3, 3, 3)
+    assert sent.satellites_visible >= 6
+
+
+def test_a_fix_at_rest_has_no_course():
+    assert on_the_wire(HilGps(0, ZURICH, (0.01, -0.02, 0.0), 0.01)).cog == 65_535
+
+
+def test_motion_capture_is_an_odometry_in_local_ned_that_ekf2_reads():
+    sent = on_the_wire(MotionCapture(20_000, (1.0, 2.0, -3.0), (0.8, 0.0, 0.6, 0.0), 4e-6, 2.5e-5))
+    assert (sent.frame_id, sent.estimator_type) == (dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_ESTIMATOR_TYPE_VISION)
+    assert (sent.x, sent.y, sent.z) == (1.0, 2.0, -3.0)
+    assert tuple(sent.q) == pytest.approx((0.8, 0.0, 0.6, 0.0))
+    assert all(math.isnan(value) for value in (sent.vx, sent.vy, sent.vz, sent.rollspeed))
+    covariance = sent.pose_covariance
+    assert [covariance[i] for i in (0, 6, 11)] == pytest.approx([4e-6] * 3)
+    assert [covariance[i] for i in (15, 18, 20)] == pytest.approx([2.5e-5] * 3)
+    assert sum(value != 0 for value in covariance) == 6
+
+
+def test_the_truth_for_px4s_log():
+    sent = on_the_wire(HilState(8_000, ZURICH, (1.0, -2.0, 0.5), (0.8, 0.0, 0.6, 0.0), (0.1, 0.2, 0.3)))
+    assert (sent.lat, sent.lon, sent.alt) == (473977420, 85455940, 488123)
+    assert (sent.vx, sent.vy, sent.vz) == (100, -200, 50)
+    assert tuple(sent.attitude_quaternion) == pytest.approx((0.8, 0.0, 0.6, 0.0))
+    assert (sent.rollspeed, sent.pitchspeed, sent.yawspeed) == pytest.approx((0.1, 0.2, 0.3))
+
+
+def test_packets_count_up():
+    encoder = HilEncoder()
+    sample = HilSensor(0, (0, 0, 0), (0, 0, 0), None, None)
+    assert [encoder.packet(sample)[4] for _ in range(258)] == [i & 0xFF for i in range(258)]
+
+
+@pytest.mark.parametrize(
+    ("packet", "expected"),
+    [
+        (controls_packet([0.1, 0.2, 0.3, 0.4], 0x81, 1), ActuatorControls(4_000, True, True, (0.1, 0.2, 0.3, 0.4))),
+        (controls_packet([0.0] * 4, 0x01, 1), ActuatorControls(4_000, False, True, (0.0,) * 4)),
+        (controls_packet([0.5] * 4, 0x81, 0), ActuatorControls(4_000, True, False, (0.5,) * 4)),
+        (controls_packet([math.nan, 0.5, 0.5, 0.5], 0x81, 1), ActuatorControls(4_000, True, True, (0, 0.5, 0.5, 0.5))),
+    ],
+    ids=["armed", "disarmed", "without lockstep", "a motor that is off"],
+)
+def test_answers_of_px4(packet, expected):
+    (found,) = HilDecoder().push(packet)
+    assert found.motor_fractions == pytest.approx(expected.motor_fractions)
+    assert (found.time_us, found.armed, found.is_lockstep) == (expected.time_us, expected.armed, expected.is_lockstep)
+
+
+def test_a_stream_cut_anywhere_gives_the_same_answers():
+    stream = greeting() + b"".join(controls_packet([0.5] * 4, 0x81, 1, 4_000 * i) for i in range(1, 4))
+    for size in (1, 7, 50, len(stream)):
+        decoder = HilDecoder()
+        pieces = [stream[i : i + size] for i in range(0, len(stream), size)]
+        found = [controls for piece in pieces for controls in decoder.push(piece)]
+        assert [controls.time_us for controls in found] == [4_000, 8_000, 12_000]

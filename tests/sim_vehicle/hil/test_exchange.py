@@ -1,0 +1,183 @@
+"""Lockstep as a table and as a conversation, without sockets and on virtual time."""
+
+import pytest
+
+from sim_vehicle.errors import NotInLockstep
+from sim_vehicle.hil.exchange import (
+    ANSWER_TIMEOUT_US,
+    FIRST_ANSWER_WORDS,
+    MOVES,
+    STARTING_PERIOD_US,
+    STARTING_TIMEOUT_US,
+    Event,
+    Exchange,
+    Phase,
+)
+from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls
+
+HALF_THRUST = (0.5, 0.5, 0.5, 0.5)
+
+
+def answer(time_us: int, armed: bool = True, is_lockstep: bool = True) -> ActuatorControls:
+    return ActuatorControls(time_us, armed, is_lockstep, HALF_THRUST)
+
+
+def starting(now_us: int = 0) -> Exchange:
+    exchange = Exchange()
+    exchange.connected(now_us)
+    return exchange
+
+
+def in_lockstep() -> Exchange:
+    """PX4 has answered the sample of 4 ms, sent at the machine's time 1000."""
+    exchange = starting()
+    exchange.sent(4_000, 1_000)
+    exchange.received(answer(4_000))
+    return exchange
+
+
+def test_nothing_is_sent_before_px4_connects():
+    assert Exchange().next_sample_at_us() is None
+
+
+def test_while_px4_boots_samples_go_out_at_a_pace_of_their_own():
+    exchange = starting(now_us=50)
+    assert exchange.next_sample_at_us() == 50
+    exchange.sent(4_000, 60)
+    assert exchange.next_sample_at_us() == 60 + STARTING_PERIOD_US
+    exchange.sent(8_000, 5_000)
+    assert exchange.phase is Phase.STARTING
+
+
+def test_the_first_answer_begins_lockstep_even_to_an_older_sample():
+    exchange = starting()
+    for number in range(1, 12):
+        exchange.sent(4_000 * number, 4_000 * number)
+    exchange.received(answer(4_000 * 10))
+    assert exchange.phase is Phase.READY
+    assert exchange.motor_fractions == HALF_THRUST
+    assert exchange.notices[0].startswith(FIRST_ANSWER_WORDS)
+
+
+def test_then_exactly_one_sample_an_answer():
+    exchange = in_lockstep()
+    for number in range(2, 50):
+        assert exchange.next_sample_at_us() is not None
+        exchange.sent(4_000 * number, number)
+        assert exchange.next_sample_at_us() is None
+        exchange.received(answer(4_000 * number))
+    assert exchange.late_answers == exchange.overdue_answers == 0
+
+
+def test_a_second_sample_before_the_answer_is_a_fault_of_the_caller():
+    exchange = in_lockstep()
+    exchange.sent(8_000, 0)
+    with pytest.raises(KeyError):
+        exchange.sent(12_000, 0)
+
+
+def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():
+    exchange = starting()
+    exchange.sent(4_000, 0)
+    exchange.sent(8_000, 4_000)
+    exchange.received(answer(4_000))
+    exchange.sent(12_000, 8_000)
+    exchange.received(answer(8_000, armed=False))
+    assert exchange.phase is Phase.AWAITING
+    assert exchange.late_answers == 1
+    exchange.received(answer(12_000))
+    assert exchange.phase is Phase.READY
+
+
+def test_a_disarmed_px4_stops_the_motors_whatever_it_says_of_them():
+    exchange = in_lockstep()
+    exchange.sent(8_000, 0)
+    exchange.received(answer(8_000, armed=False))
+    assert exchange.motor_fractions == MOTORS_STOPPED
+
+
+def test_an_answer_that_does_not_come_is_given_up_after_the_timeout_and_told_once():
+    exchange = in_lockstep()
+    exchange.notices.clear()
+    exchange.sent(8_000, 10)
+    exchange.look_at_clock(10 + ANSWER_TIMEOUT_US - 1)
+    assert exchange.next_sample_at_us() is None
+    exchange.look_at_clock(10 + ANSWER_TIMEOUT_US)
+    assert exchange.next_sample_at_us() is not None
+    exchange.sent(12_000, 20 + ANSWER_TIMEOUT_US)
+    exchange.look_at_clock(20 + 2 * ANSWER_TIMEOUT_US)
+    assert exchange.overdue_answers == 2
+    assert len(exchange.notices) == 1
+
+
+def test_a_px4_that_comes_back_late_is_in_lockstep_again():
+    exchange = in_lockstep()
+    exchange.sent(8_000, 0)
+    exchange.look_at_clock(ANSWER_TIMEOUT_US)
+    exchange.sent(12_000, ANSWER_TIMEOUT_US)
+    exchange.received(answer(8_000))
+    assert exchange.phase is Phase.AWAITING
+    exchange.received(answer(12_000))
+    assert exchange.phase is Phase.READY
+
+
+def test_a_px4_that_never_answers_is_told_of_once():
+    exchange = starting()
+    for now_us in range(0, STARTING_TIMEOUT_US + 3_000_000, 1_000_000):
+        exchange.look_at_clock(now_us)
+    assert len(exchange.notices) == 1
+    assert "no motor commands" in exchange.notices[0]
+
+
+@pytest.mark.parametrize("wrong", [answer(4_000, is_lockstep=False), answer(8_000)])
+def test_a_px4_with_a_clock_of_its_own_is_refused(wrong):
+    exchange = starting()
+    exchange.sent(4_000, 0)
+    with pytest.raises(NotInLockstep, match="lockstep"):
+        exchange.received(wrong)
+
+
+def test_the_next_px4_begins_with_stopped_motors_and_from_the_start():
+    exchange = in_lockstep()
+    exchange.closed()
+    assert exchange.next_sample_at_us() is None
+    assert exchange.motor_fractions == MOTORS_STOPPED
+    exchange.connected(70)
+    assert exchange.phase is Phase.STARTING
+    exchange.sent(4_000, 80)
+    exchange.received(answer(4_000))
+    assert exchange.phase is Phase.READY
+
+
+REACHED = {
+    Phase.WAITING: Exchange,
+    Phase.STARTING: starting,
+    Phase.READY: in_lockstep,
+    Phase.AWAITING: lambda: with_a_sample_out(in_lockstep()),
+}
+DOES = {
+    Event.CONNECTED: lambda exchange: exchange.connected(0),
+    Event.SENT: lambda exchange: exchange.sent(8_000, 1_000),
+    Event.ANSWERED: lambda exchange: answered(exchange),
+    Event.OVERDUE: lambda exchange: exchange.look_at_clock(1_000 + ANSWER_TIMEOUT_US),
+    Event.CLOSED: lambda exchange: exchange.closed(),
+}
+
+
+def with_a_sample_out(exchange: Exchange) -> Exchange:
+    exchange.sent(8_000, 1_000)
+    return exchange
+
+
+def answered(exchange: Exchange) -> None:
+    if exchange.phase is Phase.STARTING:
+        exchange.sent(8_000, 1_000)
+    exchange.received(answer(8_000))
+
+
+@pytest.mark.parametrize(("phase", "event"), MOVES, ids=lambda value: value.name)
+def test_every_move_of_the_table_happens(phase, event):
+    exchange = REACHED[phase]()
+    assert exchange.phase is phase
+    DOES[event](exchange)
+    assert exchange.phase is MOVES[phase, event]

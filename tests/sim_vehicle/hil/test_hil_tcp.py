@@ -1,0 +1,199 @@
+"""The TCP server as PX4 meets it: boot, lockstep, speed, a PX4 that goes and the next one."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.errors import NotInLockstep, PortInUse
+from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.scene import Scene
+from sim_vehicle.shell.hil_tcp import serve_px4
+from sim_vehicle.shell.truth_file import load_truth
+from tests.sim_vehicle.hil.px4_client import HOVER, TIMEOUT_S, Px4Client
+
+
+def new_vehicle() -> HilVehicle:
+    return HilVehicle(load_built_in("foldable"), Scene(), 1, sample_interval_us=4_000)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Served:
+    """The server in a thread, and what it said."""
+
+    def __init__(self, speed: float, truth_path: Path | None) -> None:
+        self.port = free_port()
+        self.said: list[str] = []
+        self.problem: Exception | None = None
+        self._stop, self._listening = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(speed, truth_path))
+        self._thread.start()
+        assert self._listening.wait(TIMEOUT_S)
+
+    def _run(self, speed: float, truth_path: Path | None) -> None:
+        try:
+            serve_px4(new_vehicle, self.port, speed, truth_path, self._stop.is_set, self._tell)
+        except NotInLockstep as problem:
+            self.problem = problem
+
+    def _tell(self, text: str) -> None:
+        self.said.append(text)
+        self._listening.set()
+
+    def end(self) -> None:
+        self._stop.set()
+        self.join()
+
+    def join(self) -> None:
+        self._thread.join(TIMEOUT_S)
+        assert not self._thread.is_alive()
+
+
+@contextmanager
+def served(speed: float = 0.0, truth_path: Path | None = None) -> Iterator[Served]:
+    server = Served(speed, truth_path)
+    try:
+        yield server
+    finally:
+        server.end()
+
+
+@contextmanager
+def connected(server: Served) -> Iterator[Px4Client]:
+    px4 = Px4Client(server.port)
+    try:
+        yield px4
+    finally:
+        px4.close()
+
+
+def boot(px4: Px4Client, unanswered: int = 12) -> None:
+    """PX4's modules need some samples before the first motor command."""
+    for _ in range(unanswered):
+        px4.next_step()
+    px4.answer([0.0] * 4, armed=False)
+
+
+def test_px4_boots_on_samples_that_it_does_not_answer_and_then_gets_one_an_answer():
+    with served() as server, connected(server) as px4:
+        boot(px4)
+        steps = list(px4.fly(200, HOVER))
+        assert px4.times_us == [4_000 * i for i in range(1, len(px4.times_us) + 1)]
+        kinds = {message.get_type() for step in steps for message in step}
+        assert kinds == {"HIL_SENSOR", "HIL_GPS", "ODOMETRY", "HIL_STATE_QUATERNION"}
+        assert all(step[-1].get_type() == "HIL_SENSOR" for step in steps)
+
+
+def test_time_stands_still_until_the_answer_comes():
+    with served() as server, connected(server) as px4:
+        boot(px4)
+        list(px4.fly(20, HOVER))
+        px4.next_step()
+        assert px4.hears_nothing_for(0.3)
+        px4.answer(HOVER)
+        px4.next_step()
+        assert px4.times_us[-1] - px4.times_us[-2] == 4_000
+
+
+def test_a_lost_answer_costs_a_second_and_not_the_flight():
+    with served() as server, connected(server) as px4:
+        boot(px4)
+        list(px4.fly(20, HOVER))
+        px4.next_step()
+        began_s = time.monotonic()
+        px4.next_step()
+        assert 0.8 < time.monotonic() - began_s < 2.0
+        px4.answer(HOVER)
+        list(px4.fly(20, HOVER))
+        assert px4.times_us == [4_000 * i for i in range(1, len(px4.times_us) + 1)]
+
+
+def test_motor_commands_move_the_vehicle():
+    with served() as server, connected(server) as px4:
+        boot(px4)
+        steps = list(px4.fly(300, [0.9] * 4))
+        heights = [message.alt for step in steps for message in step if message.get_type() == "HIL_STATE_QUATERNION"]
+        assert heights[-1] - heights[0] > 300  # mm
+
+
+def test_disarmed_it_stays_on_the_ground_whatever_the_controls_say():
+    with served() as server, connected(server) as px4:
+        boot(px4)
+        heights = []
+        for _ in range(200):
+            heights += [m.alt for m in px4.next_step() if m.get_type() == "HIL_STATE_QUATERNION"]
+            px4.answer([0.9] * 4, armed=False)
+        assert abs(heights[-1] - heights[0]) < 10
+
+
+def test_speed_one_is_real_time():
+    with served(speed=1.0) as server, connected(server) as px4:
+        boot(px4)
+        list(px4.fly(10, HOVER))
+        began_s, began_us = time.monotonic(), px4.times_us[-1]
+        list(px4.fly(200, HOVER))
+        assert time.monotonic() - began_s == pytest.approx(1e-6 * (px4.times_us[-1] - began_us), abs=0.2)
+
+
+def test_speed_four_is_four_times_as_fast():
+    with served(speed=4.0) as server, connected(server) as px4:
+        boot(px4)
+        list(px4.fly(10, HOVER))
+        began_s = time.monotonic()
+        list(px4.fly(400, HOVER))
+        assert time.monotonic() - began_s == pytest.approx(0.4, abs=0.15)
+
+
+def test_the_next_px4_gets_a_new_vehicle_and_the_truth_of_each_is_written(tmp_path):
+    path = tmp_path / "truth.npz"
+    with served(truth_path=path) as server:
+        with connected(server) as px4:
+            boot(px4)
+            list(px4.fly(300, [0.9] * 4))
+        with connected(server) as px4:
+            first = px4.next_step()
+            _, series, _ = load_truth(path)
+            assert series["position_ned_m"][-1, 2] < -0.3
+            assert first[-1].time_usec == 4_000
+            boot(px4)
+            list(px4.fly(10, [0.0] * 4))
+    _, series, _ = load_truth(path)
+    assert series["position_ned_m"][-1, 2] > -0.1
+    assert sum("has connected" in text for text in server.said) == 2
+
+
+def test_a_px4_that_goes_while_it_boots_does_no_harm():
+    with served() as server:
+        with connected(server) as px4:
+            px4.next_step()
+        with connected(server) as px4:
+            boot(px4)
+            assert len(list(px4.fly(5, HOVER))) == 5
+    assert any("before it answered" in text for text in server.said)
+
+
+def test_a_px4_without_lockstep_ends_the_simulation_with_a_reason():
+    server = Served(0.0, None)
+    with connected(server) as px4:
+        px4.next_step()
+        px4.answer(HOVER, flags=0)
+        server.join()
+    assert isinstance(server.problem, NotInLockstep)
+
+
+def test_a_port_that_is_taken_is_said_so():
+    with socket.socket() as other:
+        other.bind(("0.0.0.0", 0))
+        other.listen(1)
+        with pytest.raises(PortInUse, match="in use"):
+            serve_px4(new_vehicle, other.getsockname()[1])

@@ -1,0 +1,187 @@
+"""Sensors that PX4 gets: right in direction, unit and size."""
+
+import math
+import random
+
+import pytest
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.hil.earth import HOME, StandardAir, magnetic_field_ned_gauss, place_at
+from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
+from sim_vehicle.hil.sensors import Cameras, Gps, Magnetometer, to_body, turned
+from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.scene import Scene
+
+LEVEL_NORTH = (1.0, 0.0, 0.0, 0.0)
+HALF = math.sqrt(0.5)
+NOSE_EAST = (HALF, 0.0, 0.0, HALF)
+NOSE_UP = (HALF, 0.0, HALF, 0.0)
+RIGHT_WING_DOWN = (HALF, HALF, 0.0, 0.0)
+
+FOLDABLE = load_built_in("foldable")
+
+
+def new_vehicle(sample_interval_us: int = 4_000) -> HilVehicle:
+    return HilVehicle(FOLDABLE, Scene(), seed=1, sample_interval_us=sample_interval_us)
+
+
+def flown(vehicle: HilVehicle, seconds: float, motor_fraction: float) -> list:
+    steps = round(seconds * 1e6 / vehicle.interval_us)
+    return [message for _ in range(steps) for message in vehicle.step((motor_fraction,) * 4)]
+
+
+def of_kind(messages: list, kind: type) -> list:
+    return [message for message in messages if isinstance(message, kind)]
+
+
+def test_at_rest_the_accelerometer_shows_one_g_upwards_and_the_gyroscope_nothing():
+    samples = of_kind(flown(new_vehicle(), 2.0, 0.0), HilSensor)[50:]
+    mean = [sum(sample.specific_force_frd_m_s2[i] for sample in samples) / len(samples) for i in range(3)]
+    rate = [sum(sample.angular_velocity_frd_rad_s[i] for sample in samples) / len(samples) for i in range(3)]
+    assert mean == pytest.approx([0, 0, -9.81], abs=0.2)
+    assert rate == pytest.approx([0, 0, 0], abs=0.01)
+
+
+def test_the_field_over_zurich_is_the_one_of_the_maps():
+    """Swisstopo and NOAA: 0.48 gauss, 63.5 degrees down, three to four degrees east of north."""
+    north, east, down = magnetic_field_ned_gauss()
+    assert math.hypot(north, east, down) == pytest.approx(0.484, abs=0.005)
+    assert math.degrees(math.atan2(down, math.hypot(north, east))) == pytest.approx(63.5, abs=0.5)
+    assert 3.0 < math.degrees(math.atan2(east, north)) < 4.5
+
+
+@pytest.mark.parametrize(
+    ("attitude", "seen"),
+    [
+        (LEVEL_NORTH, (1, 2, 3)),
+        (NOSE_EAST, (2, -1, 3)),  # the nose sees east, the right side looks south
+        (NOSE_UP, (-3, 2, 1)),  # the nose looks up, the belly north
+        (RIGHT_WING_DOWN, (1, 3, -2)),  # the right side sees down, the belly looks west
+    ],
+)
+def test_a_vector_of_the_world_in_the_body(attitude, seen):
+    assert to_body(attitude, (1.0, 2.0, 3.0)) == pytest.approx(seen)
+
+
+def test_the_magnetometer_turns_with_the_body():
+    field = magnetic_field_ned_gauss()
+    x, y, z = Magnetometer(random.Random(1)).sample(NOSE_EAST)
+    assert (x, y, z) == pytest.approx((field[1], -field[0], field[2]), abs=0.006)
+
+
+def test_a_small_turn_to_the_right_moves_the_nose_east():
+    w, x, y, z = turned(LEVEL_NORTH, (0.0, 0.0, 0.1))
+    assert (w, x, y, z) == pytest.approx((math.cos(0.05), 0, 0, math.sin(0.05)), abs=1e-4)
+
+
+def test_pressure_is_the_standard_atmospheres_and_falls_with_height():
+    air = StandardAir()
+    # ICAO 7488: 954.61 hPa at 500 m, 0.115 hPa less a metre there.
+    assert air.at(500.0 - HOME.altitude_m).pressure_hpa == pytest.approx(954.61, abs=0.05)
+    assert air.at(0.0).pressure_hpa - air.at(1.0).pressure_hpa == pytest.approx(0.115, abs=0.002)
+    assert air.at(0.5).pressure_hpa == pytest.approx(
+        (air.at(0.0).pressure_hpa + air.at(1.0).pressure_hpa) / 2, abs=1e-4
+    )
+    assert air.at(0.0).temperature_c == pytest.approx(15 - 0.0065 * HOME.altitude_m, abs=0.1)
+
+
+def test_air_beyond_the_table_is_the_nearest_of_it():
+    air = StandardAir()
+    assert air.at(1e6).pressure_hpa < air.at(1900.0).pressure_hpa
+    assert air.at(-1e6).pressure_hpa > air.at(-100.0).pressure_hpa
+
+
+def test_a_kilometre_north_is_a_larger_latitude_and_a_kilometre_east_a_larger_longitude():
+    assert place_at((0.0, 0.0, 0.0)) == HOME
+    north, east, up = place_at((1000.0, 0, 0)), place_at((0, 1000.0, 0)), place_at((0, 0, -50.0))
+    assert north.latitude_deg - HOME.latitude_deg == pytest.approx(0.0089932, abs=1e-6)
+    assert north.longitude_deg == HOME.longitude_deg
+    shrink = math.cos(math.radians(HOME.latitude_deg))
+    assert east.longitude_deg - HOME.longitude_deg == pytest.approx(0.0089932 / shrink, abs=1e-6)
+    assert up.altitude_m == HOME.altitude_m + 50
+
+
+def test_the_gps_is_as_noisy_as_the_airframe_file_says():
+    gps = Gps(FOLDABLE, random.Random(1))
+    fixes = [gps.sample(0, (0.0, 0.0, 0.0), (1.0, -2.0, 0.5)) for _ in range(4000)]
+    heights = [fix.place.altitude_m - HOME.altitude_m for fix in fixes]
+    north = [fix.velocity_ned_m_s[0] - 1.0 for fix in fixes]
+    assert rms(heights) == pytest.approx(FOLDABLE.estimate.position_noise_m, rel=0.25)
+    assert rms(north) == pytest.approx(FOLDABLE.estimate.velocity_noise_m_s, rel=0.15)
+    assert sum(fix.velocity_ned_m_s[1] for fix in fixes) / len(fixes) == pytest.approx(-2.0, abs=0.01)
+
+
+def test_cameras_see_where_the_body_is_and_how_it_is_turned():
+    cameras = Cameras(random.Random(1))
+    seen = [cameras.sample(0, (1.0, 2.0, -3.0), NOSE_EAST) for _ in range(500)]
+    mean = [sum(one.position_ned_m[i] for one in seen) / len(seen) for i in range(3)]
+    assert mean == pytest.approx([1, 2, -3], abs=0.001)
+    assert rms([one.position_ned_m[0] - 1 for one in seen]) ** 2 == pytest.approx(seen[0].position_variance_m2, rel=0.2)
+    assert seen[0].attitude_wxyz == pytest.approx(NOSE_EAST, abs=0.02)
+    assert math.hypot(*seen[0].attitude_wxyz) == pytest.approx(1)
+
+
+def test_every_sensor_comes_at_its_rate_and_the_inertial_one_last():
+    vehicle = new_vehicle()
+    steps = [vehicle.step(MOTORS_STOPPED) for _ in range(250)]
+    assert all(isinstance(messages[-1], HilSensor) for messages in steps)
+    assert all(messages[-1].time_us == 4000 * (i + 1) for i, messages in enumerate(steps))
+    everything = [message for messages in steps for message in messages]
+    assert len(of_kind(everything, HilGps)) == 10
+    assert len(of_kind(everything, MotionCapture)) == 50
+    assert len(of_kind(everything, HilState)) == 200
+    sensors = of_kind(everything, HilSensor)
+    assert sum(sensor.magnetic_field_frd_gauss is not None for sensor in sensors) == 50
+    assert sum(sensor.air is not None for sensor in sensors) == 50
+
+
+@pytest.mark.parametrize("interval_us", [1_000, 2_000, 4_000])
+def test_the_rate_of_the_inertial_sensor_changes_no_other_rate_and_no_noise_of_a_longer_mean(interval_us):
+    messages = flown(new_vehicle(interval_us), 2.0, 0.0)
+    assert (len(of_kind(messages, HilGps)), len(of_kind(messages, MotionCapture))) == (20, 100)
+    x = [sample.specific_force_frd_m_s2[0] for sample in of_kind(messages, HilSensor)]
+    assert len(x) == 2_000_000 // interval_us
+    share = 4_000 // interval_us
+    means = [sum(x[i : i + share]) / share for i in range(0, len(x), share)]
+    middle = sum(means) / len(means)
+    assert rms([mean - middle for mean in means]) == pytest.approx(FOLDABLE.imu.accelerometer_noise_m_s2, rel=0.15)
+
+
+def test_more_thrust_than_weight_climbs_in_every_sensor():
+    messages = flown(new_vehicle(), 1.5, 0.95)
+    truth, fix = of_kind(messages, HilState)[-1], of_kind(messages, HilGps)[-1]
+    pressures = [sensor.air.pressure_hpa for sensor in of_kind(messages, HilSensor) if sensor.air is not None]
+    climbed_m = truth.place.altitude_m - of_kind(messages, HilState)[0].place.altitude_m
+    assert climbed_m > 1.0
+    assert truth.velocity_ned_m_s[2] < -1.0
+    assert fix.velocity_ned_m_s[2] == pytest.approx(truth.velocity_ned_m_s[2], abs=0.3)
+    assert pressures[0] - pressures[-1] == pytest.approx(0.115 * climbed_m, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("slower", "axis", "sign"),
+    [
+        ((0, 3), 0, +1),  # front right and rear right: rolls right
+        ((1, 2), 0, -1),
+        ((0, 2), 1, -1),  # front right and front left: the nose falls
+        ((1, 3), 1, +1),
+        ((0, 1), 2, -1),  # the two that turn counter-clockwise: the nose goes left
+        ((2, 3), 2, +1),
+    ],
+)
+def test_motors_are_in_px4s_quad_x_order(slower, axis, sign):
+    vehicle = new_vehicle()
+    flown(vehicle, 0.5, 0.9)
+    fractions = tuple(0.85 if motor in slower else 0.9 for motor in range(4))
+    states = of_kind([message for _ in range(10) for message in vehicle.step(fractions)], HilState)
+    rates = states[-1].angular_velocity_frd_rad_s
+    assert sign * rates[axis] > 0.02
+    assert all(abs(rates[other]) < 0.1 * abs(rates[axis]) for other in range(3) if other != axis)
+
+
+def test_the_same_seed_gives_the_same_samples():
+    assert flown(new_vehicle(), 0.2, 0.5) == flown(new_vehicle(), 0.2, 0.5)
+
+
+def rms(values: list[float]) -> float:
+    return math.sqrt(sum(value * value for value in values) / len(values))
