@@ -141,7 +141,8 @@ def _collision_text(number: int, collision: Mapping[str, Any]) -> str:
     ]
     if truth:
         contact_ms, fold_mm = 1e3 * truth["contact_duration_s"], 1e3 * truth["max_fold_m"]
-        singles.append(("contact", f"{contact_ms:.1f} ms, at most {truth['peak_force_n']:.0f} N"))
+        force = f"{truth['peak_force_n']:.0f} N, factor of safety {truth['factor_of_safety']:.2f}"
+        singles.append(("contact", f"{contact_ms:.1f} ms, at most {force}"))
         singles.append(("arms folded by", f"at most {fold_mm:.1f} mm"))
         singles.append(("height lost", _figure(truth["height_lost_m"], "m")))
     lines.extend(f"    {name:<24}{text}" for name, text in singles)

@@ -66,6 +66,6 @@ def _mass_kg(options: Namespace) -> float | None:
     for path in options.data:
         stored = path / run_folder.AIRFRAME_NAME
         if stored.is_file():
-            document = load_document(stored)
-            return validated(Airframe, document, document.data).mass_kg
+            mass_kg = load_document(stored).data.get("mass_kg")
+            return float(mass_kg) if isinstance(mass_kg, int | float) else None
     return None

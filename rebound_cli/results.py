@@ -2,10 +2,9 @@
 
 import multiprocessing
 import platform
-import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.progress import with_progress
 from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
 from rebound_cli.sensitivity import stop_sensitivity_text
 from rebound_cli.summary import FlightFacts, build_summary
@@ -75,7 +75,7 @@ def run_results(options: Namespace) -> int:
     # Compiled kernels are in the cache after one flight; two processes would compile them twice.
     fly_case(cases[0])
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        figures = list(_with_progress(pool.imap_unordered(fly_case, cases), len(cases)))
+        figures = list(with_progress(pool.imap_unordered(fly_case, cases), len(cases)))
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(results_text(figures, options.seeds), encoding="utf-8")
     print(f"Written to {options.out}.")
@@ -125,18 +125,6 @@ def fly_case(case: Case) -> CaseFigures:
         realtime_factor=summary["realtime_factor"],
         hits=tuple(hits),
     )
-
-
-def _with_progress(figures: Iterable[CaseFigures], total: int) -> Iterable[CaseFigures]:
-    width = 40
-    for done, item in enumerate(figures, start=1):
-        if sys.stderr.isatty():
-            filled = width * done // total
-            sys.stderr.write(f"\r[{'#' * filled}{'.' * (width - filled)}] {done}/{total} flights")
-            sys.stderr.flush()
-        yield item
-    if sys.stderr.isatty():
-        sys.stderr.write("\n")
 
 
 _INTRODUCTION = """\

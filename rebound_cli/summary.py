@@ -1,5 +1,6 @@
 """`summary.json`: what the companion says of a flight beside what the simulator knows; docs/summary.md."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from sim_vehicle.truth import Hit
 
 SCHEMA = 1
+
+# The paper's stress analysis (section II): a factor of safety of 1.85 at 100 N.
+BREAKING_FORCE_N = 185.0
 
 # Sizes are written to a tenth of a millimetre, times to a microsecond: finer digits are noise.
 _DIGITS = 4
@@ -101,6 +105,10 @@ def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", tr
         "max_fold_m": round(hit.max_fold_m, _TIME_DIGITS),
         "rebound_speed_m_s": round(hit.rebound_speed_m_s, _DIGITS),
         "peak_force_n": round(hit.peak_force_n, 2),
+        "factor_of_safety": round(BREAKING_FORCE_N / hit.peak_force_n, 3),
+        "impulse_n_s": round(math.hypot(*hit.impulse_ned_n_s), _DIGITS),
+        "energy_before_j": round(hit.energy_before_j, _DIGITS),
+        "energy_after_j": round(hit.energy_after_j, _DIGITS),
         "overshoot_m": round(overshoot_m, _DIGITS),
         "height_lost_m": round(height_lost_m, _DIGITS),
     }

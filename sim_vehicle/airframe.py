@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from sim_vehicle.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
 
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
@@ -66,6 +67,8 @@ class Arms(_Part):
     """l_max: where the arm meets its stop."""
     hysteresis_m: NotNegative
     """delta l: the fold that stays after a hit."""
+    tip_mass_kg: NotNegative
+    """What moves at the end of each arm: motor, propeller, guard, outer arm. Part of `mass_kg`; it makes J(l)."""
     stop: Bounce
     """The stop at l_max (for a rigid vehicle: the frame itself), for half of the vehicle's mass."""
 
@@ -107,8 +110,13 @@ class Imu(_Part):
 
 
 class Estimate(_Part):
-    """Errors of the vehicle's own state estimate, as first-order Gauss-Markov processes per axis."""
+    """Where the vehicle's own state estimate comes from.
 
+    `markov`: the truth, late, with errors that are first-order Gauss-Markov processes per axis, which the figures
+    here describe. `ekf`: a Kalman filter over the sensors, which `sensors` and `estimator` describe.
+    """
+
+    kind: Literal["markov", "ekf"]
     delay_s: NotNegative
     position_noise_m: NotNegative
     position_correlation_s: Positive
@@ -149,12 +157,22 @@ class Airframe(_Part):
     surface: Surface
     imu: Imu
     estimate: Estimate
+    sensors: Sensors
+    estimator: Estimator
     control: Control
 
     @property
     def hover_fraction(self) -> float:
         """Thrust to hover over the greatest thrust."""
         return self.mass_kg * 9.81 / (4 * self.motors.max_thrust_n)
+
+    @model_validator(mode="after")
+    def _can_navigate(self) -> "Airframe":
+        if self.estimate.kind == "ekf" and not self.sensors.can_navigate:
+            raise ValueError(
+                "estimate.kind ekf needs fitted sensors: optical_flow, range_finder and compass, or motion_capture"
+            )
+        return self
 
     @model_validator(mode="after")
     def _can_fly(self) -> "Airframe":

@@ -6,9 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.layout import (
+    HIT_ENERGY_AFTER_J,
+    HIT_ENERGY_BEFORE_J,
     HIT_EXIT_VELOCITY,
     HIT_FACE,
     HIT_FOLD_M,
+    HIT_IMPULSE,
     HIT_LAST_US,
     HIT_NORMAL,
     HIT_PEAK_N,
@@ -41,6 +44,12 @@ class Hit:
     peak_force_n: float
     rebound_velocity_ned_m_s: Vector3
     """The centre of mass's at the last touch."""
+    impulse_ned_n_s: Vector3
+    """Of the wall on the vehicle, friction included."""
+    energy_before_j: float
+    """Kinetic, moving and turning, at the first touch."""
+    energy_after_j: float
+    """The same at the last touch."""
 
     @property
     def contact_duration_s(self) -> float:
@@ -84,6 +93,9 @@ class TruthRecorder:
                 max_fold_m=float(row[HIT_FOLD_M]),
                 peak_force_n=float(row[HIT_PEAK_N]),
                 rebound_velocity_ned_m_s=_vector(row[HIT_EXIT_VELOCITY]),
+                impulse_ned_n_s=_vector(row[HIT_IMPULSE]),
+                energy_before_j=float(row[HIT_ENERGY_BEFORE_J]),
+                energy_after_j=float(row[HIT_ENERGY_AFTER_J]),
             )
         )
 

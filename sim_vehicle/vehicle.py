@@ -37,6 +37,7 @@ class SimulatedVehicle:
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
+            true_body=self._plant.state.body,
         )
         self._decoder = Decoder()
         self._streams = Streams(self._telemetry, Encoder(), seed)
@@ -96,10 +97,17 @@ class SimulatedVehicle:
         """Hand the sample to the streams; whether position and velocity are published with it."""
         telemetry = self._telemetry
         telemetry.sample = sample
+        onboard = self._plant.onboard
+        if onboard is not None:
+            telemetry.flow, telemetry.range = onboard.flow, onboard.range
         telemetry.vibration.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:
             return False
         telemetry.published = sample
+        if onboard is not None:
+            position, velocity, attitude = onboard.variances()
+            telemetry.position_variance_m2, telemetry.velocity_variance_m2_s2 = position, velocity
+            telemetry.attitude_variance_rad2 = attitude
         return True
 
     def _send_texts(self) -> None:

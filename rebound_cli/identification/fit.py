@@ -95,13 +95,16 @@ def fit_restitution_with_loss(hits: Sequence[Hit]) -> Rebound:
 
 
 def fit_friction(hits: Sequence[Hit]) -> Number | None:
-    """Coulomb's coefficient: change of speed along the wall over change across it, from hits that slide on."""
-    sliding = [hit for hit in hits if abs(hit.along_in_m_s) > hit.speed_in_m_s / 2]
-    if not sliding:
+    """Coulomb's coefficient at least: change of speed along the wall over change across it, of oblique hits.
+
+    A guard that stops sliding, because the hit has set the vehicle turning, rolls off with less than that.
+    """
+    oblique = [hit for hit in hits if abs(hit.along_in_m_s) > hit.speed_in_m_s / 2]
+    if not oblique:
         return None
-    ratios = np.array([(abs(h.along_in_m_s) - abs(h.along_out_m_s)) / h.normal_change_m_s for h in sliding])
-    noise = math.sqrt(sum((1.5 * h.speed_sigma_m_s / h.normal_change_m_s) ** 2 for h in sliding)) / len(sliding)
-    spread = float(ratios.std(ddof=1)) / math.sqrt(len(sliding)) if len(sliding) > 1 else 0.0
+    ratios = np.array([(abs(h.along_in_m_s) - abs(h.along_out_m_s)) / h.normal_change_m_s for h in oblique])
+    noise = math.sqrt(sum((1.5 * h.speed_sigma_m_s / h.normal_change_m_s) ** 2 for h in oblique)) / len(oblique)
+    spread = float(ratios.std(ddof=1)) / math.sqrt(len(oblique)) if len(oblique) > 1 else 0.0
     return Number(max(0.0, float(ratios.mean())), max(noise, spread))
 
 

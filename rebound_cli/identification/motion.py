@@ -19,9 +19,9 @@ _LONGEST_TURN_S = 0.2
 # Slower than this the rebound drowns in what the autopilot does.
 _SLOWEST_HIT_M_S = 0.15
 _SLOWEST_REBOUND_M_S = 0.02
-# Both speeds over the time between them. No autopilot within its usual 45 degrees of tilt turns around
-# faster than at 9.81, and the gentlest hit of the foldable vehicle, of 0.15 m/s, at about 1.5.
-_LEAST_DECELERATION_M_S2 = 1.5
+# Both speeds over the time between them: an autopilot would turn around like this with 22 degrees of tilt.
+# The soft hits of the foldable vehicle are as hard from 0.5 m/s on.
+_LEAST_DECELERATION_M_S2 = 4.0
 
 # Samples further apart than this many times the usual are a gap in the recording.
 _GAP_INTERVALS = 3.5

@@ -119,7 +119,7 @@ def _numbers(found: Identified) -> list[str]:
     if found.stop_m is not None:
         lines.append(f"- stop of the arms met after {1e3 * found.stop_m:.0f} mm")
     if found.friction is not None:
-        lines.append(f"- friction along the wall {_text(found.friction, 2)}")
+        lines.append(f"- friction along the wall at least {_text(found.friction, 2)}")
     return lines
 
 
@@ -176,7 +176,10 @@ def airframe_text(found: Identified, name: str, mass_kg: float, base_name: str, 
         *(_spring_lines(found, found.spring, base_name, base) if found.spring else _rigid_lines(found)),
     ]
     if found.friction is not None:
-        lines += ["", f"surface: {{guard_friction: {found.friction.value:.3f}}}   # ± {found.friction.sigma:.3f}"]
+        lines += [
+            "",
+            f"surface: {{guard_friction: {found.friction.value:.3f}}}   # at least; ± {found.friction.sigma:.3f}",
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.physics.inertia import times
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, Constants, Gains, State
 from sim_vehicle.physics.rotation import matrix_from_quaternion
@@ -16,11 +17,12 @@ ATTITUDE_LOOP_HZ = 150
 
 @njit
 def attitude_control(state: State, constants: Constants, yaw_rate_rad_s: float, gains: Gains) -> None:
-    """Set the moment tau of ``state``: tau = -k_R e_R - k_W e_W + W x J W (eq. 5).
+    """Set the moment tau of ``state``: tau = -k_R e_R - k_W e_W + W x J W + J' W (eq. 5).
 
     e_R = (R_d^T R - R^T R_d)^vee / 2 and e_W = W - R^T R_d W_d (eq. 4), where the asked rate W_d is the
     asked yaw rate about the asked b3. The setpoint comes in steps, so its angular acceleration alpha is
-    taken as zero.
+    taken as zero. J is that of the arms as they are folded; its rate is the term that a J which varies
+    adds to eq. 5's tracking (the paper refers to its proof elsewhere).
     """
     r = np.empty((3, 3))
     matrix_from_quaternion(state.estimate, r)
@@ -30,18 +32,14 @@ def attitude_control(state: State, constants: Constants, yaw_rate_rad_s: float, 
     rates = np.empty(3)
     for i in range(3):
         rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
-    j = constants.inertia_kg_m2
-    gyroscopic = np.array(
-        [
-            (j[2] - j[1]) * rates[1] * rates[2],
-            (j[0] - j[2]) * rates[2] * rates[0],
-            (j[1] - j[0]) * rates[0] * rates[1],
-        ]
-    )
+    p, q, r_z = rates[0], rates[1], rates[2]
+    x, y, z = times(state.inertia, p, q, r_z)
+    fx, fy, fz = times(state.inertia_rate, p, q, r_z)
+    carried = np.array([q * z - r_z * y + fx, r_z * x - p * z + fy, p * y - q * x + fz])
     for i in range(3):
         asked_rate = product[2, i] * yaw_rate_rad_s
         state.moment_frd_n_m[i] = (
-            -gains.k_r[i] * 0.5 * error[i] - gains.k_omega[i] * (rates[i] - asked_rate) + gyroscopic[i]
+            -gains.k_r[i] * 0.5 * error[i] - gains.k_omega[i] * (rates[i] - asked_rate) + carried[i]
         )
 
 

@@ -22,6 +22,9 @@ _INT32, _REAL32 = 6, 9
 
 _FIRST_MOTOR_FUNCTION = 101
 
+# FILTER_UPDATE_PERIOD of PX4's EKF2: its noises are standard deviations over one such step.
+EKF_PERIOD_S = 0.01
+
 Position = Literal["mocap", "gps"]
 
 
@@ -89,18 +92,28 @@ def _limits(airframe: Airframe) -> Iterable[Parameter]:
     yield Parameter("MPC_THR_MIN", 0.05, "as the motors idle")
     yield Parameter("MPC_TILTMAX_AIR", tilt_deg, "degrees; more would not carry the weight")
     yield Parameter("MPC_MAN_TILT_MAX", tilt_deg, "the same for a pilot")
-    yield Parameter("MPC_XY_P", control.position_p_per_s, "1/s")
+    yield Parameter("MPC_XY_P", control.position_p_per_s, "1/s; eq. 6, as for the built-in autopilot")
+    yield Parameter("MPC_XY_VEL_P_ACC", control.velocity_p_per_s, "1/s; the same")
+    yield Parameter("MPC_XY_VEL_I_ACC", control.velocity_i_per_s2, "1/s2; the same")
+    yield Parameter("MPC_XY_VEL_D_ACC", control.velocity_d, "the same")
 
 
 def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
     interval_us = airframe.imu.integration_interval_us
     yield Parameter("IMU_INTEG_RATE", round(1e6 / interval_us), "one HIGHRES_IMU a sample of the simulator")
-    # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s. At the default of 0.35 it then
-    # rejects the position for a second and jumps; at 1.0 it is right again after 0.4 s (measured, 2 m/s).
+    # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s at 2 m/s and by 4 m/s at 4: it
+    # should then doubt its accelerometer, not its attitude, and correct itself soon (docs/px4.md).
     yield Parameter("EKF2_ACC_NOISE", 1.0, "m/s2; leaves room for what a hit hides from the accelerometer")
+    gyroscope_noise_rad_s = airframe.imu.gyroscope_noise_rad_s * math.sqrt(1e-6 * interval_us / EKF_PERIOD_S)
+    yield Parameter("EKF2_GYR_NOISE", gyroscope_noise_rad_s, "rad/s; the gyroscope's own, over a step of EKF2")
+    yield Parameter("EKF2_TAU_VEL", 0.1, "s; corrections reach the velocity sooner than at 0.25")
+    yield Parameter("EKF2_TAU_POS", 0.1, "s; the same")
+    yield Parameter("EKF2_DELAY_MAX", 50.0, "ms; no sensor here is later, and EKF2 lags by this much")
     if position == "mocap":
         yield Parameter("EKF2_EV_CTRL", 11, "motion capture's position, height and yaw")
         yield Parameter("EKF2_HGT_REF", 3, "height from motion capture")
+        # At the default of 5 PX4 rejects the true position for a second after such a hit, and then jumps.
+        yield Parameter("EKF2_EVP_GATE", 50.0, "standard deviations; a hit must not make the true position incredible")
         yield Parameter("EKF2_EVP_NOISE", 0.01, "m, the least that PX4 takes")
         yield Parameter("EKF2_EVA_NOISE", 0.05, "rad, the least that PX4 takes")
         # With both, PX4 takes motion capture as relative to GPS and no better than it.

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import numpy as np
+import numpy.typing as npt
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
@@ -20,6 +22,7 @@ from sim_vehicle.autopilot.messages import (
     TimeSyncRequest,
 )
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.mavlink.vibration import Vibration
 from sim_vehicle.setpoint import Axis3
 
@@ -53,6 +56,10 @@ class Telemetry:
     position_variance_m2: float
     velocity_variance_m2_s2: float
     attitude_variance_rad2: float
+    flow: FlowSample | None = None
+    range: RangeSample | None = None
+    true_body: npt.NDArray[np.float64] | None = None
+    """The plant's own state (13,), for the truth channel alone."""
 
 
 class Encoder:
@@ -137,7 +144,7 @@ def odometry(state: Telemetry) -> Message:
         r,
         _covariance(state.position_variance_m2, state.attitude_variance_rad2),
         _covariance(state.velocity_variance_m2_s2, 0.0),
-        0,
+        estimate.reset_counter & 0xFF,
         dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT,
         0,
     )

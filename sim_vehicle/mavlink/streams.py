@@ -12,7 +12,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from sim_vehicle.mavlink import encode
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.mavlink import aiding, encode
 from sim_vehicle.mavlink.encode import Encoder, Message, Telemetry
 
 # A message is sent this much before it is due: 0.3 of the link's loop, which sleeps 1.5 ms.
@@ -31,6 +32,14 @@ class Topic(IntEnum):
     SAMPLE = 1
     POSITION = 2
     STATUS = 3
+    FLOW = 4
+    RANGE = 5
+    TRUTH = 6
+
+
+# What a vehicle may not have: nothing is sent of it before there is something.
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH)
+_NEVER_SENT = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +69,16 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(331, 30.0, Topic.POSITION, encode.odometry),
     StreamKind(31, 50.0, Topic.SAMPLE, encode.attitude_quaternion),
     StreamKind(83, 10.0, Topic.POSITION, encode.attitude_target),
+    StreamKind(132, 10.0, Topic.RANGE, aiding.distance_sensor),
+    StreamKind(106, 10.0, Topic.FLOW, aiding.optical_flow_rad),
     StreamKind(436, 0.5, Topic.STATUS, encode.current_mode),
     StreamKind(245, 5.0, Topic.ALWAYS_NEW, encode.extended_sys_state),
     StreamKind(85, 10.0, Topic.POSITION, encode.position_target_local_ned),
     StreamKind(1, 5.0, Topic.SAMPLE, encode.sys_status),
     StreamKind(241, 0.5, Topic.SAMPLE, encode.vibration),
     StreamKind(148, None, Topic.ALWAYS_NEW, encode.autopilot_version),
+    # The truth, as PX4's simulation has it too: for whoever studies a flight, on request alone.
+    StreamKind(115, None, Topic.TRUTH, aiding.hil_state_quaternion),
 )
 
 
@@ -84,7 +97,7 @@ class _Stream:
 
     def __init__(self, kind: StreamKind, now_us: int) -> None:
         self.kind = kind
-        self.seen = -1
+        self.seen = _NEVER_SENT
         self.restart(kind.default_interval_us, now_us)
 
     def restart(self, interval_us: int, now_us: int) -> None:
@@ -115,7 +128,9 @@ class Streams:
         self._streams = [_Stream(kind, self._now_us) for kind in KINDS]
         self._by_id = {stream.kind.message_id: stream for stream in self._streams}
         self._running = [stream for stream in self._streams if stream.interval_us >= 0]
-        self._versions = [0] * len(Topic)
+        self._versions = [_NEVER_SENT if topic in OPTIONAL else 0 for topic in Topic]
+        self._flow: FlowSample | None = None
+        self._range: RangeSample | None = None
         self._status: tuple[int, bool, int] | None = None
         self._status_us = self._now_us
         self._jitter = random.Random(seed)
@@ -146,7 +161,16 @@ class Streams:
         versions[1] += 1
         if new_position:
             versions[2] += 1
-        autopilot = self._state.autopilot
+        state = self._state
+        if state.flow is not self._flow:
+            self._flow = state.flow
+            versions[Topic.FLOW] += 1
+        if state.range is not self._range:
+            self._range = state.range
+            versions[Topic.RANGE] += 1
+        if state.true_body is not None:
+            versions[Topic.TRUTH] += 1
+        autopilot = state.autopilot
         status = (autopilot.modes.mode, autopilot.arming.armed, autopilot.system_status)
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us

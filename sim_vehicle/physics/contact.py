@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, POINTS, Contact, Scratch
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, POINTS, Contact, Scratch, State
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.world import (
     FACE_ACROSS,
@@ -171,6 +171,8 @@ def _add_push(
         slide = scratch.speed[i] + speed_in * faces[face, FACE_NORMAL + i]
         push[i] = normal * faces[face, FACE_NORMAL + i] - per_speed * slide
         scratch.force_ned[i] += push[i]
+        if face != 0:
+            scratch.contact_ned[i] += push[i]
     x = lever[1] * push[2] - lever[2] * push[1]
     y = lever[2] * push[0] - lever[0] * push[2]
     z = lever[0] * push[1] - lever[1] * push[0]
@@ -179,49 +181,83 @@ def _add_push(
 
 
 @njit
-def relaxed_folds(fold_m: Floats, step_s: float, contact: Contact, relaxed_m: Floats) -> None:
+def relax_arms(state: State, step_s: float, contact: Contact, relaxed_m: Floats) -> None:
     """Write how far each arm would be folded after ``step_s`` with nothing pressing it.
 
-    A free arm returns as fast as its own force is zero, b_s l' = -k_s l (faster out of the stop), until the
-    hysteresis holds it. That is also the fastest that it can follow a vehicle leaving the wall.
+    An arm under a wall can follow a leaving vehicle as fast as its own force is zero, b_s l' = -k_s l (faster out of
+    the stop): eq. 2 ends there. A free arm has its end's mass to move as well (implicit Euler: its fastest time,
+    3 ms, is far above any step). The hysteresis holds it where eq. 2 would take it back to zero.
     """
     for arm in range(4):
-        fold = fold_m[arm]
+        fold = state.fold_m[arm]
         held = min(fold, contact.hysteresis_m)
         if contact.arm_damping <= 0.0:
             relaxed_m[arm] = held
-            continue
-        returning_m_s = contact.arm_stiffness * fold / contact.arm_damping
-        beyond = fold - contact.fold_max_m
-        if beyond > 0.0:
-            push_n = contact.arm_stiffness * fold + contact.stop_stiffness * beyond
-            returning_m_s = max(returning_m_s, push_n / (contact.arm_damping + contact.stop_damping))
-        relaxed_m[arm] = max(fold - step_s * returning_m_s, held)
+        elif state.pressed[arm] == 1 or contact.tip_mass_kg <= 0.0:
+            relaxed_m[arm] = max(fold - step_s * _returning_m_s(fold, contact), held)
+        else:
+            damping, stiffness = contact.arm_damping / contact.tip_mass_kg, contact.arm_stiffness / contact.tip_mass_kg
+            rate = (state.fold_rate_m_s[arm] - step_s * stiffness * fold) / (
+                1.0 + step_s * damping + step_s * step_s * stiffness
+            )
+            relaxed_m[arm] = max(fold + step_s * rate, held)
 
 
 @njit
-def settle_contacts(
-    body: Floats, fold_m: Floats, behind: Ints, near: Ints, contact: Contact, faces: Floats, scratch: Scratch
+def _returning_m_s(fold_m: float, contact: Contact) -> float:
+    """How fast an arm without mass goes out."""
+    returning: float = contact.arm_stiffness * fold_m / contact.arm_damping
+    beyond = fold_m - contact.fold_max_m
+    if beyond > 0.0:
+        push_n = contact.arm_stiffness * fold_m + contact.stop_stiffness * beyond
+        returning = max(returning, push_n / (contact.arm_damping + contact.stop_damping))
+    return returning
+
+
+@njit
+def settle_arms(
+    state: State,
+    behind: Ints,
+    near: Ints,
+    touches: bool,
+    step_s: float,
+    contact: Contact,
+    faces: Floats,
+    scratch: Scratch,
 ) -> None:
-    """After a step: how far each arm is folded, and which points are behind a face.
+    """After a step: how far each arm is folded and how fast it moves."""
+    for arm in range(GUARDS):
+        scratch.fold_before_m[arm] = state.fold_m[arm]
+        state.fold_m[arm] = scratch.relaxed_m[arm]
+        state.pressed[arm] = 0
+    if touches:
+        settle_contacts(state, behind, near, contact, faces, scratch)
+    for arm in range(GUARDS):
+        state.fold_rate_m_s[arm] = (state.fold_m[arm] - scratch.fold_before_m[arm]) / step_s
+
+
+@njit
+def settle_contacts(state: State, behind: Ints, near: Ints, contact: Contact, faces: Floats, scratch: Scratch) -> None:
+    """Press the arms that a face presses, and note which points are behind a face.
 
     A point that gets behind a face beside its rectangle has passed it by and is not pushed until it is
     in front again.
     """
     # The rotation of the step's end: the next step must find the arm exactly where this one leaves it.
-    matrix_from_quaternion(body, scratch.turned)
-    for arm in range(GUARDS):
-        fold_m[arm] = scratch.relaxed_m[arm]
+    matrix_from_quaternion(state.body, scratch.turned)
     for face in range(near.shape[0]):
         for point in range(*points_at(face, near)):
-            share = contact_point(point, face, scratch.turned, body, contact, faces, scratch.where)
+            share = contact_point(point, face, scratch.turned, state.body, contact, faces, scratch.where)
             depth = depth_in(face, scratch.where, faces)
             if depth <= 0.0:
                 behind[point, face] = 0
             elif behind[point, face] == 0 and not within(face, scratch.where, faces):
                 behind[point, face] = 1
             elif behind[point, face] == 0 and point < GUARDS:
-                fold_m[point] = max(fold_m[point], depth / max(share, LEAST_IN_PLANE))
+                fold = depth / max(share, LEAST_IN_PLANE)
+                if fold >= state.fold_m[point]:
+                    state.fold_m[point] = fold
+                    state.pressed[point] = 1
 
 
 @njit

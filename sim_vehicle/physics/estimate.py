@@ -25,7 +25,7 @@ class EstimateErrors(NamedTuple):
     error: Floats  # (9,) position m, velocity m/s, attitude rad (body axes)
     keep: Floats  # (9,) share of an error that is left after one interval
     drive: Floats  # (9,) standard deviation of what is added in one interval
-    past: Floats  # (delay in intervals + 1, 13)
+    past: Floats  # (delay in intervals + 1, 13); without rows the estimate comes from elsewhere
     cursor: Ints  # (1,)
     velocity_before: Floats  # (3,) the estimate's, one interval ago
 
@@ -39,12 +39,12 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         [estimate.position_correlation_s, estimate.velocity_correlation_s, estimate.attitude_correlation_s], 3
     )
     keep = np.exp(-interval_s / correlation_s)
-    delay_intervals = round(estimate.delay_s / interval_s)
+    slots = round(estimate.delay_s / interval_s) + 1 if estimate.kind == "markov" else 0
     return EstimateErrors(
         error=sigma * rng.standard_normal(9),
         keep=keep,
         drive=sigma * np.sqrt(1 - keep**2),
-        past=np.tile(body, (delay_intervals + 1, 1)),
+        past=np.tile(body, (slots, 1)),
         cursor=np.zeros(1, np.int64),
         velocity_before=np.zeros(3),
     )
@@ -54,6 +54,8 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
 def update_estimate(state: State, errors: EstimateErrors, noise: Floats) -> None:
     """Renew ``state.estimate`` at the end of an interval; ``noise`` is (9,), standard normal."""
     slots = errors.past.shape[0]
+    if slots == 0:
+        return
     errors.past[errors.cursor[0]] = state.body
     errors.cursor[0] = (errors.cursor[0] + 1) % slots
     delayed = errors.past[errors.cursor[0]]
@@ -69,6 +71,8 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats) -> None
 @njit
 def update_slope(state: State, errors: EstimateErrors, step_s: float) -> None:
     """Low-pass the slope of the estimated velocity over one interval."""
+    if errors.past.shape[0] == 0:
+        return
     share = 1.0 - math.exp(-step_s / SLOPE_TIME_CONSTANT_S)
     for i in range(3):
         slope = (state.estimate[3 + i] - errors.velocity_before[i]) / step_s

@@ -3,12 +3,16 @@
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.physics.inertia import turning_energy
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import (
     HIT_ACTIVE,
+    HIT_ENERGY_AFTER_J,
+    HIT_ENERGY_BEFORE_J,
     HIT_EXIT_VELOCITY,
     HIT_FACE,
     HIT_FOLD_M,
+    HIT_IMPULSE,
     HIT_LAST_US,
     HIT_NORMAL,
     HIT_PEAK_N,
@@ -16,6 +20,7 @@ from sim_vehicle.physics.layout import (
     HIT_START_US,
     HIT_VELOCITY,
     SAME_HIT_US,
+    Scratch,
     State,
 )
 from sim_vehicle.world import FACE_NORMAL
@@ -24,8 +29,19 @@ Floats = npt.NDArray[np.float64]
 
 
 @njit
-def note_contact(state: State, offset_us: float, normal_forces: Floats, faces: Floats) -> None:
-    """Open, extend or leave alone the hit in progress; the ground (face 0) does not count."""
+def note_contact(
+    state: State,
+    offset_us: float,
+    step_s: float,
+    normal_forces: Floats,
+    faces: Floats,
+    mass_kg: float,
+    scratch: Scratch,
+) -> None:
+    """Open, extend or leave alone the hit in progress; the ground (face 0) does not count.
+
+    Called at the end of each step; the hit's beginning is the first step with a force in it.
+    """
     total_n, most_n, hardest = 0.0, 0.0, 0
     for face in range(1, normal_forces.shape[1]):
         on_face = 0.0
@@ -46,11 +62,24 @@ def note_contact(state: State, offset_us: float, normal_forces: Floats, faces: F
         hit[HIT_POSITION] = state.body[0:3]
         hit[HIT_VELOCITY] = state.body[3:6]
         hit[HIT_NORMAL] = faces[hardest, FACE_NORMAL : FACE_NORMAL + 3]
+        hit[HIT_IMPULSE] = 0.0
+        hit[HIT_ENERGY_BEFORE_J] = moving_energy(state, mass_kg)
     hit[HIT_LAST_US] = now_us
     hit[HIT_PEAK_N] = max(hit[HIT_PEAK_N], total_n)
     hit[HIT_FOLD_M] = max(hit[HIT_FOLD_M], np.max(state.fold_m))
     hit[HIT_EXIT_VELOCITY] = state.body[3:6]
+    hit[HIT_IMPULSE] += step_s * scratch.contact_ned
+    hit[HIT_ENERGY_AFTER_J] = moving_energy(state, mass_kg)
     state.peak_force_n = max(state.peak_force_n, total_n)
+
+
+@njit
+def moving_energy(state: State, mass_kg: float) -> float:
+    """Kinetic energy of the vehicle, joules."""
+    x, y, z = state.body[3], state.body[4], state.body[5]
+    turning: float = turning_energy(state.inertia, state.body[10], state.body[11], state.body[12])
+    moving: float = 0.5 * mass_kg * (x * x + y * y + z * z)
+    return moving + turning
 
 
 @njit

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
-from sim_vehicle.physics.contact import find_close, find_near, relaxed_folds, settle_contacts
+from sim_vehicle.physics.contact import find_close, find_near, relax_arms, settle_arms
 from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
@@ -131,12 +131,8 @@ def move_body(
             steps = fine_steps
     step_s = raw_s / steps
     for step in range(steps):
-        relaxed_folds(state.fold_m, step_s, contact, scratch.relaxed_m)
-        runge_kutta_step(
-            body, state.motor_thrust_n, behind, near, touches, step_s, constants, contact, faces, forces, scratch
-        )
+        relax_arms(state, step_s, contact, scratch.relaxed_m)
+        runge_kutta_step(state, behind, near, touches, step_s, constants, contact, faces, forces, scratch)
+        settle_arms(state, behind, near, touches, step_s, contact, faces, scratch)
         if touches:
-            settle_contacts(body, state.fold_m, behind, near, contact, faces, scratch)
-            note_contact(state, 1e6 * step * step_s, forces[0], faces)
-        else:
-            state.fold_m[:] = scratch.relaxed_m
+            note_contact(state, 1e6 * step * step_s, step_s, forces[0], faces, constants.mass_kg, scratch)

@@ -11,6 +11,8 @@ import numba
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent.parent
+# Where kernels are.
+_ROOMS = ("physics", "control", "estimator")
 
 
 def njit(function: Kernel) -> Kernel:
@@ -29,7 +31,7 @@ def _keep_code_by_content() -> None:
     would go on running as it was. Where the folder cannot be written numba's own place serves.
     """
     digest = hashlib.sha256()
-    for path in sorted([*_PACKAGE.glob("physics/*.py"), *_PACKAGE.glob("control/*.py"), _PACKAGE / "world.py"]):
+    for path in sorted([*(path for room in _ROOMS for path in _PACKAGE.glob(f"{room}/*.py")), _PACKAGE / "world.py"]):
         digest.update(path.read_bytes())
     parent = _PACKAGE / "__pycache__"
     if os.access(parent if parent.exists() else _PACKAGE, os.W_OK):

@@ -30,6 +30,7 @@ class Contact:
     arm_damping: float
     fold_max_m: float
     hysteresis_m: float
+    tip_mass_kg: float
     stop_stiffness: float
     stop_damping: float
     hub_stiffness: float
@@ -50,7 +51,9 @@ class Constants:
     """Everything about the vehicle, but for its contacts, that does not change in a flight."""
 
     mass_kg: float
-    inertia_kg_m2: Vector3  # principal, body frame
+    inertia_kg_m2: Vector3  # principal, body frame, arms out
+    motor_radius_m: float
+    tip_mass_kg: float  # at the end of each arm
     drag_n_s_m: float
     wind_ned_m_s: Vector3
     motor_max_n: float
@@ -97,6 +100,10 @@ class State:
     motor_thrust_n: Vector4
     motor_command_n: Vector4
     fold_m: Vector4  # of each arm, inward positive
+    fold_rate_m_s: Vector4
+    pressed: Annotated[Floats, (4,), int]  # 1 for the arms that a face presses
+    inertia: Vector4  # J at these folds: xx, yy, zz, xy
+    inertia_rate: Vector4
     estimate: Annotated[Floats, (10,)]  # position NED, velocity NED, attitude: what the vehicle itself knows
     acceleration_ned_m_s2: Vector3  # low-passed slope of the estimated velocity
     velocity_integral: Vector3  # of eq. 6, m/s2
@@ -110,8 +117,8 @@ class State:
     rate_sum: Vector3
     clip_counts: Annotated[Floats, (3,), int]  # since boot
     peak_force_n: float  # in this interval
-    hit: Annotated[Floats, (18,)]  # the hit in progress
-    finished_hits: Annotated[Floats, (2, 18)]  # ended in this interval; it is too short for a third
+    hit: Annotated[Floats, (23,)]  # the hit in progress
+    finished_hits: Annotated[Floats, (2, 23)]  # ended in this interval; it is too short for a third
     finished_count: int
 
 
@@ -124,17 +131,20 @@ class Scratch:
     trial: Annotated[Floats, (13,)]
     force_ned: Vector3
     moment_frd: Vector3
+    contact_ned: Vector3  # of the force, what the walls give
     where: Vector3
     lever: Vector3
     speed: Vector3
     rates_ned: Vector3
     velocity_before: Vector3
+    fold_before_m: Vector4
     relaxed_m: Vector4  # folds that arms pressed by nothing would have
 
 
 # Rows of `State.hit`.
 HIT_ACTIVE, HIT_FACE, HIT_START_US, HIT_LAST_US, HIT_PEAK_N, HIT_FOLD_M = range(6)
 HIT_POSITION, HIT_VELOCITY, HIT_NORMAL, HIT_EXIT_VELOCITY = slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 18)
+HIT_IMPULSE, HIT_ENERGY_BEFORE_J, HIT_ENERGY_AFTER_J = slice(18, 21), 21, 22
 
 # Contacts closer together than this are one hit: a bounce inside the springs, not a second approach.
 SAME_HIT_US = 20_000
@@ -180,6 +190,7 @@ def contact_from(airframe: Airframe) -> Contact:
         arm_damping=arms.damping_per_s * mass_kg / 2,
         fold_max_m=arms.fold_max_m,
         hysteresis_m=arms.hysteresis_m,
+        tip_mass_kg=arms.tip_mass_kg,
         stop_stiffness=stop_stiffness,
         stop_damping=stop_damping,
         hub_stiffness=hub_stiffness,
@@ -225,6 +236,8 @@ def constants_from(airframe: Airframe, wind_ned_m_s: tuple[float, float, float],
         Constants,
         mass_kg=airframe.mass_kg,
         inertia_kg_m2=np.array(airframe.inertia_kg_m2),
+        motor_radius_m=airframe.geometry.motor_radius_m,
+        tip_mass_kg=airframe.arms.tip_mass_kg,
         drag_n_s_m=airframe.drag_n_s_m,
         wind_ned_m_s=np.array(wind_ned_m_s),
         motor_max_n=motors.max_thrust_n,

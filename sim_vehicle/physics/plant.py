@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.onboard import OnboardEstimator
 from sim_vehicle.physics.contact import points_behind
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import (
@@ -53,6 +54,8 @@ class PlantOutput:
     """Commanded collective thrust over the greatest."""
     motor_fractions: Quadruple
     """Thrust commanded of each motor over its greatest, in motor order."""
+    reset_counter: int = 0
+    """How often the estimator has let its position or velocity jump."""
 
 
 class Plant:
@@ -77,6 +80,12 @@ class Plant:
         centre: Vector3 = (north, east, -airframe.geometry.foot_depth_m)
         self.state = initial_state(centre, math.radians(scene.start.yaw_deg))
         self._errors = estimate_errors(airframe, self.state.body, self._rng)
+        self.onboard: OnboardEstimator | None = None
+        if airframe.estimate.kind == "ekf":
+            self.onboard = OnboardEstimator(airframe, self._world.faces, self.state.body, seed)
+        self._estimate = self.state.estimate
+        self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
+        self._body = self.state.body
         self._report = np.zeros(REPORT_COLUMNS)
         self._asked = new_record(Asked)
         self._taken: TrajectorySetpoint | None = None
@@ -100,6 +109,8 @@ class Plant:
         """Put the level vehicle somewhere in flight, for studies of single hits."""
         self.state.body[0:6] = [*position_ned_m, *velocity_ned_m_s]
         self._behind[:] = points_behind(self._world.faces, position_ned_m)
+        if self.onboard is not None:
+            self.onboard.start(self.state.body, self.state.time_us)
 
     def step(self, setpoint: TrajectorySetpoint | None, armed: bool) -> PlantOutput:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
@@ -133,7 +144,19 @@ class Plant:
             self._report,
         )
         self._record_truth()
+        if self.onboard is not None:
+            self._estimate_state(self.onboard, motors == MOTORS_FLYING)
         return self._output()
+
+    def _estimate_state(self, onboard: OnboardEstimator, flies: bool) -> None:
+        """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
+        time_us, *_ = row = self._report.tolist()
+        fx, fy, fz, p, q, r, clip_x, clip_y, clip_z = row[SENSED]
+        clipped = int(clip_x), int(clip_y), int(clip_z)
+        estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
+        onboard.update(int(time_us), (fx, fy, fz), (p, q, r), clipped, flies, self._body, estimate, acceleration)
+        self._report[ESTIMATE] = estimate
+        self._report[ACCELERATION] = acceleration
 
     def _take_setpoint(self, setpoint: TrajectorySetpoint) -> None:
         """Write the setpoint where the kernels read it."""
@@ -165,4 +188,5 @@ class Plant:
             attitude_wxyz=(qw, qx, qy, qz),
             thrust_fraction=(m1 + m2 + m3 + m4) / 4,
             motor_fractions=(m1, m2, m3, m4),
+            reset_counter=self.onboard.reset_counter if self.onboard is not None else 0,
         )

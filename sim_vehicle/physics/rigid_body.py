@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.contact import contact_wrench
+from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import (
     ARM_DIRECTIONS_FRD,
@@ -13,6 +14,7 @@ from sim_vehicle.physics.layout import (
     Constants,
     Contact,
     Scratch,
+    State,
 )
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
 
@@ -24,6 +26,8 @@ Ints = npt.NDArray[np.int64]
 def derivative(
     body: Floats,
     thrusts_n: Floats,
+    inertia: Floats,
+    inertia_rate: Floats,
     behind: Ints,
     near: Ints,
     touches: bool,
@@ -35,7 +39,8 @@ def derivative(
     scratch: Scratch,
     slope: Floats,
 ) -> None:
-    """Write d(body)/dt of eq. 1 into ``slope``: m v' = m g e3 - f R e3 + drag + contact, J W' = tau - W x J W.
+    """Write d(body)/dt of eq. 1 into ``slope``: m v' = m g e3 - f R e3 + drag + contact and
+    J W' = tau - W x J W - J' W, the last for the arms' folding; J and J' are held over a step.
 
     ``touches`` off skips the contacts: no face is near.
     """
@@ -50,10 +55,10 @@ def derivative(
         moment[0] -= contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
         moment[1] += contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust
         moment[2] += ROTOR_YAW_SIGNS[motor] * constants.moment_per_thrust_m * thrust
+    scratch.contact_ned[:] = 0.0
     if touches:
         contact_wrench(body, rotation, behind, near, contact, faces, scratch, normal_forces)
 
-    j = constants.inertia_kg_m2
     p, q, r = body[10], body[11], body[12]
     for i in range(3):
         slope[i] = body[3 + i]
@@ -63,15 +68,18 @@ def derivative(
     slope[7] = 0.5 * (body[6] * p + body[8] * r - body[9] * q)
     slope[8] = 0.5 * (body[6] * q + body[9] * p - body[7] * r)
     slope[9] = 0.5 * (body[6] * r + body[7] * q - body[8] * p)
-    slope[10] = (moment[0] - (j[2] - j[1]) * q * r) / j[0]
-    slope[11] = (moment[1] - (j[0] - j[2]) * r * p) / j[1]
-    slope[12] = (moment[2] - (j[1] - j[0]) * p * q) / j[2]
+    x, y, z = times(inertia, p, q, r)
+    fx, fy, fz = times(inertia_rate, p, q, r)
+    tx, ty = moment[0] - (q * z - r * y) - fx, moment[1] - (r * x - p * z) - fy
+    determinant = inertia[XX] * inertia[YY] - inertia[XY] * inertia[XY]
+    slope[10] = (inertia[YY] * tx - inertia[XY] * ty) / determinant
+    slope[11] = (inertia[XX] * ty - inertia[XY] * tx) / determinant
+    slope[12] = (moment[2] - (p * y - q * x) - fz) / inertia[ZZ]
 
 
 @njit
 def runge_kutta_step(
-    body: Floats,
-    thrusts_n: Floats,
+    state: State,
     behind: Ints,
     near: Ints,
     touches: bool,
@@ -82,19 +90,51 @@ def runge_kutta_step(
     forces: Floats,
     scratch: Scratch,
 ) -> None:
-    """Advance ``body`` by ``step_s`` (classical fourth order), thrusts held.
+    """Advance the body by ``step_s`` (classical fourth order), thrusts and inertia held.
 
     Leaves the rotation of the step's *start* in the scratch and its normal forces in ``forces[0]``
     (2, POINTS, n faces).
     """
+    body, thrusts_n, inertia, inertia_rate = state.body, state.motor_thrust_n, state.inertia, state.inertia_rate
+    inertia_of(state.fold_m, state.fold_rate_m_s, constants, inertia, inertia_rate)
     k, trial, turned = scratch.slopes, scratch.trial, scratch.turned
     rotation, normal, tried = scratch.rotation, forces[0], forces[1]
-    derivative(body, thrusts_n, behind, near, touches, constants, contact, faces, rotation, normal, scratch, k[0])
+    derivative(
+        body,
+        thrusts_n,
+        inertia,
+        inertia_rate,
+        behind,
+        near,
+        touches,
+        constants,
+        contact,
+        faces,
+        rotation,
+        normal,
+        scratch,
+        k[0],
+    )
     for stage in range(1, 4):
         part_s = step_s if stage == 3 else 0.5 * step_s
         for i in range(BODY_SIZE):
             trial[i] = body[i] + part_s * k[stage - 1, i]
-        derivative(trial, thrusts_n, behind, near, touches, constants, contact, faces, turned, tried, scratch, k[stage])
+        derivative(
+            trial,
+            thrusts_n,
+            inertia,
+            inertia_rate,
+            behind,
+            near,
+            touches,
+            constants,
+            contact,
+            faces,
+            turned,
+            tried,
+            scratch,
+            k[stage],
+        )
     for i in range(BODY_SIZE):
         body[i] += step_s / 6 * (k[0, i] + 2 * k[1, i] + 2 * k[2, i] + k[3, i])
     normalise(body)

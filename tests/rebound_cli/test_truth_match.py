@@ -23,6 +23,9 @@ def hit(start_ms, end_ms=None):
         max_fold_m=0.02,
         peak_force_n=60.0,
         rebound_velocity_ned_m_s=(-0.3, 0.0, 0.1),
+        impulse_ned_n_s=(-2.6, 0.0, 0.1),
+        energy_before_j=2.2,
+        energy_after_j=0.06,
     )
 
 
@@ -135,7 +138,8 @@ def test_the_summary_has_exactly_the_documented_keys():
     )
     assert " ".join(summary["collisions"][0]["truth"]) == (
         "contact_at_s detection_latency_ms impact_velocity_ned_m_s normal_ned contact_duration_s max_fold_m "
-        "rebound_speed_m_s peak_force_n overshoot_m height_lost_m"
+        "rebound_speed_m_s peak_force_n factor_of_safety impulse_n_s energy_before_j energy_after_j "
+        "overshoot_m height_lost_m"
     )
 
 

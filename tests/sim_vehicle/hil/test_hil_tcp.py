@@ -11,6 +11,7 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import NotInLockstep, PortInUse
+from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.hil_tcp import serve_px4
@@ -20,6 +21,12 @@ from tests.sim_vehicle.hil.px4_client import HOVER, TIMEOUT_S, Px4Client
 
 def new_vehicle() -> HilVehicle:
     return HilVehicle(load_built_in("foldable"), Scene(), 1, sample_interval_us=4_000)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_physics() -> None:
+    """On a machine that has never run them, the kernels compile for longer than PX4's client waits."""
+    new_vehicle().step(MOTORS_STOPPED)
 
 
 def free_port() -> int:

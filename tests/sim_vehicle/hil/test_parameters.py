@@ -71,6 +71,17 @@ def test_indoors_it_flies_by_motion_capture_and_outdoors_by_gps():
     assert "EKF2_GPS_CTRL" not in outdoors
 
 
+def test_the_position_loop_is_the_airframe_files():
+    found, control = values(), FOLDABLE.control
+    assert (found["MPC_XY_P"], found["MPC_XY_VEL_P_ACC"]) == (control.position_p_per_s, control.velocity_p_per_s)
+    assert found["MPC_TILTMAX_AIR"] == pytest.approx(math.degrees(control.tilt_max_rad))
+
+
+def test_ekf2_gets_the_gyroscopes_noise_over_its_own_step():
+    """White noise of 4 ms means, averaged over EKF2's 10 ms."""
+    assert values()["EKF2_GYR_NOISE"] == pytest.approx(FOLDABLE.imu.gyroscope_noise_rad_s * math.sqrt(0.4))
+
+
 def test_names_fit_px4_and_come_once():
     names = [parameter.name for parameter in px4_parameters(FOLDABLE)]
     assert len(set(names)) == len(names)

@@ -1,0 +1,215 @@
+"""One flight of a study: what is flown, and what is kept of it."""
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.mission.model import Mission
+from rebound_cli.flight_log import FlightLog, read_flight_log
+from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.summary import FlightFacts, Flown, build_summary
+from rebound_cli.truth_match import FlightTruth, match_contacts
+from sim_vehicle.airframe import Airframe, with_base
+from sim_vehicle.scene import Scene
+from sim_vehicle.truth import Hit
+
+Floats = npt.NDArray[np.float64]
+Vector3 = tuple[float, float, float]
+
+# What the paper used, whatever the defaults become.
+DETECTOR, LAW, GAMMA_S = "lateral", "paper", 0.5
+
+# What is kept of a flight that is to be drawn, around its first contact.
+TRACK_BEFORE_S, TRACK_AFTER_S = 2.0, 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Flight:
+    """A mission's content, an airframe (a built-in one with changes) and a seed; `key` is the study's own."""
+
+    key: tuple[Any, ...]
+    mission: Mapping[str, Any]
+    airframe: str
+    seed: int
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    is_drawn: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A hit, and what the companion made of it: None where it did not see it. SI units."""
+
+    hit: Hit
+    share_received: float
+    """Share of the contact that lies in the averaging windows of the samples that were received."""
+    latency_s: float | None
+    impact_speed_estimate_m_s: float | None
+    setpoint_ned_m: Vector3 | None
+    position_estimate_ned_m: Vector3 | None
+    overshoot_m: float | None
+
+    @property
+    def impact_speed_m_s(self) -> float:
+        return float(np.linalg.norm(self.hit.impact_velocity_ned_m_s))
+
+    @property
+    def is_detected(self) -> bool:
+        return self.latency_s is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A flight along the line into the wall that it hit first. Seconds since that contact; metres, m/s.
+
+    Places count from the take-off point, into the wall positive.
+    """
+
+    time_s: Floats
+    place_m: Floats
+    speed_m_s: Floats
+    fold_m: Floats
+    tilt_rad: Floats
+    setpoint_at_s: Floats
+    setpoint_m: Floats
+    touch_m: float
+    """Where the vehicle's centre was at the first touch."""
+    wall_m: float
+    contacts_s: tuple[float, ...]
+    detections_s: tuple[float, ...]
+    targets_m: tuple[float, ...]
+    """The recovery setpoint of each detection."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What the studies need of a flight."""
+
+    flight: Flight
+    is_completed: bool
+    contacts: tuple[Contact, ...]
+    recontacts: int
+    false_detections: int
+    imu_received_hz: float
+    integration_interval_us: int
+    greatest_tilt_rad: float
+    track: Track | None
+
+    @property
+    def first(self) -> Contact:
+        return self.contacts[0]
+
+    @property
+    def overshoots_m(self) -> list[float]:
+        return [contact.overshoot_m for contact in self.contacts if contact.overshoot_m is not None]
+
+
+def fly(flight: Flight) -> Result:
+    """Fly it in lockstep, all MAVLink bytes and the log on."""
+    mission = Mission.model_validate(dict(flight.mission))
+    scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
+    airframe = Airframe.model_validate(with_base({"based_on": flight.airframe, **flight.changes}))
+    with tempfile.TemporaryDirectory() as name:
+        recorder = FlightRecorder(Path(name))
+        try:
+            flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+        finally:
+            recorder.close()
+        log = read_flight_log(Path(name) / TLOG_NAME)
+    assert flown.truth is not None, "a lockstep flight has its truth"
+    settled_duration_s = mission.companion.settled.duration_s
+    matches = match_contacts(flown.report.collisions, flown.truth.hits, settled_duration_s)
+    interval_us = airframe.imu.integration_interval_us
+    return Result(
+        flight=flight,
+        is_completed=flown.report.outcome == "completed",
+        contacts=_contacts(flown, flown.truth, log, interval_us, settled_duration_s),
+        recontacts=matches.recontacts,
+        false_detections=matches.false_detections,
+        imu_received_hz=flown.report.stream_rates_hz["HIGHRES_IMU"],
+        integration_interval_us=interval_us,
+        greatest_tilt_rad=float(_tilt_rad(flown.truth).max()),
+        track=_track(flown, flown.truth, log, scene) if flight.is_drawn and flown.truth.hits else None,
+    )
+
+
+def _contacts(
+    flown: Flown, truth: FlightTruth, log: FlightLog, interval_us: int, settled_duration_s: float
+) -> tuple[Contact, ...]:
+    collisions = flown.report.collisions
+    matches = match_contacts(collisions, truth.hits, settled_duration_s)
+    entries = build_summary(flown, FlightFacts("", None, None, settled_duration_s))["collisions"]
+    number_of = {id(hit): number for number, hit in enumerate(matches.hit_of_collision) if hit is not None}
+    contacts = []
+    for hit in truth.hits:
+        number = number_of.get(id(hit))
+        collision = None if number is None else collisions[number]
+        seen = None if number is None else entries[number]["truth"]
+        contacts.append(
+            Contact(
+                hit=hit,
+                share_received=share_received(log.imu_time_boot_us, interval_us, hit),
+                latency_s=None if seen is None else 1e-3 * seen["detection_latency_ms"],
+                impact_speed_estimate_m_s=None if collision is None else collision.impact_speed_m_s,
+                setpoint_ned_m=None if collision is None else collision.recovery_setpoint_ned_m,
+                position_estimate_ned_m=None if collision is None else collision.position_ned_m,
+                overshoot_m=None if seen is None else seen["overshoot_m"],
+            )
+        )
+    return tuple(contacts)
+
+
+def share_received(sample_times_boot_us: Floats, interval_us: int, hit: Hit) -> float:
+    """Share of a contact covered by the windows (of `interval_us`, ending at the sample's time) that arrived."""
+    start, end = hit.contact_at_boot_us, hit.ended_at_boot_us
+    covered = np.minimum(sample_times_boot_us, end) - np.maximum(sample_times_boot_us - interval_us, start)
+    return float(np.clip(covered, 0.0, None).sum() / max(end - start, 1.0))
+
+
+def _tilt_rad(truth: FlightTruth) -> Floats:
+    """Angle between the thrust and the vertical."""
+    attitude = truth.series["attitude_wxyz"]
+    upright = 1.0 - 2.0 * (attitude[:, 1] ** 2 + attitude[:, 2] ** 2)
+    tilt: Floats = np.arccos(np.clip(upright, -1.0, 1.0))
+    return tilt
+
+
+def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Track:
+    report, hit = flown.report, truth.hits[0]
+    into_wall = -np.array(hit.normal_ned)
+    origin = np.array(report.origin_ned_m or (0.0, 0.0, 0.0))
+    wall = next(wall for wall in scene.walls_built() if wall.name == hit.obstacle)
+    zero_us = hit.contact_at_boot_us
+
+    def seconds(at_us: Floats) -> Floats:
+        since: Floats = 1e-6 * (at_us - truth.epoch_at_boot_us - zero_us)
+        return since
+
+    def place_m(position_ned_m: Vector3) -> float:
+        return float((np.array(position_ned_m) - origin) @ into_wall)
+
+    time_s = 1e-6 * (truth.series["time_boot_us"] - zero_us)
+    kept = (time_s >= -TRACK_BEFORE_S) & (time_s <= TRACK_AFTER_S)
+    setpoint_at_s = seconds(log.setpoint_at_us)
+    asked = (setpoint_at_s >= -TRACK_BEFORE_S) & (setpoint_at_s <= TRACK_AFTER_S)
+    return Track(
+        time_s=time_s[kept],
+        place_m=(truth.series["position_ned_m"][kept] - origin) @ into_wall,
+        speed_m_s=truth.series["velocity_ned_m_s"][kept] @ into_wall,
+        fold_m=truth.series["arm_fold_m"][kept],
+        tilt_rad=_tilt_rad(truth)[kept],
+        setpoint_at_s=setpoint_at_s[asked],
+        setpoint_m=(log.setpoint_ned_m[asked] - origin) @ into_wall,
+        touch_m=place_m(hit.contact_position_ned_m),
+        wall_m=place_m(wall.point_ned_m),
+        contacts_s=tuple(1e-6 * (each.contact_at_boot_us - zero_us) for each in truth.hits),
+        detections_s=tuple(1e-6 * (each.sample_time_boot_us - zero_us) for each in report.collisions),
+        targets_m=tuple(place_m(each.recovery_setpoint_ned_m) for each in report.collisions),
+    )

@@ -1,0 +1,37 @@
+"""What every study is: flights to fly, and what follows from their results."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from matplotlib.figure import Figure
+
+from rebound_cli.paper.flights import Flight, Result
+from rebound_cli.paper.table import Row
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """`text` is Markdown; pictures by the name of their file."""
+
+    title: str
+    rows: tuple[Row, ...]
+    text: str
+    pictures: Mapping[str, Figure] = field(default_factory=dict)
+
+
+class Study(Protocol):
+    """Both are called with the number of seeds asked for; the results come in the order of the flights."""
+
+    def flights(self, seeds: int) -> list[Flight]: ...
+
+    def conclude(self, results: Sequence[Result]) -> Findings: ...
+
+
+def sampling_text(results: Sequence[Result]) -> str:
+    """How the inertial sensor was received: the range over these flights."""
+    rates = sorted(result.imu_received_hz for result in results)
+    intervals = sorted({result.integration_interval_us for result in results})
+    rate = f"{rates[0]:.0f}" if f"{rates[0]:.0f}" == f"{rates[-1]:.0f}" else f"{rates[0]:.0f} to {rates[-1]:.0f}"
+    lengths = " or ".join(f"{1e-3 * interval:g}" for interval in intervals)
+    return f"`HIGHRES_IMU` as received: {rate} Hz, each sample the mean of {lengths} ms."

@@ -1,0 +1,107 @@
+"""The `sensors:` and `estimator:` parts of an airframe file: what aids the vehicle's own Kalman filter."""
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, lt=1)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Aid(_Part):
+    """What every aiding sensor has."""
+
+    fitted: bool
+    rate_hz: Positive
+    delay_s: NotNegative
+    """How late a sample reaches the filter, which fuses it at the time it was taken."""
+    share_lost: Share
+    """Chance that a sample is lost."""
+    lost_between_s: tuple[tuple[NotNegative, NotNegative], ...]
+    """Times since boot between which every sample is lost."""
+
+    @model_validator(mode="after")
+    def _losses_have_length(self) -> Self:
+        for start_s, end_s in self.lost_between_s:
+            if end_s <= start_s:
+                raise ValueError(f"lost_between_s: [{start_s}, {end_s}] ends before it begins")
+        return self
+
+
+class OpticalFlow(Aid):
+    """A camera that looks down and says by what angle the ground has moved (OPTICAL_FLOW_RAD)."""
+
+    noise_rad_s: Positive
+    """Standard deviation of one sample's mean angular rate."""
+    gyroscope_noise_rad_s: NotNegative
+    """The same for the camera's own gyroscope."""
+    rate_max_rad_s: Positive
+    """Faster flow than this is not seen."""
+    distance_min_m: NotNegative
+    distance_max_m: Positive
+
+
+class RangeFinder(Aid):
+    """A beam that looks down (DISTANCE_SENSOR)."""
+
+    noise_m: Positive
+    bias_m: NotNegative
+    """Standard deviation of the constant error that is drawn for each flight."""
+    distance_min_m: NotNegative
+    distance_max_m: Positive
+
+
+class Compass(Aid):
+    """Magnetometer, as a heading."""
+
+    noise_rad: Positive
+
+
+class MotionCapture(Aid):
+    """Cameras around the room: position and heading."""
+
+    noise_m: Positive
+    noise_rad: Positive
+
+
+class Sensors(_Part):
+    """What is fitted beside the inertial sensor."""
+
+    optical_flow: OpticalFlow
+    range_finder: RangeFinder
+    compass: Compass
+    motion_capture: MotionCapture
+
+    @property
+    def can_navigate(self) -> bool:
+        """Whether velocity, height and heading are all observed."""
+        flow_range_heading = self.optical_flow.fitted and self.range_finder.fitted and self.compass.fitted
+        return flow_range_heading or self.motion_capture.fitted
+
+    @property
+    def delay_s(self) -> float:
+        """The latest of the fitted sensors' samples."""
+        aids: tuple[Aid, ...] = (self.optical_flow, self.range_finder, self.compass, self.motion_capture)
+        return max((aid.delay_s for aid in aids if aid.fitted), default=0.0)
+
+
+class Estimator(_Part):
+    """Tuning of the filter that the sensors' own figures do not give."""
+
+    gyroscope_bias_walk_rad_s2: NotNegative
+    """Standard deviation by which a gyroscope's bias may wander, per square root of a second."""
+    accelerometer_bias_walk_m_s3: NotNegative
+    clipped_excess_m_s2: NotNegative
+    """What a clipped raw sample may have lost: standard deviation of the force beyond the sensor's range."""
+    flow_gate: Positive
+    """Innovations of more standard deviations than this are not fused."""
+    range_gate: Positive
+    heading_gate: Positive
+    capture_gate: Positive
+    reset_after_s: Positive
+    """Without anything fused for this long, the next good sample resets what it measures."""

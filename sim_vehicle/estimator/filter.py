@@ -1,0 +1,185 @@
+"""The extended Kalman filter: inertial samples predict, everything else corrects.
+
+filterpy's `ExtendedKalmanFilter` estimates the error of a state that is carried along beside it
+(`strapdown.py`), as PX4's EKF2 does for the attitude: the error is small, so its model is nearly linear, and
+an attitude stays one.
+"""
+
+import numpy as np
+import numpy.typing as npt
+from filterpy.kalman import ExtendedKalmanFilter
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.consistency import Innovations
+from sim_vehicle.estimator.sensors import wrapped
+from sim_vehicle.estimator.strapdown import (
+    D_ACCELEROMETER,
+    D_ATTITUDE,
+    D_FLOW,
+    D_GYROSCOPE,
+    D_POSITION,
+    D_VELOCITY,
+    ERROR_ROWS,
+    FLOW,
+    GYROSCOPE_BIAS,
+    NOMINAL_ROWS,
+    POSITION,
+    QUATERNION,
+    VELOCITY,
+    advance,
+    correct,
+    down_range,
+    heading,
+)
+from sim_vehicle.world import Vector3
+
+Floats = npt.NDArray[np.float64]
+
+# A vehicle on its feet on flat ground stands level to about two degrees, heels and gravel included.
+FIRST_TILT_RAD = 0.03
+# It begins where its local frame begins.
+FIRST_POSITION_M = 0.01
+FIRST_VELOCITY_M_S = 0.01
+
+FLOW_NAME, RANGE_NAME, HEADING_NAME, CAPTURE_NAME, REST_NAME = "flow", "range", "heading", "capture", "rest"
+
+
+class NavigationFilter:
+    """State and covariance at the time of the last inertial sample used."""
+
+    def __init__(self, airframe: Airframe, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float) -> None:
+        imu, tuning = airframe.imu, airframe.estimator
+        self._step_s = step_s = 1e-6 * imu.integration_interval_us
+        self._noise = np.array(
+            [
+                imu.gyroscope_noise_rad_s * step_s,
+                imu.accelerometer_noise_m_s2 * step_s,
+                tuning.gyroscope_bias_walk_rad_s2 * np.sqrt(step_s),
+                tuning.accelerometer_bias_walk_m_s3 * np.sqrt(step_s),
+                tuning.clipped_excess_m_s2 * 1e-6 * imu.raw_interval_us,
+            ]
+        )
+        self.nominal = np.zeros(NOMINAL_ROWS)
+        self.nominal[POSITION : POSITION + 3] = position_ned_m
+        self.nominal[VELOCITY : VELOCITY + 3] = velocity_ned_m_s
+        self.nominal[QUATERNION : QUATERNION + 4] = [np.cos(yaw_rad / 2), 0.0, 0.0, np.sin(yaw_rad / 2)]
+        self._ekf = ekf = ExtendedKalmanFilter(ERROR_ROWS, 1)
+        ekf.x = np.zeros(ERROR_ROWS)
+        ekf.Q = np.zeros((ERROR_ROWS, ERROR_ROWS))
+        first = np.zeros(ERROR_ROWS)
+        first[D_ATTITUDE : D_ATTITUDE + 3] = FIRST_TILT_RAD
+        first[D_VELOCITY : D_VELOCITY + 3] = FIRST_VELOCITY_M_S
+        first[D_POSITION : D_POSITION + 3] = FIRST_POSITION_M
+        first[D_GYROSCOPE : D_GYROSCOPE + 3] = imu.gyroscope_bias_rad_s
+        first[D_ACCELEROMETER : D_ACCELEROMETER + 3] = imu.accelerometer_bias_m_s2
+        ekf.P = np.diag(first**2)
+        self._nothing = {size: np.zeros(size) for size in (1, 2, 3)}
+        self.innovations: dict[str, Innovations] = {}
+
+    @property
+    def covariance(self) -> Floats:
+        """P of the error (ERROR_ROWS squared)."""
+        covariance: Floats = self._ekf.P
+        return covariance
+
+    def predict(self, sample: Floats) -> None:
+        """Carry state and covariance through one inertial sample (SAMPLE_COLUMNS,)."""
+        ekf = self._ekf
+        advance(self.nominal, sample, self._step_s, self._noise, ekf.F, ekf.Q)
+        ekf.predict()
+
+    # --- corrections: each says whether it was fused -------------------------------------------------------
+
+    def fuse_flow(self, flow_rad: tuple[float, float], noise_rad: float, gate: float) -> bool:
+        """Angle by which the ground has moved past, turns taken out, since `begin_flow`."""
+        innovation = np.array(flow_rad) - self.nominal[FLOW : FLOW + 2]
+        return self._fuse(FLOW_NAME, innovation, _PICK_FLOW, np.full(2, noise_rad**2), gate)
+
+    def begin_flow(self) -> None:
+        """Begin the integral of a new flow sample."""
+        self.nominal[FLOW : FLOW + 2] = 0.0
+        self._forget(slice(D_FLOW, D_FLOW + 2), 0.0)
+
+    def fuse_range(self, distance_m: float, noise_m: float, gate: float) -> bool:
+        """Distance along the down axis to the ground."""
+        row = np.empty((1, ERROR_ROWS))
+        innovation = np.array([distance_m - down_range(self.nominal, row[0])])
+        return self._fuse(RANGE_NAME, innovation, row, np.array([noise_m**2]), gate)
+
+    def fuse_heading(self, yaw_rad: float, noise_rad: float, gate: float) -> bool:
+        """Heading of the nose."""
+        row = np.empty((1, ERROR_ROWS))
+        innovation = np.array([wrapped(yaw_rad - heading(self.nominal, row[0]))])
+        return self._fuse(HEADING_NAME, innovation, row, np.array([noise_rad**2]), gate)
+
+    def fuse_position(self, position_ned_m: Vector3, noise_m: float, gate: float) -> bool:
+        """Position as motion capture sees it."""
+        innovation = np.array(position_ned_m) - self.nominal[POSITION : POSITION + 3]
+        return self._fuse(CAPTURE_NAME, innovation, _PICK_POSITION, np.full(3, noise_m**2), gate)
+
+    def fuse_rest(self, mean_rates_frd_rad_s: Floats, speed_noise_m_s: float, rate_noise_rad_s: float) -> None:
+        """The vehicle stands still: no velocity, and what the gyroscope shows is its bias."""
+        still = -self.nominal[VELOCITY : VELOCITY + 3]
+        self._fuse(REST_NAME, still, _PICK_VELOCITY, np.full(3, speed_noise_m_s**2), np.inf)
+        bias = mean_rates_frd_rad_s - self.nominal[GYROSCOPE_BIAS : GYROSCOPE_BIAS + 3]
+        self._fuse(REST_NAME, bias, _PICK_GYROSCOPE, np.full(3, rate_noise_rad_s**2), np.inf)
+
+    def _fuse(self, name: str, innovation: Floats, h: Floats, variances: Floats, gate: float) -> bool:
+        """Correct by ``innovation`` = h error + noise, unless one of its values lies beyond the gate."""
+        ekf = self._ekf
+        r = np.diag(variances)
+        s = h @ ekf.P @ h.T + r
+        accepted = bool((innovation**2 <= gate**2 * np.diagonal(s)).all())
+        statistics = self.innovations.get(name)
+        if statistics is None:
+            statistics = self.innovations[name] = Innovations(len(innovation))
+        statistics.add(float(innovation @ np.linalg.solve(s, innovation)), accepted)
+        if accepted:
+            nothing = self._nothing[len(innovation)]
+            ekf.update(innovation, lambda _: h, lambda _: nothing, R=r)
+            correct(self.nominal, ekf.x)
+        return accepted
+
+    # --- resets ---------------------------------------------------------------------------------------------
+
+    def reset_horizontal_velocity(self, flow_rad: tuple[float, float], seconds: float, noise_rad: float) -> None:
+        """Take the flow's word for the velocity: move it by what would explain the whole innovation."""
+        row = np.empty(ERROR_ROWS)
+        distance_m = down_range(self.nominal, row)
+        about_x, about_y = (flow_rad[i] - float(self.nominal[FLOW + i]) for i in range(2))
+        w, x, y, z = self.nominal[QUATERNION : QUATERNION + 4].tolist()
+        forward, right = distance_m * about_y / seconds, -distance_m * about_x / seconds
+        self.nominal[VELOCITY] += (1 - 2 * (y * y + z * z)) * forward + 2 * (x * y - w * z) * right
+        self.nominal[VELOCITY + 1] += 2 * (x * y + w * z) * forward + (1 - 2 * (x * x + z * z)) * right
+        self._forget(slice(D_VELOCITY, D_VELOCITY + 2), distance_m * noise_rad / seconds)
+
+    def reset_height(self, distance_m: float, noise_m: float) -> None:
+        """Take the range's word for the height."""
+        row = np.empty(ERROR_ROWS)
+        predicted_m = down_range(self.nominal, row)
+        self.nominal[POSITION + 2] += (distance_m - predicted_m) / float(row[D_POSITION + 2])
+        self._forget(slice(D_POSITION + 2, D_POSITION + 3), noise_m)
+
+    def reset_position(self, position_ned_m: Vector3, noise_m: float, speed_noise_m_s: float) -> None:
+        """Take motion capture's word for the position; the velocity that led astray is open again."""
+        self.nominal[POSITION : POSITION + 3] = position_ned_m
+        self._forget(slice(D_POSITION, D_POSITION + 3), noise_m)
+        self._forget(slice(D_VELOCITY, D_VELOCITY + 3), speed_noise_m_s)
+
+    def _forget(self, rows: slice, deviation: float) -> None:
+        """Make rows of the error independent of everything else, with the standard deviation given."""
+        p = self._ekf.P
+        p[rows, :] = 0.0
+        p[:, rows] = 0.0
+        p[rows, rows] = np.eye(rows.stop - rows.start) * deviation**2
+
+
+def _pick(start: int, size: int) -> Floats:
+    """The matrix H of a measurement that is the error's rows from ``start`` on."""
+    return np.eye(ERROR_ROWS)[start : start + size].copy()
+
+
+_PICK_FLOW = _pick(D_FLOW, 2)
+_PICK_POSITION = _pick(D_POSITION, 3)
+_PICK_VELOCITY = _pick(D_VELOCITY, 3)
+_PICK_GYROSCOPE = _pick(D_GYROSCOPE, 3)

@@ -1,0 +1,213 @@
+"""The estimator as it runs on the vehicle: sensors, the filter at its delayed horizon, the output predictor."""
+
+import math
+import random
+from collections import deque
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.estimator.filter import NavigationFilter
+from sim_vehicle.estimator.optics import distance_below
+from sim_vehicle.estimator.resets import ResetClock
+from sim_vehicle.estimator.rest import STILL_SPEED_M_S, RestDetector
+from sim_vehicle.estimator.samples import (
+    NO_QUALITY,
+    CaptureSample,
+    FlowSample,
+    RangeSample,
+    Sample,
+)
+from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, FlowSensor, RangeSensor, true_yaw
+from sim_vehicle.estimator.strapdown import (
+    CLIPPED,
+    D_ATTITUDE,
+    D_POSITION,
+    D_VELOCITY,
+    FORCE,
+    NOMINAL_ROWS,
+    RATES,
+    SAMPLE_COLUMNS,
+    predict_now,
+)
+from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
+from sim_vehicle.physics.layout import GRAVITY_M_S2
+from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.world import Vector3
+
+Floats = npt.NDArray[np.float64]
+
+# So that the sensors' noise does not change with what the rest of the simulation draws.
+_OWN_SEED = 0xF10
+# After a position reset by motion capture: the speed by which the vehicle went astray unseen.
+_SPEED_AFTER_RESET_M_S = 1.0
+
+
+class OnboardEstimator:
+    """Sensors and filter of one flight; everything in it that is not a sensor knows samples only."""
+
+    def __init__(self, airframe: Airframe, faces: Floats, body: Floats, seed: int) -> None:
+        """``body`` is the true state at the start, of which the vehicle knows where its frame begins."""
+        sensors, interval_us = airframe.sensors, airframe.imu.integration_interval_us
+        rng = random.Random(seed ^ _OWN_SEED)
+        self._airframe = airframe
+        self._faces = faces
+        self._interval_us = interval_us
+        self._step_s = 1e-6 * interval_us
+        self.flow_sensor = FlowSensor(sensors.optical_flow, faces, interval_us, rng)
+        self._range_sensor = RangeSensor(sensors.range_finder, interval_us, rng)
+        self._compass = CompassSensor(sensors.compass, interval_us, rng)
+        self._cameras = CaptureSensor(sensors.motion_capture, interval_us, rng)
+        self._has_cameras = sensors.motion_capture.fitted
+        self._rest = RestDetector(interval_us)
+        # At least one sample behind, so that the output predictor always has one to go by.
+        self._slots = max(math.ceil(sensors.delay_s / self._step_s - 1e-9), 1) + 1
+        self._rotation = np.empty((3, 3))
+        self._share = 1 - math.exp(-self._step_s / SLOPE_TIME_CONSTANT_S)
+        self._now = np.zeros(NOMINAL_ROWS + 3)
+        self.flow: FlowSample | None = None
+        self.range: RangeSample | None = None
+        self.reset_counter = 0
+        self._seed_yaw_noise = rng.gauss(0, 1)
+        self.start(body, 0)
+
+    def start(self, body: Floats, time_us: int) -> None:
+        """Begin anew, at a place and speed that are known and with the heading that the sensors show."""
+        sensors, tuning = self._airframe.sensors, self._airframe.estimator
+        heads_by = sensors.motion_capture if self._has_cameras else sensors.compass
+        yaw_rad = true_yaw(body) + heads_by.noise_rad * self._seed_yaw_noise
+        x, y, z, vx, vy, vz = body[0:6].tolist()
+        self.filter = NavigationFilter(self._airframe, (x, y, z), (vx, vy, vz), yaw_rad)
+        self._samples = np.zeros((self._slots, SAMPLE_COLUMNS))
+        self._samples[:, FORCE + 2] = -GRAVITY_M_S2
+        self._head = 0
+        self._clipped = (0, 0, 0)
+        self._waiting: deque[Sample] = deque()
+        self._velocity_clock = ResetClock(tuning.reset_after_s, time_us)
+        self._height_clock = ResetClock(tuning.reset_after_s, time_us)
+        self._position_clock = ResetClock(tuning.reset_after_s, time_us)
+
+    def update(
+        self,
+        time_us: int,
+        specific_force_frd_m_s2: Vector3,
+        angular_velocity_frd_rad_s: Vector3,
+        clipping_counts: tuple[int, int, int],
+        flies: bool,
+        body: Floats,
+        estimate: Floats,
+        acceleration_ned_m_s2: Floats,
+    ) -> None:
+        """Take one inertial sample; renew ``estimate`` (position, velocity, attitude) and the acceleration.
+
+        ``body``, the truth, goes no further than the sensors.
+        """
+        self._sense(time_us, body)
+        head = self._head = (self._head + 1) % self._slots
+        before, self._clipped = self._clipped, clipping_counts
+        row = self._samples[head]
+        row[FORCE : FORCE + 3] = specific_force_frd_m_s2
+        row[RATES : RATES + 3] = angular_velocity_frd_rad_s
+        row[CLIPPED : CLIPPED + 3] = [now - then for now, then in zip(clipping_counts, before, strict=True)]
+        oldest = (head + 1) % self._slots
+        self.filter.predict(self._samples[oldest])
+        horizon_us = time_us - (self._slots - 1) * self._interval_us
+        self._fuse_rest(self._samples[oldest], flies, horizon_us)
+        while self._waiting and self._waiting[0].time_us <= horizon_us:
+            self._fuse(self._waiting.popleft())
+        predict_now(self.filter.nominal, self._samples, oldest, self._step_s, self._now)
+        estimate[:] = self._now[:10]
+        acceleration_ned_m_s2 += self._share * (self._now[NOMINAL_ROWS:] - acceleration_ned_m_s2)
+
+    def variances(self) -> tuple[float, float, float]:
+        """Of position (m2), velocity (m2/s2) and attitude (rad2), each on its worst axis."""
+        diagonal: list[float] = self.filter.covariance.diagonal().tolist()
+        position, velocity, attitude = (diagonal[row : row + 3] for row in (D_POSITION, D_VELOCITY, D_ATTITUDE))
+        return max(position), max(velocity), max(attitude)
+
+    # --- sensing: the only place that looks at the truth ----------------------------------------------------
+
+    def _sense(self, time_us: int, body: Floats) -> None:
+        sensors, waiting = self._airframe.sensors, self._waiting
+        if sensors.optical_flow.fitted:
+            flow = self.flow_sensor.observe(time_us, body)
+            if flow is not None:
+                self.flow = flow
+                waiting.append(flow)
+        if sensors.range_finder.fitted and self._range_sensor.is_due(time_us):
+            matrix_from_quaternion(body, self._rotation)
+            distance_m = distance_below(body, self._rotation, self._faces)
+            self.range = self._range_sensor.observe(time_us, distance_m)
+            waiting.append(self.range)
+        if sensors.compass.fitted:
+            heading = self._compass.observe(time_us, body)
+            if heading is not None:
+                waiting.append(heading)
+        if sensors.motion_capture.fitted:
+            capture = self._cameras.observe(time_us, body)
+            if capture is not None:
+                waiting.append(capture)
+
+    # --- fusing ---------------------------------------------------------------------------------------------
+
+    def _fuse(self, sample: Sample) -> None:
+        if isinstance(sample, FlowSample):
+            self._fuse_flow(sample)
+            self.filter.begin_flow()
+        elif isinstance(sample, CaptureSample):
+            self._fuse_capture(sample)
+        elif self._has_cameras:
+            # Height and heading come from one reference, as in PX4: a beam's offset would argue with the cameras.
+            return
+        elif isinstance(sample, RangeSample):
+            self._fuse_range(sample)
+        else:
+            compass, gate = self._airframe.sensors.compass, self._airframe.estimator.heading_gate
+            self.filter.fuse_heading(sample.yaw_rad, compass.noise_rad, gate)
+
+    def _fuse_flow(self, sample: FlowSample) -> None:
+        if sample.quality == NO_QUALITY:
+            return
+        spec, seconds = self._airframe.sensors.optical_flow, 1e-6 * sample.integration_us
+        flow_rad = (
+            sample.flow_frd_rad[0] - sample.gyroscope_frd_rad[0],
+            sample.flow_frd_rad[1] - sample.gyroscope_frd_rad[1],
+        )
+        noise_rad = math.hypot(spec.noise_rad_s, spec.gyroscope_noise_rad_s) * seconds
+        if self._velocity_clock.is_due(sample.time_us):
+            self.filter.reset_horizontal_velocity(flow_rad, seconds, noise_rad)
+            self.reset_counter += 1
+        elif not self.filter.fuse_flow(flow_rad, noise_rad, self._airframe.estimator.flow_gate):
+            return
+        self._velocity_clock.fused(sample.time_us)
+
+    def _fuse_range(self, sample: RangeSample) -> None:
+        if sample.distance_m is None:
+            return
+        noise_m, gate = self._airframe.sensors.range_finder.noise_m, self._airframe.estimator.range_gate
+        if not self.filter.fuse_range(sample.distance_m, noise_m, gate):
+            if not self._height_clock.is_due(sample.time_us):
+                return
+            self.filter.reset_height(sample.distance_m, noise_m)
+            self.reset_counter += 1
+        self._height_clock.fused(sample.time_us)
+
+    def _fuse_capture(self, sample: CaptureSample) -> None:
+        spec, gate = self._airframe.sensors.motion_capture, self._airframe.estimator.capture_gate
+        if not self.filter.fuse_position(sample.position_ned_m, spec.noise_m, gate):
+            if not self._position_clock.is_due(sample.time_us):
+                return
+            self.filter.reset_position(sample.position_ned_m, spec.noise_m, _SPEED_AFTER_RESET_M_S)
+            self.reset_counter += 1
+        self.filter.fuse_heading(sample.yaw_rad, spec.noise_rad, self._airframe.estimator.heading_gate)
+        self._position_clock.fused(sample.time_us)
+        self._velocity_clock.fused(sample.time_us)
+
+    def _fuse_rest(self, sample: Floats, flies: bool, horizon_us: int) -> None:
+        mean_rates = self._rest.update(sample, flies)
+        if mean_rates is None:
+            return
+        noise_rad_s = self._airframe.imu.gyroscope_noise_rad_s / math.sqrt(self._rest.samples)
+        self.filter.fuse_rest(mean_rates, STILL_SPEED_M_S, noise_rad_s)
+        self._velocity_clock.fused(horizon_us)

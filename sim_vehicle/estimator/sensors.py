@@ -1,0 +1,159 @@
+"""Aiding sensors: the truth in, samples with their rate, noise, range and losses out."""
+
+import math
+import random
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder
+from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.estimator.optics import (
+    CAMERA_ROWS,
+    DISTANCE,
+    FASTEST,
+    FLOW_X,
+    FLOW_Y,
+    TURN_X,
+    TURN_Z,
+    watch,
+)
+from sim_vehicle.estimator.samples import (
+    BEST_QUALITY,
+    NO_QUALITY,
+    CaptureSample,
+    FlowSample,
+    HeadingSample,
+    RangeSample,
+)
+
+Floats = npt.NDArray[np.float64]
+
+
+class Schedule:
+    """When a sensor's samples are due, and which of them are lost."""
+
+    def __init__(self, aid: Aid, interval_us: int, rng: random.Random) -> None:
+        self._period_us = round(1e6 / aid.rate_hz)
+        self._interval_us = interval_us
+        self._share_lost = aid.share_lost
+        self._lost_us = [(1e6 * start, 1e6 * end) for start, end in aid.lost_between_s]
+        self._rng = rng
+
+    def is_due(self, time_us: int) -> bool:
+        """Whether the interval just ended contains a multiple of the period."""
+        return time_us % self._period_us < self._interval_us
+
+    def is_lost(self, time_us: int) -> bool:
+        """Whether the sample of this moment is lost, by the file's plan or by chance."""
+        if any(start <= time_us < end for start, end in self._lost_us):
+            return True
+        return self._share_lost > 0 and self._rng.random() < self._share_lost
+
+
+class FlowSensor:
+    """A PX4FLOW: integrates flow and its own gyroscope between samples; what is lost has quality 0."""
+
+    def __init__(self, spec: OpticalFlow, faces: Floats, interval_us: int, rng: random.Random) -> None:
+        self._spec = spec
+        self._faces = faces
+        self._step_s = 1e-6 * interval_us
+        self._schedule = Schedule(spec, interval_us, rng)
+        self._rng = rng
+        self._camera = np.zeros(CAMERA_ROWS)
+        self._last_us = 0
+
+    def observe(self, time_us: int, body: Floats) -> FlowSample | None:
+        """See one interval; the sample if one is due."""
+        watch(body, self._faces, self._step_s, self._camera)
+        if not self._schedule.is_due(time_us):
+            return None
+        seen: list[float] = self._camera.tolist()
+        self._camera[FLOW_X : TURN_Z + 1] = 0.0
+        self._camera[FASTEST] = 0.0
+        integration_us, self._last_us = time_us - self._last_us, time_us
+        if not self._sees(seen) or self._schedule.is_lost(time_us):
+            return FlowSample(time_us, integration_us, (0.0, 0.0), (0.0, 0.0, 0.0), NO_QUALITY)
+        spec, gauss, seconds = self._spec, self._rng.gauss, 1e-6 * integration_us
+        turn_x, turn_y, turn_z = (
+            seen[TURN_X + axis] + gauss(0, spec.gyroscope_noise_rad_s * seconds) for axis in range(3)
+        )
+        flow_x = seen[FLOW_X] + seen[TURN_X] + gauss(0, spec.noise_rad_s * seconds)
+        flow_y = seen[FLOW_Y] + seen[TURN_X + 1] + gauss(0, spec.noise_rad_s * seconds)
+        return FlowSample(time_us, integration_us, (flow_x, flow_y), (turn_x, turn_y, turn_z), BEST_QUALITY)
+
+    def _sees(self, seen: list[float]) -> bool:
+        """Sharp enough to compare pictures, and slow enough that they still overlap."""
+        spec = self._spec
+        return spec.distance_min_m <= seen[DISTANCE] <= spec.distance_max_m and seen[FASTEST] <= spec.rate_max_rad_s
+
+    @property
+    def distance_m(self) -> float:
+        """True distance along the down axis at the last interval."""
+        return float(self._camera[DISTANCE])
+
+
+class RangeSensor:
+    """A LeddarOne that looks along the body's down axis."""
+
+    def __init__(self, spec: RangeFinder, interval_us: int, rng: random.Random) -> None:
+        self._spec = spec
+        self._schedule = Schedule(spec, interval_us, rng)
+        self._rng = rng
+        self._bias_m = rng.gauss(0, spec.bias_m)
+
+    def is_due(self, time_us: int) -> bool:
+        return self._schedule.is_due(time_us)
+
+    def observe(self, time_us: int, distance_m: float) -> RangeSample:
+        """The sample of a true distance, which is only worth computing when one is due."""
+        spec = self._spec
+        least_m, most_m = spec.distance_min_m, spec.distance_max_m
+        if self._schedule.is_lost(time_us) or not least_m <= distance_m <= most_m:
+            return RangeSample(time_us, None, least_m, most_m)
+        measured_m = distance_m + self._bias_m + self._rng.gauss(0, spec.noise_m)
+        return RangeSample(time_us, max(measured_m, 0.0), least_m, most_m)
+
+
+class CompassSensor:
+    """A magnetometer already turned into a heading. A constant error would only rename north."""
+
+    def __init__(self, spec: Compass, interval_us: int, rng: random.Random) -> None:
+        self._spec = spec
+        self._schedule = Schedule(spec, interval_us, rng)
+        self._rng = rng
+
+    def observe(self, time_us: int, body: Floats) -> HeadingSample | None:
+        """The sample if one is due and not lost."""
+        if not self._schedule.is_due(time_us) or self._schedule.is_lost(time_us):
+            return None
+        return HeadingSample(time_us, true_yaw(body) + self._rng.gauss(0, self._spec.noise_rad))
+
+
+class CaptureSensor:
+    """Cameras around the room: position and heading, with errors that are new in every frame."""
+
+    def __init__(self, spec: MotionCapture, interval_us: int, rng: random.Random) -> None:
+        self._spec = spec
+        self._schedule = Schedule(spec, interval_us, rng)
+        self._rng = rng
+
+    def observe(self, time_us: int, body: Floats) -> CaptureSample | None:
+        """The sample if one is due and not lost."""
+        if not self._schedule.is_due(time_us) or self._schedule.is_lost(time_us):
+            return None
+        gauss, noise_m = self._rng.gauss, self._spec.noise_m
+        x, y, z = body[0:3].tolist()
+        position = (x + gauss(0, noise_m), y + gauss(0, noise_m), z + gauss(0, noise_m))
+        return CaptureSample(time_us, position, true_yaw(body) + gauss(0, self._spec.noise_rad))
+
+
+def true_yaw(body: Floats) -> float:
+    """Heading of the nose; math.pi wraps are left to who compares."""
+    w, x, y, z = body[6:10].tolist()
+    return yaw_of((w, x, y, z))
+
+
+def wrapped(angle_rad: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi

@@ -1,0 +1,92 @@
+"""The aiding sensors' messages and the truth channel, filled as PX4's streams of those names fill them.
+
+Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp, DISTANCE_SENSOR.hpp and HIL_STATE_QUATERNION.hpp.
+"""
+
+import math
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.mavlink.encode import Message, Telemetry
+
+# Where the local frame's origin lies on the Earth: where PX4's own simulators put their home.
+HOME_LATITUDE_DEG, HOME_LONGITUDE_DEG, HOME_ALTITUDE_M = 47.397742, 8.545594, 488.0
+# The sphere of PX4's projection (lib/geo).
+_EARTH_RADIUS_M = 6_371_000.0
+_UNKNOWN_DISTANCE = -1.0
+_LASER, _LOOKS_DOWN = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270
+_BAD_SIGNAL, _GOOD_SIGNAL = 1, 100
+# LeddarOne's beam, as PX4's driver states it: 6 degrees.
+_BEAM_RAD = 0.105
+_UNKNOWN_VARIANCE = 255
+
+
+def optical_flow_rad(state: Telemetry) -> Message:
+    sample = state.flow
+    assert sample is not None, "streamed only once there is a sample"
+    flow_x, flow_y = sample.flow_frd_rad
+    turn_x, turn_y, turn_z = sample.gyroscope_frd_rad
+    return dialect.MAVLink_optical_flow_rad_message(
+        sample.time_us,
+        0,
+        sample.integration_us,
+        flow_x,
+        flow_y,
+        turn_x,
+        turn_y,
+        turn_z,
+        0,
+        sample.quality,
+        0,
+        _UNKNOWN_DISTANCE,
+    )
+
+
+def distance_sensor(state: Telemetry) -> Message:
+    """In whole centimetres; what was not seen is one beyond the greatest, with a bad signal."""
+    sample = state.range
+    assert sample is not None, "streamed only once there is a sample"
+    least_cm, most_cm = round(100 * sample.distance_min_m), round(100 * sample.distance_max_m)
+    seen = sample.distance_m is not None
+    return dialect.MAVLink_distance_sensor_message(
+        (sample.time_us // 1000) & 0xFFFFFFFF,
+        least_cm,
+        most_cm,
+        most_cm + 1 if sample.distance_m is None else round(100 * sample.distance_m),
+        _LASER,
+        0,
+        _LOOKS_DOWN,
+        _UNKNOWN_VARIANCE,
+        _BEAM_RAD,
+        _BEAM_RAD,
+        (0.0, 0.0, 0.0, 0.0),
+        _GOOD_SIGNAL if seen else _BAD_SIGNAL,
+    )
+
+
+def hil_state_quaternion(state: Telemetry) -> Message:
+    """The truth, only ever sent on request; accelerations and airspeed are left at zero.
+
+    Meridians are taken as parallel: 100 m from home that is wrong by 1 mm, a tenth of the message's resolution.
+    """
+    assert state.true_body is not None, "streamed only where there is a truth"
+    north, east, down, v_north, v_east, v_down, w, x, y, z, p, q, r = state.true_body.tolist()
+    parallel_radius_m = _EARTH_RADIUS_M * math.cos(math.radians(HOME_LATITUDE_DEG))
+    return dialect.MAVLink_hil_state_quaternion_message(
+        state.sample.time_boot_us,
+        (w, x, y, z),
+        p,
+        q,
+        r,
+        round(1e7 * (HOME_LATITUDE_DEG + math.degrees(north / _EARTH_RADIUS_M))),
+        round(1e7 * (HOME_LONGITUDE_DEG + math.degrees(east / parallel_radius_m))),
+        round(1e3 * (HOME_ALTITUDE_M - down)),
+        round(100 * v_north),
+        round(100 * v_east),
+        round(100 * v_down),
+        0,
+        0,
+        0,
+        0,
+        0,
+    )

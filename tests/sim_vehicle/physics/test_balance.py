@@ -1,0 +1,122 @@
+"""What a hit must conserve: momentum, energy, angular momentum; and the integrator's order."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of
+from sim_vehicle.physics.layout import (
+    POINTS,
+    Scratch,
+    constants_from,
+    contact_from,
+    initial_state,
+)
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.physics.record import new_record
+from sim_vehicle.physics.rigid_body import runge_kutta_step
+from sim_vehicle.scene import Scene
+from sim_vehicle.world import build_world
+from tests.sim_vehicle.physics.throwing import quiet, throw
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("speed_m_s", [1.0, 2.5, 5.0])
+@pytest.mark.parametrize("yaw_deg", [0, 20])
+def test_the_walls_impulse_is_the_change_of_momentum(name: str, speed_m_s: float, yaw_deg: float) -> None:
+    airframe = quiet(load_built_in(name))
+    hit = throw(airframe, speed_m_s, yaw_rad=math.radians(yaw_deg)).hit
+    change = airframe.mass_kg * (np.array(hit.rebound_velocity_ned_m_s) - np.array(hit.impact_velocity_ned_m_s))
+    assert hit.impulse_ned_n_s[0] == pytest.approx(change[0], rel=0.01)
+    assert hit.impulse_ned_n_s[1] == pytest.approx(change[1], abs=0.01 * abs(change[0]))
+
+
+@pytest.mark.parametrize("speed_m_s", [0.5, 1.0, 1.4])
+def test_a_head_on_hit_keeps_the_energy_that_eq_2_leaves(foldable: Airframe, speed_m_s: float) -> None:
+    hit = throw(foldable, speed_m_s).hit
+    falling_m_s = hit.rebound_velocity_ned_m_s[2]
+    after_j = hit.energy_after_j - 0.5 * foldable.mass_kg * falling_m_s**2
+    before_j = hit.energy_before_j - 0.5 * foldable.mass_kg * hit.impact_velocity_ned_m_s[2] ** 2
+    assert after_j / before_j == pytest.approx(0.2204**2, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("yaw_deg", [0, 10, 20, 45])
+@pytest.mark.parametrize("rate_rad_s", [0.0, 4.0, -4.0])
+def test_no_hit_returns_more_energy_than_it_took(name: str, yaw_deg: float, rate_rad_s: float) -> None:
+    airframe = quiet(load_built_in(name))
+    thrown = throw(airframe, 2.0, yaw_rad=math.radians(yaw_deg), rates_frd_rad_s=(0.0, 0.0, rate_rad_s))
+    for hit in thrown.plant.truth.hits:
+        fall_j = airframe.mass_kg * 9.81 * 2.0 * hit.contact_duration_s * (hit.contact_duration_s + 0.4)
+        assert 0.0 < hit.energy_after_j < hit.energy_before_j + fall_j
+
+
+def test_inertia_of_folded_arms() -> None:
+    """Point masses at 0.145 m: both front arms in by 30 mm take 2 m (R^2 - (R - l)^2) from the yaw axis."""
+    airframe = load_built_in("foldable")
+    constants = constants_from(airframe, (0.0, 0.0, 0.0), np.random.default_rng(1))
+    inertia, rate = np.zeros(4), np.zeros(4)
+    lost = 0.05 * (0.145**2 - 0.115**2)
+
+    inertia_of(np.array([0.03, 0.0, 0.03, 0.0]), np.zeros(4), constants, inertia, rate)
+    assert inertia[ZZ] == pytest.approx(0.0053 - 2 * lost)
+    assert inertia[XX] == pytest.approx(0.0034 - lost)
+    assert inertia[YY] == pytest.approx(0.0034 - lost)
+    assert inertia[XY] == pytest.approx(0.0, abs=1e-12)
+
+    inertia_of(np.array([0.03, 0.0, 0.0, 0.0]), np.zeros(4), constants, inertia, rate)
+    # Mass taken from the front right corner, where x y > 0, leaves the product of inertia -sum m x y larger.
+    assert inertia[XY] == pytest.approx(lost / 2)
+
+
+def test_the_inertias_rate_is_its_slope() -> None:
+    constants = constants_from(load_built_in("foldable"), (0.0, 0.0, 0.0), np.random.default_rng(1))
+    folds, rates, step_s = np.array([0.01, 0.02, 0.0, 0.03]), np.array([-0.5, 0.1, 0.3, -0.2]), 1e-6
+    before, after, rate, unused = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
+    inertia_of(folds, rates, constants, before, rate)
+    inertia_of(folds + step_s * rates, rates, constants, after, unused)
+    assert (after - before) / step_s == pytest.approx(rate, rel=1e-3)
+
+
+def test_arms_that_unfold_slow_a_spin_as_a_skaters_do() -> None:
+    """No moment acts: J_zz times yaw rate stays while the arms return."""
+    airframe = quiet(load_built_in("foldable"))
+    plant = Plant(airframe, Scene(), seed=1)
+    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
+    plant.state.body[12] = 10.0
+    plant.state.fold_m[:] = 0.03
+    plant.step(None, armed=False)
+    momentum, spin = plant.state.inertia[ZZ] * plant.state.body[12], plant.state.body[12]
+    for _ in range(100):
+        plant.step(None, armed=False)
+    assert plant.state.fold_m.max() == pytest.approx(airframe.arms.hysteresis_m)
+    assert plant.state.body[12] < 0.85 * spin
+    assert plant.state.inertia[ZZ] * plant.state.body[12] == pytest.approx(momentum, rel=1e-3)
+
+
+def test_the_integrator_is_of_fourth_order() -> None:
+    """A tumble with drag: halving the step divides the error by sixteen."""
+    airframe = load_built_in("foldable")
+    world = build_world(())
+    constants = constants_from(airframe, (0.0, 0.0, 0.0), np.random.default_rng(1))
+
+    def tumbled(steps: int) -> np.ndarray:
+        state = initial_state((0.0, 0.0, -50.0), 0.3)
+        state.body[3:6], state.body[10:13] = [3.0, -1.0, 0.5], [6.0, -4.0, 5.0]
+        state.motor_thrust_n[:] = [2.0, 3.0, 2.5, 2.2]
+        count = len(world.faces)
+        behind, near = np.zeros((POINTS, count), np.int64), np.zeros(count, np.int64)
+        forces = np.zeros((2, POINTS, count))
+        for _ in range(steps):
+            runge_kutta_step(
+                state, behind, near, False, 0.5 / steps, constants, contact_from(airframe), world.faces, forces,
+                new_record(Scratch),
+            )  # fmt: skip
+        return np.array(state.body)
+
+    exact = tumbled(3200)
+    errors = [np.abs(tumbled(steps) - exact).max() for steps in (25, 50, 100)]
+    orders = [math.log2(errors[0] / errors[1]), math.log2(errors[1] / errors[2])]
+    assert orders == pytest.approx([4.0, 4.0], abs=0.4)
