@@ -7,12 +7,13 @@ import numpy.typing as npt
 
 from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
-from sim_vehicle.physics.contact import find_close, find_near, relax_arms, settle_arms
+from sim_vehicle.physics.contact import relax_arms, settle_arms
 from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import Asked, Constants, Contact, Gains, Scratch, State
+from sim_vehicle.physics.proximity import find_close, find_near
 from sim_vehicle.physics.report import write_report
 from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of

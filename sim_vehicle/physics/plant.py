@@ -7,7 +7,6 @@ import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.estimator.onboard import OnboardEstimator
-from sim_vehicle.physics.contact import points_behind
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import (
     FINE_STEPS,
@@ -26,6 +25,7 @@ from sim_vehicle.physics.layout import (
     gains_from,
     initial_state,
 )
+from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import new_record
 from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
 from sim_vehicle.scene import Scene

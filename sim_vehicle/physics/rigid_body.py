@@ -97,28 +97,11 @@ def runge_kutta_step(
     """
     body, thrusts_n, inertia, inertia_rate = state.body, state.motor_thrust_n, state.inertia, state.inertia_rate
     inertia_of(state.fold_m, state.fold_rate_m_s, constants, inertia, inertia_rate)
-    k, trial, turned = scratch.slopes, scratch.trial, scratch.turned
-    rotation, normal, tried = scratch.rotation, forces[0], forces[1]
-    derivative(
-        body,
-        thrusts_n,
-        inertia,
-        inertia_rate,
-        behind,
-        near,
-        touches,
-        constants,
-        contact,
-        faces,
-        rotation,
-        normal,
-        scratch,
-        k[0],
-    )
-    for stage in range(1, 4):
-        part_s = step_s if stage == 3 else 0.5 * step_s
+    k, trial = scratch.slopes, scratch.trial
+    for stage in range(4):
+        part_s = 0.0 if stage == 0 else step_s if stage == 3 else 0.5 * step_s
         for i in range(BODY_SIZE):
-            trial[i] = body[i] + part_s * k[stage - 1, i]
+            trial[i] = body[i] + part_s * k[max(stage - 1, 0), i]
         derivative(
             trial,
             thrusts_n,
@@ -130,8 +113,8 @@ def runge_kutta_step(
             constants,
             contact,
             faces,
-            turned,
-            tried,
+            scratch.rotation if stage == 0 else scratch.turned,
+            forces[0] if stage == 0 else forces[1],
             scratch,
             k[stage],
         )
