@@ -45,6 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_fly(commands)
     _add_sim(commands)
     _add_results(commands)
+    _add_paper(commands)
     _add_airframe(commands)
     _add_identify(commands)
     return parser
@@ -140,6 +141,24 @@ def _add_results(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     results.set_defaults(run=_results)
 
 
+def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    paper = commands.add_parser(
+        "paper",
+        help="fly the paper's studies and write figures and table",
+        description="The paper's figures and numbers beside ours, flown in lockstep; see docs/paper.md.",
+    )
+    paper.add_argument(
+        "--out",
+        type=Path,
+        default=Path("docs"),
+        metavar="DIR",
+        help="folder of paper.md and images/paper (default: docs)",
+    )
+    paper.add_argument("--seeds", type=_count, default=6, help="flights for each speed and airframe (default 6)")
+    paper.add_argument("--jobs", type=_count, default=2, help="processes at a time (default 2)")
+    paper.set_defaults(run=_paper)
+
+
 def _add_airframe(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     airframe = commands.add_parser(
         "airframe",
@@ -213,6 +232,12 @@ def _results(options: argparse.Namespace) -> int:
     return run_results(options)
 
 
+def _paper(options: argparse.Namespace) -> int:
+    from rebound_cli.paper.command import run_paper
+
+    return run_paper(options)
+
+
 def _with_plain_sim(arguments: Sequence[str]) -> list[str]:
     """`--sim` stands alone before a mission's name too, which argparse would take for its value."""
     following = [*arguments[1:], ""]
@@ -237,6 +262,12 @@ def _identify(options: argparse.Namespace) -> int:
 def _port(text: str) -> int:
     if not text.isdigit() or int(text) > 65_535:
         raise argparse.ArgumentTypeError(f"{text!r} is not a port: give a number from 0 to 65535")
+    return int(text)
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a count: give a whole number from 1 on")
     return int(text)
 
 

@@ -21,6 +21,8 @@ ACK_TIMEOUT_US = 500_000
 CONFIRMATION_TIMEOUT_US = 2_500_000
 # A temporary refusal (a check still failing) is worth asking about once a second, PX4's own rhythm of checks.
 REFUSAL_PAUSE_US = 1_000_000
+# Answers that promise an effect.
+TAKEN_UP = (CommandResult.ACCEPTED, CommandResult.IN_PROGRESS)
 # Five lost or refused in a row are no accident.
 ATTEMPTS = 5
 
@@ -37,11 +39,15 @@ class Pending:
 
 @dataclass(frozen=True, slots=True)
 class CommandOutcome:
-    """How it ended; `text` names the command and, when it failed, the vehicle's last answer."""
+    """How it ended; `text` names the command and, when it failed, the vehicle's last answer.
+
+    `refused`: it failed and the last that the vehicle said was no, rather than nothing.
+    """
 
     command: VehicleCommand
     succeeded: bool
     text: str
+    refused: bool = False
 
 
 def describe(command: VehicleCommand) -> str:
@@ -120,9 +126,10 @@ class Commander:
 
     def _end(self, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
         assert self._pending is not None
-        command = self._pending.command
+        command, last_result = self._pending.command, self._pending.last_result
         self._pending = None
-        return None, CommandOutcome(command, succeeded, f"{describe(command)}: {text}")
+        refused = not succeeded and last_result is not None and last_result not in TAKEN_UP
+        return None, CommandOutcome(command, succeeded, f"{describe(command)}: {text}", refused)
 
 
 def _answered(pending: Pending, result: CommandResult, now_us: int) -> Pending:
@@ -137,6 +144,6 @@ def _answered(pending: Pending, result: CommandResult, now_us: int) -> Pending:
 def _why_given_up(pending: Pending) -> str:
     if pending.last_result is None:
         return f"no answer to {pending.attempts} attempts"
-    if pending.last_result in (CommandResult.ACCEPTED, CommandResult.IN_PROGRESS):
+    if pending.last_result in TAKEN_UP:
         return f"answered {pending.last_result.name} but never took effect, {pending.attempts} attempts"
     return f"the vehicle answered {pending.last_result.name} to {pending.attempts} attempts"

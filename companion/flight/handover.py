@@ -21,8 +21,9 @@ class LetGo:
 class HandOver:
     """Disarm if the climb has not begun, then request the mode; setpoints go on until it is seen to hold.
 
-    Whoever else takes the vehicle meanwhile may have it. When the commander gives up (about 2.5 s without an
-    answer) the setpoints stop all the same, and PX4's own loss-of-offboard action takes over.
+    Whoever else takes the vehicle meanwhile may have it. A vehicle that refuses to hold is asked to land. When the
+    commander gives up (about 2.5 s without an answer) the setpoints stop all the same, and PX4's own
+    loss-of-offboard action takes over.
     """
 
     def __init__(self, flight: FlightContext) -> None:
@@ -51,10 +52,17 @@ class HandOver:
             flight.commander.begin(SetMode(self._mode))
             inputs = Inputs()
         outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
-        if outcome is not None:
-            if outcome.succeeded:
-                flight.tell(now_us, "mode", f"handed over to {mode_name(self._mode)}")
-            self._finish(flight)
+        if outcome is None:
+            return None
+        if outcome.succeeded:
+            flight.tell(now_us, "mode", f"handed over to {mode_name(self._mode)}")
+        elif outcome.refused and self._mode == AUTO_LOITER:
+            # PX4 holds only with a global position; without one (motion capture alone) it still lands.
+            self._mode = AUTO_LAND
+            flight.tell(now_us, "mode", "the vehicle does not hold: asking it to land")
+            flight.commander.begin(SetMode(self._mode))
+            return None
+        self._finish(flight)
         return None
 
     def _taken_by_another(self, flight: FlightContext, now_us: int) -> bool:

@@ -77,6 +77,8 @@ class ArmHit:
     hit: Hit
     time_s: Floats
     fold_m: Floats
+    speed_m_s: Floats
+    """Into the wall."""
 
 
 def head_on(airframe: Airframe, speed_m_s: float) -> ArmHit:
@@ -92,7 +94,8 @@ def head_on(airframe: Airframe, speed_m_s: float) -> ArmHit:
     for _ in range(round((GAP_M / speed_m_s + AFTER_S) * 1e6 / plant.interval_us)):
         plant.step(None, armed=False)
     hit, series = plant.truth.hits[0], plant.truth.series()
-    return ArmHit(hit, 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us), series["arm_fold_m"].max(axis=1))
+    time_s = 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us)
+    return ArmHit(hit, time_s, series["arm_fold_m"].max(axis=1), series["velocity_ned_m_s"][:, 0])
 
 
 def flights(seeds: int) -> list[Flight]:
@@ -138,7 +141,9 @@ def conclude(results: Sequence[Result]) -> Findings:
             0.02,
         ),
     )
-    return Findings("Parameter identification", rows, _text(ours, arms.hysteresis_m), {"arm.png": _figure(single, arms)})
+    return Findings(
+        "Parameter identification", rows, _text(ours, arms.hysteresis_m), {"arm.png": _figure(single, arms)}
+    )
 
 
 def fold_when_leaving_at(response: SpringResponse, speed_m_s: float) -> float:
@@ -168,7 +173,7 @@ The paper's rebound does not follow from its eq. 2 in the way that it says. At 1
 |---|---:|---:|---:|
 | force zero (ours) | {response.force_free_s:.3f} s | {-at_free_m_s:.2f} m/s | {-at_free_m_s / IMPACT_M_S:.2f} |
 | l = δl = {1e3 * hysteresis_m:g} mm | {held:.3f} s | {-at_held_m_s:.2f} m/s | {-at_held_m_s / IMPACT_M_S:.2f} |
-| l = 0, as section III-B.1 has it | {response.half_period_s:.3f} s | {-at_zero_m_s:.2f} m/s | {-at_zero_m_s / IMPACT_M_S:.2f} |
+| l = 0, section III-B.1 | {response.half_period_s:.3f} s | {-at_zero_m_s:.2f} m/s | {-at_zero_m_s / IMPACT_M_S:.2f} |
 | as the paper states it | | {REBOUND_M_S:.2f} m/s | {REBOUND_M_S / IMPACT_M_S:.2f} |
 
 0.28 m/s at l = δl would take δl = {1e3 * needed_m:.0f} mm. The force's zero is the nearest of the three, and the only
@@ -183,7 +188,11 @@ def _figure(single: ArmHit, arms: Any) -> Any:
     time_s = np.linspace(0.0, response.half_period_s, 400)
     pushed = time_s <= response.force_free_s
     axis.plot(
-        time_s[pushed], 1e3 * response.fold_m(time_s[pushed]), color="tab:orange", linewidth=4, label="eq. 2, wall pushes"
+        time_s[pushed],
+        1e3 * response.fold_m(time_s[pushed]),
+        color="tab:orange",
+        linewidth=4,
+        label="eq. 2, wall pushes",
     )
     axis.plot(
         time_s[~pushed],
@@ -194,7 +203,9 @@ def _figure(single: ArmHit, arms: Any) -> Any:
     )
     axis.plot(single.time_s, 1e3 * single.fold_m, color="tab:blue", marker=".", label="simulated arm")
     axis.axhline(1e3 * arms.fold_max_m, color="0.4", linestyle=":", label=f"stop, l_max = {1e3 * arms.fold_max_m:g} mm")
-    axis.axhline(1e3 * arms.hysteresis_m, color="tab:green", linestyle=":", label=f"δl = {1e3 * arms.hysteresis_m:g} mm")
+    axis.axhline(
+        1e3 * arms.hysteresis_m, color="tab:green", linestyle=":", label=f"δl = {1e3 * arms.hysteresis_m:g} mm"
+    )
     axis.axvline(0.0, color=CONTACT, linewidth=1.1, label="first contact")
     axis.axvline(single.hit.contact_duration_s, color=CONTACT, linewidth=1.1, linestyle="--", label="wall lets go")
     axis.set_xlim(-0.02, AFTER_S)
@@ -202,5 +213,3 @@ def _figure(single: ArmHit, arms: Any) -> Any:
     finish(axis, "", "fold of the arm l [mm]")
     axis.legend(fontsize=8)
     return figure
-
-

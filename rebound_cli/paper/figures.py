@@ -34,7 +34,7 @@ def draw_position(axis: Any, track: Track, title: str, start_s: float = -1.0, en
         target_m = track.targets_m[0]
         axis.axhline(target_m, color=TARGET, linewidth=1.0, label="recovery setpoint (eq. 3)")
     shown = track.place_m[(track.time_s >= start_s) & (track.time_s <= end_s)]
-    low_m = min([float(shown.min()), *track.targets_m[:1]])
+    low_m = min([float(shown.min(initial=track.touch_m)), *track.targets_m[:1]])
     axis.set_ylim(low_m - 0.15, max(track.wall_m, float(shown.max())) + 0.25)
     axis.set_xlim(start_s, end_s)
     mark_moments(axis, track)
@@ -67,7 +67,11 @@ def mark_moments(axis: Any, track: Track) -> None:
     if track.detections_s:
         late_ms = 1e3 * track.detections_s[0]
         axis.axvline(
-            track.detections_s[0], color=DETECTED, linewidth=1.1, linestyle="--", label=f"hit detected, {late_ms:.1f} ms"
+            track.detections_s[0],
+            color=DETECTED,
+            linewidth=1.1,
+            linestyle="--",
+            label=f"hit detected, {late_ms:.1f} ms",
         )
     low, high = axis.get_xlim()
     further = [time_s for time_s in track.contacts_s[NAMED_CONTACTS:] if low <= time_s <= high]

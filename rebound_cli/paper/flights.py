@@ -29,6 +29,8 @@ DETECTOR, LAW, GAMMA_S = "lateral", "paper", 0.5
 
 # What is kept of a flight that is to be drawn, around its first contact.
 TRACK_BEFORE_S, TRACK_AFTER_S = 2.0, 8.0
+# The hit turns the vehicle, the attitude loop turns it back: all of that is over within a second.
+LEAN_LOOKED_AT_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,11 @@ class Contact:
     def is_detected(self) -> bool:
         return self.latency_s is not None
 
+    @property
+    def is_approach(self) -> bool:
+        """Whether the centre moved towards the wall at the first touch; a swinging guard touches while it leaves."""
+        return float(np.dot(self.hit.impact_velocity_ned_m_s, self.hit.normal_ned)) < 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Track:
@@ -76,7 +83,6 @@ class Track:
     place_m: Floats
     speed_m_s: Floats
     fold_m: Floats
-    tilt_rad: Floats
     setpoint_at_s: Floats
     setpoint_m: Floats
     touch_m: float
@@ -99,12 +105,18 @@ class Result:
     false_detections: int
     imu_received_hz: float
     integration_interval_us: int
-    greatest_tilt_rad: float
+    greatest_lean_rad: float
+    """Of the thrust towards the wall in the second after the first touch: what presses the vehicle back on."""
     track: Track | None
 
     @property
     def first(self) -> Contact:
         return self.contacts[0]
+
+    @property
+    def came_back(self) -> bool:
+        """Whether a second hit was one: the vehicle moved towards the wall again before it had recovered."""
+        return self.recontacts > 0 and any(contact.is_approach for contact in self.contacts[1:])
 
     @property
     def overshoots_m(self) -> list[float]:
@@ -135,7 +147,7 @@ def fly(flight: Flight) -> Result:
         false_detections=matches.false_detections,
         imu_received_hz=flown.report.stream_rates_hz["HIGHRES_IMU"],
         integration_interval_us=interval_us,
-        greatest_tilt_rad=float(_tilt_rad(flown.truth).max()),
+        greatest_lean_rad=_greatest_lean_rad(flown.truth),
         track=_track(flown, flown.truth, log, scene) if flight.is_drawn and flown.truth.hits else None,
     )
 
@@ -173,12 +185,14 @@ def share_received(sample_times_boot_us: Floats, interval_us: int, hit: Hit) -> 
     return float(np.clip(covered, 0.0, None).sum() / max(end - start, 1.0))
 
 
-def _tilt_rad(truth: FlightTruth) -> Floats:
-    """Angle between the thrust and the vertical."""
-    attitude = truth.series["attitude_wxyz"]
-    upright = 1.0 - 2.0 * (attitude[:, 1] ** 2 + attitude[:, 2] ** 2)
-    tilt: Floats = np.arccos(np.clip(upright, -1.0, 1.0))
-    return tilt
+def _greatest_lean_rad(truth: FlightTruth) -> float:
+    if not truth.hits:
+        return 0.0
+    hit = truth.hits[0]
+    since_s = 1e-6 * (truth.series["time_boot_us"] - hit.contact_at_boot_us)
+    w, x, y, z = truth.series["attitude_wxyz"][(since_s >= 0.0) & (since_s <= LEAN_LOOKED_AT_S)].T
+    thrust_ned = -np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+    return float(np.arcsin(np.clip(-np.array(hit.normal_ned) @ thrust_ned, -1.0, 1.0)).max())
 
 
 def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Track:
@@ -204,7 +218,6 @@ def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Tr
         place_m=(truth.series["position_ned_m"][kept] - origin) @ into_wall,
         speed_m_s=truth.series["velocity_ned_m_s"][kept] @ into_wall,
         fold_m=truth.series["arm_fold_m"][kept],
-        tilt_rad=_tilt_rad(truth)[kept],
         setpoint_at_s=setpoint_at_s[asked],
         setpoint_m=(log.setpoint_ned_m[asked] - origin) @ into_wall,
         touch_m=place_m(hit.contact_position_ned_m),

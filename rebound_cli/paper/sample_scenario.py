@@ -4,10 +4,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from rebound_cli.inputs import load_mission_document
 from rebound_cli.paper.approach import pinned
-from rebound_cli.paper.figures import add_legend, draw_fold, draw_position, draw_velocity, finish, mark_moments, new_figure
+from rebound_cli.paper.figures import (
+    add_legend,
+    draw_fold,
+    draw_position,
+    draw_velocity,
+    finish,
+    mark_moments,
+    new_figure,
+)
 from rebound_cli.paper.flights import GAMMA_S, Flight, Result, Track
 from rebound_cli.paper.study import Findings, sampling_text
 from rebound_cli.paper.table import Row, around
@@ -74,7 +83,7 @@ def _rows(result: Result, track: Track) -> tuple[Row, ...]:
     )
 
 
-def _figure(track: Track) -> object:
+def _figure(track: Track) -> Figure:
     figure, axes = new_figure(2, 2, "The paper's sample scenario: wall 0.3 m ahead, target 2 m ahead")
     draw_position(axes[0, 0], track, "b: position", -0.5, 3.0)
     draw_velocity(axes[0, 1], track, "c: velocity", -0.5, 3.0)

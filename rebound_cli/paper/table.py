@@ -47,6 +47,14 @@ def around(claim: str, paper: str, expected: float, ours: float, unit: str, shar
     return Row(claim, paper, ours, unit, expected - margin, expected + margin, note)
 
 
+def within_factor(
+    claim: str, paper: str, expected: float, ours: float, unit: str, factor: float, note: str = ""
+) -> Row:
+    """A row for a number that the paper gives in round figures ("≈") and without saying how it was measured."""
+    assert 1.0 < factor < 2.0, "a factor of two would pass"
+    return Row(claim, paper, ours, unit, expected / factor, expected * factor, note)
+
+
 def at_most(claim: str, paper: str, high: float, ours: float, unit: str, note: str = "") -> Row:
     return Row(claim, paper, ours, unit, None, high, note)
 

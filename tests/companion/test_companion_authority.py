@@ -152,6 +152,23 @@ def test_a_vehicle_that_does_not_answer_the_hand_over_is_left_to_its_own_failsaf
     assert_silent_from_now(f)
 
 
+def test_a_vehicle_that_refuses_to_hold_is_asked_to_land():
+    """As PX4 does without a global position: ACCEPTED by the receiver, then the commander's refusal."""
+    f = flying_in("mission")
+
+    def asks_to_hold() -> bool:
+        message = f.vehicle.commands[-1][1]
+        return message.command == 176 and int(message.param2) << 16 | int(message.param3) << 24 == LOITER
+
+    f.vehicle.ack = lambda command, count: [0, 1] if asks_to_hold() else [0]
+    f.vehicle.obey = lambda command, count: not asks_to_hold()
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(8.0)
+    assert f.vehicle.mode == LAND
+    assert [e for e in f.events if "asking it to land" in e.text]
+    assert f.companion.report().outcome == "aborted"
+
+
 def test_a_pilot_who_takes_over_during_the_hand_over_keeps_the_vehicle():
     f = flying_in("mission")
     f.vehicle.deaf = True

@@ -98,7 +98,9 @@ def test_a_simulators_port_that_is_taken_is_one_sentence(tmp_path):
     assert f"TCP port {SIMULATOR_PORT} is in use" in sentence
 
 
-@pytest.mark.parametrize("arguments", [("--speed", "-1"), ("--speed", "fast"), ("--sensor-rate", "333"), ("--autopilot", "apm")])
+@pytest.mark.parametrize(
+    "arguments", [("--speed", "-1"), ("--speed", "fast"), ("--sensor-rate", "333"), ("--autopilot", "apm")]
+)
 def test_options_that_make_no_sense_are_refused(arguments):
     result = run("sim", *arguments)
     assert result.returncode == 2

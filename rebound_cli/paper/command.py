@@ -1,0 +1,112 @@
+"""`rebound paper`: flies every study and writes pictures, table and the result section of docs/paper.md."""
+
+import multiprocessing
+import re
+from argparse import Namespace
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import ModuleType
+
+from rebound_cli import __version__
+from rebound_cli.paper import (
+    arm,
+    causes,
+    claims,
+    directions,
+    flight_tests,
+    imu_rate,
+    sample_scenario,
+    simulation_experiment,
+)
+from rebound_cli.paper.flights import Flight, Result, fly
+from rebound_cli.paper.study import Findings
+from rebound_cli.paper.table import Row, rows_text
+from rebound_cli.progress import with_progress
+
+STUDIES: tuple[ModuleType, ...] = (
+    arm,
+    sample_scenario,
+    simulation_experiment,
+    flight_tests,
+    causes,
+    directions,
+    imu_rate,
+    claims,
+)
+
+DOCUMENT_NAME, PICTURES_FOLDER = "paper.md", Path("images") / "paper"
+START_MARK, END_MARK = "<!-- generated: paper results -->", "<!-- end -->"
+
+
+def run_paper(options: Namespace) -> int:
+    """Fly everything and write it. 0 when it is written, whatever it says."""
+    planned = [study.flights(options.seeds) for study in STUDIES]
+    results = _fly_all([flight for flights in planned for flight in flights], options.jobs)
+    findings, first = [], 0
+    for study, flights in zip(STUDIES, planned, strict=True):
+        findings.append(study.conclude(results[first : first + len(flights)]))
+        first += len(flights)
+    write(options.out, findings, options.seeds)
+    rows = [row for found in findings for row in found.rows]
+    print(verdict_text(rows))
+    print(f"Written to {options.out / DOCUMENT_NAME} and {options.out / PICTURES_FOLDER}.")
+    return 0
+
+
+def _fly_all(flights: Sequence[Flight], jobs: int) -> list[Result]:
+    """The results in the order of the flights, whichever is flown first."""
+    # Compiled kernels are in the cache after one flight; two processes would compile them twice.
+    results = [fly(flights[0])]
+    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+        rest: Iterable[Result] = pool.imap(fly, flights[1:])
+        results.extend(with_progress(rest, len(flights) - 1))
+    return results
+
+
+def verdict_text(rows: Sequence[Row]) -> str:
+    """How many rows agree, and which do not."""
+    judged = [row for row in rows if row.is_judged]
+    differing = [row for row in judged if not row.agrees]
+    lines = [f"{len(judged) - len(differing)} of {len(judged)} of the paper's numbers agree with ours."]
+    lines += [f"  differs: {row.claim}: paper {row.paper}, ours {row.ours:.3g} {row.unit}" for row in differing]
+    return "\n".join(lines)
+
+
+def write(folder: Path, findings: Sequence[Findings], seeds: int) -> None:
+    """Pictures beside the document; its result section made anew, the rest left as it is."""
+    pictures = folder / PICTURES_FOLDER
+    pictures.mkdir(parents=True, exist_ok=True)
+    for found in findings:
+        for name, figure in found.pictures.items():
+            figure.savefig(pictures / name)
+    path = folder / DOCUMENT_NAME
+    before = path.read_text(encoding="utf-8") if path.exists() else f"# Results\n\n{START_MARK}\n{END_MARK}\n"
+    path.write_text(with_results(before, results_text(findings, seeds)), encoding="utf-8")
+
+
+def with_results(document: str, results: str) -> str:
+    """The document with what stands between its marks made anew; raises ValueError where there are none."""
+    marked = re.compile(rf"({re.escape(START_MARK)}\n).*?({re.escape(END_MARK)})", re.DOTALL)
+    text, found = marked.subn(lambda match: match[1] + results + match[2], document)
+    if found != 1:
+        raise ValueError(f"the document has {found} places for the results, not one")
+    return text
+
+
+def results_text(findings: Sequence[Findings], seeds: int) -> str:
+    """Markdown: the table of all rows first, then each study."""
+    rows = [row for found in findings for row in found.rows]
+    differing = [row for row in rows if row.is_judged and not row.agrees]
+    option = "" if seeds == DEFAULT_SEEDS else f" --seeds {seeds}"
+    parts = [
+        f"Written by `rebound paper{option}` (version {__version__}). Detector `lateral`, law `paper`, γ = 0.5.\n",
+        f"{sum(row.is_judged for row in rows)} rows have a verdict; {len(differing)} differ, each with its reason in "
+        "the remark or in its study below.\n",
+    ]
+    parts += [f"### Table: {found.title}\n\n{rows_text(found.rows)}" for found in findings]
+    parts += [f"## {found.title}\n\n{found.text}" for found in findings]
+    return "\n" + "\n".join(parts) + "\n"
+
+
+# Chosen so that all of it takes less than five minutes on two cores.
+DEFAULT_SEEDS = 6

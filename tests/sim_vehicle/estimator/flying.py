@@ -1,0 +1,143 @@
+"""A vehicle that flies by its own filter, and how wrong the filter is."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.estimator.onboard import OnboardEstimator
+from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.scene import Scene
+from sim_vehicle.setpoint import TrajectorySetpoint
+
+Floats = npt.NDArray[np.float64]
+
+HEIGHT_M = 1.5
+STEP_S = 0.004
+WITH_CAMERAS = {"sensors": {"motion_capture": {"fitted": True}}}
+
+
+def filtered(base: str = "foldable", changes: dict[str, Any] | None = None) -> Airframe:
+    """A built-in airframe with its filter on."""
+    data = load_built_in(base).model_dump()
+    _lay_over(data, {"estimate": {"kind": "ekf"}})
+    _lay_over(data, changes or {})
+    return Airframe.model_validate(data)
+
+
+def _lay_over(data: dict[str, Any], changes: dict[str, Any]) -> None:
+    for key, value in changes.items():
+        if isinstance(value, dict):
+            _lay_over(data[key], value)
+        else:
+            data[key] = value
+
+
+class Flight:
+    """Two seconds on the ground, then whatever is asked."""
+
+    def __init__(self, airframe: Airframe, seed: int = 1, scene: Scene | None = None) -> None:
+        self.plant = Plant(airframe, scene or Scene(), seed)
+        self.output: PlantOutput
+        for _ in range(500):
+            self.output = self.plant.step(None, armed=False)
+
+    @property
+    def onboard(self) -> OnboardEstimator:
+        assert self.plant.onboard is not None
+        return self.plant.onboard
+
+    @property
+    def velocity_error_m_s(self) -> Floats:
+        return np.array(self.output.velocity_ned_m_s) - self.plant.state.body[3:6]
+
+    @property
+    def position_error_m(self) -> Floats:
+        return np.array(self.output.position_ned_m) - self.plant.state.body[0:3]
+
+    def fly(self, setpoint: TrajectorySetpoint, seconds: float) -> Floats:
+        """Fly the setpoint; velocity errors (n, 3)."""
+        errors = []
+        for _ in range(round(seconds / STEP_S)):
+            self.output = self.plant.step(setpoint, armed=True)
+            errors.append(self.velocity_error_m_s)
+        return np.array(errors)
+
+    def fly_along(self, setpoint_at: Callable[[float], TrajectorySetpoint], seconds: float) -> Floats:
+        """The same with a setpoint of time since the start of the call."""
+        errors = [self.fly(setpoint_at(STEP_S * n), STEP_S) for n in range(round(seconds / STEP_S))]
+        return np.concatenate(errors)
+
+    def climb(self) -> None:
+        """To `HEIGHT_M`, and still there."""
+        self.fly(HOVER, 6.0)
+
+    def forget_innovations(self) -> None:
+        self.onboard.filter.innovations.clear()
+
+
+HOVER = TrajectorySetpoint(position_ned_m=(0.0, 0.0, -HEIGHT_M), yaw_rad=0.0)
+
+
+def cruise(speed_m_s: float, acceleration_m_s2: float = 2.0) -> Callable[[float], TrajectorySetpoint]:
+    """North at a speed reached with a constant acceleration."""
+
+    def setpoint_at(time_s: float) -> TrajectorySetpoint:
+        speed = min(speed_m_s, acceleration_m_s2 * time_s)
+        return TrajectorySetpoint((None, 0.0, -HEIGHT_M), (speed, None, None), yaw_rad=0.0)
+
+    return setpoint_at
+
+
+def circle(radius_m: float, speed_m_s: float) -> Callable[[float], TrajectorySetpoint]:
+    """Round a circle that begins at the origin, northwards."""
+
+    def setpoint_at(time_s: float) -> TrajectorySetpoint:
+        angle = speed_m_s / radius_m * time_s
+        north, east = radius_m * math.sin(angle), radius_m * (1 - math.cos(angle))
+        velocity = (speed_m_s * math.cos(angle), speed_m_s * math.sin(angle), 0.0)
+        return TrajectorySetpoint((north, east, -HEIGHT_M), velocity, yaw_rad=0.0)
+
+    return setpoint_at
+
+
+@dataclass(frozen=True)
+class HitErrors:
+    """Length of the velocity error, m/s, at the end of the interval of the first touch and so many ms after it."""
+
+    before: float
+    after: dict[int, float]
+    flight: Flight
+
+
+def hit_wall(airframe: Airframe, speed_m_s: float, seed: int, after_ms: tuple[int, ...]) -> HitErrors:
+    """Fly head-on at a wall and, from the touch on, to half a second's way behind it, as the paper's eq. 3."""
+    distance_m = 2 + 0.75 * speed_m_s**2
+    scene = Scene.model_validate({"walls": [{"point_ned_m": [distance_m, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]}]})
+    flight = Flight(airframe, seed, scene)
+    flight.climb()
+    way = cruise(speed_m_s)
+    time_s, before = 0.0, math.nan
+    reach_m = distance_m - airframe.geometry.reach_m * math.cos(math.pi / 4) - 1.0
+    while not _touches(flight):
+        before = float(np.linalg.norm(flight.velocity_error_m_s))
+        last = flight.output
+        flight.fly(way(time_s), STEP_S)
+        time_s += STEP_S
+        assert flight.plant.state.body[0] < reach_m + 2.0, "the wall was passed"
+    v_c, x_c = last.velocity_ned_m_s[0], last.position_ned_m[0]
+    back = TrajectorySetpoint(position_ned_m=(x_c - 0.5 * v_c, 0.0, -HEIGHT_M), yaw_rad=0.0)
+    after, now_ms = {}, 0
+    for moment in sorted(after_ms):
+        flight.fly(back, 1e-3 * (moment - now_ms))
+        now_ms = moment
+        after[moment] = float(np.linalg.norm(flight.velocity_error_m_s))
+    return HitErrors(before, after, flight)
+
+
+def _touches(flight: Flight) -> bool:
+    return bool(flight.plant.state.peak_force_n > 0.0)

@@ -1,0 +1,169 @@
+"""The filter in flight: as good as it says, led astray by a hit that clips, and back."""
+
+import numpy as np
+import pytest
+
+from sim_vehicle.estimator.consistency import Innovations, chi_square
+from tests.sim_vehicle.estimator.flying import HOVER, WITH_CAMERAS, Flight, circle, filtered, hit_wall
+
+
+def rms(errors) -> float:
+    """Root of the mean squared error on one axis, of the horizontal two."""
+    return float(np.sqrt(np.mean(errors[:, :2] ** 2)))
+
+
+@pytest.fixture(scope="module")
+def hover():
+    flight = Flight(filtered())
+    flight.climb()
+    return flight, flight.fly(HOVER, 30.0)
+
+
+# 999 of 1000 runs of a consistent filter lie within.
+NEARLY_ALWAYS = 3.29
+
+
+@pytest.mark.parametrize("name", ["hover", "circle"])
+def test_innovations_are_as_large_as_the_filter_says(name):
+    # Given four flights that hover, or fly a circle of 2 m at 1.5 m/s
+    pooled: dict[str, list[float]] = {}
+    for seed in range(1, 5):
+        flight = Flight(filtered(), seed)
+        flight.climb()
+        way = circle(2.0, 1.5) if name == "circle" else lambda _: HOVER
+        flight.fly_along(way, 4.0)
+        flight.forget_innovations()
+        flight.fly_along(lambda time_s, way=way: way(4.0 + time_s), 12.0)
+        for sensor, innovations in flight.onboard.filter.innovations.items():
+            total = pooled.setdefault(sensor, [0.0, 0.0, 0.0])
+            total[0] += innovations.count * innovations.dimension
+            total[1] += innovations.total
+            total[2] += innovations.rejected
+    # Then each sensor's summed squares are chi-square distributed with as many degrees of freedom as values
+    assert pooled.keys() == {"flow", "range", "heading"}
+    for sensor, (freedom, total_nis, rejected) in pooled.items():
+        low, high = chi_square(int(freedom), -NEARLY_ALWAYS), chi_square(int(freedom), NEARLY_ALWAYS)
+        assert low < total_nis < high, sensor
+        assert rejected <= 0.01 * freedom, sensor
+
+
+def test_velocity_on_a_circle_is_within_four_centimetres_per_second():
+    flight = Flight(filtered(), seed=2)
+    flight.climb()
+    assert rms(flight.fly_along(circle(2.0, 1.5), 16.0)) < 0.04
+
+
+def test_velocity_in_hover_is_within_four_centimetres_per_second(hover):
+    _, errors = hover
+    assert rms(errors) < 0.04
+    # and not the truth itself
+    assert rms(errors) > 0.005
+
+
+def test_position_by_flow_drifts_and_by_cameras_does_not(hover):
+    flight, _ = hover
+    drift_m = float(np.hypot(*flight.position_error_m[:2]))
+    assert 0.02 < drift_m < 1.0
+    assert abs(flight.position_error_m[2]) < 0.05
+    seen = Flight(filtered(changes=WITH_CAMERAS))
+    seen.climb()
+    errors = seen.fly(HOVER, 10.0)
+    assert np.linalg.norm(seen.position_error_m) < 0.01
+    assert rms(errors) < 0.015
+
+
+def test_the_filter_finds_the_gyroscopes_bias(hover):
+    flight, _ = hover
+    true = flight.plant._constants.gyroscope_bias_frd_rad_s
+    assert flight.onboard.filter.nominal[10:13] == pytest.approx(true, abs=0.0007)
+
+
+def test_a_hit_on_the_arms_stop_clips_and_flow_brings_the_velocity_back():
+    hit = hit_wall(filtered(), 2.0, seed=1, after_ms=(48, 200, 1000))
+    # Given a hit that the accelerometer could not follow
+    assert hit.flight.output.clipping_counts[0] > 10
+    assert hit.before < 0.1
+    # Then the velocity is wrong by what was clipped, until the next flow samples
+    assert hit.after[48] > 0.3
+    assert hit.after[200] < 0.15
+    assert hit.after[1000] < 0.1
+    assert hit.flight.output.reset_counter == 0
+
+
+def test_a_rigid_hit_is_seen_as_next_to_nothing():
+    hit = hit_wall(filtered("rigid"), 2.0, seed=1, after_ms=(8, 3000))
+    # 3.8 m/s in 1 ms: of that the clipped millisecond shows 0.16
+    assert hit.after[8] > 3.0
+    assert hit.after[3000] < 0.15
+
+
+def test_with_px4s_own_rule_the_velocity_is_reset_to_the_flow_a_second_after_the_hit():
+    airframe = filtered(changes={"estimator": {"clipped_excess_m_s2": 4.9}})
+    hit = hit_wall(airframe, 2.0, seed=1, after_ms=(200, 900, 2000))
+    # Given that so little is allowed for clipping, the gate turns flow down
+    assert hit.after[200] > 0.3
+    assert hit.after[900] > 0.3
+    # Then after a second without it the velocity is reset, and counted
+    assert hit.after[2000] < 0.15
+    assert hit.flight.output.reset_counter >= 1
+
+
+def test_flow_that_comes_back_after_seconds_resets_the_velocity():
+    # Given flow that is lost for 4 s in hover
+    flight = Flight(filtered(changes={"sensors": {"optical_flow": {"lost_between_s": [[9.0, 13.0]]}}}))
+    flight.climb()
+    flight.fly(HOVER, 4.9)
+    assert flight.output.time_boot_us == pytest.approx(12_900_000, abs=4_000)
+    assert flight.output.reset_counter == 0
+    deviation_m_s = flight.onboard.variances()[1] ** 0.5
+    # When it is back
+    flight.fly(HOVER, 0.3)
+    # Then the velocity jumps to it, once, and the filter is sure again
+    assert flight.output.reset_counter == 1
+    assert flight.onboard.variances()[1] ** 0.5 < 0.5 * deviation_m_s
+    assert np.linalg.norm(flight.velocity_error_m_s[:2]) < 0.15
+    flight.fly(HOVER, 3.0)
+    assert flight.output.reset_counter == 1
+
+
+def test_cameras_that_are_turned_down_for_a_second_reset_the_position():
+    # Given a rigid hit seen by cameras alone, by a filter that allows next to nothing for clipping
+    only = {name: {"fitted": False} for name in ("optical_flow", "range_finder", "compass")}
+    changes = {"sensors": {**only, "motion_capture": {"fitted": True}}, "estimator": {"clipped_excess_m_s2": 4.9}}
+    hit = hit_wall(filtered("rigid", changes), 2.0, seed=1, after_ms=(800, 3000))
+    # Then its position runs away from the cameras', which its gate turns down, until it is reset to them
+    assert hit.after[800] > 1.0
+    assert hit.after[3000] < 0.1
+    assert hit.flight.output.reset_counter >= 1
+    assert np.linalg.norm(hit.flight.position_error_m) < 0.02
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not():
+    flights = [Flight(filtered(), seed) for seed in (5, 5, 6)]
+    first, again, other = (flight.fly(HOVER, 3.0) for flight in flights)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_the_truth_does_not_reach_the_filter_but_through_its_sensors():
+    # Given two flights of which one has every aiding sensor lost for good
+    lost = {name: {"lost_between_s": [[0.0, 1e6]]} for name in ("optical_flow", "range_finder", "compass")}
+    blind = Flight(filtered(changes={"sensors": lost}))
+    # When the body is pushed aside and its inertial sensor does not see it
+    before = np.array(blind.output.position_ned_m)
+    blind.plant.state.body[0] += 5.0
+    for _ in range(250):
+        blind.output = blind.plant.step(None, armed=False)
+    # Then the estimate stays where it was
+    assert blind.output.position_ned_m == pytest.approx(before, abs=0.02)
+
+
+def test_chi_square_quantiles():
+    # Tables: 95 % two-sided for 100 degrees of freedom is 74.22 to 129.56
+    assert chi_square(100, -1.95996) == pytest.approx(74.22, rel=2e-3)
+    assert chi_square(100, 1.95996) == pytest.approx(129.56, rel=2e-3)
+    innovations = Innovations(2)
+    for _ in range(50):
+        innovations.add(2.0, accepted=True)
+    assert innovations.mean_per_value == 1.0
+    assert innovations.bounds == pytest.approx((0.7422, 1.2956), rel=2e-3)

@@ -1,0 +1,140 @@
+"""The filter's model: every derivative against small differences, every sign against a case everyone knows."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_vehicle.estimator.strapdown import (
+    D_POSITION,
+    ERROR_ROWS,
+    FLOW,
+    NOMINAL_ROWS,
+    SAMPLE_COLUMNS,
+    advance,
+    correct,
+    down_range,
+    heading,
+    predict_now,
+)
+
+STEP_S = 0.004
+NOISE = np.array([1e-5, 1e-3, 1e-6, 1e-6, 0.1])
+
+
+def tilted() -> np.ndarray:
+    """Some state in flight, none of whose entries is special."""
+    nominal = np.zeros(NOMINAL_ROWS)
+    nominal[0:3] = [1.0, -2.0, -1.7]
+    nominal[3:6] = [1.5, -0.7, 0.3]
+    attitude = np.array([0.95, 0.12, -0.17, 0.21])
+    nominal[6:10] = attitude / np.linalg.norm(attitude)
+    nominal[10:13] = [0.002, -0.001, 0.003]
+    nominal[13:16] = [0.05, -0.03, 0.02]
+    nominal[16:18] = [0.01, -0.02]
+    return nominal
+
+
+def some_sample() -> np.ndarray:
+    sample = np.zeros(SAMPLE_COLUMNS)
+    sample[0:3] = [1.2, -0.8, -11.0]
+    sample[3:6] = [0.6, -0.9, 0.4]
+    return sample
+
+
+def advanced(nominal: np.ndarray, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    after, f, q = nominal.copy(), np.eye(ERROR_ROWS), np.zeros((ERROR_ROWS, ERROR_ROWS))
+    advance(after, sample, STEP_S, NOISE, f, q)
+    return after, f, q
+
+
+def erred(nominal: np.ndarray, row: int, size: float) -> np.ndarray:
+    """The state that is ``size`` of one error away."""
+    error = np.zeros(ERROR_ROWS)
+    error[row] = size
+    moved = nominal.copy()
+    correct(moved, error)
+    return moved
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The error that leads from ``b`` to ``a``."""
+    conjugate = b[6:10] * [1, -1, -1, -1]
+    w, x, y, z = conjugate
+    p, q, r, s = a[6:10]
+    turn = 2 * np.array([w * q + x * p + y * s - z * r, w * r - x * s + y * p + z * q, w * s + x * r - y * q + z * p])
+    return np.concatenate([turn, a[3:6] - b[3:6], a[0:3] - b[0:3], a[10:] - b[10:]])
+
+
+@pytest.mark.parametrize("row", range(ERROR_ROWS))
+def test_the_transition_is_the_derivative_of_the_motion(row: int) -> None:
+    size = 1e-5
+    plus, minus = (advanced(erred(tilted(), row, sign * size), some_sample())[0] for sign in (1, -1))
+    _, f, _ = advanced(tilted(), some_sample())
+    # F is of first order in the step of 4 ms: what it leaves out is of second order.
+    assert difference(plus, minus) / (2 * size) == pytest.approx(f[:, row], abs=2e-4)
+
+
+@pytest.mark.parametrize("measure", [down_range, heading])
+def test_each_measurements_row_is_its_derivative(measure) -> None:
+    row, unused = np.empty(ERROR_ROWS), np.empty(ERROR_ROWS)
+    measure(tilted(), row)
+    for column in range(ERROR_ROWS):
+        plus, minus = (measure(erred(tilted(), column, sign * 1e-6), unused) for sign in (1, -1))
+        assert (plus - minus) / 2e-6 == pytest.approx(row[column], abs=1e-6)
+
+
+def test_a_level_vehicle_that_nothing_pushes_but_its_weight_stays() -> None:
+    nominal, sample = np.zeros(NOMINAL_ROWS), np.zeros(SAMPLE_COLUMNS)
+    nominal[6], nominal[2], sample[2] = 1.0, -2.0, -9.81
+    after, _, _ = advanced(nominal, sample)
+    assert after == pytest.approx(nominal)
+
+
+def test_forward_makes_the_ground_flow_about_right_and_right_about_back() -> None:
+    # Given a vehicle 2 m up, nose north, moving north, then east, at 1 m/s
+    sample = np.zeros(SAMPLE_COLUMNS)
+    sample[2] = -9.81
+    nominal = np.zeros(NOMINAL_ROWS)
+    nominal[6], nominal[2] = 1.0, -2.0
+    for axis, expected in ((3, (0.0, 0.5)), (4, (-0.5, 0.0))):
+        moving = nominal.copy()
+        moving[axis] = 1.0
+        # Then the flow over one step is speed over height, about the axis that OPTICAL_FLOW_RAD says
+        after, _, _ = advanced(moving, sample)
+        assert after[FLOW : FLOW + 2] / STEP_S == pytest.approx(expected)
+
+
+def test_a_tilted_beam_is_longer_and_the_heading_is_clockwise_from_north() -> None:
+    nominal, row = np.zeros(NOMINAL_ROWS), np.empty(ERROR_ROWS)
+    nominal[2] = -2.0
+    nominal[6:10] = [math.cos(0.15), math.sin(0.15), 0.0, 0.0]
+    assert down_range(nominal, row) == pytest.approx(2.0 / math.cos(0.3))
+    assert row[D_POSITION + 2] < 0
+    nominal[6:10] = [math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]
+    assert heading(nominal, row) == pytest.approx(math.pi / 2)
+
+
+def test_clipping_opens_the_velocity_along_the_clipped_axis_only() -> None:
+    # Given a vehicle whose nose points east, and ten raw samples clipped along its nose
+    nominal, sample = np.zeros(NOMINAL_ROWS), np.zeros(SAMPLE_COLUMNS)
+    nominal[2], nominal[6:10] = -2.0, [math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]
+    sample[2], sample[6] = -9.81, 10
+    _, _, q = advanced(nominal, sample)
+    # Then the east velocity may have lost ten times what one may lose, the others nothing
+    assert math.sqrt(q[4, 4]) == pytest.approx(1.0, rel=1e-3)
+    assert math.sqrt(q[3, 3]) == pytest.approx(1e-3, rel=1e-3)
+    assert math.sqrt(q[5, 5]) == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_the_output_predictor_brings_the_state_through_the_samples_not_used_yet() -> None:
+    # Given a filter three samples behind, and a ring in which the oldest row is the one it used last
+    samples = np.tile(some_sample(), (4, 1))
+    samples[:, 0] = [0.5, 1.0, 1.5, 2.0]
+    now, expected = np.empty(NOMINAL_ROWS + 3), tilted()
+    # When its state is carried to now
+    predict_now(tilted(), samples, 1, STEP_S, now)
+    # Then it is where the filter will be once it has used them, in order
+    for row in (2, 3, 0):
+        expected, _, _ = advanced(expected, samples[row])
+    assert now[:10] == pytest.approx(expected[:10], abs=1e-12)
