@@ -42,6 +42,7 @@ class CollisionRecord:
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     settled_at_boot_us: int | None = None
+    is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 

@@ -10,7 +10,7 @@ from companion.flight.collision import CollisionRecord, horizontal_unit
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.states import Trigger
 from companion.messages import Quaternion
-from companion.recovery.envelope import Envelope
+from companion.recovery.envelope import Envelope, away_from_both
 from companion.recovery.interface import Contact
 from companion.recovery.registry import RECOVERY_LAWS
 
@@ -44,11 +44,12 @@ class Recover:
             record.follow_recovery(sample)
             since_us = self._monitor.settled_since(sample)
             if since_us is not None:
-                record.settled_at_boot_us = since_us
+                record.settled_at_boot_us, record.is_over = since_us, True
                 flight.tell(now_us, "recovered", _recovered_text(record), settled_after_s=record.settled_after_s())
                 return Move(AFTERWARDS[flight.mission.on_collision.then])
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._started_us > timeout_s * 1e6:
+            record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.tell(now_us, "recovered", text, settled_after_s=None)
             return Move(AFTERWARDS[flight.mission.on_collision.then])
@@ -65,7 +66,11 @@ def record_collision(flight: FlightContext, impact: Impact, now_us: int) -> None
     law = RECOVERY_LAWS[mission.recovery.law](mission.recovery)
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
     fence = Envelope(flight.origin_ned_m, mission.fence.radius_m, mission.fence.max_height_m)
-    setpoint = fence.clamp(contact.position_ned_m, law.setpoint_ned_m(contact))
+    wanted = law.setpoint_ned_m(contact)
+    if flight.collisions and not flight.collisions[-1].is_over:
+        earlier = flight.collisions[-1]
+        wanted = away_from_both(wanted, normal, earlier.setpoint_ned_m, earlier.normal_ned)
+    setpoint = fence.clamp(contact.position_ned_m, wanted)
     strength = math.hypot(*impact.specific_force_frd_m_s2)
     record = CollisionRecord(
         detected_at_us=now_us,

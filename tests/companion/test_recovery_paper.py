@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.recovery.envelope import Envelope
+from companion.recovery.envelope import Envelope, away_from_both
 from companion.recovery.interface import Contact, RecoveryConfig
 from companion.recovery.paper import PaperLaw
 
@@ -55,3 +55,25 @@ def test_a_contact_outside_the_fence_is_answered_with_the_nearest_place_inside()
 
 def test_height_is_limited_from_the_arming_position():
     assert FENCE.clamp((10.0, 0.0, -5.0), (10.0, 0.0, -5.0))[2] == -4.0
+
+
+NORTH_WALL, EAST_WALL = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)
+
+
+def test_in_a_corner_the_second_setpoint_leads_out_of_both_walls():
+    """Leaving the north wall at 0.4 m/s when the east wall is hit at 1.4: back along the approach is north again."""
+    first = (2.0, 2.1, -1.5)
+    law = PaperLaw(RecoveryConfig(gamma=0.5))
+    second = law.setpoint_ned_m(Contact(0, (2.7, 2.8, -1.5), (-0.4, 1.4, 0.0), EAST_WALL))
+    assert second[0] > 2.7, "alone, it would lead back into the north wall"
+
+    assert away_from_both(second, EAST_WALL, first, NORTH_WALL) == pytest.approx((2.0, 2.1, -1.5))
+
+
+def test_a_setpoint_that_is_far_enough_from_the_first_wall_stays():
+    assert away_from_both((1.0, 2.0, -1.5), EAST_WALL, (1.5, 2.0, -1.5), NORTH_WALL) == (1.0, 2.0, -1.5)
+
+
+def test_between_walls_that_face_each_other_only_the_last_hit_counts():
+    south_wall = (1.0, 0.0, 0.0)
+    assert away_from_both((1.0, 0.0, -1.5), south_wall, (0.2, 0.0, -1.5), NORTH_WALL) == (1.0, 0.0, -1.5)
