@@ -154,7 +154,9 @@ def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         metavar="DIR",
         help="folder of paper.md and images/paper (default: docs)",
     )
-    paper.add_argument("--seeds", type=_count, default=6, help="flights for each speed and airframe (default 6)")
+    paper.add_argument(
+        "--seeds", type=_count, default=10, help="walls from any side: flights at each speed (default 10)"
+    )
     paper.add_argument("--jobs", type=_count, default=2, help="processes at a time (default 2)")
     paper.set_defaults(run=_paper)
 

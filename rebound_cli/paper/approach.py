@@ -31,17 +31,22 @@ def approach(
     heading_deg: float = 0.0,
     height_m: float = HEIGHT_M,
     cruise_s: float = CRUISE_S,
+    slant_deg: float = 0.0,
     companion: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Mission towards `heading_deg` at a wall square to it. The nose stays north: the heading chooses the arms hit."""
+    """Mission towards `heading_deg` at a wall square to it, or turned from there by `slant_deg`.
+
+    The nose stays north: the heading chooses the arms that are hit.
+    """
     north, east = math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))
+    facing = math.radians(heading_deg + 180.0 + slant_deg)
     ramp_m = speed_m_s**2 / (2.0 * ACCELERATION_M_S2)
     wall_m = ramp_m + cruise_s * speed_m_s
     target_m = wall_m + ramp_m + BEHIND_S * speed_m_s
     wall = {
         "name": "wall",
         "point_ned_m": [wall_m * north, wall_m * east, -0.5 * WALL_HEIGHT_M - 0.1],
-        "normal_ned": [-north, -east, 0.0],
+        "normal_ned": [math.cos(facing), math.sin(facing), 0.0],
         "width_m": WALL_WIDTH_M,
         "height_m": WALL_HEIGHT_M,
     }

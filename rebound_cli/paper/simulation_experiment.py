@@ -17,17 +17,14 @@ SIMULATED_AT_M, FLOWN_AT_M = 0.6, 0.4
 # In the experiment the setpoint was 0.95 m away instead of 1.05 m, "attributed to the error" of v_c.
 SETPOINT_ERROR_M = 0.10
 
-LEAST_SEEDS = 8
+SEEDS = 8
 # The paper flies half a metre above the ground; the detector must be on there.
 COMPANION = {"min_detection_height_m": 0.3}
 
 
 def flights(seeds: int) -> list[Flight]:
     mission = approach(SPEED_M_S, height_m=HEIGHT_M, companion=COMPANION)
-    return [
-        Flight(("experiment", seed), mission, "foldable", seed, is_drawn=seed == 1)
-        for seed in range(1, max(seeds, LEAST_SEEDS) + 1)
-    ]
+    return [Flight(("experiment", seed), mission, "foldable", seed, is_drawn=seed == 1) for seed in range(1, SEEDS + 1)]
 
 
 def conclude(results: Sequence[Result]) -> Findings:

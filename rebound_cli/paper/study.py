@@ -21,7 +21,10 @@ class Findings:
 
 
 class Study(Protocol):
-    """Both are called with the number of seeds asked for; the results come in the order of the flights."""
+    """`flights` is told how many seeds are asked for; the results come in the order of the flights.
+
+    Only the study of walls from any side grows with the seeds. The others fly what their pictures and rows need.
+    """
 
     def flights(self, seeds: int) -> list[Flight]: ...
 
