@@ -1,6 +1,7 @@
 """The command `rebound`: reads its arguments and turns expected errors into one sentence."""
 
 import argparse
+import itertools
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -242,10 +243,9 @@ def _paper(options: argparse.Namespace) -> int:
 
 def _with_plain_sim(arguments: Sequence[str]) -> list[str]:
     """`--sim` stands alone before a mission's name too, which argparse would take for its value."""
-    following = [*arguments[1:], ""]
     return [
         "--sim=builtin" if word == "--sim" and after not in SIMULATED_AUTOPILOTS else word
-        for word, after in zip(arguments, following, strict=True)
+        for word, after in itertools.zip_longest(arguments, arguments[1:])
     ]
 
 

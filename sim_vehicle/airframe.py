@@ -30,6 +30,8 @@ class Geometry(_Part):
     """The paper's l_arm: from the hub's edge to the motor's axis."""
     guard_radius_m: Positive
     """Radius of the propeller guard's disc around the motor's axis: the contact point lies on its rim."""
+    guard_height_m: NotNegative
+    """Height of the guard's hoop, half above and half below the arms' plane."""
     hub_solid_radius_m: Positive
     foot_radius_m: Positive
     """Distance of each of the four feet from the centre, under the arms."""

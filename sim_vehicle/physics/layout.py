@@ -41,6 +41,7 @@ class Contact:
     ground_friction: float
     motor_radius_m: float
     guard_radius_m: float
+    guard_half_height_m: float
     hub_radius_m: float
     foot_radius_m: float
     foot_depth_m: float
@@ -201,6 +202,7 @@ def contact_from(airframe: Airframe) -> Contact:
         ground_friction=airframe.surface.ground_friction,
         motor_radius_m=geometry.motor_radius_m,
         guard_radius_m=geometry.guard_radius_m,
+        guard_half_height_m=geometry.guard_height_m / 2,
         hub_radius_m=geometry.hub_solid_radius_m,
         foot_radius_m=geometry.foot_radius_m,
         foot_depth_m=geometry.foot_depth_m,

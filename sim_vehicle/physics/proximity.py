@@ -21,6 +21,8 @@ Ints = npt.NDArray[np.int64]
 
 # Values of `near`, per face: out of reach, within reach, and so close that guards and hub must be looked at.
 FAR, NEAR, CLOSE = range(3)
+# Leaning by this the hoop stands on one edge; less, on both of them in part, as a hoop that gives a little does.
+EDGE_LEAN_RAD = 0.1
 # Room for the travel in one raw interval at any speed the vehicle can fly.
 NEAR_MARGIN_M = 0.01
 
@@ -32,7 +34,8 @@ def contact_point(
     """Write the point's position (NED, m) nearest to or deepest in a face into ``out``; return the share of
     the face's normal that lies in the guard's plane (1 for hub and feet).
 
-    A guard is a disc: its deepest point is on the rim, along the in-plane part of the inward normal.
+    A guard is a hoop: its deepest point is on the rim, along the in-plane part of the inward normal, and on the
+    edge of the hoop that leans into the face.
     """
     share = 1.0
     if point < GUARDS:
@@ -40,11 +43,12 @@ def contact_point(
         for i in range(3):
             axis_dot -= faces[face, FACE_NORMAL + i] * rotation[i, 2]
         share = math.sqrt(max(0.0, 1.0 - axis_dot * axis_dot))
+        edge = contact.guard_half_height_m * min(max(axis_dot / EDGE_LEAN_RAD, -1.0), 1.0)
         for i in range(3):
             arm = rotation[i, 0] * ARM_DIRECTIONS_FRD[point, 0] + rotation[i, 1] * ARM_DIRECTIONS_FRD[point, 1]
             towards = -faces[face, FACE_NORMAL + i] - axis_dot * rotation[i, 2]
             rim = contact.guard_radius_m * towards / share if share > 1e-9 else 0.0
-            out[i] = position[i] + contact.motor_radius_m * arm + rim
+            out[i] = position[i] + contact.motor_radius_m * arm + rim + edge * rotation[i, 2]
     elif point == HUB:
         for i in range(3):
             out[i] = position[i] - contact.hub_radius_m * faces[face, FACE_NORMAL + i]

@@ -92,6 +92,28 @@ def test_the_side_that_is_hit_is_pushed_back(foldable: Airframe) -> None:
     assert body[12] < -0.5
 
 
+@pytest.mark.parametrize("lean_deg", [-6.0, 6.0])
+def test_a_leaning_hoop_touches_with_its_forward_edge(foldable: Airframe, lean_deg: float) -> None:
+    """Leaning 6 degrees, the front of a flat disc is 1.9 cm off the centre's height; the hoop's edge takes back 1.5."""
+
+    def spun(airframe: Airframe) -> float:
+        wall = {"point_ned_m": [2, 0, -3], "normal_ned": [-1, 0, 0]}
+        plant = Plant(airframe, Scene.model_validate({"walls": [wall]}), seed=1)
+        plant.place((1.7, 0.0, -3.0), (2.0, 0.0, 0.0))
+        half = math.radians(lean_deg) / 2
+        plant.state.body[6:10] = [math.cos(half), 0.0, math.sin(half), 0.0]
+        for _ in range(40):
+            plant.step(None, armed=False)
+        assert plant.truth.hits
+        return float(plant.state.body[11])
+
+    smooth = quiet(foldable, surface__guard_friction=0.0)
+    flat = quiet(smooth, geometry__guard_height_m=0.0)
+    # Nose down the front is hit below the centre, which turns the nose further down; nose up the other way.
+    assert math.copysign(1.0, spun(flat)) == math.copysign(1.0, lean_deg)
+    assert abs(spun(smooth)) < 0.5 * abs(spun(flat))
+
+
 def test_a_wall_only_pushes(foldable: Airframe) -> None:
     """Released arms stay folded for a while; nothing draws the vehicle back to the wall."""
     series = throw(foldable, 2.0).plant.truth.series()
