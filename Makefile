@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: fly test check lint types results diagrams clean
+.PHONY: fly test check lint types results paper diagrams clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml --sim
@@ -30,6 +30,9 @@ $(READY): pyproject.toml requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $(READY)
+
+paper: $(READY)
+	$(BIN)/rebound paper --seeds 50
 
 diagrams: $(READY)
 	$(BIN)/python -m rebound_cli.diagrams docs/architecture.md
