@@ -55,7 +55,7 @@ class _Session:
         self._vehicle = vehicle
         self._link = link
         self._tell = tell
-        self._pace = _Pace(speed)
+        self._pace = Pace(speed)
         self._exchange = Exchange()
         self._encoder, self._decoder = HilEncoder(), HilDecoder()
         self._lockstep_from: tuple[int, int] | None = None
@@ -126,7 +126,7 @@ class _Session:
         self._exchange.notices.clear()
 
 
-class _Pace:
+class Pace:
     """Keeps the vehicle's clock on the machine's, times a speed."""
 
     def __init__(self, speed: float) -> None:
