@@ -3,7 +3,6 @@
 import json
 import socket
 import threading
-import time
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
@@ -104,9 +103,7 @@ def assert_failed(result, folder, *words):
 
 def test_no_heartbeat(tmp_path):
     _, fly = fly_without_reply(tmp_path / "run")
-    started_s = time.monotonic()
     assert_failed(fly(), tmp_path / "run", "HEARTBEAT", "1 s")
-    assert time.monotonic() - started_s < 10
 
 
 @pytest.mark.parametrize(
