@@ -208,7 +208,9 @@ def _draw_specific_force(axis: Any, hit: _Hit, log: FlightLog, report: FlightRep
 def _draw_threshold(axis: Any, mission: Mission) -> None:
     if mission.companion.detector == "lateral":
         threshold = mission.companion.lateral.threshold_m_s2
-        axis.axhline(threshold, color=_DETECTED, linewidth=1.0, linestyle=":", label=f"threshold {threshold:g} m/s²")
+        axis.axhline(
+            threshold, color=_DETECTED, linewidth=1.0, linestyle=":", label=f"least threshold, {threshold:g} m/s²"
+        )
 
 
 def _draw_fold(axis: Any, hit: _Hit, report: FlightReport, truth: FlightTruth) -> None:

@@ -19,7 +19,3 @@ class PortInUse(SimulationError):  # noqa: N818 - reads as the sentence it is
 
 class NotInLockstep(SimulationError):  # noqa: N818 - reads as the sentence it is
     """A PX4 that keeps its own time instead of the simulator's."""
-
-
-class TruthFileError(SimulationError):
-    """A truth file that cannot be written or read."""

@@ -1,7 +1,7 @@
 """The `sim:` part of a mission file: which airframe starts where, among which walls, in which wind."""
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -92,8 +92,3 @@ def check_start_is_free(scene: Scene, airframe: Airframe) -> None:
                 f"({distance_m:.2f} m from its centre, which needs {reach_m:.2f} m); "
                 "move the wall or sim.start.position_ned_m"
             )
-
-
-def scene_from(data: dict[str, Any] | None) -> Scene:
-    """Validate the raw `sim:` part; pydantic's ValidationError says what is wrong."""
-    return Scene.model_validate(data or {})

@@ -29,12 +29,12 @@ class Wall:
 
 # Columns of a row of faces: everything that can push, one row each; row 0 is the ground. All NED.
 FACE_POINT, FACE_NORMAL, FACE_ACROSS, FACE_ALONG = 0, 3, 6, 9  # three columns each; the last three unit vectors
-FACE_HALF_WIDTH, FACE_HALF_HEIGHT, FACE_COLUMNS = 12, 13, 14
+FACE_HALF_WIDTH, FACE_HALF_HEIGHT = 12, 13
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The faces (n, FACE_COLUMNS) and, for each, the name of the thing it belongs to."""
+    """The faces (n, 14) and, for each, the name of the thing it belongs to."""
 
     faces: Floats
     names: tuple[str, ...]

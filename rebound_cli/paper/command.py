@@ -5,7 +5,6 @@ import re
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from types import ModuleType
 
 from rebound_cli import __version__
 from rebound_cli.paper import (
@@ -19,11 +18,11 @@ from rebound_cli.paper import (
     simulation_experiment,
 )
 from rebound_cli.paper.flights import Flight, Result, fly
-from rebound_cli.paper.study import Findings
+from rebound_cli.paper.study import Findings, Study
 from rebound_cli.paper.table import Row, rows_text
 from rebound_cli.progress import with_progress
 
-STUDIES: tuple[ModuleType, ...] = (
+STUDIES: tuple[Study, ...] = (
     arm,
     sample_scenario,
     simulation_experiment,

@@ -202,6 +202,24 @@ def test_a_second_hit_is_a_new_collision_with_a_new_setpoint(state):
     assert f.companion.report().outcome == "completed"
 
 
+@pytest.mark.parametrize(("state", "keeps_clear"), [("recovering", True), ("holding", False)])
+def test_a_second_hit_while_recovering_does_not_lead_back_to_the_first_wall(state, keeps_clear):
+    """Flying back from the north wall when something strikes from the west: eq. 3 alone leads north again."""
+    f = at_wall()
+    f.run_to(state)
+    f.run_for(0.2)
+
+    strike(f, 0.0, 12.0)
+
+    first, second = f.companion.report().collisions
+    alone_m = second.position_ned_m[0] - 0.5 * second.impact_velocity_ned_m_s[0]
+    if keeps_clear:
+        assert alone_m > first.recovery_setpoint_ned_m[0] + 0.1
+        assert second.recovery_setpoint_ned_m[0] == pytest.approx(first.recovery_setpoint_ned_m[0], abs=0.05)
+    else:
+        assert second.recovery_setpoint_ned_m[0] == pytest.approx(alone_m, abs=1e-6)
+
+
 def test_v_c_of_a_second_hit_knows_nothing_from_before_the_first():
     f = at_wall()
     f.run_to("recovering")

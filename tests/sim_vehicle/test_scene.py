@@ -5,12 +5,12 @@ from pydantic import ValidationError
 
 from sim_vehicle.airframe import Airframe, built_in_airframes, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, SceneError
-from sim_vehicle.scene import Scene, check_start_is_free, scene_from
+from sim_vehicle.scene import Scene, check_start_is_free
 
 
 def test_an_empty_part_is_the_foldable_vehicle_alone() -> None:
-    assert scene_from(None) == Scene(airframe="foldable", seed=1)
-    assert scene_from(None).world().names == ("ground",)
+    assert Scene.model_validate({}) == Scene(airframe="foldable", seed=1)
+    assert Scene().world().names == ("ground",)
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ def test_an_empty_part_is_the_foldable_vehicle_alone() -> None:
 )
 def test_bad_parts_are_refused(part: dict[str, object], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
-        scene_from(part)
+        Scene.model_validate(part)
 
 
 @pytest.mark.parametrize(("north_m", "free"), [(0.0, False), (0.2, False), (0.23, True), (2.0, True), (-0.2, False)])

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS
+from sim_vehicle.control.attitude import attitude_control
+from sim_vehicle.physics.layout import (
+    ARM_DIRECTIONS_FRD,
+    ROTOR_YAW_SIGNS,
+    constants_from,
+    gains_from,
+    initial_state,
+)
 from sim_vehicle.physics.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
@@ -50,6 +57,41 @@ def test_a_step_of_the_setpoint_does_not_overshoot() -> None:
     plant = hovering(quiet(load_built_in("foldable")))
     flown(plant, at(1.0, 0, -2), 6)
     assert plant.truth.series()["position_ned_m"][:, 0].max() < 1.02
+
+
+@pytest.mark.parametrize(("yaw_deg", "rate_rad_s"), [(0, 7.0), (160, 0.0), (180, 0.0), (180, 7.0)])
+def test_a_spun_vehicle_still_flies_where_it_should_while_it_turns_back(yaw_deg: float, rate_rad_s: float) -> None:
+    """As an off-centre hit leaves it: moving sideways, its nose far from the asked heading or turning away."""
+    plant = hovering(quiet(load_built_in("foldable")))
+    half = math.radians(yaw_deg) / 2
+    plant.state.body[4] = 1.0
+    plant.state.body[6:10] = [math.cos(half), 0.0, 0.0, math.sin(half)]
+    plant.state.body[12] = rate_rad_s
+    flown(plant, at(-1, 0, -2), 4)
+    position = plant.truth.series()["position_ned_m"][-1000:]
+    assert position[:, 0].min() > -1.05
+    assert np.abs(position[:, 1]).max() < 0.4
+    assert position[:, 2].max() + 2 < 0.1
+
+
+def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
+    """Eq. 5 without errors and damping: tau = W x J W + J' W, whatever J is."""
+    airframe = load_built_in("foldable")
+    constants = constants_from(airframe, (0.0, 0.0, 0.0), np.random.default_rng(1))
+    constants.gyroscope_bias_frd_rad_s[:] = 0.0
+    gains, state = gains_from(airframe), initial_state((0.0, 0.0, -2.0), 0.0)
+    gains.k_omega[:] = 0.0
+    state.body[10:13] = rates = np.array([2.0, -3.0, 5.0])
+    state.inertia[:], state.inertia_rate[:] = [0.0031, 0.0030, 0.0049, 0.0002], [-0.01, -0.02, -0.03, 0.004]
+
+    attitude_control(state, constants, 0.0, gains)
+
+    def full(entries: np.ndarray) -> np.ndarray:
+        xx, yy, zz, xy = entries
+        return np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, zz]])
+
+    expected = np.cross(rates, full(state.inertia) @ rates) + full(state.inertia_rate) @ rates
+    assert state.moment_frd_n_m == pytest.approx(expected)
 
 
 def test_hover_thrust_is_the_stated_share() -> None:
