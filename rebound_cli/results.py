@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from rebound_cli import __version__
+from rebound_cli.documents import Document
 from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.paper.flights import DETECTOR, GAMMA_S, LAW
 from rebound_cli.progress import with_progress
 from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
 from rebound_cli.sensitivity import stop_sensitivity_text
@@ -23,6 +25,8 @@ from rebound_cli.truth_match import match_contacts
 
 MISSION_FILE = Path("missions/wall.yaml")
 SPEED_PATH = "items.1.go_to.speed_m_s"
+# The paper's, whatever the defaults become.
+PINNED = (f"companion.detector={DETECTOR}", f"recovery.law={LAW}", f"recovery.gamma={GAMMA_S}")
 AIRFRAMES = ("foldable", "rigid")
 SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
 
@@ -82,10 +86,15 @@ def run_results(options: Namespace) -> int:
     return 0
 
 
+def case_document(case: Case) -> Document:
+    """The mission of one flight, with the speed and all that is pinned put in."""
+    sets = [f"{SPEED_PATH}={case.speed_m_s}", *PINNED]
+    return load_mission_document(MISSION_FILE, sets, case.airframe, case.seed)
+
+
 def fly_case(case: Case) -> CaseFigures:
     """One lockstep flight with its log on, in a folder of its own that is removed afterwards."""
-    sets = [f"{SPEED_PATH}={case.speed_m_s}"]
-    document = load_mission_document(MISSION_FILE, sets, case.airframe, case.seed)
+    document = case_document(case)
     mission, world = mission_from(document), world_from(document)
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
@@ -135,9 +144,10 @@ Written by `rebound results`{seeds_option} (version {version}, Python {python}, 
 Each row is {seeds} flights of `{mission}`, seeds 1 to {seeds}: whole flights from take-off to landing in
 lockstep, with all MAVLink bytes and the log on. One of them again, with its log, summary and picture:
 
-    rebound fly {mission} --lockstep --airframe foldable --seed 1 --set {path}=2.0
+    rebound fly {mission} --lockstep --airframe foldable --seed 1 --set {path}=2.0 \\
+        --set companion.detector={detector} --set recovery.law={law} --set recovery.gamma={gamma}
 
-Both airframes fly the same missions with the same gain (gamma = 0.5). The contrast:
+Both airframes fly the same missions with the paper's law and gain. The contrast:
 
 - The rigid frame gives back most of the speed it came with, in a millisecond and with ten times the force.
 - A millisecond lies within one `HIGHRES_IMU` sample, and PX4's link loses one in a hundred. If it is that one, the hit
@@ -201,6 +211,9 @@ def results_text(figures: Sequence[CaseFigures], seeds: int) -> str:
             seeds=seeds,
             mission=MISSION_FILE,
             path=SPEED_PATH,
+            detector=DETECTOR,
+            law=LAW,
+            gamma=GAMMA_S,
         )
     ]
     for airframe in AIRFRAMES:

@@ -1,6 +1,12 @@
 """The table of results: what one flight adds to it, and what it says of many."""
 
-from rebound_cli.results import Case, CaseFigures, HitFigures, fly_case, results_text
+from rebound_cli.results import Case, CaseFigures, HitFigures, case_document, fly_case, results_text
+
+
+def test_the_papers_detector_law_and_gain_are_stated_in_every_flight():
+    data = case_document(Case("rigid", 2.5, 7)).data
+    assert data["companion"]["detector"] == "lateral"
+    assert (data["recovery"]["law"], data["recovery"]["gamma"]) == ("paper", 0.5)
 
 
 def test_one_flight_gives_the_figures_of_its_hit():
