@@ -90,8 +90,8 @@ def interval_from_request(interval_us: float) -> int:
     return max(int(np.float32(1_000_000) / rate_hz), 1)
 
 
-class _Stream:
-    """One running or stopped stream."""
+class Stream:
+    """One running or stopped stream: due when `now_us > due_after_us`; then tell it that it was `sent`."""
 
     __slots__ = ("_last_us", "due_after_us", "interval_us", "kind", "seen")
 
@@ -118,6 +118,20 @@ class _Stream:
         self.due_after_us = self._last_us + interval_us - EARLY_US
 
 
+class LateLoops:
+    """The link's loop that now and then comes too late for a sample, which then nobody receives."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._missed_last = False
+
+    def misses_this_one(self) -> bool:
+        """Never two in a row: the gaps that were measured are of one sample."""
+        missed = self._random.random() < MISSED_LOOPS_SHARE and not self._missed_last
+        self._missed_last = missed
+        return missed
+
+
 class Streams:
     """All streams of the one link; packets wait in ``outbox`` until they are taken."""
 
@@ -125,7 +139,7 @@ class Streams:
         self._state = state
         self._encoder = encoder
         self._now_us = state.sample.time_boot_us
-        self._streams = [_Stream(kind, self._now_us) for kind in KINDS]
+        self._streams = [Stream(kind, self._now_us) for kind in KINDS]
         self._by_id = {stream.kind.message_id: stream for stream in self._streams}
         self._running = [stream for stream in self._streams if stream.interval_us >= 0]
         self._versions = [_NEVER_SENT if topic in OPTIONAL else 0 for topic in Topic]
@@ -133,15 +147,14 @@ class Streams:
         self._range: RangeSample | None = None
         self._status: tuple[int, bool, int] | None = None
         self._status_us = self._now_us
-        self._jitter = random.Random(seed)
-        self._missed_last = False
+        self._loops = LateLoops(seed)
         self.outbox: list[bytes] = []
 
     def update(self, new_position: bool) -> None:
         """Send what is due at the newest sample; ``new_position``: the estimator has published."""
         self._now_us = now_us = self._state.sample.time_boot_us
         self._count_topics(now_us, new_position)
-        if self._misses_this_one():
+        if self._loops.misses_this_one():
             return
         versions, outbox = self._versions, self.outbox
         for stream in self._running:
@@ -175,12 +188,6 @@ class Streams:
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[3] += 1
-
-    def _misses_this_one(self) -> bool:
-        """Never two in a row: the gaps that were measured are of one sample."""
-        missed = self._jitter.random() < MISSED_LOOPS_SHARE and not self._missed_last
-        self._missed_last = missed
-        return missed
 
     # --- commands ----------------------------------------------------------------------------------------
 
