@@ -102,7 +102,7 @@ class Companion:
             armed=vehicle.armed is True,
             position_ned_m=None if latest is None else latest.position_ned_m,
             speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
-            detector="blind (no HIGHRES_IMU)" if self._core.imu_silent else self._core.detection.describe(),
+            detector=self._core.watch.describe(),
         )
 
     def report(self) -> FlightReport:

@@ -6,11 +6,11 @@ same outputs, which is what makes a flight replayable.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from companion.detection.interface import Detector, DetectorState, Impact, Phase
-from companion.detection.registry import DETECTORS
-from companion.estimate.history import REBOOT_US
+from companion.detection import watch
+from companion.detection.interface import Situation
+from companion.detection.watch import Watch, start_watch
+from companion.estimate.impact import ImpactEstimate
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.machine import Machine
@@ -21,7 +21,6 @@ from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
     Heartbeat,
-    ImuSample,
     LocalPosition,
     OnboardHeartbeat,
     Outgoing,
@@ -38,8 +37,6 @@ from companion.report import Event
 HEARTBEAT_INTERVAL_US = 1_000_000
 # All timeouts are noticed within this, when nothing arrives.
 POLL_INTERVAL_US = 50_000
-# Ten samples of the slowest acceptable IMU stream: whoever waits longer for one sees no hit.
-IMU_SILENCE_US = 250_000
 
 DETECTING_STATES = frozenset({State.MISSION, State.RECOVERING, State.HOLDING})
 
@@ -55,17 +52,12 @@ class Core:
     """All that is remembered between steps."""
 
     machine: Machine
-    detector: Detector[Any]
-    detection: DetectorState
+    watch: Watch
     started_at_us: int
     now_us: int
     heartbeat_due_us: int
     setpoint_due_us: int
     setpoint_interval_us: int
-    last_imu_boot_us: int = 0
-    last_imu_us: int = 0
-    imu_silent: bool = False
-    detector_told: bool = False
     stop_reason: str | None = None
 
     @property
@@ -76,13 +68,11 @@ class Core:
 def start(mission: Mission, now_us: int) -> Core:
     """A flight before its first step."""
     config = mission.companion
-    averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
-    detector = DETECTORS[config.detector](config.lateral, averaging_us)
-    flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams))
+    watching = start_watch(config, now_us)
+    flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams, tuple(watching.detector.losses)))
     return Core(
         machine=Machine(flight, Connect(now_us)),
-        detector=detector,
-        detection=detector.initial(),
+        watch=watching,
         started_at_us=now_us,
         now_us=now_us,
         heartbeat_due_us=now_us,
@@ -130,59 +120,53 @@ def hear(core: Core, samples: Sequence[Sample], now_us: int) -> str | None:
     return None
 
 
-def detect(core: Core, samples: Sequence[Sample], now_us: int) -> list[Impact]:
-    """Every IMU sample through the detector, in the order of their time stamps."""
-    impacts: list[Impact] = []
-    off_reason = why_not_detecting(core)
-    for sample in samples:
-        if not isinstance(sample, ImuSample):
-            continue
-        core.last_imu_us = now_us
-        if 0 <= core.last_imu_boot_us - sample.time_boot_us < REBOOT_US:
-            continue
-        core.last_imu_boot_us = sample.time_boot_us
-        core.detection, impact = core.detector.step(core.detection, sample, off_reason)
-        if impact is not None:
-            impacts.append(impact)
-    watch_imu(core, now_us)
-    tell_threshold(core, now_us)
-    return impacts
+def detect(core: Core, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
+    """The samples through the watch; the impacts that ask for a recovery."""
+    seen = watch.advance(core.watch, samples, situation(core), now_us)
+    for notice in seen.notices:
+        core.flight.tell(now_us, notice.kind, notice.text, **notice.data)
+    for estimate in seen.impacts:
+        if not estimate.impact.is_collision:
+            tell_contact(core, estimate, now_us)
+    return [estimate for estimate in seen.impacts if estimate.impact.is_collision]
 
 
-def tell_threshold(core: Core, now_us: int) -> None:
-    """Once, when the detector is first on the watch: what it takes to be seen as a hit by this vehicle."""
-    if core.detector_told or core.detection.phase is not Phase.ARMED:
-        return
-    core.detector_told = True
-    threshold_m_s2 = core.detection.threshold_m_s2
-    text = f"detector '{core.detector.name}' on the watch: a hit is {threshold_m_s2:.1f} m/s^2 sideways or more"
-    core.flight.tell(now_us, "detector", text, threshold_m_s2=round(threshold_m_s2, 3))
+def tell_contact(core: Core, estimate: ImpactEstimate, now_us: int) -> None:
+    """A touch that is no collision is worth a line and nothing more."""
+    kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
+    text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
+    core.flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
 
 
-def why_not_detecting(core: Core) -> str | None:
-    """Ground, take-off and landing shake a vehicle as a hit does."""
+def situation(core: Core) -> Situation:
+    """What the flight knows, for the detector."""
     flight = core.flight
+    latest, target = flight.vehicle.history.latest(), flight.target
+    height_m = None
+    if latest is not None and flight.origin_ned_m is not None:
+        height_m = flight.origin_ned_m[2] - latest.position_ned_m[2]
+    return Situation(
+        off_reason=why_not_detecting(core, height_m),
+        armed=flight.vehicle.armed,
+        landed_state=flight.vehicle.landed,
+        height_m=height_m,
+        descent_commanded=core.machine.state is State.LANDING,
+        setpoint_position_ned_m=None if target is None else target.position_ned_m,
+        setpoint_velocity_ned_m_s=None if target is None else target.velocity_ned_m_s,
+    )
+
+
+def why_not_detecting(core: Core, height_m: float | None) -> str | None:
+    """Ground, take-off and landing shake a vehicle as a hit does."""
     if core.machine.state not in DETECTING_STATES:
         return core.machine.state.value
-    latest = flight.vehicle.history.latest()
-    least_m = flight.mission.companion.min_detection_height_m
-    if latest is None or flight.origin_ned_m is None or flight.origin_ned_m[2] - latest.position_ned_m[2] < least_m:
-        return f"below {least_m:g} m"
-    return None
+    least_m = core.flight.mission.companion.min_detection_height_m
+    return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
 
 
-def watch_imu(core: Core, now_us: int) -> None:
-    """A detector without samples is blind, and says so."""
-    silent = core.machine.state in DETECTING_STATES and now_us - core.last_imu_us > IMU_SILENCE_US
-    if silent != core.imu_silent:
-        core.imu_silent = silent
-        if silent:
-            core.flight.tell(now_us, "link", f"detector blind: no HIGHRES_IMU for {IMU_SILENCE_US // 1000} ms")
-        elif core.machine.state in DETECTING_STATES:
-            core.flight.tell(now_us, "link", "HIGHRES_IMU is back, the detector sees again")
-
-
-def fly(core: Core, samples: Sequence[Sample], impacts: list[Impact], refusal: str | None, now_us: int) -> bool:
+def fly(
+    core: Core, samples: Sequence[Sample], impacts: Sequence[ImpactEstimate], refusal: str | None, now_us: int
+) -> bool:
     """Let the state machine act; whether it moved."""
     acks = [sample for sample in samples if isinstance(sample, CommandAck)]
     positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
@@ -198,7 +182,7 @@ def fly(core: Core, samples: Sequence[Sample], impacts: list[Impact], refusal: s
 def follow_contact(core: Core) -> None:
     """Let the latest collision's record see the contact's course."""
     if core.flight.collisions:
-        core.flight.collisions[-1].follow_contact(core.detection)
+        core.flight.collisions[-1].follow_contact(core.watch.state)
 
 
 def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:

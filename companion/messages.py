@@ -39,9 +39,12 @@ class MessageId(IntEnum):
 
     ATTITUDE_QUATERNION = 31
     LOCAL_POSITION_NED = 32
+    ATTITUDE_TARGET = 83
     HIGHRES_IMU = 105
     AUTOPILOT_VERSION = 148
+    VIBRATION = 241
     EXTENDED_SYS_STATE = 245
+    ODOMETRY = 331
     CURRENT_MODE = 436
 
 
@@ -76,9 +79,44 @@ class LocalPosition:
 
 
 @dataclass(frozen=True, slots=True)
+class Odometry:
+    """ODOMETRY: what LOCAL_POSITION_NED says, and how often the estimator has let it jump (modulo 256)."""
+
+    time_boot_us: int
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    reset_counter: int
+
+
+@dataclass(frozen=True, slots=True)
 class Attitude:
+    """ATTITUDE_QUATERNION; the rates are those of the moment, not a mean."""
+
     time_boot_us: int
     attitude_wxyz: Quaternion
+    angular_velocity_frd_rad_s: Vector3 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeTarget:
+    """ATTITUDE_TARGET: what the vehicle's position control asks of its attitude control."""
+
+    time_boot_us: int
+    thrust_fraction: float  # collective over the greatest, 0 to 1
+    attitude_wxyz: Quaternion | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Vibration:
+    """VIBRATION as PX4 fills it: the mean change from sample to sample, and clipped samples since boot.
+
+    `clipping_counts` has one count for each accelerometer, its three axes together.
+    """
+
+    time_boot_us: int
+    gyroscope_rad_s: float
+    accelerometer_m_s2: float
+    clipping_counts: tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +152,10 @@ Sample: TypeAlias = (
     Heartbeat
     | ImuSample
     | LocalPosition
+    | Odometry
     | Attitude
+    | AttitudeTarget
+    | Vibration
     | ExtendedState
     | CurrentMode
     | CommandAck

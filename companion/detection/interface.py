@@ -1,10 +1,11 @@
-"""The interface of all collision detectors: samples in, impact out, state explicit."""
+"""The interface of all collision detectors: samples and the flight's situation in, impact out, state explicit."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
-from companion.messages import ImuSample, Vector3
+from companion.messages import LandedState, MessageId, Sample, Vector3
 
 
 class Phase(Enum):
@@ -16,21 +17,73 @@ class Phase(Enum):
     CONTACT = "contact"  # has fired; the same contact cannot fire again
 
 
+class ImpactKind(Enum):
+    """What was touched, as far as telemetry can tell; the value is the word shown to people."""
+
+    UNKNOWN = "hit"  # the detector does not classify
+    WALL = "wall"
+    CEILING = "ceiling"
+    FLOOR = "floor"  # the ground, not by a landing
+    OFF_CENTRE = "pole or off-centre"  # the push passes beside the centre and turns the vehicle
+    STRUCK = "struck while hovering"  # the obstacle moved, not the vehicle
+    LANDING = "landing"  # touchdown
+    CONTACT = "contact"  # held or pushed gently, as by a hand
+
+
+# Touching the ground at the end of a landing and being caught by hand are nothing to recover from.
+NO_COLLISION = frozenset({ImpactKind.LANDING, ImpactKind.CONTACT})
+
+
+class Evidence(Enum):
+    """By what an impact was found."""
+
+    FORCE = "force"  # a sample's averaging window held the contact's own force
+    AFTERMATH = "aftermath"  # the contact fell between the samples; what followed it showed
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the flight knows when samples arrive; None where it does not.
+
+    `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
+    one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
+    to, so that touching it is no surprise.
+    """
+
+    off_reason: str | None = None
+    armed: bool | None = None
+    landed_state: LandedState = LandedState.UNDEFINED
+    height_m: float | None = None
+    descent_commanded: bool = False
+    setpoint_position_ned_m: Vector3 | None = None
+    setpoint_velocity_ned_m_s: Vector3 | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Impact:
     """A hit, on the first sample that shows it.
 
     `contact_free_until_boot_us` is the latest time at which the vehicle was certainly still free: the start of
     the sample's averaging window, or the previous sample where the stream left a gap before it.
-    `specific_force_frd_m_s2` is what the contact alone did to the vehicle, in body axes.
+    `specific_force_frd_m_s2` is what the contact alone did to the vehicle, in body axes; where only the aftermath
+    was seen, the mean over the gap that the contact must have fallen into.
+    `response` scales the reaction, 0 to 1; `confidence` is the detector's own, 0 to 1.
     """
 
     sample_time_boot_us: int
     contact_free_until_boot_us: int
     specific_force_frd_m_s2: Vector3
+    kind: ImpactKind = ImpactKind.UNKNOWN
+    evidence: Evidence = Evidence.FORCE
+    confidence: float = 1.0
+    response: float = 1.0
+
+    @property
+    def is_collision(self) -> bool:
+        return self.kind not in NO_COLLISION
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class DetectorState:
     """What every detector's state shows; a detector that remembers more extends it.
 
@@ -58,12 +111,19 @@ StateT = TypeVar("StateT", bound=DetectorState)
 
 
 class Detector(Protocol[StateT]):
-    """A detector holds its parameters; all that changes is in the state passed through `step`."""
+    """A detector holds its parameters; all that changes is in the state passed through `step`.
+
+    `losses` are the streams it makes use of besides HIGHRES_IMU, with what is lost where one does not arrive.
+    """
 
     name: str
+    losses: ClassVar[Mapping[MessageId, str]]
 
     def initial(self) -> StateT: ...
 
-    def step(self, state: StateT, sample: ImuSample, off_reason: str | None) -> tuple[StateT, Impact | None]:
-        """Take one IMU sample; `off_reason` says why a hit may not be reported now, or is None."""
+    def step(self, state: StateT, sample: Sample, situation: Situation) -> tuple[StateT, Impact | None]:
+        """Take one sample of any kind, in the order heard; IMU samples come in the order of their stamps.
+
+        The state given may be changed and returned; whoever wants to keep an old one copies it.
+        """
         ...

@@ -6,11 +6,13 @@ the threshold or more is a hit.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
-from companion.detection.interface import DetectorState, Impact, Phase
+from companion.detection.interface import DetectorState, Impact, Phase, Situation
 from companion.detection.noise import MEMORY_US, NoiseFloor
-from companion.messages import ImuSample, Vector3
+from companion.messages import ImuSample, MessageId, Sample, Vector3
 from companion.written import Positive, Written
 
 
@@ -32,7 +34,7 @@ class LateralConfig(Written):
 NOTHING_LEARNT = NoiseFloor()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class LateralState(DetectorState):
     """Adds what the detector has learnt of the vehicle's own shaking."""
 
@@ -43,6 +45,7 @@ class LateralDetector:
     """See the module's text. Specific forces in FRD, m/s^2; times in the vehicle's boot clock."""
 
     name = "lateral"
+    losses: ClassVar[Mapping[MessageId, str]] = {}
 
     def __init__(self, config: LateralConfig, averaging_interval_us: int) -> None:
         self._config = config
@@ -52,12 +55,12 @@ class LateralDetector:
     def initial(self) -> LateralState:
         return LateralState(threshold_m_s2=self._config.threshold_m_s2)
 
-    def step(
-        self, state: LateralState, sample: ImuSample, off_reason: str | None
-    ) -> tuple[LateralState, Impact | None]:
+    def step(self, state: LateralState, sample: Sample, situation: Situation) -> tuple[LateralState, Impact | None]:
+        if not isinstance(sample, ImuSample):
+            return state, None
         f_x, f_y, _ = sample.specific_force_frd_m_s2
-        if off_reason is not None:
-            return self._off(state, sample.time_boot_us, off_reason, f_x, f_y), None
+        if situation.off_reason is not None:
+            return self._off(state, sample.time_boot_us, situation.off_reason, f_x, f_y), None
         x, y = f_x - state.noise.mean_x_m_s2, f_y - state.noise.mean_y_m_s2
         departure_m_s2 = math.hypot(x, y)
         if departure_m_s2 < state.threshold_m_s2:

@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
-from companion.detection.interface import DetectorState, Phase
+from companion.detection.interface import DetectorState
+from companion.estimate.impact import IN_OR_AFTER_CONTACT
 from companion.estimate.rotation import body_to_ned
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.recovery.interface import Contact
@@ -17,9 +18,6 @@ REBOUND_KEPT_US = 1_000_000
 # Below this there is no direction in a velocity or a way that noise could not have made.
 LEAST_SPEED_M_S = 0.05
 LEAST_WAY_M = 0.01
-
-# In these phases a detector's state still describes the contact it fired on.
-IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
 
 
 def horizontal_unit(vector: Vector3) -> Vector3:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from companion.detection.interface import Impact
+from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
 from companion.flight.commander import Commander, CommandOutcome
 from companion.flight.states import Trigger
@@ -40,7 +40,7 @@ class Inputs:
 
     acks: Sequence[CommandAck] = ()
     positions: Sequence[LocalPosition] = ()
-    impacts: Sequence[Impact] = ()
+    impacts: Sequence[ImpactEstimate] = ()
     stop_reason: str | None = None
     refusal: str | None = None  # why the other end cannot be flown
 

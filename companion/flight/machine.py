@@ -32,9 +32,9 @@ class Machine:
         before = self.activity
         if self.state not in FINAL_STATES:
             self._take(guard(self.flight, self.state, inputs, now_us), now_us)
-        for impact in inputs.impacts:
+        for estimate in inputs.impacts:
             if moves(self.state, Trigger.COLLISION):
-                record_collision(self.flight, impact, now_us)
+                record_collision(self.flight, estimate, now_us)
                 self._take(Move(Trigger.COLLISION), now_us)
         move = self.activity.step(self.flight, inputs, now_us)
         while move is not None:

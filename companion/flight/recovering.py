@@ -2,20 +2,15 @@
 
 import math
 
-from companion.detection.interface import Impact
-from companion.estimate.collision import BATCH_US, STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
+from companion.estimate.impact import LEVEL, ImpactEstimate
 from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.collision import CollisionRecord, horizontal_unit
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.states import Trigger
-from companion.messages import Quaternion
 from companion.recovery.envelope import Envelope, away_from_both
 from companion.recovery.interface import Contact
 from companion.recovery.registry import RECOVERY_LAWS
-
-# Attitude streams are required, so this is only for a hit before the first one: level, nose north.
-LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 AFTERWARDS = {
     "hold": Trigger.RECOVERED_TO_HOLD,
@@ -56,13 +51,12 @@ class Recover:
         return None
 
 
-def record_collision(flight: FlightContext, impact: Impact, now_us: int) -> None:
+def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """A new collision: what was known just before it, and from that the setpoint, set once."""
-    vehicle, mission = flight.vehicle, flight.mission
+    vehicle, mission, impact = flight.vehicle, flight.mission, estimate.impact
     attitude = vehicle.attitude.attitude_wxyz if vehicle.attitude is not None else LEVEL
     normal = horizontal_unit(body_to_ned(attitude, impact.specific_force_frd_m_s2))
-    motion = _motion_at_contact(flight, impact)
-    contact = Contact(motion.time_boot_us, motion.position_ned_m, motion.velocity_ned_m_s, normal)
+    contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
     law = RECOVERY_LAWS[mission.recovery.law](mission.recovery)
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
     fence = Envelope(flight.origin_ned_m, mission.fence.radius_m, mission.fence.max_height_m)
@@ -85,21 +79,6 @@ def record_collision(flight: FlightContext, impact: Impact, now_us: int) -> None
     )
     flight.collisions.append(record)
     _tell_detection(flight, record, now_us)
-
-
-def _motion_at_contact(flight: FlightContext, impact: Impact) -> ContactMotion:
-    """From the history before this contact and after the one before it."""
-    contact_us = impact.contact_free_until_boot_us
-    start_us = contact_us - BATCH_US
-    if flight.collisions:
-        start_us = max(start_us, flight.collisions[-1].contact_ended_boot_us + STAMP_RESOLUTION_US)
-    samples = flight.vehicle.history.between(start_us, contact_us)
-    motion = motion_before_contact(samples, contact_us, flight.mission.companion.estimate)
-    if motion is not None:
-        return motion
-    latest = flight.vehicle.history.latest()
-    assert latest is not None, "a flight begins only with positions arriving"
-    return ContactMotion(latest.time_boot_us, latest.position_ned_m, latest.velocity_ned_m_s)
 
 
 def _tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:

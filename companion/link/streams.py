@@ -1,15 +1,19 @@
 """The streams the companion needs: what it asks for, and what really arrives."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from companion.messages import (
     Attitude,
+    AttitudeTarget,
     CurrentMode,
     ExtendedState,
     ImuSample,
     LocalPosition,
     MessageId,
+    Odometry,
     SetMessageInterval,
+    Vibration,
 )
 from companion.mission.config import StreamsConfig
 
@@ -27,9 +31,12 @@ class Stream:
         return SetMessageInterval(self.message_id, round(1e6 / self.asked_hz))
 
 
-def wanted_streams(config: StreamsConfig) -> tuple[Stream, ...]:
-    """Mode and landed state are wished for, not required: HEARTBEAT tells the mode too, if more slowly."""
-    return (
+def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -> tuple[Stream, ...]:
+    """Mode and landed state are wished for, not required: HEARTBEAT tells the mode too, if more slowly.
+
+    What the detector makes use of beyond that is wished for, too: it says what it loses without.
+    """
+    always = (
         Stream(MessageId.HIGHRES_IMU, ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
         Stream(
             MessageId.LOCAL_POSITION_NED,
@@ -41,6 +48,12 @@ def wanted_streams(config: StreamsConfig) -> tuple[Stream, ...]:
         Stream(MessageId.EXTENDED_SYS_STATE, ExtendedState, config.extended_sys_state_hz, 0.0),
         Stream(MessageId.CURRENT_MODE, CurrentMode, config.current_mode_hz, 0.0),
     )
+    wished = (
+        Stream(MessageId.ATTITUDE_TARGET, AttitudeTarget, config.attitude_target_hz, 0.0),
+        Stream(MessageId.ODOMETRY, Odometry, config.odometry_hz, 0.0),
+        Stream(MessageId.VIBRATION, Vibration, config.vibration_hz, 0.0),
+    )
+    return always + tuple(stream for stream in wished if stream.message_id in for_detector)
 
 
 class StreamMonitor:
@@ -48,8 +61,8 @@ class StreamMonitor:
 
     __slots__ = ("_counts", "_started_us", "_until_us", "streams")
 
-    def __init__(self, config: StreamsConfig) -> None:
-        self.streams = wanted_streams(config)
+    def __init__(self, config: StreamsConfig, for_detector: Collection[MessageId] = ()) -> None:
+        self.streams = wanted_streams(config, for_detector)
         self._counts: dict[type, int] = {stream.sample_type: 0 for stream in self.streams}
         self._started_us: int | None = None
         self._until_us = 0

@@ -5,6 +5,7 @@ rest, checksums included, is pymavlink's.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from fastcrc.crc16 import mcrf4xx
@@ -13,6 +14,7 @@ from pymavlink.dialects.v20 import development as dialect
 from companion.mavlink.encode import COMPONENT_ID
 from companion.messages import (
     Attitude,
+    AttitudeTarget,
     AutopilotVersion,
     CommandAck,
     CommandResult,
@@ -22,8 +24,10 @@ from companion.messages import (
     ImuSample,
     LandedState,
     LocalPosition,
+    Odometry,
     Sample,
     TimeSyncRequest,
+    Vibration,
 )
 
 Frame = tuple[bytes, Sample | None]
@@ -31,6 +35,8 @@ Frame = tuple[bytes, Sample | None]
 MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 FLAG_SIGNED = 0x01
+# time_boot_ms has 32 bits: it begins again after 49.7 days.
+WRAP_US = (1 << 32) * 1000
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
 
@@ -63,7 +69,31 @@ def _local_position(m: Any) -> LocalPosition | None:
 def _attitude(m: Any) -> Attitude | None:
     if not _finite(m.q1, m.q2, m.q3, m.q4):
         return None
-    return Attitude(m.time_boot_ms * 1000, (m.q1, m.q2, m.q3, m.q4))
+    rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
+    return Attitude(m.time_boot_ms * 1000, (m.q1, m.q2, m.q3, m.q4), rates if _finite(*rates) else None)
+
+
+def _odometry(m: Any) -> Odometry | None:
+    # PX4 sends NED velocity under child frame LOCAL_NED; any other frame would have to be turned first.
+    in_ned = m.frame_id == dialect.MAV_FRAME_LOCAL_NED and m.child_frame_id == dialect.MAV_FRAME_LOCAL_NED
+    if not in_ned or not _finite(m.x, m.y, m.z, m.vx, m.vy, m.vz):
+        return None
+    return Odometry(m.time_usec, (m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.reset_counter)
+
+
+def _attitude_target(m: Any) -> AttitudeTarget | None:
+    if m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE or not _finite(m.thrust):
+        return None
+    given = not m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and _finite(*m.q)
+    w, x, y, z = m.q
+    return AttitudeTarget(m.time_boot_ms * 1000, m.thrust, (w, x, y, z) if given else None)
+
+
+def _vibration(m: Any) -> Vibration | None:
+    if not _finite(m.vibration_y, m.vibration_z):
+        return None
+    counts = (m.clipping_0, m.clipping_1, m.clipping_2)
+    return Vibration(m.time_usec, m.vibration_y, m.vibration_z, counts)
 
 
 def _extended_state(m: Any) -> ExtendedState | None:
@@ -97,7 +127,10 @@ CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: _heartbeat,
     dialect.MAVLINK_MSG_ID_HIGHRES_IMU: _imu,
     dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
+    dialect.MAVLINK_MSG_ID_ODOMETRY: _odometry,
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude,
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: _attitude_target,
+    dialect.MAVLINK_MSG_ID_VIBRATION: _vibration,
     dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
     dialect.MAVLINK_MSG_ID_CURRENT_MODE: _current_mode,
     dialect.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
@@ -116,6 +149,7 @@ class Decoder:
         self._mavlink = dialect.MAVLink(None)
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
+        self._boot_us = 0  # newest 64-bit stamp
         self.bad_bytes = 0
 
     def listen_to(self, system_id: int, component_id: int) -> None:
@@ -159,9 +193,15 @@ class Decoder:
         if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
             return None
         try:
-            return converter(self._mavlink.decode(bytearray(packet)))
+            sample = converter(self._mavlink.decode(bytearray(packet)))
         except dialect.MAVError:
             return None
+        if isinstance(sample, ImuSample):
+            self._boot_us = sample.time_boot_us
+        elif self._boot_us > WRAP_US // 2 and isinstance(sample, LocalPosition | Attitude | AttitudeTarget):
+            wraps = round((self._boot_us - sample.time_boot_us) / WRAP_US)
+            return replace(sample, time_boot_us=sample.time_boot_us + wraps * WRAP_US) if wraps else sample
+        return sample
 
 
 def _packet_length(data: bytes, start: int) -> int:

@@ -6,6 +6,7 @@ from pydantic import Field, field_validator
 
 from companion.detection.lateral import LateralConfig
 from companion.detection.registry import DETECTORS, check_known_detector
+from companion.detection.sight import SightConfig
 from companion.written import NotNegative, Positive, Written
 
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
@@ -21,6 +22,12 @@ class StreamsConfig(Written):
     attitude_hz: Rate = 50.0
     # Take-off and touchdown last longer than a second.
     extended_sys_state_hz: Rate = 5.0
+    # The thrust asked for changes within a motor's lag of 20 ms. Asked for only by a detector that uses it.
+    attitude_target_hz: Rate = 50.0
+    # PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of.
+    odometry_hz: Rate = 30.0
+    # Cumulative counts; twice a second is PX4's own rate.
+    vibration_hz: Rate = 1.0
     # Mode changes are acted on within a tenth of a second.
     current_mode_hz: Rate = 10.0
     # Long enough to see 80 samples of the slowest acceptable IMU stream.
@@ -94,6 +101,7 @@ class CompanionConfig(Written):
     # Ground handling, landing gear and ground effect are below this height above the arming position.
     min_detection_height_m: NotNegative = 0.5
     lateral: LateralConfig = LateralConfig()
+    sight: SightConfig = SightConfig()
     streams: StreamsConfig = StreamsConfig()
     estimate: EstimateConfig = EstimateConfig()
     settled: SettledConfig = SettledConfig()

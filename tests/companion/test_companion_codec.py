@@ -9,6 +9,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.messages import (
     Attitude,
+    AttitudeTarget,
     AutopilotVersion,
     CommandAck,
     CommandResult,
@@ -18,6 +19,7 @@ from companion.messages import (
     ImuSample,
     LandedState,
     LocalPosition,
+    Odometry,
     OnboardHeartbeat,
     PositionSetpoint,
     RequestMessage,
@@ -27,6 +29,7 @@ from companion.messages import (
     SetMode,
     TimeSyncReply,
     TimeSyncRequest,
+    Vibration,
 )
 
 HEARTBEAT = (
@@ -44,8 +47,27 @@ CASES = [
         LocalPosition(5_000_000, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25)),
     ),
     (
-        mav.MAVLink_attitude_quaternion_message(5000, 0.5, 0.5, -0.5, 0.5, 0, 0, 0),
-        Attitude(5_000_000, (0.5, 0.5, -0.5, 0.5)),
+        mav.MAVLink_attitude_quaternion_message(5000, 0.5, 0.5, -0.5, 0.5, 0.25, 0.5, -1.0),
+        Attitude(5_000_000, (0.5, 0.5, -0.5, 0.5), (0.25, 0.5, -1.0)),
+    ),
+    (
+        # PX4's way: local NED in both frames, the resets counted
+        mav.MAVLink_odometry_message(
+            5_000_123, 1, 1, 1.0, 2.0, -3.0, [1, 0, 0, 0], 0.5, -0.5, 0.25, 0, 0, 0, [0] * 21, [0] * 21, 7
+        ),
+        Odometry(5_000_123, (1.0, 2.0, -3.0), (0.5, -0.5, 0.25), 7),
+    ),
+    (
+        mav.MAVLink_attitude_target_message(5000, 0, (0.5, 0.5, -0.5, 0.5), 0, 0, 0, 0.75),
+        AttitudeTarget(5_000_000, 0.75, (0.5, 0.5, -0.5, 0.5)),
+    ),
+    (
+        mav.MAVLink_attitude_target_message(5000, 128, (1, 0, 0, 0), 0, 0, 0, 0.75),
+        AttitudeTarget(5_000_000, 0.75, None),
+    ),
+    (
+        mav.MAVLink_vibration_message(5_000_000, 0.0, 0.125, 2.5, 12, 0, 3),
+        Vibration(5_000_000, 0.125, 2.5, (12, 0, 3)),
     ),
     (mav.MAVLink_extended_sys_state_message(0, 2), ExtendedState(LandedState.IN_AIR)),
     (mav.MAVLink_current_mode_message(0, 6 << 16, 3 << 16), CurrentMode(6 << 16, 3 << 16)),
@@ -60,6 +82,13 @@ CASES = [
 UNUSED = mav.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0, 0, 0)
 
 
+# Nothing is made of these: body velocity without its attitude, a thrust that is not given.
+NOT_TAKEN = [
+    mav.MAVLink_odometry_message(5, 1, 12, 1, 2, 3, [1, 0, 0, 0], 1, 1, 1, 0, 0, 0, [0] * 21, [0] * 21, 7),
+    mav.MAVLink_attitude_target_message(5000, 64, (1, 0, 0, 0), 0, 0, 0, 0.75),
+]
+
+
 def packed(message, system=1, component=1, v1=False) -> bytes:
     return bytes(message.pack(mav.MAVLink(None, system, component), force_mavlink1=v1))
 
@@ -68,6 +97,24 @@ def listening_decoder() -> Decoder:
     decoder = Decoder()
     decoder.listen_to(1, 1)
     return decoder
+
+
+@pytest.mark.parametrize("message", NOT_TAKEN)
+def test_what_would_be_misread_is_not_taken(message):
+    assert [sample for _, sample in listening_decoder().feed(packed(message))] == [None]
+
+
+def test_millisecond_stamps_go_on_where_their_32_bits_wrap():
+    """After 49.7 days of uptime HIGHRES_IMU's microseconds go on and time_boot_ms begins again."""
+    wrap_ms = 1 << 32
+    imu = mav.MAVLink_highres_imu_message((wrap_ms + 5) * 1000, 0, 0, -9.8, *[0] * 10, 0x3F)
+    before = mav.MAVLink_local_position_ned_message(wrap_ms - 3, 1, 2, 3, 0, 0, 0)
+    after = mav.MAVLink_local_position_ned_message(2, 1, 2, 3, 0, 0, 0)
+    attitude = mav.MAVLink_attitude_quaternion_message(4, 1, 0, 0, 0, 0, 0, 0)
+
+    frames = listening_decoder().feed(packed(imu) + packed(before) + packed(after) + packed(attitude))
+
+    assert [sample.time_boot_us // 1000 - wrap_ms for _, sample in frames] == [5, -3, 2, 4]
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 100_000])

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from companion.detection.interface import Phase
+from companion.detection.interface import Phase, Situation
 from companion.detection.lateral import LateralConfig, LateralDetector
 from companion.messages import ImuSample
 
@@ -39,7 +39,7 @@ def run(samples, window_us=4000, off=lambda sample: None, **config):
     detector = LateralDetector(LateralConfig(**config), window_us)
     state, impacts, states = detector.initial(), [], []
     for sample in samples:
-        state, impact = detector.step(state, sample, off(sample))
+        state, impact = detector.step(state, sample, Situation(off(sample)))
         states.append(state)
         if impact is not None:
             impacts.append(impact)

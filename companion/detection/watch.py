@@ -1,0 +1,114 @@
+"""The watch for collisions: detector, estimate and sight joined; pure, and the same in flight, replay and bench.
+
+A `Watch` is changed only by `advance`: the same samples at the same times give the same impacts and notices.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from companion.detection.interface import Detector, DetectorState, Phase, Situation
+from companion.detection.registry import DETECTORS
+from companion.detection.sight import Sight, heard, why_blind
+from companion.estimate.history import REBOOT_US
+from companion.estimate.impact import ImpactEstimate, ImpactEstimator
+from companion.messages import ImuSample, Sample
+from companion.mission.config import CompanionConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something about the detector itself that is worth a line in the timeline."""
+
+    kind: str  # of the event
+    text: str
+    data: Mapping[str, float]
+
+
+@dataclass(slots=True)
+class Watch:
+    """All that is remembered between steps; copies and pickles as a whole."""
+
+    config: CompanionConfig
+    detector: Detector[Any]
+    state: DetectorState
+    estimator: ImpactEstimator
+    sight: Sight
+    last_imu_boot_us: int = 0
+    threshold_told: bool = False
+
+    @property
+    def blind_reason(self) -> str | None:
+        """Why a hit might not be seen although the detector is on; None while it sees."""
+        return self.sight.blind_reason
+
+    @property
+    def estimate(self) -> ImpactEstimate | None:
+        """Of the latest impact, as known by now."""
+        return self.estimator.estimate
+
+    def describe(self) -> str:
+        """For the live line."""
+        return self.state.describe() if self.blind_reason is None else f"blind ({self.blind_reason})"
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What one step showed: impacts as known at their first sample, estimates of contacts now over, notices."""
+
+    impacts: Sequence[ImpactEstimate]
+    finished: Sequence[ImpactEstimate]
+    notices: Sequence[Notice]
+
+
+NOTHING_SEEN = Seen((), (), ())
+
+
+def start_watch(config: CompanionConfig, now_us: int) -> Watch:
+    """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
+    averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
+    detector = DETECTORS[config.detector](getattr(config, config.detector), averaging_us)
+    return Watch(config, detector, detector.initial(), ImpactEstimator(config.estimate), Sight(now_us, now_us))
+
+
+def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_us: int) -> Seen:
+    """Take the samples heard since the last call, in the order heard; call now and then without any, too."""
+    impacts: list[ImpactEstimate] = []
+    finished: list[ImpactEstimate] = []
+    imu_samples = 0
+    for sample in samples:
+        if type(sample) is ImuSample:
+            imu_samples += 1
+            if 0 <= watch.last_imu_boot_us - sample.time_boot_us < REBOOT_US:
+                continue
+            watch.last_imu_boot_us = sample.time_boot_us
+        watch.estimator.hear(sample)
+        watch.state, impact = watch.detector.step(watch.state, sample, situation)
+        if impact is not None:
+            impacts.append(watch.estimator.begin(impact))
+        if type(sample) is ImuSample:
+            final = watch.estimator.follow(watch.state)
+            if final is not None:
+                finished.append(final)
+    notices = _look_after_sight(watch, imu_samples, situation, now_us)
+    if not impacts and not finished and not notices:
+        return NOTHING_SEEN
+    return Seen(impacts, finished, notices)
+
+
+def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_us: int) -> list[Notice]:
+    """Blind or seeing, told when it changes and only while the detector is on; and, once, the threshold."""
+    notices: list[Notice] = []
+    sight = heard(watch.sight, imu_samples, now_us)
+    on = situation.off_reason is None
+    reason = why_blind(sight, watch.state.threshold_m_s2, watch.config.sight, now_us) if on else None
+    if (reason is None) != (sight.blind_reason is None) and on:
+        text = "the detector sees again" if reason is None else f"detector blind: {reason}"
+        notices.append(Notice("link", text, {}))
+    watch.sight = Sight(sight.last_heard_us, sight.window_started_us, sight.heard_in_window, sight.rate_hz, reason)
+    if not watch.threshold_told and watch.state.phase is Phase.ARMED:
+        watch.threshold_told = True
+        threshold_m_s2 = watch.state.threshold_m_s2
+        text = f"detector '{watch.detector.name}' on the watch: a hit is {threshold_m_s2:.1f} m/s^2 or more"
+        notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
+    return notices

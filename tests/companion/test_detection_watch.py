@@ -1,0 +1,97 @@
+"""The watch: detector, estimate and sight joined; what it says of itself."""
+
+import math
+import pickle
+
+import pytest
+
+from companion.detection.interface import Phase, Situation
+from companion.detection.watch import advance, start_watch
+from companion.messages import Attitude, ImuSample, LocalPosition
+from companion.mission.config import CompanionConfig
+
+INTERVAL_US = 4_000
+WANTED = Situation()
+
+
+def lateral(**changes):
+    return CompanionConfig(detector="lateral", **changes)
+
+
+def fly(watch, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WANTED, start_us=INTERVAL_US):
+    """North at 2 m/s, level; `push` is the contact's force per unit mass on body x, m/s^2."""
+    impacts, finished, notices = [], [], []
+    for t in range(start_us, until_us, every_us):
+        north_m = 2.0 * t * 1e-6
+        samples = [ImuSample(t, (push(t), 0.0, -9.81), (0.0, 0.0, 0.0))]
+        samples.append(LocalPosition(t, (north_m, 0.0, -1.5), (2.0, 0.0, 0.0)))
+        samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
+        seen = advance(watch, samples, situation, t)
+        impacts += seen.impacts
+        finished += seen.finished
+        notices += seen.notices
+    return impacts, finished, notices
+
+
+def hit(t):
+    return -30.0 if 1_000_000 <= t < 1_020_000 else 0.0
+
+
+def test_an_impact_comes_at_its_first_sample_and_its_final_estimate_when_the_contact_is_over():
+    watch = start_watch(lateral(), 0)
+    impacts, finished, _ = fly(watch, 1_500_000, hit)
+
+    assert [e.impact.sample_time_boot_us for e in impacts] == [1_000_000]
+    assert not impacts[0].is_final
+    assert impacts[0].velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.01)
+    assert len(finished) == 1 and finished[0].is_final
+    assert finished[0].normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
+    assert watch.estimate == finished[0]
+
+
+def test_a_watch_survives_pickling_in_mid_flight():
+    """Campaigns send watches between processes."""
+    watch = start_watch(lateral(), 0)
+    fly(watch, 900_000)
+    copy = pickle.loads(pickle.dumps(watch))
+    assert fly(copy, 1_500_000, hit, start_us=900_000)[0] == fly(watch, 1_500_000, hit, start_us=900_000)[0] != []
+
+
+def test_late_and_doubled_samples_are_dropped_and_a_reboot_is_not():
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_900_000)
+    at = watch.last_imu_boot_us
+    late = ImuSample(at - INTERVAL_US, (-50.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    assert advance(watch, [late], WANTED, 1_900_000).impacts == ()
+    fly(watch, 500_000)
+    assert watch.last_imu_boot_us < 500_000
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda watch: advance(watch, [], WANTED, 1_500_000), "no HIGHRES_IMU for 250 ms"),
+        (lambda watch: fly(watch, 4_000_000, every_us=100_000, start_us=1_000_000), "HIGHRES_IMU at 10 Hz, below 20"),
+        (lambda watch: fly(watch, 4_000_000, lambda t: 12.0 * math.sin(t), start_us=1_000_000), "vibration hides"),
+    ],
+)
+def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reason):
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000)
+    assert watch.blind_reason is None
+    spoil(watch)
+    assert reason in watch.blind_reason
+    assert watch.describe().startswith("blind (")
+
+    _, _, notices = fly(watch, 12_000_000, start_us=4_000_000)
+
+    assert watch.blind_reason is None
+    assert watch.state.phase is Phase.ARMED
+    assert "the detector sees again" in [notice.text for notice in notices]
+
+
+def test_a_watch_that_is_not_wanted_is_off_not_blind():
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000, situation=Situation("landing"))
+    seen = advance(watch, [], Situation("landing"), 3_000_000)
+    assert (seen.notices, watch.blind_reason, watch.describe()) == ((), None, "off (landing)")
