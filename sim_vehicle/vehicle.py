@@ -1,15 +1,16 @@
 """The simulated vehicle: MAVLink bytes in, one interval of flight, MAVLink bytes out."""
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.autopilot import commands
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
-from sim_vehicle.autopilot.messages import Command, PeerHeartbeat, PositionTarget, Received
-from sim_vehicle.mavlink import encode
-from sim_vehicle.mavlink.decode import Decoder
-from sim_vehicle.mavlink.encode import Encoder, Telemetry
-from sim_vehicle.mavlink.streams import Streams
-from sim_vehicle.mavlink.texts import TextLink
+from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.mavlink.board import Board
+from sim_vehicle.mavlink.encode import Telemetry
+from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.topics import Topics
 from sim_vehicle.mavlink.vibration import Vibration
+from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.setpoint import TrajectorySetpoint
@@ -25,10 +26,13 @@ class SimulatedVehicle:
         Raises SceneError where a wall passes through the start position.
         """
         check_start_is_free(scene, airframe)
+        self._seed = seed
+        self.parameters = parameters = Parameters(defaults_from(airframe))
+        self._tuned_at = parameters.changes
         self._plant = Plant(airframe, scene, seed, keeps_path)
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
-        self._autopilot = Autopilot(airframe.hover_fraction, first)
+        self._autopilot = Autopilot(airframe.hover_fraction, first, parameters)
         self._telemetry = Telemetry(
             sample=first,
             published=first,
@@ -39,53 +43,50 @@ class SimulatedVehicle:
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
             true_body=self._plant.state.body,
         )
-        self._decoder = Decoder()
-        self._streams = Streams(self._telemetry, Encoder(), seed)
-        self._texts = TextLink()
         self.interval_us = self._plant.interval_us
         self.time_boot_us = first.time_boot_us
+        self._topics = Topics(self._telemetry)
+        identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
+        self._board = Board(identity, self._autopilot, parameters, self._telemetry, self._topics, self.interval_us)
+        self._links: list[Link] = []
+        self._companion_link = self.add_link(LinkKind.ONBOARD)
 
     @property
     def truth(self) -> TruthRecorder:
         """What really happened, never sent."""
         return self._plant.truth
 
+    def add_link(self, kind: LinkKind) -> Link:
+        """One more connection, from now on."""
+        link = Link(kind, self._board, self._seed + len(self._links))
+        self._links.append(link)
+        return link
+
     def step(self, received: bytes) -> tuple[bytes, ...]:
-        """Apply the bytes received since the last step, advance one interval, return the packets to send."""
-        self._acknowledge_last_commands()
-        for message in self._decoder.push(received):
-            self._receive(message)
-        setpoint = self._autopilot.run_control()
-        sample = self._fly(setpoint)
-        self._send_texts()
-        self._streams.update(new_position=self._publish(sample))
-        return self._streams.take()
+        """One interval for a lone companion: apply the bytes received since the last, return the packets to send."""
+        self._companion_link.push(received)
+        self.advance()
+        return self._companion_link.take()
 
-    def _acknowledge_last_commands(self) -> None:
-        """The commander runs beside the receiver: it answers in the interval after a command came."""
-        for ack in self._autopilot.run_commander():
-            self._streams.send(encode.command_ack(ack))
+    def advance(self) -> None:
+        """One interval: act on what the links have received, fly, leave what they are to send."""
+        # The commander runs beside the receivers: it answers in the interval after a command came.
+        acks = self._autopilot.run_commander()
+        for link in self._links:
+            link.acknowledge(acks)
+            link.receive()
+        self._tune()
+        sample = self._fly(self._autopilot.run_control())
+        self._topics.count(new_position=self._publish(sample))
+        texts = tuple(self._autopilot.texts)
+        self._autopilot.texts.clear()
+        for link in self._links:
+            link.update(self.time_boot_us, texts)
 
-    def _receive(self, message: Received) -> None:
-        if isinstance(message, PositionTarget):
-            self._autopilot.setpoint(message)
-        elif isinstance(message, Command):
-            self._receive_command(message)
-        elif isinstance(message, PeerHeartbeat):
-            self._texts.heard(message, self.time_boot_us)
-        else:
-            # Bytes arrive anywhere in the interval since the last sample: on average in its middle.
-            heard_at_us = self.time_boot_us + self.interval_us // 2
-            self._streams.send(encode.timesync_reply(message, heard_at_us))
-
-    def _receive_command(self, command: Command) -> None:
-        if not commands.is_for_us(command):
-            return
-        result, is_for_commander = commands.receive(command, self._streams)
-        if result is not None:
-            self._streams.send(encode.command_ack(commands.answer(command, result)))
-        if is_for_commander:
-            self._autopilot.command(command)
+    def _tune(self) -> None:
+        if self.parameters.changes != self._tuned_at:
+            self._tuned_at = self.parameters.changes
+            self._plant.tune(position_gains(self.parameters))
 
     def _fly(self, setpoint: TrajectorySetpoint | None) -> PlantOutput:
         sample = self._plant.step(setpoint, self._autopilot.arming.armed)
@@ -109,11 +110,3 @@ class SimulatedVehicle:
             telemetry.position_variance_m2, telemetry.velocity_variance_m2_s2 = position, velocity
             telemetry.attitude_variance_rad2 = attitude
         return True
-
-    def _send_texts(self) -> None:
-        texts = self._autopilot.texts
-        for text in texts:
-            self._texts.add(text, self.time_boot_us)
-        texts.clear()
-        for message in self._texts.due(self.time_boot_us):
-            self._streams.send(message)

@@ -16,8 +16,12 @@ OUTSIDE = {
     *("socket", "select", "serial", "asyncio", "threading", "subprocess", "signal"),
     *("time", "datetime", "os", "sys", "shutil", "tempfile", "pathlib", "io"),
 }
-# Built-in airframes are read where they lie; compiled kernels are kept beside their source.
-MAY_READ_FILES = {"sim_vehicle/airframe.py", "sim_vehicle/physics/jit.py"}
+# Built-in airframes and the table of parameters are read where they lie; compiled kernels are kept beside their source.
+MAY_READ_FILES = {
+    "sim_vehicle/airframe.py",
+    "sim_vehicle/parameters/definitions.py",
+    "sim_vehicle/physics/jit.py",
+}
 
 
 def sources(package: str) -> list[Path]:

@@ -6,11 +6,7 @@ Source: PX4's Commander::arm, Commander::disarm and Commander::handleAutoDisarm.
 from enum import StrEnum
 
 from sim_vehicle.autopilot.messages import Result
-
-# COM_SPOOLUP_TIME (1 s) + COM_DISARM_PRFLT (10 s): an armed vehicle on which nobody acts.
-DISARM_WITHOUT_TAKEOFF_US = 11_000_000
-# COM_DISARM_LAND: long enough that a bounce on landing does not stop the motors in the air.
-DISARM_LANDED_US = 2_000_000
+from sim_vehicle.parameters.store import Parameters
 
 
 class Reason(StrEnum):
@@ -24,7 +20,8 @@ class Reason(StrEnum):
 class Arming:
     """Whether the motors may turn, since when, and what has happened since."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
         self.armed = False
         self.armed_at_us = 0
         self.taken_off = False
@@ -56,13 +53,17 @@ class Arming:
             self._landed_since_us = None
             return None
         if not self.taken_off:
-            if now_us - self.armed_at_us < DISARM_WITHOUT_TAKEOFF_US:
+            # PX4 counts both for an armed vehicle on which nobody acts; a time of 0 or less switches it off.
+            allowed_s = self._parameters["COM_DISARM_PRFLT"]
+            waited_s = (now_us - self.armed_at_us) / 1e6
+            if allowed_s <= 0 or waited_s < allowed_s + self._parameters["COM_SPOOLUP_TIME"]:
                 return None
             self.armed = False
             return Reason.INACTION
         if self._landed_since_us is None:
             self._landed_since_us = now_us
-        if now_us - self._landed_since_us < DISARM_LANDED_US:
+        wait_s = self._parameters["COM_DISARM_LAND"]
+        if wait_s <= 0 or (now_us - self._landed_since_us) / 1e6 < wait_s:
             return None
         self.armed = False
         return Reason.LANDING

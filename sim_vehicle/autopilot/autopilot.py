@@ -10,6 +10,7 @@ from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, 
 from sim_vehicle.autopilot.modes import ARMABLE, Conditions, Event, Mode, ModeState
 from sim_vehicle.autopilot.takeoff import Takeoff, wants_takeoff
 from sim_vehicle.autopilot.trajectory import ModeTrajectory
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
@@ -37,15 +38,16 @@ class LandedState(IntEnum):
 class Autopilot:
     """Commands and setpoints in; modes, a demand for the position control, texts and acks out."""
 
-    def __init__(self, hover_thrust_fraction: float, first: Estimate) -> None:
+    def __init__(self, hover_thrust_fraction: float, first: Estimate, parameters: Parameters) -> None:
+        self.parameters = parameters
         self.modes = ModeState()
-        self.arming = Arming()
+        self.arming = Arming(parameters)
         self.signal = offboard.OffboardSignal()
-        self.detector = LandDetector(hover_thrust_fraction)
+        self.detector = LandDetector(hover_thrust_fraction, parameters)
         self.applied: TrajectorySetpoint | None = None
         self.texts: list[StatusText] = []
-        self._takeoff = Takeoff()
-        self._trajectory = ModeTrajectory()
+        self._takeoff = Takeoff(parameters)
+        self._trajectory = ModeTrajectory(parameters)
         self._estimate = first
         self._now_us = first.time_boot_us
         self._demanded_us = first.time_boot_us
@@ -62,8 +64,6 @@ class Autopilot:
 
     def setpoint(self, target: PositionTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
-        if not offboard.is_for_us(target):
-            return
         refusal = offboard.refusal(target)
         if refusal is not None:
             self.texts.append(refusal)

@@ -9,14 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
-from sim_vehicle.autopilot.messages import (
-    AUTOPILOT_COMPONENT_ID,
-    EVERY_ID,
-    SYSTEM_ID,
-    Command,
-    CommandAck,
-    Result,
-)
+from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
 from sim_vehicle.autopilot.modes import AUTO_MAIN_MODE, CUSTOM_FLAG, Mode, mode_from_request
 
 NAV_RETURN_TO_LAUNCH = 20
@@ -67,16 +60,13 @@ class Flight(Protocol):
         """Disarm."""
 
 
-def is_for_us(command: Command) -> bool:
+def is_for_us(command: Command, us: Identity) -> bool:
     """Whether PX4 takes the command: others are not answered, nor are its own echoes."""
-    if (command.source_system, command.source_component) == (SYSTEM_ID, AUTOPILOT_COMPONENT_ID):
+    if (command.source_system, command.source_component) == us:
         return False
-    if command.target_system not in (SYSTEM_ID, EVERY_ID):
-        return False
-    return (
-        command.target_component in (AUTOPILOT_COMPONENT_ID, EVERY_ID)
-        or command.command == REQUEST_AUTOPILOT_CAPABILITIES
-    )
+    if command.command == REQUEST_AUTOPILOT_CAPABILITIES:
+        return command.target_system in (us.system, EVERY_ID)
+    return us.is_addressed(command.target_system, command.target_component)
 
 
 def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bool]:

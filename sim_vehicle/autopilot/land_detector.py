@@ -1,22 +1,18 @@
 """Whether the vehicle stands on the ground, judged as PX4 does: from its own estimate and its own demand.
 
-Source: PX4's land_detector/MulticopterLandDetector.cpp with the defaults of land_detector_params_mc.yaml.
+Source: PX4's land_detector/MulticopterLandDetector.cpp and the parameters LNDMC_* and MPC_THR_MIN.
 It has no sensor for the ground, so a descent that stalls on an obstacle looks like a landing.
 """
 
 import math
 
-# LNDMC_Z_VEL_MAX and LNDMC_XY_VEL_MAX: slower than this counts as not moving.
-STILL_VERTICAL_M_S = 0.25
-STILL_HORIZONTAL_M_S = 1.5
-# LNDMC_ROT_MAX, about roll and pitch.
-STILL_ROTATION_RAD_S = math.radians(20.0)
+from sim_vehicle.parameters.store import Parameters
+
 # On the ground the thresholds widen, so that idling motors do not look like a takeoff.
 WIDER_WHEN_LANDED = 2.5
-# A demand faster than this is a commanded descent.
-DESCENT_M_S = 1.1 * STILL_VERTICAL_M_S
-# MPC_THR_MIN, and how far between it and hover thrust still counts as low, and as none.
-MINIMUM_THRUST = 0.12
+# A demand faster than this many times LNDMC_Z_VEL_MAX is a commanded descent.
+DESCENT_FACTOR = 1.1
+# How far between MPC_THR_MIN and hover thrust still counts as low, and as none.
 LOW_THRUST_SHARE = 0.6
 NO_THRUST_SHARE = 0.1
 # Each of the three stages has to last a third of the detection time of 1 s.
@@ -50,10 +46,9 @@ class _Stage:
 class LandDetector:
     """Ground contact, then maybe landed, then landed. A disarmed vehicle is landed."""
 
-    def __init__(self, hover_thrust_fraction: float) -> None:
-        span = hover_thrust_fraction - MINIMUM_THRUST
-        self._low_thrust = MINIMUM_THRUST + LOW_THRUST_SHARE * span
-        self._no_thrust = MINIMUM_THRUST + NO_THRUST_SHARE * span
+    def __init__(self, hover_thrust_fraction: float, parameters: Parameters) -> None:
+        self._hover_thrust = hover_thrust_fraction
+        self._parameters = parameters
         self._contact = _Stage(STAGE_US, True)
         self._maybe = _Stage(STAGE_US, True)
         self._landed = _Stage(STAGE_US, True)
@@ -91,13 +86,14 @@ class LandDetector:
                 stage.state = True
             return
         on_ground = self._maybe.state or self._landed.state
-        descends = asked_down_m_s is not None and asked_down_m_s >= DESCENT_M_S
+        descent_m_s = DESCENT_FACTOR * self._parameters["LNDMC_Z_VEL_MAX"]
+        descends = asked_down_m_s is not None and asked_down_m_s >= descent_m_s
         still = self._is_still(velocity_ned_m_s)
         self._free_fall.update(math.hypot(*specific_force_frd_m_s2) < FREE_FALL_M_S2, now_us)
-        gives_way = thrust_fraction <= self._low_thrust and (descends or on_ground)
+        gives_way = thrust_fraction <= self._thrust(LOW_THRUST_SHARE) and (descends or on_ground)
         self._contact.update(gives_way and still, now_us)
         self._maybe.update(
-            thrust_fraction <= self._no_thrust
+            thrust_fraction <= self._thrust(NO_THRUST_SHARE)
             and self._contact.state
             and not self._free_fall.state
             and not self._rotates(angular_velocity_frd_rad_s),
@@ -105,11 +101,15 @@ class LandDetector:
         )
         self._landed.update(self._maybe.state, now_us)
 
+    def _thrust(self, share: float) -> float:
+        least = self._parameters["MPC_THR_MIN"]
+        return least + share * (self._hover_thrust - least)
+
     def _is_still(self, velocity_ned_m_s: Vector3) -> bool:
         north, east, down = velocity_ned_m_s
-        vertical = STILL_VERTICAL_M_S * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
-        return abs(down) < vertical and math.hypot(north, east) <= STILL_HORIZONTAL_M_S
+        vertical = self._parameters["LNDMC_Z_VEL_MAX"] * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
+        return abs(down) < vertical and math.hypot(north, east) <= self._parameters["LNDMC_XY_VEL_MAX"]
 
     def _rotates(self, angular_velocity_frd_rad_s: Vector3) -> bool:
-        limit = STILL_ROTATION_RAD_S * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
+        limit = math.radians(self._parameters["LNDMC_ROT_MAX"]) * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
         return math.hypot(angular_velocity_frd_rad_s[0], angular_velocity_frd_rad_s[1]) > limit

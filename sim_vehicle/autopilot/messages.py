@@ -2,14 +2,23 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeAlias
+from typing import NamedTuple
 
 from sim_vehicle.setpoint import Axis3
 
-SYSTEM_ID = 1
-AUTOPILOT_COMPONENT_ID = 1
 EVERY_ID = 0
 """A target of 0 addresses every system, or every component."""
+
+
+class Identity(NamedTuple):
+    """Who the vehicle is on the wire: MAV_SYS_ID and MAV_COMP_ID."""
+
+    system: int = 1
+    component: int = 1
+
+    def is_addressed(self, target_system: int, target_component: int) -> bool:
+        """Whether something sent to these ids is meant for this vehicle, too."""
+        return target_system in (self.system, EVERY_ID) and target_component in (self.component, EVERY_ID)
 
 
 class Result(IntEnum):
@@ -51,7 +60,13 @@ class Command:
     param2: float = 0.0
     param3: float = 0.0
     param4: float = 0.0
+    param5: float = 0.0
+    """Latitude in degrees, where it is one; a COMMAND_LONG carries it with 24 bits only."""
+    param6: float = 0.0
     param7: float = 0.0
+    confirmation: int = 0
+    frame: int | None = None
+    """MAV_FRAME of a COMMAND_INT; None for a COMMAND_LONG."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +93,6 @@ class TimeSyncRequest:
     """TIMESYNC with tc1 = 0: the peer asks for our clock; an answer to our own request never gets here."""
 
     peer_time_ns: int
-
-
-Received: TypeAlias = PeerHeartbeat | Command | PositionTarget | TimeSyncRequest
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,7 @@ and PositionControl::_inputValid of PX4; the two delays are measured on it.
 
 import math
 
-from sim_vehicle.autopilot.messages import (
-    AUTOPILOT_COMPONENT_ID,
-    EVERY_ID,
-    SYSTEM_ID,
-    PositionTarget,
-    Severity,
-    StatusText,
-)
+from sim_vehicle.autopilot.messages import PositionTarget, Severity, StatusText
 from sim_vehicle.setpoint import FREE, Axis3, TrajectorySetpoint
 
 FRAME_LOCAL_NED = 1
@@ -63,14 +56,6 @@ class OffboardSignal:
         if now_us - self._last_us >= SETPOINTS_LOST_AFTER_US:
             self.arrives = self.is_back = False
             self._last_us = None
-
-
-def is_for_us(target: PositionTarget) -> bool:
-    """Whether the setpoint is addressed to this autopilot; PX4 drops others without a word."""
-    return target.target_system in (SYSTEM_ID, EVERY_ID) and target.target_component in (
-        AUTOPILOT_COMPONENT_ID,
-        EVERY_ID,
-    )
 
 
 def refusal(target: PositionTarget) -> StatusText | None:

@@ -6,17 +6,10 @@ every mode, offboard too: a vehicle leaves the ground some 2.4 s after it is arm
 
 from enum import IntEnum
 
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import FREE, TrajectorySetpoint
 
-# COM_SPOOLUP_TIME and MPC_TKO_RAMP_T.
-SPOOL_UP_US = 1_000_000
-RAMP_US = 3_000_000
-# The allowed climb starts where the velocity control would take the whole weight off the motors,
-# g / MPC_Z_VEL_P_ACC, and ends at MPC_Z_VEL_MAX_UP.
-RAMP_START_CLIMB_M_S = -9.80665 / 4.0
-RAMP_END_CLIMB_M_S = 3.0
-# MPC_Z_P turns a height error into a demanded climb.
-HEIGHT_P_PER_S = 1.0
+_GRAVITY_M_S2 = 9.80665
 
 
 class TakeoffState(IntEnum):
@@ -32,7 +25,8 @@ class TakeoffState(IntEnum):
 class Takeoff:
     """Decides what of a demand may reach the position control."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
         self.state = TakeoffState.DISARMED
         self._since_us = 0
 
@@ -43,11 +37,11 @@ class Takeoff:
             return
         if self.state is TakeoffState.DISARMED:
             self.state, self._since_us = TakeoffState.SPOOL_UP, now_us
-        if self.state is TakeoffState.SPOOL_UP and now_us - self._since_us >= SPOOL_UP_US:
+        if self.state is TakeoffState.SPOOL_UP and self._passed_s(now_us) >= self._parameters["COM_SPOOLUP_TIME"]:
             self.state = TakeoffState.READY
         if self.state is TakeoffState.READY and wants_takeoff:
             self.state, self._since_us = TakeoffState.RAMP_UP, now_us
-        if self.state is TakeoffState.RAMP_UP and now_us - self._since_us >= RAMP_US:
+        if self.state is TakeoffState.RAMP_UP and self._passed_s(now_us) >= self._parameters["MPC_TKO_RAMP_T"]:
             self.state = TakeoffState.FLIGHT
         elif self.state is TakeoffState.FLIGHT and landed:
             self.state = TakeoffState.READY
@@ -60,11 +54,19 @@ class Takeoff:
             return None
         if self.state is TakeoffState.FLIGHT:
             return None if ground_contact else demand
-        progress = (now_us - self._since_us) / RAMP_US
-        climb_m_s = RAMP_START_CLIMB_M_S + progress * (RAMP_END_CLIMB_M_S - RAMP_START_CLIMB_M_S)
+        climb_m_s = self._ramp_climb_m_s(now_us)
         if climb_m_s <= 0.0:
             return None
-        return _with_climb_limited(demand, climb_m_s, down_m)
+        return _with_climb_limited(demand, climb_m_s, down_m, self._parameters["MPC_Z_P"])
+
+    def _ramp_climb_m_s(self, now_us: int) -> float:
+        """From where the velocity control would take the whole weight off the motors to MPC_Z_VEL_MAX_UP."""
+        start = -_GRAVITY_M_S2 / self._parameters["MPC_Z_VEL_P_ACC"]
+        progress = self._passed_s(now_us) / self._parameters["MPC_TKO_RAMP_T"]
+        return start + progress * (self._parameters["MPC_Z_VEL_MAX_UP"] - start)
+
+    def _passed_s(self, now_us: int) -> float:
+        return (now_us - self._since_us) / 1e6
 
 
 def wants_takeoff(demand: TrajectorySetpoint | None, down_m: float) -> bool:
@@ -80,12 +82,14 @@ def wants_takeoff(demand: TrajectorySetpoint | None, down_m: float) -> bool:
     )
 
 
-def _with_climb_limited(demand: TrajectorySetpoint, climb_m_s: float, down_m: float) -> TrajectorySetpoint:
+def _with_climb_limited(
+    demand: TrajectorySetpoint, climb_m_s: float, down_m: float, height_p_per_s: float
+) -> TrajectorySetpoint:
     north, east, height = demand.position_ned_m
     v_north, v_east, v_down = demand.velocity_ned_m_s
     if height is None and v_down is None:
         return demand
-    asked_down_m_s = (v_down or 0.0) + (HEIGHT_P_PER_S * (height - down_m) if height is not None else 0.0)
+    asked_down_m_s = (v_down or 0.0) + (height_p_per_s * (height - down_m) if height is not None else 0.0)
     if asked_down_m_s >= -climb_m_s:
         return demand
     a_north, a_east, _ = demand.acceleration_ned_m_s2

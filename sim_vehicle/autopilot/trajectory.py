@@ -1,7 +1,6 @@
 """What each mode asks of the position control by itself: hold, takeoff, return, land, sink.
 
-Sources: PX4's navigator (takeoff.cpp, rtl.cpp, rtl_direct.cpp, land.cpp), FlightTaskAuto.cpp and their
-parameters' defaults; RTL_RETURN_ALT and NAV_ACC_RAD as rc.mc_defaults sets them for multicopters.
+Sources: PX4's navigator (takeoff.cpp, rtl.cpp, rtl_direct.cpp, land.cpp), FlightTaskAuto.cpp and their parameters.
 """
 
 import math
@@ -9,29 +8,17 @@ from enum import Enum, auto
 
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.smoothing import (
-    ACCELERATION_DOWN_M_S2,
     Smoother,
     Vector3,
     stop_point,
     towards,
     vertical_velocity,
 )
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 
-TAKEOFF_HEIGHT_M = 2.5  # MIS_TAKEOFF_ALT, above where the takeoff began
-TAKEOFF_SPEED_M_S = 1.5  # MPC_TKO_SPEED
-TAKEOFF_ACCELERATION_M_S2 = TAKEOFF_SPEED_M_S / 3.0  # MPC_TKO_SPEED / MPC_TKO_RAMP_T
-HEIGHT_REACHED_M = 0.8  # NAV_MC_ALT_RAD: nearer than this counts as reached
-PLACE_REACHED_M = 2.0  # NAV_ACC_RAD
-
-LAND_SPEED_M_S = 0.7  # MPC_LAND_SPEED, below 5 m
-LAND_SPEED_HIGH_M_S = 1.5  # MPC_Z_VEL_MAX_DN, above 10 m
-LAND_SLOW_BELOW_M, LAND_FAST_ABOVE_M = 5.0, 10.0  # MPC_LAND_ALT2, MPC_LAND_ALT1
-
-RETURN_HEIGHT_M = 30.0  # RTL_RETURN_ALT
-RETURN_NEAR_M = 10.0  # RTL_MIN_DIST: nearer than this the return stays inside a cone
-RETURN_CONE_RAD = math.radians(45.0)  # RTL_CONE_ANG
-YAW_RATE_RAD_S = math.radians(60.0)  # MPC_YAWRAUTO_MAX
+# MPC_TKO_RAMP_T may be 0: PX4 then allows the whole climb at once.
+SHORTEST_RAMP_S = 0.01
 
 
 class ReturnLeg(Enum):
@@ -42,31 +29,42 @@ class ReturnLeg(Enum):
     LAND = auto()
 
 
-def return_height_m(height_m: float, home_distance_m: float) -> float:
+def return_height_m(height_m: float, home_distance_m: float, parameters: Parameters) -> float:
     """Height above home at which RETURN flies, from the present height and distance (rtl.cpp)."""
-    if home_distance_m <= PLACE_REACHED_M:
+    most_m, near_m = parameters["RTL_RETURN_ALT"], parameters["NAV_ACC_RAD"]
+    if home_distance_m <= near_m:
         wanted = 2.0 * home_distance_m
     else:
-        wanted = RETURN_HEIGHT_M
-        if home_distance_m <= RETURN_NEAR_M:
-            wanted = min(wanted, home_distance_m / math.tan(RETURN_CONE_RAD))
-        wanted = max(wanted, 2.0 * PLACE_REACHED_M)
-    return max(height_m, min(wanted, RETURN_HEIGHT_M))
+        wanted = most_m
+        if home_distance_m <= parameters["RTL_MIN_DIST"]:
+            wanted = min(wanted, _cone_height_m(home_distance_m, parameters["RTL_CONE_ANG"]))
+        wanted = max(wanted, 2.0 * near_m)
+    return max(height_m, min(wanted, most_m))
 
 
-def land_speed_m_s(height_m: float) -> float:
-    """Descent of LAND, slower near the ground."""
-    share = (height_m - LAND_SLOW_BELOW_M) / (LAND_FAST_ABOVE_M - LAND_SLOW_BELOW_M)
-    return LAND_SPEED_M_S + min(max(share, 0.0), 1.0) * (LAND_SPEED_HIGH_M_S - LAND_SPEED_M_S)
+def _cone_height_m(home_distance_m: float, half_angle_deg: float) -> float:
+    """Inside the cone over home: as high as it is there; an angle of 0 means no cone, 90 degrees no climb."""
+    if half_angle_deg <= 0:
+        return math.inf
+    return 0.0 if half_angle_deg >= 90 else home_distance_m / math.tan(math.radians(half_angle_deg))
+
+
+def land_speed_m_s(height_m: float, parameters: Parameters) -> float:
+    """Descent of LAND, slower near the ground: from MPC_Z_VEL_MAX_DN above to MPC_LAND_SPEED below."""
+    slow, slow_below_m = parameters["MPC_LAND_SPEED"], parameters["MPC_LAND_ALT2"]
+    span_m = max(parameters["MPC_LAND_ALT1"] - slow_below_m, 1e-3)
+    share = min(max((height_m - slow_below_m) / span_m, 0.0), 1.0)
+    return slow + share * (parameters["MPC_Z_VEL_MAX_DN"] - slow)
 
 
 class ModeTrajectory:
     """The demand of the modes that fly by themselves; local NED."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
         self.home_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self._home_yaw_rad = 0.0
-        self._smoother = Smoother()
+        self._smoother = Smoother(parameters)
         self._target_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self._yaw_rad = 0.0
         self._asked_yaw_rad = 0.0
@@ -84,12 +82,12 @@ class ModeTrajectory:
         self._position_ned_m = position_ned_m
         continues = previous is Mode.TAKEOFF and mode is Mode.LOITER
         if not continues:
-            self._target_ned_m = stop_point(position_ned_m, velocity_ned_m_s)
+            self._target_ned_m = stop_point(position_ned_m, velocity_ned_m_s, self._parameters)
             self._yaw_rad = self._asked_yaw_rad = yaw_rad
             self._smoother.start(position_ned_m, velocity_ned_m_s)
         if mode is Mode.TAKEOFF:
             north, east, down = position_ned_m
-            self._target_ned_m = (north, east, down - TAKEOFF_HEIGHT_M)
+            self._target_ned_m = (north, east, down - self._parameters["MIS_TAKEOFF_ALT"])
             self._smoother.start(position_ned_m, (0.0, 0.0, 0.0))
         elif mode is Mode.RETURN:
             self._begin_return()
@@ -102,12 +100,14 @@ class ModeTrajectory:
     def takeoff_is_reached(self, position_ned_m: Vector3) -> bool:
         """Whether TAKEOFF is near enough to its height and place to be over."""
         north, east, down = (p - t for p, t in zip(position_ned_m, self._target_ned_m, strict=True))
-        return abs(down) <= HEIGHT_REACHED_M and math.hypot(north, east) <= PLACE_REACHED_M
+        near_m = self._parameters["NAV_ACC_RAD"]
+        return abs(down) <= self._parameters["NAV_MC_ALT_RAD"] and math.hypot(north, east) <= near_m
 
     def demand(self, mode: Mode, position_ned_m: Vector3, step_s: float) -> TrajectorySetpoint | None:
         """The next setpoint of ``mode``; None for a mode that flies nothing by itself."""
         self._position_ned_m = position_ned_m
-        self._yaw_rad = _turned_towards(self._yaw_rad, self._asked_yaw_rad, YAW_RATE_RAD_S * step_s)
+        turn_rad = math.radians(self._parameters["MPC_YAWRAUTO_MAX"]) * step_s
+        self._yaw_rad = _turned_towards(self._yaw_rad, self._asked_yaw_rad, turn_rad)
         if mode in (Mode.LOITER, Mode.POSCTL):
             return self._fly_to_target(step_s)
         if mode is Mode.TAKEOFF:
@@ -115,9 +115,9 @@ class ModeTrajectory:
         if mode is Mode.RETURN:
             return self._return(step_s)
         if mode is Mode.LAND:
-            return self._descend(land_speed_m_s(self._height_m()), step_s)
+            return self._descend(land_speed_m_s(self._height_m(), self._parameters), step_s)
         if mode is Mode.OFFBOARD_LOST:
-            return self._descend(LAND_SPEED_M_S, step_s)
+            return self._descend(self._parameters["MPC_LAND_SPEED"], step_s)
         return None
 
     def _height_m(self) -> float:
@@ -140,14 +140,17 @@ class ModeTrajectory:
         north, east, down = self._target_ned_m
         height = self._position_ned_m[2]
         *_, v_down = self._smoother.velocity_ned_m_s
-        wanted = max(vertical_velocity(v_down, down - height, step_s), -TAKEOFF_SPEED_M_S)
-        v_down = towards(v_down, wanted, TAKEOFF_ACCELERATION_M_S2 * step_s)
+        parameters = self._parameters
+        speed = parameters["MPC_TKO_SPEED"]
+        acceleration = speed / max(parameters["MPC_TKO_RAMP_T"], SHORTEST_RAMP_S)
+        wanted = max(vertical_velocity(v_down, down - height, step_s, parameters), -speed)
+        v_down = towards(v_down, wanted, acceleration * step_s)
         self._smoother.start((north, east, height), (0.0, 0.0, v_down))
         return TrajectorySetpoint((north, east, None), (0.0, 0.0, v_down), yaw_rad=self._yaw_rad)
 
     def _descend(self, speed_m_s: float, step_s: float) -> TrajectorySetpoint:
         *_, v_down = self._smoother.velocity_ned_m_s
-        v_down = towards(v_down, speed_m_s, ACCELERATION_DOWN_M_S2 * step_s)
+        v_down = towards(v_down, speed_m_s, self._parameters["MPC_ACC_DOWN_MAX"] * step_s)
         self._smoother.advance(self._target_ned_m, step_s)
         north, east, _ = self._smoother.position_ned_m
         v_north, v_east, _ = self._smoother.velocity_ned_m_s
@@ -157,24 +160,27 @@ class ModeTrajectory:
     def _begin_return(self) -> None:
         self._leg = ReturnLeg.CLIMB
         north, east, _ = self._position_ned_m
-        height_m = return_height_m(self._height_m(), self._home_distance_m())
+        height_m = return_height_m(self._height_m(), self._home_distance_m(), self._parameters)
         self._target_ned_m = (north, east, self.home_ned_m[2] - height_m)
 
     def _return(self, step_s: float) -> TrajectorySetpoint:
         down = self._target_ned_m[2]
-        if self._leg is ReturnLeg.CLIMB and abs(self._position_ned_m[2] - down) <= HEIGHT_REACHED_M:
+        if self._leg is ReturnLeg.CLIMB and self._is_at_height(down):
             self._leg = ReturnLeg.GO_HOME
             self._target_ned_m = (self.home_ned_m[0], self.home_ned_m[1], down)
             self._look_home()
-        if self._leg is ReturnLeg.GO_HOME and self._home_distance_m() <= PLACE_REACHED_M:
+        if self._leg is ReturnLeg.GO_HOME and self._home_distance_m() <= self._parameters["NAV_ACC_RAD"]:
             self._leg = ReturnLeg.LAND
             self._asked_yaw_rad = self._home_yaw_rad
         if self._leg is ReturnLeg.LAND:
-            return self._descend(land_speed_m_s(self._height_m()), step_s)
+            return self._descend(land_speed_m_s(self._height_m(), self._parameters), step_s)
         return self._fly_to_target(step_s)
 
+    def _is_at_height(self, down_m: float) -> bool:
+        return abs(self._position_ned_m[2] - down_m) <= self._parameters["NAV_MC_ALT_RAD"]
+
     def _look_home(self) -> None:
-        if self._home_distance_m() > PLACE_REACHED_M:
+        if self._home_distance_m() > self._parameters["NAV_ACC_RAD"]:
             self._asked_yaw_rad = math.atan2(
                 self.home_ned_m[1] - self._position_ned_m[1], self.home_ned_m[0] - self._position_ned_m[0]
             )

@@ -49,19 +49,19 @@ def _axis_acceleration(axis: int, state: State, asked: Asked, gains: Gains) -> f
         return feed_forward
     wanted = asked.value[ASK_VELOCITY, axis] if asked.given[ASK_VELOCITY, axis] else 0.0
     if asked.given[ASK_POSITION, axis]:
-        wanted += gains.position_p * (asked.value[ASK_POSITION, axis] - state.estimate[axis])
+        wanted += gains.position_p[axis] * (asked.value[ASK_POSITION, axis] - state.estimate[axis])
     if axis == 2:
         wanted = min(max(wanted, -gains.climb_max_m_s), gains.descent_max_m_s)
     else:
         wanted = min(max(wanted, -gains.speed_max_m_s), gains.speed_max_m_s)
     error = wanted - state.estimate[3 + axis]
-    proportional: float = gains.velocity_p * error
+    proportional: float = gains.velocity_p[axis] * error
     # Horizontally, integrate only what the tilt limit lets happen; an integral wound up while
     # saturated is what carries a vehicle past its setpoint.
     limit = GRAVITY_M_S2 * math.tan(gains.tilt_max_rad)
     if abs(proportional) < limit:
-        state.velocity_integral[axis] += gains.velocity_i * error / POSITION_LOOP_HZ
-    slope: float = gains.velocity_d * state.acceleration_ned_m_s2[axis]
+        state.velocity_integral[axis] += gains.velocity_i[axis] * error / POSITION_LOOP_HZ
+    slope: float = gains.velocity_d[axis] * state.acceleration_ned_m_s2[axis]
     integral: float = state.velocity_integral[axis]
     return proportional + integral - slope + feed_forward
 

@@ -2,10 +2,12 @@
 
 import math
 import re
+from collections.abc import Callable
+from typing import TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import Command, PeerHeartbeat, PositionTarget, Received, TimeSyncRequest
+from sim_vehicle.autopilot.messages import EVERY_ID, Command, Identity, PeerHeartbeat, PositionTarget, TimeSyncRequest
 from sim_vehicle.setpoint import Axis3
 
 _MARKER = re.compile(rb"[\xfd\xfe]")
@@ -14,6 +16,7 @@ _MARKER_V2 = 0xFD
 _AROUND_V2, _AROUND_V1, _SIGNATURE = 12, 8, 13
 _SIGNED_FLAG = 0x01
 
+_GREATEST_INT32 = 2**31 - 1
 _FORCE_BIT = 0x200
 _YAW_IGNORED, _YAW_RATE_IGNORED = 0x400, 0x800
 
@@ -21,12 +24,15 @@ _YAW_IGNORED, _YAW_RATE_IGNORED = 0x400, 0x800
 class Decoder:
     """Finds the packets in a stream of bytes that may be split, damaged or anything else."""
 
-    def __init__(self) -> None:
+    def __init__(self, us: Identity) -> None:
+        self._us = us
         self._parser = dialect.MAVLink(None)
         self._rest = b""
+        self.sources: set[tuple[int, int]] = set()
+        """System and component of everybody who was heard here."""
 
-    def push(self, data: bytes) -> list[Received]:
-        """The messages completed by ``data``, in order; kinds that this vehicle does not read are dropped.
+    def push(self, data: bytes) -> list[object]:
+        """The messages completed by ``data``, in order; what this vehicle does not read or is not meant for is dropped.
 
         A packet whose checksum is wrong is skipped by one byte only, and one that is not complete
         holds up nothing that follows: what looked like a packet may have been noise.
@@ -34,7 +40,7 @@ class Decoder:
         if not data:
             return []
         buffer = self._rest + data if self._rest else data
-        messages: list[Received] = []
+        messages: list[object] = []
         kept = len(buffer)
         position = 0
         while (found := _MARKER.search(buffer, position)) is not None:
@@ -49,7 +55,7 @@ class Decoder:
                 position = start + 1
                 continue
             kept, position = len(buffer), end
-            message = _message(packet)
+            message = self._read(packet)
             if message is not None:
                 messages.append(message)
         self._rest = buffer[kept:]
@@ -65,6 +71,14 @@ class Decoder:
         # Without its definition, a packet's checksum cannot be judged.
         return None if isinstance(message, dialect.MAVLink_unknown) else message
 
+    def _read(self, packet: dialect.MAVLink_message) -> object | None:
+        self.sources.add((packet.get_srcSystem(), packet.get_srcComponent()))
+        message_id: int = packet.id
+        read = READERS.get(message_id)
+        if read is None or (message_id in _ADDRESSED and not self._us.is_addressed(*_target(packet))):
+            return None
+        return read(packet)
+
 
 def _end_of_packet(buffer: bytes, start: int) -> int | None:
     """Where the packet that may begin at ``start`` ends; None while its header is not complete."""
@@ -77,22 +91,37 @@ def _end_of_packet(buffer: bytes, start: int) -> int | None:
     return start + length + _AROUND_V2 + signature
 
 
-def _message(packet: dialect.MAVLink_message) -> Received | None:
-    if isinstance(packet, dialect.MAVLink_set_position_target_local_ned_message):
-        return _position_target(packet)
-    if isinstance(packet, dialect.MAVLink_command_long_message):
-        return _command(packet, packet.param7)
-    if isinstance(packet, dialect.MAVLink_command_int_message):
-        return _command(packet, packet.z)
-    if isinstance(packet, dialect.MAVLink_heartbeat_message):
-        return PeerHeartbeat(packet.get_srcSystem(), packet.get_srcComponent(), packet.type)
-    if isinstance(packet, dialect.MAVLink_timesync_message) and packet.tc1 == 0:
-        return TimeSyncRequest(packet.ts1)
-    return None
+def _target(packet: dialect.MAVLink_message) -> tuple[int, int]:
+    """Whom it addresses; a message without a component is for all of them."""
+    return packet.target_system, getattr(packet, "target_component", EVERY_ID)
+
+
+def _heartbeat(packet: dialect.MAVLink_heartbeat_message) -> PeerHeartbeat:
+    return PeerHeartbeat(packet.get_srcSystem(), packet.get_srcComponent(), packet.type)
+
+
+def _timesync(packet: dialect.MAVLink_timesync_message) -> TimeSyncRequest | None:
+    return TimeSyncRequest(packet.ts1) if packet.tc1 == 0 else None
+
+
+def _command_long(packet: dialect.MAVLink_command_long_message) -> Command:
+    return _command(packet, packet.param5, packet.param6, packet.param7, packet.confirmation, None)
+
+
+def _command_int(packet: dialect.MAVLink_command_int_message) -> Command:
+    """x and y are divided by 10^7 whatever they mean, as PX4 does; both at their greatest mean none."""
+    unset = packet.x == _GREATEST_INT32 and packet.y == _GREATEST_INT32
+    param5, param6 = (math.nan, math.nan) if unset else (packet.x / 1e7, packet.y / 1e7)
+    return _command(packet, param5, param6, packet.z, 0, packet.frame)
 
 
 def _command(
-    packet: dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message, param7: float
+    packet: dialect.MAVLink_command_long_message | dialect.MAVLink_command_int_message,
+    param5: float,
+    param6: float,
+    param7: float,
+    confirmation: int,
+    frame: int | None,
 ) -> Command:
     return Command(
         source_system=packet.get_srcSystem(),
@@ -104,7 +133,11 @@ def _command(
         param2=packet.param2,
         param3=packet.param3,
         param4=packet.param4,
+        param5=param5,
+        param6=param6,
         param7=param7,
+        confirmation=confirmation,
+        frame=frame,
     )
 
 
@@ -129,3 +162,21 @@ def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
 
 def _value(ignored: int, value: float) -> float | None:
     return None if ignored or not math.isfinite(value) else value
+
+
+Reader: TypeAlias = Callable[[dialect.MAVLink_message], object | None]
+"""A packet's value; None where it says nothing to this vehicle."""
+
+# By message id. What is in no table is dropped.
+READERS: dict[int, Reader] = {
+    0: _heartbeat,
+    75: _command_int,
+    76: _command_long,
+    84: _position_target,
+    111: _timesync,
+}
+
+# Commands may go to other components and still be answered: whom they are for is decided where they are handled.
+_ADDRESSED = frozenset(
+    number for number in READERS if "target_system" in dialect.mavlink_map[number].fieldnames and number not in (75, 76)
+)

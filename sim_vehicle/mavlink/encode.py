@@ -14,13 +14,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.estimate import Estimate
-from sim_vehicle.autopilot.messages import (
-    AUTOPILOT_COMPONENT_ID,
-    SYSTEM_ID,
-    CommandAck,
-    StatusText,
-    TimeSyncRequest,
-)
+from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.mavlink.vibration import Vibration
@@ -65,8 +59,8 @@ class Telemetry:
 class Encoder:
     """Packets of this vehicle in one sequence of numbers."""
 
-    def __init__(self) -> None:
-        self._link = dialect.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=AUTOPILOT_COMPONENT_ID)
+    def __init__(self, us: Identity) -> None:
+        self._link = dialect.MAVLink(None, srcSystem=us.system, srcComponent=us.component)
 
     def packet(self, message: Message) -> bytes:
         """The message as a MAVLink 2 packet."""

@@ -73,10 +73,10 @@ class Constants:
 class Gains:
     """Gains and limits of the inner loops (eqs. 4-6)."""
 
-    position_p: float
-    velocity_p: float
-    velocity_i: float
-    velocity_d: float
+    position_p: Vector3  # along north, east, down
+    velocity_p: Vector3
+    velocity_i: Vector3
+    velocity_d: Vector3
     k_r: Vector3  # N m per unit of e_R
     k_omega: Vector3  # N m per rad/s
     tilt_max_rad: float

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.gains import PositionGains
 from sim_vehicle.estimator.onboard import OnboardEstimator
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import (
@@ -104,6 +105,18 @@ class Plant:
         self._scratch = new_record(Scratch)
         self.interval_us = airframe.imu.integration_interval_us
         self.truth = TruthRecorder(keeps_path)
+
+    def tune(self, gains: PositionGains) -> None:
+        """Change the gains and limits of the position control."""
+        record = self._gains
+        record.position_p[:] = gains.position_p_per_s
+        record.velocity_p[:] = gains.velocity_p_per_s
+        record.velocity_i[:] = gains.velocity_i_per_s2
+        record.velocity_d[:] = gains.velocity_d
+        record.tilt_max_rad = gains.tilt_max_rad
+        record.speed_max_m_s = gains.speed_max_m_s
+        record.climb_max_m_s = gains.climb_max_m_s
+        record.descent_max_m_s = gains.descent_max_m_s
 
     def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Put the level vehicle somewhere in flight, for studies of single hits."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import FREE, Axis3, TrajectorySetpoint
 
 STEP_US = 4_000
@@ -70,7 +71,8 @@ class Flight:
 
     def __init__(self, start: Estimate | None = None) -> None:
         self.state = start or Estimate()
-        self.autopilot = Autopilot(HOVER, self.state)
+        self.parameters = Parameters()
+        self.autopilot = Autopilot(HOVER, self.state, self.parameters)
         self.acks: list[CommandAck] = []
 
     @property

@@ -2,18 +2,19 @@
 
 from sim_vehicle.autopilot.arming import Arming, Reason
 from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.parameters.store import Parameters
 
 SECOND = 1_000_000
 
 
 def armed_at_zero() -> Arming:
-    arming = Arming()
+    arming = Arming(Parameters())
     assert arming.arm(0, checks_pass=True, forced=False) is Result.ACCEPTED
     return arming
 
 
 def test_failing_checks_refuse_arming_and_force_overrides_them():
-    arming = Arming()
+    arming = Arming(Parameters())
     assert arming.arm(0, checks_pass=False, forced=False) is Result.TEMPORARILY_REJECTED
     assert not arming.armed
     assert arming.arm(0, checks_pass=False, forced=True) is Result.ACCEPTED

@@ -13,7 +13,7 @@ from sim_vehicle.autopilot.commands import (
     REQUEST_MESSAGE,
     SET_MESSAGE_INTERVAL,
 )
-from sim_vehicle.autopilot.messages import Command, Result
+from sim_vehicle.autopilot.messages import Command, Identity, Result
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 
 NAN = math.nan
@@ -39,7 +39,7 @@ class StreamsThatKnow105:
 
 def command(number: int, *params: float, target: tuple[int, int] = (1, 1)) -> Command:
     p = [*params, *[0.0] * (7 - len(params))]
-    return Command(255, 190, *target, number, p[0], p[1], p[2], p[3], p[6])
+    return Command(255, 190, *target, number, *p[:7])
 
 
 @pytest.mark.parametrize(
@@ -76,11 +76,11 @@ def test_everything_else_goes_to_the_commander_unanswered():
     [((1, 1), True), ((0, 0), True), ((0, 1), True), ((1, 0), True), ((2, 1), False), ((1, 191), False)],
 )
 def test_only_what_is_addressed_to_us_is_answered(target, ours):
-    assert commands.is_for_us(command(NAV_TAKEOFF, target=target)) is ours
+    assert commands.is_for_us(command(NAV_TAKEOFF, target=target), Identity()) is ours
 
 
 def test_our_own_echo_is_not_a_command():
-    assert not commands.is_for_us(Command(1, 1, 1, 1, NAV_TAKEOFF))
+    assert not commands.is_for_us(Command(1, 1, 1, 1, NAV_TAKEOFF), Identity())
 
 
 def test_arming_by_command():

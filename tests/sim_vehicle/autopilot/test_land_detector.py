@@ -3,6 +3,7 @@
 import pytest
 
 from sim_vehicle.autopilot.land_detector import LandDetector
+from sim_vehicle.parameters.store import Parameters
 
 STEP_US = 8_000
 STILL = (0.0, 0.0, 0.0)
@@ -15,7 +16,7 @@ class Detection:
     """A detector that has taken off, fed at 125 Hz."""
 
     def __init__(self) -> None:
-        self.detector = LandDetector(HOVER)
+        self.detector = LandDetector(HOVER, Parameters())
         self.now_us = 0
         self.feed(0.1, thrust=HOVER, asked_down=None)
         assert not self.detector.landed

@@ -10,10 +10,12 @@ from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.smoothing import Smoother, stop_point
 from sim_vehicle.autopilot.takeoff import Takeoff, TakeoffState, wants_takeoff
 from sim_vehicle.autopilot.trajectory import land_speed_m_s, return_height_m
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.kinematic_plant import Estimate, Flight, attitude_of_yaw, target
 
 SECOND = 1_000_000
+DEFAULTS = Parameters()
 
 
 def taken_off(start: Estimate | None = None) -> Flight:
@@ -90,7 +92,7 @@ def test_what_counts_as_wanting_to_take_off(demand, wants):
 
 
 def test_after_a_landing_the_ramp_begins_again():
-    takeoff = Takeoff()
+    takeoff = Takeoff(Parameters())
     takeoff.update(0, armed=True, landed=True, wants_takeoff=True)
     takeoff.update(SECOND, armed=True, landed=True, wants_takeoff=True)
     assert takeoff.state is TakeoffState.RAMP_UP
@@ -120,9 +122,9 @@ def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground
 
 
 def test_landing_is_faster_high_up():
-    assert land_speed_m_s(3.0) == land_speed_m_s(5.0) == pytest.approx(0.7)
-    assert land_speed_m_s(7.5) == pytest.approx(1.1)
-    assert land_speed_m_s(10.0) == land_speed_m_s(50.0) == pytest.approx(1.5)
+    assert land_speed_m_s(3.0, DEFAULTS) == land_speed_m_s(5.0, DEFAULTS) == pytest.approx(0.7)
+    assert land_speed_m_s(7.5, DEFAULTS) == pytest.approx(1.1)
+    assert land_speed_m_s(10.0, DEFAULTS) == land_speed_m_s(50.0, DEFAULTS) == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +139,7 @@ def test_landing_is_faster_high_up():
     ],
 )
 def test_return_flies_at_px4s_height(height_m, distance_m, expected_m):
-    assert return_height_m(height_m, distance_m) == pytest.approx(expected_m)
+    assert return_height_m(height_m, distance_m, DEFAULTS) == pytest.approx(expected_m)
 
 
 def test_return_climbs_comes_home_and_lands_facing_as_it_stood():
@@ -171,7 +173,7 @@ def test_hold_stops_where_braking_ends_and_stays():
     flight.ask(176, 1, 6)
     flight.fly(3.0, moving)
     place = flight.state.position_ned_m[0]
-    expected = stop_point(flight.state.position_ned_m, flight.state.velocity_ned_m_s)[0]
+    expected = stop_point(flight.state.position_ned_m, flight.state.velocity_ned_m_s, DEFAULTS)[0]
     flight.ask(176, 1, 4, 3)
     flight.fly(6.0)
     assert flight.state.position_ned_m[0] == pytest.approx(expected, abs=0.1)
@@ -181,11 +183,11 @@ def test_hold_stops_where_braking_ends_and_stays():
 
 def test_the_stop_point_allows_for_speed_and_for_the_build_up_of_acceleration():
     # v (v / 2a + 0.6 s) with a = 3 m/s^2
-    assert stop_point((1.0, 2.0, -3.0), (0.0, 3.0, 1.0)) == pytest.approx((1.0, 2.0 + 3 * (0.5 + 0.6), -3.0))
+    assert stop_point((1.0, 2.0, -3.0), (0.0, 3.0, 1.0), DEFAULTS) == pytest.approx((1.0, 2.0 + 3 * (0.5 + 0.6), -3.0))
 
 
 def test_a_smoothed_setpoint_keeps_its_limits_and_does_not_run_past():
-    smoother = Smoother()
+    smoother = Smoother(DEFAULTS)
     smoother.start((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     step_s, before = 0.008, (0.0, 0.0, 0.0)
     for _ in range(3000):

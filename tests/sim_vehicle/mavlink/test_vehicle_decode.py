@@ -6,7 +6,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import Command, PeerHeartbeat, PositionTarget, TimeSyncRequest
+from sim_vehicle.autopilot.messages import Command, Identity, PeerHeartbeat, PositionTarget, TimeSyncRequest
 from sim_vehicle.mavlink.decode import Decoder
 from sim_vehicle.setpoint import FREE
 
@@ -47,11 +47,11 @@ CASES = [
     (dialect.MAVLink_param_request_list_message(1, 1), None),
     (
         dialect.MAVLink_command_long_message(1, 1, 511, 0, 105.0, 4000.0, 0.5, 0.25, 5.0, 6.0, 7.0),
-        Command(1, 191, 1, 1, 511, 105.0, 4000.0, 0.5, 0.25, 7.0),
+        Command(1, 191, 1, 1, 511, 105.0, 4000.0, 0.5, 0.25, 5.0, 6.0, 7.0),
     ),
     (
         dialect.MAVLink_command_int_message(1, 1, 6, 22, 0, 0, 1.0, 2.0, 3.0, 4.0, 473977418, 85455939, 12.5),
-        Command(1, 191, 1, 1, 22, 1.0, 2.0, 3.0, 4.0, 12.5),
+        Command(1, 191, 1, 1, 22, 1.0, 2.0, 3.0, 4.0, 47.3977418, 8.5455939, 12.5, frame=6),
     ),
     (target_message(1, 0xDF8, *NUMBERS), target(position_m=(1.0, 2.0, -3.0))),
     (target_message(1, 0xDC7, *NUMBERS), target(velocity_m_s=(4.0, 5.0, 6.0))),
@@ -75,9 +75,23 @@ CASES = [
 def test_each_message_whole_and_byte_by_byte(message, expected, v1):
     raw = packet(message, v1)
     wanted = [] if expected is None else [expected]
-    assert Decoder().push(raw) == wanted
-    decoder = Decoder()
+    assert Decoder(Identity()).push(raw) == wanted
+    decoder = Decoder(Identity())
     assert [got for byte in raw for got in decoder.push(bytes([byte]))] == wanted
+
+
+@pytest.mark.parametrize(
+    ("system", "component", "ours"),
+    [(1, 1, True), (0, 0, True), (0, 1, True), (1, 0, True), (2, 1, False), (1, 191, False)],
+)
+def test_a_setpoint_for_another_is_dropped(system, component, ours):
+    raw = packet(dialect.MAVLink_set_position_target_local_ned_message(7, system, component, 1, 0xDF8, *NUMBERS))
+    assert bool(Decoder(Identity()).push(raw)) is ours
+
+
+def test_a_vehicle_of_another_number_hears_what_is_meant_for_it():
+    raw = packet(dialect.MAVLink_set_position_target_local_ned_message(7, 5, 1, 1, 0xDF8, *NUMBERS))
+    assert Decoder(Identity(5, 1)).push(raw) and not Decoder(Identity(4, 1)).push(raw)
 
 
 def test_many_packets_cut_anywhere():
@@ -86,7 +100,7 @@ def test_many_packets_cut_anywhere():
     chance = random.Random(1)
     for _ in range(50):
         cuts = sorted(chance.sample(range(len(raw)), 6))
-        decoder = Decoder()
+        decoder = Decoder(Identity())
         parts = [raw[a:b] for a, b in zip([0, *cuts], [*cuts, len(raw)], strict=True)]
         assert [got for part in parts for got in decoder.push(part)] == wanted
 
@@ -113,14 +127,14 @@ TARGET = packet(CASES[6][0])
     ids=repr,
 )
 def test_what_follows_noise_is_not_held_up(noise):
-    decoder = Decoder()
+    decoder = Decoder(Identity())
     assert decoder.push(noise) == []
     assert decoder.push(HEARTBEAT) == [PeerHeartbeat(1, 191, 18)]
     assert decoder.push(HEARTBEAT) == [PeerHeartbeat(1, 191, 18)]
 
 
 def test_noise_for_hours_is_not_kept():
-    decoder = Decoder()
+    decoder = Decoder(Identity())
     chance = random.Random(2)
     for _ in range(300):
         decoder.push(chance.randbytes(1000))
@@ -133,4 +147,4 @@ def test_a_signed_packet_is_read_without_a_key():
     link.signing.secret_key = bytes(32)
     link.signing.sign_outgoing = True
     link.signing.timestamp = 1
-    assert Decoder().push(CASES[0][0].pack(link)) == [PeerHeartbeat(1, 191, 18)]
+    assert Decoder(Identity()).push(CASES[0][0].pack(link)) == [PeerHeartbeat(1, 191, 18)]

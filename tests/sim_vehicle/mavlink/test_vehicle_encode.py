@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import (
     CommandAck,
+    Identity,
     PeerHeartbeat,
     Result,
     Severity,
@@ -20,6 +21,7 @@ from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.encode import Encoder, Telemetry
 from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.mavlink.vibration import Vibration
+from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate, attitude_of_yaw
 
@@ -37,15 +39,15 @@ SAMPLE = Estimate(
 
 
 def telemetry() -> Telemetry:
-    return Telemetry(SAMPLE, SAMPLE, Autopilot(HOVER, SAMPLE), Vibration(), 1e-4, 4e-4, 9e-4)
+    return Telemetry(SAMPLE, SAMPLE, Autopilot(HOVER, SAMPLE, Parameters()), Vibration(), 1e-4, 4e-4, 9e-4)
 
 
 def read_back(message):
-    return dialect.MAVLink(None).decode(bytearray(Encoder().packet(message)))
+    return dialect.MAVLink(None).decode(bytearray(Encoder(Identity()).packet(message)))
 
 
 def test_packets_are_mavlink_2_from_the_autopilot():
-    raw = Encoder().packet(encode.heartbeat(telemetry()))
+    raw = Encoder(Identity()).packet(encode.heartbeat(telemetry()))
     assert raw[0] == 0xFD
     message = dialect.MAVLink(None).decode(bytearray(raw))
     assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 1)

@@ -8,11 +8,15 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import streams as module
 from sim_vehicle.mavlink.encode import Encoder, Telemetry
+from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams, interval_from_request
+from sim_vehicle.mavlink.topics import Topics
 from sim_vehicle.mavlink.vibration import Vibration
+from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate
 
 HEARTBEAT, SYS_STATUS, ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 0, 1, 30, 31, 32
@@ -25,10 +29,11 @@ class Link:
 
     def __init__(self, seed: int = 1) -> None:
         self.sample = Estimate(time_boot_us=4_000)
-        self.autopilot = Autopilot(HOVER, self.sample)
+        self.autopilot = Autopilot(HOVER, self.sample, Parameters())
         telemetry = Telemetry(self.sample, self.sample, self.autopilot, Vibration(), 1e-4, 1e-3, 1e-5)
         self.telemetry = telemetry
-        self.streams = Streams(telemetry, Encoder(), seed)
+        self.topics = Topics(telemetry)
+        self.streams = Streams(telemetry, self.topics, Encoder(Identity()), LinkKind.ONBOARD, seed)
         self.parser = dialect.MAVLink(None)
         self.sent_us: dict[int, list[int]] = {}
         self.last: dict[int, object] = {}
@@ -42,7 +47,8 @@ class Link:
             new_position = self.sample.time_boot_us % 8_000 == 0
             if new_position:
                 self.telemetry.published = self.sample
-            self.streams.update(new_position)
+            self.topics.count(new_position)
+            self.streams.update()
             self.take()
 
     def take(self) -> None:
@@ -226,7 +232,8 @@ def test_sequence_numbers_count_every_packet():
     for _ in range(2_000):
         link.sample = replace(link.sample, time_boot_us=link.sample.time_boot_us + 4_000)
         link.telemetry.sample = link.telemetry.published = link.sample
-        link.streams.update(True)
+        link.topics.count(True)
+        link.streams.update()
         numbers += [raw[4] for raw in link.streams.take()]
     assert all((b - a) % 256 == 1 for a, b in pairwise(numbers))
     assert len(numbers) > 1_000

@@ -1,0 +1,20 @@
+"""The table of what every link offers: one line a protocol."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from sim_vehicle.mavlink.board import Board
+from sim_vehicle.mavlink.command_service import CommandService
+from sim_vehicle.mavlink.service import Service
+from sim_vehicle.mavlink.setpoint_service import SetpointService
+from sim_vehicle.mavlink.timesync_service import TimeSyncService
+
+if TYPE_CHECKING:
+    from sim_vehicle.mavlink.link import Link
+
+# In the order in which they are brought up to date in an interval.
+SERVICES: "tuple[Callable[[Link, Board], Service], ...]" = (
+    CommandService,
+    TimeSyncService,
+    SetpointService,
+)

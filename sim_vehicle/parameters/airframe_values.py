@@ -1,0 +1,45 @@
+"""Parameters that describe the vehicle: their defaults from an airframe, and the control that they make."""
+
+import math
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.control.gains import PositionGains
+from sim_vehicle.parameters.store import Parameters
+
+_MICROSECONDS = 1_000_000
+
+
+def defaults_from(airframe: Airframe) -> dict[str, float]:
+    """What ``airframe`` has in place of PX4's defaults; one gain for all axes becomes PX4's two."""
+    control = airframe.control
+    return {
+        "IMU_INTEG_RATE": _MICROSECONDS // airframe.imu.integration_interval_us,
+        "MPC_THR_HOVER": airframe.hover_fraction,
+        "MPC_TILTMAX_AIR": math.degrees(control.tilt_max_rad),
+        "MPC_XY_P": control.position_p_per_s,
+        "MPC_XY_VEL_D_ACC": control.velocity_d,
+        "MPC_XY_VEL_I_ACC": control.velocity_i_per_s2,
+        "MPC_XY_VEL_MAX": control.speed_max_m_s,
+        "MPC_XY_VEL_P_ACC": control.velocity_p_per_s,
+        "MPC_Z_P": control.position_p_per_s,
+        "MPC_Z_VEL_D_ACC": control.velocity_d,
+        "MPC_Z_VEL_I_ACC": control.velocity_i_per_s2,
+        "MPC_Z_VEL_MAX_DN": control.descent_max_m_s,
+        "MPC_Z_VEL_MAX_UP": control.climb_max_m_s,
+        "MPC_Z_VEL_P_ACC": control.velocity_p_per_s,
+    }
+
+
+def position_gains(parameters: Parameters) -> PositionGains:
+    """What the parameters say now, for the position control."""
+    p = parameters
+    return PositionGains(
+        position_p_per_s=(p["MPC_XY_P"], p["MPC_XY_P"], p["MPC_Z_P"]),
+        velocity_p_per_s=(p["MPC_XY_VEL_P_ACC"], p["MPC_XY_VEL_P_ACC"], p["MPC_Z_VEL_P_ACC"]),
+        velocity_i_per_s2=(p["MPC_XY_VEL_I_ACC"], p["MPC_XY_VEL_I_ACC"], p["MPC_Z_VEL_I_ACC"]),
+        velocity_d=(p["MPC_XY_VEL_D_ACC"], p["MPC_XY_VEL_D_ACC"], p["MPC_Z_VEL_D_ACC"]),
+        tilt_max_rad=math.radians(p["MPC_TILTMAX_AIR"]),
+        speed_max_m_s=p["MPC_XY_VEL_MAX"],
+        climb_max_m_s=p["MPC_Z_VEL_MAX_UP"],
+        descent_max_m_s=p["MPC_Z_VEL_MAX_DN"],
+    )
