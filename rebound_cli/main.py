@@ -2,12 +2,14 @@
 
 import argparse
 import itertools
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
+from rebound_cli.arguments import count, host_and_port, instance, port, speed
 
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
@@ -47,6 +49,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_sim(commands)
     _add_results(commands)
     _add_paper(commands)
+    _add_detectors(commands)
     _add_airframe(commands)
     _add_identify(commands)
     return parser
@@ -74,7 +77,7 @@ def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     _add_world_options(fly)
     fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
     fly.add_argument(
-        "--instance", type=_instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
+        "--instance", type=instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
     )
     fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
@@ -97,12 +100,12 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     )
     sim.add_argument(
         "--port",
-        type=_port,
+        type=port,
         help="UDP port to listen on (default 14580; 0: any free one); with --autopilot px4 the TCP port (4560)",
     )
     sim.add_argument(
         "--speed",
-        type=_speed,
+        type=speed,
         default=1.0,
         metavar="N",
         help="with --autopilot px4: at most N times real time, 0 for as fast as PX4 answers (default 1)",
@@ -116,7 +119,7 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     )
     sim.add_argument(
         "--remote",
-        type=_host_and_port,
+        type=host_and_port,
         default=("127.0.0.1", 14540),
         metavar="HOST:PORT",
         help="where to send unasked (default 127.0.0.1:14540)",
@@ -156,10 +159,31 @@ def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="folder of paper.md and images/paper (default: docs)",
     )
     paper.add_argument(
-        "--seeds", type=_count, default=10, help="walls from any side: flights at each speed (default 10)"
+        "--seeds", type=count, default=10, help="walls from any side: flights at each speed (default 10)"
     )
-    paper.add_argument("--jobs", type=_count, default=2, help="processes at a time (default 2)")
+    paper.add_argument("--jobs", type=count, default=2, help="processes at a time (default 2)")
     paper.set_defaults(run=_paper)
+
+
+def _add_detectors(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    detectors = commands.add_parser(
+        "detectors",
+        help="try every collision detector on hits and healthy flights",
+        description="Simulated and recorded hits and flights through every detector; see docs/detection.md.",
+    )
+    detectors.add_argument("--hits", type=count, default=400, metavar="N", help="simulated hits (default 400)")
+    detectors.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
+    detectors.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"
+    )
+    detectors.add_argument(
+        "--out",
+        type=Path,
+        default=Path("docs"),
+        metavar="DIR",
+        help="folder of detection.md and images/detection (default: docs)",
+    )
+    detectors.set_defaults(run=_detectors)
 
 
 def _add_airframe(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -241,6 +265,12 @@ def _paper(options: argparse.Namespace) -> int:
     return run_paper(options)
 
 
+def _detectors(options: argparse.Namespace) -> int:
+    from rebound_cli.detectors_report.command import run_detectors
+
+    return run_detectors(options)
+
+
 def _with_plain_sim(arguments: Sequence[str]) -> list[str]:
     """`--sim` stands alone before a mission's name too, which argparse would take for its value."""
     return [
@@ -259,39 +289,3 @@ def _identify(options: argparse.Namespace) -> int:
     from rebound_cli.identify import run_identify
 
     return run_identify(options)
-
-
-def _port(text: str) -> int:
-    if not text.isdigit() or int(text) > 65_535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port: give a number from 0 to 65535")
-    return int(text)
-
-
-def _count(text: str) -> int:
-    if not text.isdigit() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a count: give a whole number from 1 on")
-    return int(text)
-
-
-def _host_and_port(text: str) -> tuple[str, int]:
-    host, separator, port = text.rpartition(":")
-    if not separator or not host:
-        raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT")
-    return host, _port(port)
-
-
-def _instance(text: str) -> int:
-    # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
-    if not text.isdigit() or int(text) > 9:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an instance: give a number from 0 to 9")
-    return int(text)
-
-
-def _speed(text: str) -> float:
-    try:
-        speed = float(text)
-    except ValueError:
-        speed = -1.0
-    if not 0 <= speed <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a speed: give a number from 0 to 1000")
-    return speed

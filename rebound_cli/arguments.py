@@ -1,0 +1,39 @@
+"""Kinds of arguments that the command line takes: text to value, or a sentence why not."""
+
+import argparse
+
+
+def port(text: str) -> int:
+    if not text.isdigit() or int(text) > 65_535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: give a number from 0 to 65535")
+    return int(text)
+
+
+def count(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a count: give a whole number from 1 on")
+    return int(text)
+
+
+def host_and_port(text: str) -> tuple[str, int]:
+    host, separator, number = text.rpartition(":")
+    if not separator or not host:
+        raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT")
+    return host, port(number)
+
+
+def instance(text: str) -> int:
+    # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
+    if not text.isdigit() or int(text) > 9:
+        raise argparse.ArgumentTypeError(f"{text!r} is not an instance: give a number from 0 to 9")
+    return int(text)
+
+
+def speed(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a speed: give a number from 0 to 1000")
+    return value

@@ -1,0 +1,42 @@
+"""A stretch of simulated flight as its intervals went by: what the vehicle's software knew, and the truth beside it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from companion.detection.interface import Situation
+from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
+from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_IMPULSE, HIT_START_US
+from sim_vehicle.physics.plant import Plant, PlantOutput
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(slots=True)
+class Recording:
+    """One entry an interval in each list. `published` is the state estimate as of 8 ms, as PX4 publishes it."""
+
+    samples: list[PlantOutput] = field(default_factory=list)
+    published: list[PlantOutput] = field(default_factory=list)
+    situations: list[Situation] = field(default_factory=list)
+    contact_m_s2: list[float] = field(default_factory=list)
+    """The obstacles' mean force on the vehicle over the interval, per unit mass. The ground's is not in it."""
+    _impulse: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
+
+    def add(self, plant: Plant, sample: PlantOutput, situation: Situation, mass_kg: float) -> None:
+        """Take an interval that the plant has just advanced by."""
+        latest = self.published[-1] if self.published else sample
+        is_due = sample.time_boot_us - latest.time_boot_us >= POSITION_PERIOD_US
+        self.samples.append(sample)
+        self.published.append(sample if is_due else latest)
+        self.situations.append(situation)
+        self.contact_m_s2.append(self._contact_n_s(plant) / (mass_kg * 1e-6 * plant.interval_us))
+
+    def _contact_n_s(self, plant: Plant) -> float:
+        """Size of the impulse that the obstacles gave in the latest interval."""
+        hit = plant.state.hit
+        started_us = float(hit[HIT_START_US]) if hit[HIT_ACTIVE] or self._impulse[0] else 0.0
+        x, y, z = (float(value) for value in hit[HIT_IMPULSE])
+        before = self._impulse[1] if started_us == self._impulse[0] else (0.0, 0.0, 0.0)
+        self._impulse = (started_us, (x, y, z))
+        return float(np.linalg.norm((x - before[0], y - before[1], z - before[2])))

@@ -1,0 +1,81 @@
+"""Detectors by name let loose on what was heard."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.detection.interface import Situation
+from companion.detection.registry import DETECTORS
+from companion.detection.watch import advance, start_watch
+from companion.estimate.impact import ImpactEstimate
+from companion.link.streams import wanted_streams
+from companion.messages import MessageId
+from companion.mission.config import CompanionConfig
+from rebound_cli.detectors.wire import BUILDERS, Heard
+
+# HIGHRES_IMU asked for, and what a client of PX4 receives of it.
+ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
+
+# The setting that a detector's sensitivity hangs on, as a multiple of its default.
+SWEPT_FACTORS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+
+
+@dataclass(slots=True)
+class Found:
+    """A reported collision: when its sample was heard, its estimate then, and the final one if there was one."""
+
+    time_boot_us: int
+    first: ImpactEstimate
+    final: ImpactEstimate
+
+
+def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
+    """Default settings but for the detector's name, and its main threshold times `factor`."""
+    config = CompanionConfig(detector=detector)
+    if factor == 1.0:
+        return config
+    own = getattr(config, detector)
+    field = swept_field(detector)
+    swept = type(own).model_validate({**own.model_dump(), field: factor * getattr(own, field)})
+    return config.model_copy(update={detector: swept})
+
+
+def swept_field(detector: str) -> str:
+    """Name of the setting that is swept: by convention the first of the detector's settings."""
+    return next(iter(type(getattr(CompanionConfig(), detector)).model_fields))
+
+
+def detector_names() -> tuple[str, ...]:
+    return tuple(DETECTORS)
+
+
+def streams_asked_hz(rate: int) -> dict[MessageId, float]:
+    """What is asked of the vehicle for all detectors together, HIGHRES_IMU at the rate."""
+    config = CompanionConfig().streams
+    asked = {stream.message_id: stream.asked_hz for stream in wanted_streams(config, tuple(MessageId))}
+    wanted = {message: hz for message, hz in asked.items() if message in BUILDERS}
+    return {**wanted, MessageId.HIGHRES_IMU: ASKED_HZ[rate]}
+
+
+def watch_all(
+    config: CompanionConfig, heard: Sequence[Heard], situations: Sequence[Situation]
+) -> tuple[list[Found], list[ImpactEstimate], int]:
+    """Collisions reported, touches that were reported as none, and how often the detector said it was blind."""
+    watch = start_watch(config, heard[0].time_boot_us)
+    found: list[Found] = []
+    touches: list[ImpactEstimate] = []
+    blind = 0
+    for step in heard:
+        seen = advance(watch, step.samples, situations[step.index], step.time_boot_us)
+        for estimate in seen.impacts:
+            if estimate.impact.is_collision:
+                found.append(Found(step.time_boot_us, estimate, estimate))
+            else:
+                touches.append(estimate)
+        for final in seen.finished:
+            for entry in found:
+                if entry.first.impact is final.impact:
+                    entry.final = final
+        blind += sum("blind" in notice.text for notice in seen.notices)
+    if found and watch.estimate is not None and watch.estimate.impact is found[-1].first.impact:
+        found[-1].final = watch.estimate
+    return found, touches, blind
