@@ -71,6 +71,15 @@ class Companion:
         if self._core is not None:
             self._core.flight.plan_confirmed = True
 
+    @property
+    def plan_is_confirmed(self) -> bool:
+        return self._confirmed
+
+    @property
+    def stop_reason(self) -> str | None:
+        """What `stop` was last called with; None as long as nobody has."""
+        return self._stop_reason
+
     def plan_is_ready(self) -> bool:
         """Connected, checked, waiting for nothing but the confirmation."""
         return self._core is not None and self._core.machine.state is State.READY

@@ -101,4 +101,5 @@ def fly_realtime(
         if interrupts.reason is not None and not is_stopped:
             is_stopped = True
             companion.stop(interrupts.reason)
+        recorder.record_person(now_us, companion.plan_is_confirmed, companion.stop_reason)
         console.live(companion.status, (now_us - started_us) / 1e6)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from companion.errors import ReboundError
-from companion.shell.tlog import TlogWriter
+from companion.shell.tlog import TlogWriter, is_packet
 from rebound_cli import __version__
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ RUNS_FOLDER = Path("runs")
 
 TLOG_NAME = "flight.tlog"
 EVENTS_NAME = "events.jsonl"
+INPUTS_NAME = "inputs.jsonl"
 SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "flight.png"
 TRUTH_NAME = "truth.npz"
@@ -73,12 +74,19 @@ def create_run_folder(out: Path | None, mission_name: str) -> Path:
 
 
 class FlightRecorder:
-    """Writes packets and events as they happen and keeps the events for the timeline."""
+    """Writes packets and events as they happen and keeps the events for the timeline.
+
+    What a replay needs besides is in a file of its own: the steps of which no packet tells, because nothing came
+    and nothing was sent, and what the person said.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._tlog = TlogWriter(folder / TLOG_NAME)
         # Line-buffered: events are few, and the last one before a kill is the one that matters.
         self._events_file = (folder / EVENTS_NAME).open("w", encoding="utf-8", buffering=1)
+        self._inputs_file = (folder / INPUTS_NAME).open("w", encoding="utf-8", buffering=1)
+        self._is_confirmed = False
+        self._stop_reason: str | None = None
         self.events: list[Event] = []
 
     def record(self, now_us: int, result: "StepResult") -> None:
@@ -86,17 +94,31 @@ class FlightRecorder:
             self._tlog.write(now_us, result.received_frames)
         if result.sent_frames:
             self._tlog.write(now_us, result.sent_frames)
+        elif not any(map(is_packet, result.received_frames)):
+            self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
         for event in result.events:
             self.events.append(event)
-            self._events_file.write(json.dumps(_event_record(event)) + "\n")
+            self._events_file.write(event_line(event))
+
+    def record_person(self, now_us: int, is_confirmed: bool, stop_reason: str | None) -> None:
+        """What the companion has been told by now, after its step at `now_us`; only what is new is written."""
+        if is_confirmed and not self._is_confirmed:
+            self._is_confirmed = True
+            self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "confirm"}}\n')
+        if stop_reason is not None and stop_reason != self._stop_reason:
+            self._stop_reason = stop_reason
+            self._inputs_file.write(json.dumps({"time_us": now_us, "kind": "stop", "reason": stop_reason}) + "\n")
 
     def close(self) -> None:
         self._tlog.close()
         self._events_file.close()
+        self._inputs_file.close()
 
 
-def _event_record(event: "Event") -> dict[str, Any]:
-    return {"time_us": event.time_us, "kind": event.kind, "text": event.text, "data": dict(event.data)}
+def event_line(event: "Event") -> str:
+    """The event as `events.jsonl` has it."""
+    record = {"time_us": event.time_us, "kind": event.kind, "text": event.text, "data": dict(event.data)}
+    return json.dumps(record) + "\n"
 
 
 def write_yaml(path: Path, data: Any) -> None:

@@ -74,6 +74,11 @@ def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
         position = start + length
 
 
+def is_packet(frame: bytes) -> bool:
+    """Whether bytes are as long as their own header says: `read_tlog` gives them back; others it passes over."""
+    return len(frame) > 0 and _frame_length(frame, 0) == len(frame)
+
+
 def _plausible(stamp_us: int, last_us: int | None) -> bool:
     return last_us is None or last_us <= stamp_us <= last_us + _LONGEST_GAP_US
 

@@ -20,6 +20,7 @@ FILES = {
     "events.jsonl",
     "flight.png",
     "flight.tlog",
+    "inputs.jsonl",
     "mission.yaml",
     "resolved.yaml",
     "summary.json",
