@@ -16,7 +16,8 @@ _OVERHEAD_V2 = 12
 _SIGNATURE_LENGTH = 13
 _SIGNED_FLAG = 0x01
 
-# After foreign bytes the reader looks for the next stamp: no earlier than the last, at most this much later.
+# After foreign bytes the reader looks for the next stamp: this near to the last. Earlier than the last it may be too,
+# as other programs stamp with a clock that can be set back.
 _LONGEST_GAP_US = 3 * 24 * 3600 * 1_000_000
 
 
@@ -80,7 +81,7 @@ def is_packet(frame: bytes) -> bool:
 
 
 def _plausible(stamp_us: int, last_us: int | None) -> bool:
-    return last_us is None or last_us <= stamp_us <= last_us + _LONGEST_GAP_US
+    return last_us is None or abs(stamp_us - last_us) <= _LONGEST_GAP_US
 
 
 def _stamp_follows(content: bytes, end: int, stamp_us: int) -> bool:

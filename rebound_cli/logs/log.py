@@ -1,0 +1,72 @@
+"""What every reader gives: typed samples in the order heard, and what the log cannot tell."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from companion.errors import ReboundError
+from companion.messages import ImuSample, Sample, Vector3
+
+
+class LogError(ReboundError):
+    """The log cannot be read or holds nothing that a detector could use."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What the vehicle's position control was asked for; local NED, None where nothing was (wholly) asked.
+
+    The companion is told this by no message: in flight it knows what it sent. A log tells it of any pilot.
+    """
+
+    time_boot_us: int
+    position_ned_m: Vector3 | None
+    velocity_ned_m_s: Vector3 | None
+    velocity_down_m_s: float | None
+
+
+Told: TypeAlias = Sample | Demand
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A sample and when it was heard, in microseconds of the log's own clock."""
+
+    at_us: int
+    sample: Told
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """A recorded flight. `losses` are sentences: what is missing, and what that costs.
+
+    `hover_thrust_fraction` is the vehicle's own estimate or parameter, where the log has it.
+    `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
+    """
+
+    path: Path
+    vehicle: str
+    started_at_us: int
+    heard: tuple[Heard, ...]
+    losses: tuple[str, ...]
+    hover_thrust_fraction: float | None = None
+    clipped_at_us: tuple[int, ...] | None = None
+
+    def imu(self) -> list[tuple[int, ImuSample]]:
+        """All IMU samples with the time each was heard at."""
+        return [(heard.at_us, heard.sample) for heard in self.heard if isinstance(heard.sample, ImuSample)]
+
+    @property
+    def duration_s(self) -> float:
+        return self.seconds(self.heard[-1].at_us) - self.seconds(self.heard[0].at_us)
+
+    def seconds(self, at_us: float) -> float:
+        """Since the log's start."""
+        return (at_us - self.started_at_us) * 1e-6
+
+
+def checked(log: Log) -> Log:
+    """The log, if there is anything in it for a detector. Raises LogError."""
+    if len(log.imu()) < 2:
+        raise LogError(f"{log.path}: no IMU samples in it; a collision cannot be looked for without them.")
+    return log

@@ -1,0 +1,128 @@
+"""What a detector made of a flight: impacts with their evidence, when it could not see, what happened around."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from companion.detection.interface import Situation
+from companion.detection.watch import Seen, Watch
+from companion.estimate.impact import ImpactEstimate
+from companion.messages import ExtendedState, Heartbeat, LandedState
+from companion.px4_mode import mode_name
+from rebound_cli.logs.log import Told
+
+
+@dataclass(slots=True)
+class Finding:
+    """One impact: as known at once, and as known when the contact was over (the same until then)."""
+
+    at_us: int
+    threshold_m_s2: float
+    situation: Situation
+    first: ImpactEstimate
+    final: ImpactEstimate
+
+    @property
+    def is_collision(self) -> bool:
+        return self.first.impact.is_collision
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A time in which the detector was off or blind, and why. Microseconds of the log's clock."""
+
+    start_us: int
+    end_us: int
+    reason: str
+
+    @property
+    def duration_s(self) -> float:
+        return (self.end_us - self.start_us) * 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """A line of the timeline that is no impact."""
+
+    at_us: int
+    text: str
+
+
+@dataclass(slots=True)
+class Findings:
+    """Grows step by step."""
+
+    impacts: list[Finding] = field(default_factory=list)
+    blind: list[Span] = field(default_factory=list)
+    off: list[Span] = field(default_factory=list)
+    happenings: list[Happening] = field(default_factory=list)
+
+    @property
+    def collisions(self) -> list[Finding]:
+        return [finding for finding in self.impacts if finding.is_collision]
+
+    @property
+    def contacts(self) -> list[Finding]:
+        """Touches that are no collisions: landings, hands."""
+        return [finding for finding in self.impacts if not finding.is_collision]
+
+
+class Notebook:
+    """Writes findings down as the watch makes them."""
+
+    def __init__(self, situation_at: Callable[[], Situation]) -> None:
+        self.findings = Findings()
+        self._situation_at = situation_at
+        self._open: dict[str, tuple[int, str]] = {}
+        self._landed = LandedState.UNDEFINED
+        self._armed: bool | None = None
+        self._mode: int | None = None
+
+    def note_seen(self, watch: Watch, seen: Seen, at_us: int) -> None:
+        for estimate in seen.impacts:
+            threshold = watch.state.threshold_m_s2
+            self.findings.impacts.append(Finding(at_us, threshold, self._situation_at(), estimate, estimate))
+        for estimate in seen.finished:
+            for finding in reversed(self.findings.impacts):
+                if finding.first.impact is estimate.impact:
+                    finding.final = estimate
+                    break
+        for notice in seen.notices:
+            self.findings.happenings.append(Happening(at_us, notice.text))
+        self._note_span("blind", watch.blind_reason, self.findings.blind, at_us)
+        self._note_span("off", self._situation_at().off_reason, self.findings.off, at_us)
+
+    def note_samples(self, samples: Sequence[Told], at_us: int) -> None:
+        """Take-offs, landings, arming and modes, as the vehicle reports them."""
+        for sample in samples:
+            if isinstance(sample, ExtendedState):
+                self._note_landed(sample.landed_state, at_us)
+            elif isinstance(sample, Heartbeat):
+                if sample.armed != self._armed and (self._armed is not None or sample.armed):
+                    self._tell(at_us, "armed" if sample.armed else "disarmed")
+                if sample.custom_mode != self._mode:
+                    self._tell(at_us, f"mode {mode_name(sample.custom_mode)}")
+                self._armed, self._mode = sample.armed, sample.custom_mode
+
+    def close(self, at_us: int) -> Findings:
+        self._note_span("blind", None, self.findings.blind, at_us)
+        self._note_span("off", None, self.findings.off, at_us)
+        return self.findings
+
+    def _note_landed(self, landed: LandedState, at_us: int) -> None:
+        was_down, is_down = self._landed is LandedState.ON_GROUND, landed is LandedState.ON_GROUND
+        if was_down and not is_down:
+            self._tell(at_us, "took off")
+        elif is_down and not was_down and self._landed is not LandedState.UNDEFINED:
+            self._tell(at_us, "landed")
+        self._landed = landed
+
+    def _tell(self, at_us: int, text: str) -> None:
+        self.findings.happenings.append(Happening(at_us, text))
+
+    def _note_span(self, name: str, reason: str | None, spans: list[Span], at_us: int) -> None:
+        """A span lasts as long as there is a reason, and goes by its first one."""
+        if reason is not None:
+            self._open.setdefault(name, (at_us, reason))
+        elif name in self._open:
+            start_us, first_reason = self._open.pop(name)
+            spans.append(Span(start_us, at_us, first_reason))
