@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
+from companion.detection.fused import FusedConfig
 from companion.detection.lateral import LateralConfig
 from companion.detection.registry import DETECTORS, check_known_detector
 from companion.detection.sight import SightConfig
@@ -100,6 +101,7 @@ class CompanionConfig(Written):
     detector: str = "lateral"
     # Ground handling, landing gear and ground effect are below this height above the arming position.
     min_detection_height_m: NotNegative = 0.5
+    fused: FusedConfig = FusedConfig()
     lateral: LateralConfig = LateralConfig()
     sight: SightConfig = SightConfig()
     streams: StreamsConfig = StreamsConfig()
