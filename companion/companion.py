@@ -72,6 +72,11 @@ class Companion:
             self._core.flight.plan_confirmed = True
 
     @property
+    def core(self) -> Core | None:
+        """What is remembered between steps, for whoever studies a flight; None before the first."""
+        return self._core
+
+    @property
     def plan_is_confirmed(self) -> bool:
         return self._confirmed
 
