@@ -85,7 +85,8 @@ def _load_airframe(name: str, document: Document) -> Airframe:
 
 def resolved(mission: Mission, world: SimulatedWorld | None) -> dict[str, Any]:
     """The mission with every default and option written out; it is itself a mission file."""
-    data = mission.model_dump(mode="json", exclude_none=True, by_alias=True)
+    data = mission.model_dump(mode="json", exclude_none=True)
+    data["items"] = [{item.name: item.action.model_dump(mode="json", exclude_none=True)} for item in mission.items]
     if world is not None:
         data["sim"] = world.scene.model_dump(mode="json", exclude_none=True)
     return data

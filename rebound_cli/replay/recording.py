@@ -28,7 +28,6 @@ class Step:
     sent: Sequence[bytes] = ()
     confirms: bool = False
     stop_reason: str | None = None
-    file_appears: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,6 @@ def read_recording(folder: Path) -> Recording:
     for record in _records(inputs_file):
         step = steps.setdefault(record["time_us"], Step(record["time_us"]))
         step.confirms |= record["kind"] == "confirm"
-        step.file_appears |= record["kind"] == "file"
         step.stop_reason = record.get("reason", step.stop_reason)
     lines = (folder / EVENTS_NAME).read_text(encoding="utf-8").splitlines(keepends=True)
     return Recording(mission, [steps[time_us] for time_us in sorted(steps)], lines)

@@ -31,8 +31,6 @@ def reproduce(recording: Recording, watch: Callable[[Companion, Step, StepResult
         watch(companion, step, result)
         if step.confirms:
             companion.confirm_plan()
-        if step.file_appears:
-            companion.file_is_there()
         if step.stop_reason is not None:
             companion.stop(step.stop_reason)
     comparison.finish()
