@@ -10,6 +10,7 @@ from pathlib import Path
 from companion.errors import ReboundError
 from rebound_cli import __version__
 from rebound_cli.arguments import count, host_and_port, hours, instance, port, speed
+from rebound_cli.replay.arguments import add_replay
 
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
@@ -50,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_results(commands)
     _add_paper(commands)
     _add_detectors(commands)
+    add_replay(commands)
     _add_airframe(commands)
     _add_identify(commands)
     return parser
@@ -78,6 +80,9 @@ def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
     fly.add_argument(
         "--instance", type=instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
+    )
+    fly.add_argument(
+        "--companion", type=Path, metavar="FILE", help="take the companion: part from this file, e.g. from rebound tune"
     )
     fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")

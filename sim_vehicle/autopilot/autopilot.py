@@ -4,14 +4,19 @@ from enum import IntEnum
 
 from sim_vehicle.autopilot import commands, offboard
 from sim_vehicle.autopilot.arming import Arming, Reason
-from sim_vehicle.autopilot.estimate import Estimate, yaw_of
+from sim_vehicle.autopilot.battery import Battery
+from sim_vehicle.autopilot.estimate import Estimate, Vector3, yaw_of
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result, Severity, StatusText
 from sim_vehicle.autopilot.modes import ARMABLE, Conditions, Event, Mode, ModeState
 from sim_vehicle.autopilot.takeoff import Takeoff, wants_takeoff
 from sim_vehicle.autopilot.trajectory import ModeTrajectory
+from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
+
+# Modes in which PX4's navigator has a setpoint.
+AUTO_MODES = frozenset({Mode.MISSION, Mode.LOITER, Mode.RETURN, Mode.TAKEOFF, Mode.LAND})
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
 POSITION_PERIOD_US = 8_000
@@ -40,6 +45,9 @@ class Autopilot:
 
     def __init__(self, hover_thrust_fraction: float, first: Estimate, parameters: Parameters) -> None:
         self.parameters = parameters
+        self.battery = Battery(parameters)
+        self.origin = Origin()
+        self.home_set_us = first.time_boot_us
         self.modes = ModeState()
         self.arming = Arming(parameters)
         self.signal = offboard.OffboardSignal()
@@ -76,6 +84,7 @@ class Autopilot:
         """Take what the sensors and the estimator say at the end of an interval."""
         self._estimate = estimate
         self._now_us = estimate.time_boot_us
+        self.battery.update(self._now_us, self.arming.armed, estimate.thrust_fraction)
 
     # --- the commander's cycle ---------------------------------------------------------------------------
 
@@ -171,7 +180,17 @@ class Autopilot:
             self._offboard_demand = self._demand or offboard.STOP
 
     def _set_home(self) -> None:
-        self._trajectory.set_home(self._estimate.position_ned_m, yaw_of(self._estimate.attitude_wxyz))
+        self.set_home_at(self._estimate.position_ned_m, yaw_of(self._estimate.attitude_wxyz))
+
+    def set_home_here(self) -> Result:
+        """DO_SET_HOME with the present position."""
+        self._set_home()
+        return Result.ACCEPTED
+
+    def set_home_at(self, position_ned_m: Vector3, yaw_rad: float) -> None:
+        """Where RETURN leads to from now on."""
+        self._trajectory.set_home(position_ned_m, yaw_rad)
+        self.home_set_us = self._now_us
 
     def _say(self, severity: Severity, text: str) -> None:
         self.texts.append(StatusText(severity, text))
@@ -223,6 +242,22 @@ class Autopilot:
             self._say(Severity.INFO, "Landing detected")
 
     # --- what is shown -----------------------------------------------------------------------------------
+
+    @property
+    def home_ned_m(self) -> Vector3:
+        """HOME_POSITION, local NED."""
+        return self._trajectory.home_ned_m
+
+    @property
+    def home_yaw_rad(self) -> float:
+        """Heading at home."""
+        return self._trajectory.home_yaw_rad
+
+    @property
+    def auto_target_ned_m(self) -> Vector3 | None:
+        """Where a mode that flies by itself is going, local NED; None in all other modes and on the ground."""
+        is_auto = self.modes.shown in AUTO_MODES and not self.detector.landed
+        return self._trajectory.target_ned_m if is_auto else None
 
     @property
     def checks_pass(self) -> bool:

@@ -63,7 +63,7 @@ class ModeTrajectory:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self.home_ned_m: Vector3 = (0.0, 0.0, 0.0)
-        self._home_yaw_rad = 0.0
+        self.home_yaw_rad = 0.0
         self._smoother = Smoother(parameters)
         self._target_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self._yaw_rad = 0.0
@@ -73,7 +73,7 @@ class ModeTrajectory:
 
     def set_home(self, position_ned_m: Vector3, yaw_rad: float) -> None:
         """Where RETURN leads to: the place of arming, and again that of leaving the ground."""
-        self.home_ned_m, self._home_yaw_rad = position_ned_m, yaw_rad
+        self.home_ned_m, self.home_yaw_rad = position_ned_m, yaw_rad
 
     def enter(
         self, mode: Mode, previous: Mode, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float
@@ -91,6 +91,11 @@ class ModeTrajectory:
             self._smoother.start(position_ned_m, (0.0, 0.0, 0.0))
         elif mode is Mode.RETURN:
             self._begin_return()
+
+    @property
+    def target_ned_m(self) -> Vector3:
+        """Where the mode wants to be."""
+        return self._target_ned_m
 
     @property
     def is_descending_to_land(self) -> bool:
@@ -171,7 +176,7 @@ class ModeTrajectory:
             self._look_home()
         if self._leg is ReturnLeg.GO_HOME and self._home_distance_m() <= self._parameters["NAV_ACC_RAD"]:
             self._leg = ReturnLeg.LAND
-            self._asked_yaw_rad = self._home_yaw_rad
+            self._asked_yaw_rad = self.home_yaw_rad
         if self._leg is ReturnLeg.LAND:
             return self._descend(land_speed_m_s(self._height_m(), self._parameters), step_s)
         return self._fly_to_target(step_s)

@@ -43,6 +43,10 @@ class Link:
         """Send something that is no stream."""
         self.streams.send(message)
 
+    def burst(self, fast: int, serial: int) -> int:
+        """How many packets of a long answer may be sent in this interval: ``serial`` on a serial line."""
+        return fast
+
     # --- what the vehicle's step calls, in this order ----------------------------------------------------
 
     def acknowledge(self, acks: Sequence[CommandAck]) -> None:

@@ -25,6 +25,7 @@ class Estimate:
     velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     attitude_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     thrust_fraction: float = 0.0
+    motor_fractions: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     reset_counter: int = 0
 
 
