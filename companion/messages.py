@@ -120,13 +120,6 @@ class Vibration:
 
 
 @dataclass(frozen=True, slots=True)
-class Battery:
-    """SYS_STATUS of a vehicle that knows its charge."""
-
-    remaining_percent: int
-
-
-@dataclass(frozen=True, slots=True)
 class ExtendedState:
     landed_state: LandedState
 
@@ -163,7 +156,6 @@ Sample: TypeAlias = (
     | Attitude
     | AttitudeTarget
     | Vibration
-    | Battery
     | ExtendedState
     | CurrentMode
     | CommandAck

@@ -7,7 +7,6 @@ from companion.link.identity import Identity
 from companion.messages import (
     Attitude,
     AutopilotVersion,
-    Battery,
     CurrentMode,
     ExtendedState,
     Heartbeat,
@@ -39,7 +38,6 @@ class Vehicle:
     failsafe: bool = False
     landed: LandedState = LandedState.UNDEFINED
     attitude: Attitude | None = None
-    battery_percent: int | None = None
     history: MotionHistory = field(default_factory=MotionHistory)
     last_heard_us: int = 0
     last_position_us: int | None = None
@@ -63,8 +61,6 @@ class Vehicle:
                 self.mode = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
             case ExtendedState():
                 self.landed = sample.landed_state
-            case Battery():
-                self.battery_percent = sample.remaining_percent
             case AutopilotVersion():
                 self.version = sample.flight_version
             case _:
