@@ -10,7 +10,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.mission.model import Mission
 from companion.px4_mode import mode_name
-from companion.report import Event, FlightReport, Status
+from companion.report import Event, ExpectationReport, FlightReport, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +72,11 @@ class Companion:
             self._core.flight.plan_confirmed = True
 
     @property
+    def core(self) -> Core | None:
+        """What is remembered between steps, for whoever studies a flight; None before the first."""
+        return self._core
+
+    @property
     def plan_is_confirmed(self) -> bool:
         return self._confirmed
 
@@ -87,6 +92,16 @@ class Companion:
     def plan_text(self) -> str:
         """The plan for a person to agree to; complete once `plan_is_ready`."""
         return "" if self._core is None else plan_text(self._core.flight)
+
+    @property
+    def file_awaited(self) -> str | None:
+        """The file whose existence the mission waits for now; the companion itself opens none."""
+        return None if self._core is None else self._core.flight.file_awaited
+
+    def file_is_there(self) -> None:
+        """The file that is awaited exists."""
+        if self._core is not None:
+            self._core.flight.file_is_there = True
 
     def stop(self, reason: str) -> None:
         """End the flight: hand the vehicle to hold or land, as the mission says; done when `finished`."""
@@ -129,4 +144,7 @@ class Companion:
             started_at_us=core.started_at_us,
             ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,
             armed_at_us=flight.armed_at_us,
+            expectations=tuple(
+                [ExpectationReport(wish.label, wish.text, wish.met, wish.detail) for wish in flight.expectations]
+            ),
         )

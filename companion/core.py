@@ -12,7 +12,8 @@ from companion.detection.interface import Situation
 from companion.detection.watch import Watch, start_watch
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.connecting import Connect
-from companion.flight.context import FlightContext, Inputs
+from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.envelope import Surroundings, bounded
 from companion.flight.machine import Machine
 from companion.flight.states import FINAL_STATES, State
 from companion.link.identity import identify, is_autopilot
@@ -28,6 +29,7 @@ from companion.messages import (
     Sample,
     TimeSyncReply,
     TimeSyncRequest,
+    Vector3,
 )
 from companion.mission.model import Mission
 from companion.px4_mode import mode_name
@@ -38,7 +40,10 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 # All timeouts are noticed within this, when nothing arrives.
 POLL_INTERVAL_US = 50_000
 
-DETECTING_STATES = frozenset({State.MISSION, State.RECOVERING, State.HOLDING})
+# A setpoint at the edge of the envelope may cross it fifty times a second.
+LEAST_BETWEEN_LIMITS_US = 1_000_000
+
+DETECTING_STATES = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,10 @@ class Core:
     setpoint_due_us: int
     setpoint_interval_us: int
     stop_reason: str | None = None
+    last_setpoint_ned_m: Vector3 | None = None
+    last_setpoint_us: int = 0
+    limited_by: str = ""
+    limit_told_us: int = 0
 
     @property
     def flight(self) -> FlightContext:
@@ -191,16 +200,36 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
         return
     due_us = core.setpoint_due_us + core.setpoint_interval_us
     core.setpoint_due_us = due_us if not moved and due_us > now_us else now_us + core.setpoint_interval_us
-    target = core.machine.activity.target(now_us)
-    if target is None:
+    wanted = core.machine.activity.target(now_us)
+    if wanted is None:
         return
-    core.flight.target = target
+    target = core.flight.target = within_envelope(core, wanted, moved, now_us)
     time_us = now_us - core.started_at_us
     core.flight.outbox.append(
         PositionSetpoint(
             time_us, target.position_ned_m, target.yaw_rad, target.velocity_ned_m_s, target.acceleration_ned_m_s2
         )
     )
+
+
+def within_envelope(core: Core, wanted: Target, moved: bool, now_us: int) -> Target:
+    """The setpoint as the mission's fence and limits let it pass; told when they do not."""
+    flight = core.flight
+    latest = flight.vehicle.history.latest()
+    around = Surroundings(
+        vehicle_ned_m=None if latest is None else latest.position_ned_m,
+        origin_ned_m=flight.origin_ned_m,
+        has_floor=core.machine.state in DETECTING_STATES,
+        last_ned_m=None if moved else core.last_setpoint_ned_m,
+        since_last_s=(now_us - core.last_setpoint_us) * 1e-6,
+    )
+    target, reason = bounded(wanted, around, flight.mission.fence, flight.mission.limits)
+    if reason != core.limited_by and now_us - core.limit_told_us >= LEAST_BETWEEN_LIMITS_US:
+        core.limited_by, core.limit_told_us = reason, now_us
+        text = f"setpoint held back: {reason}" if reason else "setpoint free again"
+        flight.tell(now_us, "envelope", text, reason=reason)
+    core.last_setpoint_ned_m, core.last_setpoint_us = target.position_ned_m, now_us
+    return target
 
 
 def beat(core: Core, now_us: int) -> None:

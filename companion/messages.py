@@ -120,6 +120,13 @@ class Vibration:
 
 
 @dataclass(frozen=True, slots=True)
+class Battery:
+    """SYS_STATUS of a vehicle that knows its charge."""
+
+    remaining_percent: int
+
+
+@dataclass(frozen=True, slots=True)
 class ExtendedState:
     landed_state: LandedState
 
@@ -156,6 +163,7 @@ Sample: TypeAlias = (
     | Attitude
     | AttitudeTarget
     | Vibration
+    | Battery
     | ExtendedState
     | CurrentMode
     | CommandAck

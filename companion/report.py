@@ -61,10 +61,21 @@ class CollisionReport:
 
 
 @dataclass(frozen=True, slots=True)
+class ExpectationReport:
+    """An assertion of the mission's: `label` is its item's number, `detail` what was found."""
+
+    label: str
+    text: str
+    met: bool | None  # None: the flight is not over
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
 class FlightReport:
     """The outcome of a flight.
 
-    `failed`: the flight never began (no vehicle, wrong vehicle, streams too slow, refused).
+    `failed`: the flight never began (no vehicle, wrong vehicle, streams too slow, refused), or it ended as it
+    should but not as the mission expected (`expectations`).
     `aborted`: it began, or was stopped by the person, and ended before the mission did.
     `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission coordinates.
     """
@@ -78,3 +89,4 @@ class FlightReport:
     started_at_us: int
     ended_at_us: int
     armed_at_us: int | None
+    expectations: tuple[ExpectationReport, ...] = ()

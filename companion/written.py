@@ -1,5 +1,6 @@
 """Number types for files a person writes: finite, never a string or a truth value in disguise."""
 
+from collections.abc import Container
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -14,3 +15,10 @@ class Written(BaseModel):
     """Base of everything a person writes: unknown keys are errors, values never change afterwards."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+
+def with_bare_keys(data: object, keys: Container[str]) -> object:
+    """A key without a value, which YAML reads as null, as one with an empty map; for keys that need no value."""
+    if not isinstance(data, dict):
+        return data
+    return {key: {} if value is None and key in keys else value for key, value in data.items()}

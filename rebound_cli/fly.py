@@ -43,7 +43,7 @@ def run_fly(options: Namespace) -> int:
     is_simulated = options.connect is None
     if not is_simulated and (options.airframe is not None or options.seed is not None):
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
-    document = load_mission_document(options.mission, options.set, options.airframe, options.seed)
+    document = load_mission_document(options.mission, options.set, options.airframe, options.seed, options.companion)
     mission = mission_from(document)
     world = world_from(document) if is_simulated else None
     console = console_for(options.json)

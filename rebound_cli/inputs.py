@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from rebound_cli.documents import (
     Document,
@@ -34,10 +35,21 @@ class SimulatedWorld:
 
 
 def load_mission_document(
-    path: Path, sets: Sequence[str], airframe: str | None = None, seed: int | None = None
+    path: Path,
+    sets: Sequence[str],
+    airframe: str | None = None,
+    seed: int | None = None,
+    companion: Path | None = None,
 ) -> Document:
-    """The mission file with every --set, and --airframe and --seed, put in. Raises DocumentError."""
+    """The mission file with every --set, and --airframe and --seed, put in. Raises DocumentError.
+
+    The `companion:` part of the file `companion`, where one is given, takes the place of the mission's own.
+    """
     document = load_document(path)
+    if companion is not None:
+        settings = load_document(companion)
+        validated(CompanionConfig, settings, settings.data.get("companion") or {}, ("companion",))
+        document.data["companion"] = settings.data.get("companion")
     _apply_options(document, sets, airframe, seed)
     return document
 
@@ -85,8 +97,7 @@ def _load_airframe(name: str, document: Document) -> Airframe:
 
 def resolved(mission: Mission, world: SimulatedWorld | None) -> dict[str, Any]:
     """The mission with every default and option written out; it is itself a mission file."""
-    data = mission.model_dump(mode="json", exclude_none=True)
-    data["items"] = [{item.name: item.action.model_dump(mode="json", exclude_none=True)} for item in mission.items]
+    data = mission.model_dump(mode="json", exclude_none=True, by_alias=True)
     if world is not None:
         data["sim"] = world.scene.model_dump(mode="json", exclude_none=True)
     return data

@@ -1,15 +1,16 @@
 """Companion and simulated vehicle in one process, joined by the same bytes, on virtual time."""
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
 from companion.companion import Companion
-from companion.mission.model import GoToItem, HoldItem, Mission, TakeoffItem
+from companion.mission.itinerary import longest_s
+from companion.mission.model import Mission
 from rebound_cli.console import Console
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts
+from rebound_cli.realtime import look_for_file
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.summary import Flown
 from rebound_cli.truth_match import FlightTruth
@@ -21,10 +22,10 @@ EPOCH_US = 1_600_000_000_000_000
 
 # What a mission may take beyond its own distances and durations: connecting, arming, landing.
 _LIMIT_MARGIN_S = 60.0
-# Times the shortest possible duration: ramps, recoveries and detours take longer than flying at full speed.
+# Times the planned duration: recoveries, and ways tried again slower, take longer.
 _LIMIT_FACTOR = 3.0
-# Climbs are no slower than this; landing a metre takes less than two seconds too.
-_SLOWEST_VERTICAL_M_S = 0.5
+# A wait without a time-out; in lockstep nobody comes to end it.
+_LONGEST_WAIT_S = 60.0
 
 # Ctrl-C and the live line are looked at once in so many intervals: often enough at 100 times real time.
 _LOOK_EVERY = 250
@@ -32,7 +33,8 @@ _LOOK_EVERY = 250
 
 def virtual_time_limit_s(mission: Mission) -> float:
     """Longest virtual time a mission may reasonably take; a flight beyond it hangs."""
-    return _LIMIT_MARGIN_S + _LIMIT_FACTOR * _shortest_duration_s(mission)
+    hits = mission.on_collision.max_hits * (mission.on_collision.hold_s + mission.companion.settled.timeout_s)
+    return _LIMIT_MARGIN_S + _LIMIT_FACTOR * longest_s(mission, _LONGEST_WAIT_S) + hits
 
 
 def fly_mission_lockstep(
@@ -101,24 +103,6 @@ def run_lockstep(
             is_stopped = True
             companion.stop(interrupts.reason)
             recorder.record_person(now_us, is_confirmed, interrupts.reason)
+        look_for_file(companion, recorder, now_us)
         look(time_boot_us / 1e6)
     return True
-
-
-def _shortest_duration_s(mission: Mission) -> float:
-    """Flying every item at its full speed, holding as long as asked, and one hold after a hit per item."""
-    duration_s, place = 0.0, (0.0, 0.0, 0.0)
-    for item in mission.items:
-        action = item.action
-        if isinstance(action, TakeoffItem):
-            duration_s += action.height_m / _SLOWEST_VERTICAL_M_S
-            place = (0.0, 0.0, -action.height_m)
-        elif isinstance(action, GoToItem):
-            duration_s += math.dist(place, action.position_ned_m) / action.speed_m_s
-            duration_s += mission.on_collision.hold_s
-            place = action.position_ned_m
-        elif isinstance(action, HoldItem):
-            duration_s += action.duration_s
-        else:
-            duration_s += -place[2] / _SLOWEST_VERTICAL_M_S
-    return duration_s

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
-from rebound_cli.arguments import count, host_and_port, instance, port, speed
+from rebound_cli.arguments import count, host_and_port, hours, instance, port, speed
+from rebound_cli.replay.arguments import add_replay
 
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
@@ -50,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_results(commands)
     _add_paper(commands)
     _add_detectors(commands)
+    add_replay(commands)
     _add_airframe(commands)
     _add_identify(commands)
     return parser
@@ -78,6 +80,9 @@ def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
     fly.add_argument(
         "--instance", type=instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
+    )
+    fly.add_argument(
+        "--companion", type=Path, metavar="FILE", help="take the companion: part from this file, e.g. from rebound tune"
     )
     fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
@@ -172,6 +177,16 @@ def _add_detectors(commands: "argparse._SubParsersAction[argparse.ArgumentParser
         description="Simulated and recorded hits and flights through every detector; see docs/detection.md.",
     )
     detectors.add_argument("--hits", type=count, default=400, metavar="N", help="simulated hits (default 400)")
+    detectors.add_argument(
+        "--hours", type=hours, default=0.5, metavar="H", help="hours of simulated healthy flight (default 0.5)"
+    )
+    detectors.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        default=os.environ.get("REBOUND_DATA") or None,
+        help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
+    )
     detectors.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
     detectors.add_argument(
         "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"

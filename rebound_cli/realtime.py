@@ -2,6 +2,7 @@
 
 import os
 import select
+from pathlib import Path
 from typing import Protocol
 
 from companion.companion import Companion
@@ -77,6 +78,13 @@ class AskPerson:
         return self._typed.split(b"\n")[0].decode(errors="replace").strip().lower()
 
 
+def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -> None:
+    """For a mission that waits for a file."""
+    if companion.file_awaited is not None and Path(companion.file_awaited).exists():
+        companion.file_is_there()
+        recorder.record_file(now_us)
+
+
 def fly_realtime(
     companion: Companion,
     connection: Connection,
@@ -98,6 +106,7 @@ def fly_realtime(
             connection.send(frame)
         recorder.record(now_us, result)
         confirmation.poll(companion)
+        look_for_file(companion, recorder, now_us)
         if interrupts.reason is not None and not is_stopped:
             is_stopped = True
             companion.stop(interrupts.reason)

@@ -109,6 +109,10 @@ class FlightRecorder:
             self._stop_reason = stop_reason
             self._inputs_file.write(json.dumps({"time_us": now_us, "kind": "stop", "reason": stop_reason}) + "\n")
 
+    def record_file(self, now_us: int) -> None:
+        """The companion was told, after its step at `now_us`, that the file it waits for exists."""
+        self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "file"}}\n')
+
     def close(self) -> None:
         self._tlog.close()
         self._events_file.close()

@@ -34,7 +34,7 @@ def _resolved(schema: Any, definitions: dict[str, Any]) -> Iterator[dict[str, An
         yield from _resolved(definitions[schema["$ref"].rpartition("/")[2]], definitions)
         return
     alternatives = [*schema.get("anyOf", ()), *schema.get("oneOf", ()), *schema.get("allOf", ())]
-    if not alternatives:
+    if not alternatives or "properties" in schema:
         yield schema
     for alternative in alternatives:
         yield from _resolved(alternative, definitions)

@@ -64,6 +64,10 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         "false_detections": matches.false_detections if matches else None,
         "missed_contacts": matches.missed_contacts if matches else None,
         "recontacts": matches.recontacts if matches else None,
+        "expectations": [
+            {"item": wish.label, "expected": wish.text, "met": wish.met, "was": wish.detail}
+            for wish in report.expectations
+        ],
         "collisions": [
             {
                 **_collision(report, number),

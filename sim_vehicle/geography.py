@@ -1,40 +1,53 @@
-"""Between geographic and local coordinates: PX4's azimuthal equidistant projection (lib/geo, MapProjection)."""
+"""Local NED and geographic coordinates of one flight.
+
+Source: PX4's lib/geo (MapProjection): the azimuthal equidistant projection on a sphere of 6371 km, which is what
+PX4's own local position means. Heights are above mean sea level.
+"""
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
-Vector3 = tuple[float, float, float]
+from sim_vehicle.hil.earth import EARTH_RADIUS_M, HOME
+from sim_vehicle.hil.messages import Place
+from sim_vehicle.world import Vector3
 
-EARTH_RADIUS_M = 6_371_000.0
 
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Origin:
-    """Where local (0, 0, 0) lies; altitude above mean sea level."""
+    """Where local NED (0, 0, 0) lies."""
 
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
+    place: Place = HOME
 
-    def local_ned_m(self, latitude_deg: float, longitude_deg: float, altitude_m: float) -> Vector3:
-        """A place of the Earth in local NED."""
-        lat, lon = math.radians(latitude_deg), math.radians(longitude_deg)
-        lat0, lon0 = math.radians(self.latitude_deg), math.radians(self.longitude_deg)
-        cos_distance = math.sin(lat0) * math.sin(lat) + math.cos(lat0) * math.cos(lat) * math.cos(lon - lon0)
-        distance = math.acos(min(max(cos_distance, -1.0), 1.0))
-        k = EARTH_RADIUS_M * (distance / math.sin(distance) if distance > 0.0 else 1.0)
-        north = k * (math.cos(lat0) * math.sin(lat) - math.sin(lat0) * math.cos(lat) * math.cos(lon - lon0))
-        return north, k * math.cos(lat) * math.sin(lon - lon0), self.altitude_m - altitude_m
+    @cached_property
+    def _sin_cos(self) -> tuple[float, float]:
+        latitude_rad = math.radians(self.place.latitude_deg)
+        return math.sin(latitude_rad), math.cos(latitude_rad)
 
-    def geodetic(self, position_ned_m: Vector3) -> tuple[float, float, float]:
-        """Latitude and longitude in degrees, altitude in metres."""
-        north, east, down = position_ned_m
-        lat0 = math.radians(self.latitude_deg)
-        distance = math.hypot(north, east)
-        angle = distance / EARTH_RADIUS_M
-        if distance == 0.0:
-            return self.latitude_deg, self.longitude_deg, self.altitude_m - down
+    def place_at(self, position_ned_m: Vector3) -> Place:
+        """The geographic place of a local position."""
+        north_m, east_m, down_m = position_ned_m
+        altitude_m = self.place.altitude_m - down_m
+        north, east = north_m / EARTH_RADIUS_M, east_m / EARTH_RADIUS_M
+        angle = math.hypot(north, east)
+        if angle == 0.0:
+            return Place(self.place.latitude_deg, self.place.longitude_deg, altitude_m)
+        sin_0, cos_0 = self._sin_cos
         sin, cos = math.sin(angle), math.cos(angle)
-        lat = math.asin(cos * math.sin(lat0) + north * sin * math.cos(lat0) / distance)
-        turn = math.atan2(east * sin, distance * math.cos(lat0) * cos - north * math.sin(lat0) * sin)
-        return math.degrees(lat), self.longitude_deg + math.degrees(turn), self.altitude_m - down
+        latitude = math.asin(cos * sin_0 + north * sin * cos_0 / angle)
+        longitude = math.atan2(east * sin, angle * cos_0 * cos - north * sin_0 * sin)
+        return Place(math.degrees(latitude), self.place.longitude_deg + math.degrees(longitude), altitude_m)
+
+    def position_of(self, place: Place) -> Vector3:
+        """The local position of a geographic place, metres NED."""
+        sin_0, cos_0 = self._sin_cos
+        latitude = math.radians(place.latitude_deg)
+        turned = math.radians(place.longitude_deg - self.place.longitude_deg)
+        sin, cos = math.sin(latitude), math.cos(latitude)
+        angle = math.acos(min(max(sin_0 * sin + cos_0 * cos * math.cos(turned), -1.0), 1.0))
+        stretch = EARTH_RADIUS_M * (angle / math.sin(angle) if angle > 0.0 else 1.0)
+        return (
+            stretch * (cos_0 * sin - sin_0 * cos * math.cos(turned)),
+            stretch * cos * math.sin(turned),
+            self.place.altitude_m - place.altitude_m,
+        )

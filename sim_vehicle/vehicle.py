@@ -4,24 +4,34 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.board import Board
-from sim_vehicle.mavlink.encode import Telemetry
 from sim_vehicle.mavlink.link import Link
 from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import Topics
 from sim_vehicle.mavlink.vibration import Vibration
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
-from sim_vehicle.setpoint import Setpoint
+from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.slow_sensors import SlowSensors
 from sim_vehicle.truth import TruthRecorder
 
 
 class SimulatedVehicle:
     """Airframe, world and seed in; the same bytes in give the same bytes out."""
 
-    def __init__(self, airframe: Airframe, scene: Scene, seed: int, keeps_path: bool = True) -> None:
+    def __init__(
+        self,
+        airframe: Airframe,
+        scene: Scene,
+        seed: int,
+        keeps_path: bool = True,
+        epoch_at_boot_us: int = 0,
+    ) -> None:
         """``keeps_path`` off: the truth holds the hits but no path, for a simulation without an end.
+
+        ``epoch_at_boot_us``: Unix time when the vehicle's clock was at zero, which it tells who asks for the time.
 
         Raises SceneError where a wall passes through the start position.
         """
@@ -42,7 +52,11 @@ class SimulatedVehicle:
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
             true_body=self._plant.state.body,
+            attitude_setpoint=self._plant.state.attitude_setpoint,
+            epoch_at_boot_us=epoch_at_boot_us,
+            system=int(parameters["MAV_SYS_ID"]),
         )
+        self._slow = SlowSensors(airframe, seed)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = first.time_boot_us
         self._topics = Topics(self._telemetry)
@@ -83,13 +97,19 @@ class SimulatedVehicle:
         for link in self._links:
             link.update(self.time_boot_us, texts)
 
+    def _sense(self, telemetry: Telemetry) -> None:
+        slow = self._slow
+        slow.update(self.time_boot_us, self._plant.state.body)
+        telemetry.air, telemetry.gps = slow.air, slow.gps
+        telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
+
     def _tune(self) -> None:
         if self.parameters.changes != self._tuned_at:
             self._tuned_at = self.parameters.changes
             self._plant.tune(position_gains(self.parameters))
 
-    def _fly(self, setpoint: Setpoint | None) -> PlantOutput:
-        sample = self._plant.step(setpoint, self._autopilot.motors_run)
+    def _fly(self, setpoint: TrajectorySetpoint | None) -> PlantOutput:
+        sample = self._plant.step(setpoint, self._autopilot.arming.armed)
         self._autopilot.observe(sample)
         self.time_boot_us = sample.time_boot_us
         return sample
@@ -101,6 +121,7 @@ class SimulatedVehicle:
         onboard = self._plant.onboard
         if onboard is not None:
             telemetry.flow, telemetry.range = onboard.flow, onboard.range
+        self._sense(telemetry)
         telemetry.vibration.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:
             return False

@@ -3,11 +3,15 @@
 from collections.abc import Callable, Container
 from typing import Any
 
+from companion.detection.fused import FusedDetector
 from companion.detection.interface import Detector
 from companion.detection.lateral import LateralDetector
 
 # name -> maker from the detector's own settings and the IMU's averaging interval in microseconds
-DETECTORS: dict[str, Callable[[Any, int], Detector[Any]]] = {LateralDetector.name: LateralDetector}
+DETECTORS: dict[str, Callable[[Any, int], Detector[Any]]] = {
+    FusedDetector.name: FusedDetector,
+    LateralDetector.name: LateralDetector,
+}
 
 
 def check_known_detector(name: str, known: Container[str]) -> None:

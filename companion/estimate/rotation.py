@@ -18,6 +18,12 @@ def body_to_ned(attitude_wxyz: Quaternion, vector_frd: Vector3) -> Vector3:
     )
 
 
+def ned_to_body(attitude_wxyz: Quaternion, vector_ned: Vector3) -> Vector3:
+    """R(q)^T v."""
+    w, x, y, z = attitude_wxyz
+    return body_to_ned((w, -x, -y, -z), vector_ned)
+
+
 def yaw_rad(attitude_wxyz: Quaternion) -> float:
     """Heading of the nose, clockwise from north, in (-pi, pi]."""
     w, x, y, z = attitude_wxyz

@@ -3,6 +3,7 @@
 from collections import deque
 
 from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.flight.guards import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, RequestMessage, VehicleCommand
@@ -94,7 +95,9 @@ def ground_check(flight: FlightContext) -> str | None:
         return "the vehicle is armed already; land and disarm it first"
     if vehicle.landed in (LandedState.IN_AIR, LandedState.TAKEOFF, LandedState.LANDING):
         return "the vehicle says it is not on the ground"
-    return None
+    if flight.mission.abort_when.battery_below_percent is not None and vehicle.battery_percent is None:
+        return "the mission ends below a battery level, and the vehicle says none (SYS_STATUS.battery_remaining)"
+    return battery_complaint(flight)
 
 
 def _connected_text(flight: FlightContext) -> str:

@@ -7,11 +7,15 @@ from typing import Protocol
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
 from companion.flight.commander import Commander, CommandOutcome
+from companion.flight.course import Pace
 from companion.flight.states import Trigger
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import CommandAck, LocalPosition, Outgoing, Vector3
+from companion.mission.expectations import ExpectItem
+from companion.mission.items import ReturnItem
 from companion.mission.model import Mission
+from companion.mission.program import Step, program
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -46,6 +50,38 @@ class Inputs:
 
 
 @dataclass(slots=True)
+class StepTally:
+    """What has happened to the present step; begun anew with the next one."""
+
+    index: int = 0
+    began_us: int | None = None
+    hits: int = 0
+    pace_factor: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class AfterRecovery:
+    """What follows once the vehicle has settled; decided at the hit."""
+
+    trigger: Trigger = Trigger.RECOVERED_TO_HOLD
+    hold_s: float = 0.0
+    text: str = ""
+
+
+@dataclass(slots=True)
+class Expectation:
+    """An assertion of the mission's: pending until `met` is known."""
+
+    label: str  # of its step
+    text: str
+    item: ExpectItem
+    began_us: int
+    hits_before: int
+    met: bool | None = None
+    detail: str = ""
+
+
+@dataclass(slots=True)
 class FlightContext:
     """Shared and changed by the flight's parts within a step; nothing else holds or changes it."""
 
@@ -62,12 +98,30 @@ class FlightContext:
     foreign_mode_since_us: int | None = None  # while landing: when the mode was first not ours
     arming_requested: bool = False
     armed_at_us: int | None = None
-    item_index: int = 0
+    steps: tuple[Step, ...] = ()
+    step_index: int = 0  # the one that is flown, or is to be flown next
+    tally: StepTally = field(default_factory=StepTally)
+    pace: Pace = field(init=False)
+    after_recovery: AfterRecovery = field(default_factory=AfterRecovery)
+    returning_as: ReturnItem = field(default_factory=ReturnItem)
+    going_home: bool = False
+    file_awaited: str | None = None
+    file_is_there: bool = False
+    expectations: list[Expectation] = field(default_factory=list)
     collisions: list[CollisionRecord] = field(default_factory=list)
     plan_confirmed: bool = False
     outcome: Outcome | None = None
     reason: str = ""
     ended_at_us: int | None = None
+
+    def __post_init__(self) -> None:
+        config = self.mission.companion.flight
+        self.pace = Pace(config.cruise_speed_m_s, config.cruise_acceleration_m_s2)
+        self.steps = self.steps or program(self.mission)
+
+    @property
+    def step(self) -> Step:
+        return self.steps[self.step_index]
 
     def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""

@@ -1,13 +1,18 @@
 """What ends a flight from outside, whatever it is doing: looked at in every step, before anything else."""
 
+import math
+
 from companion.flight.authority import Holder, who_decided
 from companion.flight.context import FlightContext, Inputs, Move
 from companion.flight.states import State, Trigger
-from companion.messages import LandedState
+from companion.messages import LandedState, Vector3
 from companion.px4_mode import AUTO_LAND, mode_name
 
 ON_THE_GROUND = (State.CONNECT, State.READY)
-ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING)
+ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
+
+# After a hit the setpoint jumps, and the vehicle takes its time.
+FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
 
 # HEARTBEAT, which alone tells that the vehicle has disarmed, comes once a second; half a second for delays.
 DISARM_NEWS_US = 1_500_000
@@ -21,6 +26,7 @@ def guard(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> M
         or _stopped(state, inputs)
         or _link_silent(flight, state, now_us)
         or _position_silent(flight, state, now_us)
+        or _abort_condition(flight, state, inputs, now_us)
     )
 
 
@@ -94,3 +100,34 @@ def _position_silent(flight: FlightContext, state: State, now_us: int) -> Move |
         return None
     text = f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive"
     return Move(Trigger.INTERRUPTED, text, hand_over=True)
+
+
+def _abort_condition(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
+    """The mission's own conditions; looked at with each new position, so that a silent link is not one of them."""
+    if state not in ON_SETPOINTS or not inputs.positions or flight.armed_at_us is None:
+        return None
+    reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+    return None if reason is None else Move(Trigger.INTERRUPTED, reason, hand_over=True)
+
+
+def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
+    when, fence = flight.mission.abort_when, flight.mission.fence
+    outside_m = fence.outside_by_m(flight.mission_ned_m(place_ned_m))
+    if when.outside_fence_by_m is not None and outside_m > when.outside_fence_by_m:
+        return f"the vehicle is {outside_m:.2f} m outside the fence"
+    flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
+    if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
+        return f"flight time above {when.flight_time_above_s:g} s"
+    if when.setpoint_missed_by_m is not None and state in FOLLOWING and flight.target is not None:
+        missed_m = math.dist(place_ned_m, flight.target.position_ned_m)
+        if missed_m > when.setpoint_missed_by_m:
+            return f"the vehicle is {missed_m:.2f} m from its setpoint"
+    return battery_complaint(flight)
+
+
+def battery_complaint(flight: FlightContext) -> str | None:
+    """What is wrong with the battery by the mission's condition; None where there is none."""
+    least, percent = flight.mission.abort_when.battery_below_percent, flight.vehicle.battery_percent
+    if least is None or percent is None or percent >= least:
+        return None
+    return f"battery at {percent} %, below abort_when.battery_below_percent = {least:g}"

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from companion.flight import expecting
+from companion.flight.after_hit import decide
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
 from companion.flight.guards import guard
@@ -9,9 +11,10 @@ from companion.flight.handover import HandOver, LetGo
 from companion.flight.landing import Land
 from companion.flight.progress import FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
+from companion.flight.returning import FlyHome
 from companion.flight.states import FINAL_STATES, State, Trigger, moves, next_state
 from companion.flight.takeoff import TakeOff
-from companion.mission.model import TakeoffItem
+from companion.mission.items import TakeoffItem
 
 
 @dataclass(slots=True)
@@ -35,19 +38,20 @@ class Machine:
         for estimate in inputs.impacts:
             if moves(self.state, Trigger.COLLISION):
                 record_collision(self.flight, estimate, now_us)
+                decide(self.flight, self.state, now_us)
                 self._take(Move(Trigger.COLLISION), now_us)
         move = self.activity.step(self.flight, inputs, now_us)
         while move is not None:
             self._take(move, now_us)
             # The answers and positions of this step belong to the state that asked for them.
             move = self.activity.step(self.flight, Inputs(), now_us)
+        if self.flight.expectations:
+            expecting.review(self.flight, now_us)
         return self.activity is not before
 
     def _take(self, move: Move | None, now_us: int) -> None:
         if move is None or not moves(self.state, move.trigger):
             return
-        if self.state is State.MISSION and move.trigger is Trigger.COLLISION:
-            self.flight.item_index += 1
         previous, self.state = self.state, next_state(self.state, move.trigger)
         self.activity = self._begin(previous, move, now_us)
 
@@ -59,17 +63,19 @@ class Machine:
             case State.READY:
                 return Ready()
             case State.TAKEOFF:
-                first = flight.mission.items[0].action
+                first = flight.steps[0].action
                 assert isinstance(first, TakeoffItem), "the mission model sees to it"
                 return TakeOff(flight, first, now_us)
             case State.MISSION:
                 if previous is State.TAKEOFF:
-                    flight.item_index = 1
+                    flight.step_index = 1
                 return FlyItems(flight, now_us)
             case State.RECOVERING:
                 return Recover(flight, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)
+            case State.RETURNING:
+                return FlyHome(flight, now_us)
             case State.LANDING:
                 return Land(flight, now_us)
             case State.DONE:
@@ -79,15 +85,22 @@ class Machine:
 
     def _done(self, now_us: int) -> Activity:
         flight = self.flight
-        flight.outcome, flight.reason = "completed", "landed and disarmed"
-        flight.tell(now_us, "done", f"done: landed and disarmed, {_hits(len(flight.collisions))}")
+        expecting.close(flight, now_us)
+        failure = expecting.failure(flight)
+        left = "" if flight.step.name in ("land", "return") else f"; not flown from item {flight.step.label} on"
+        flight.outcome = "completed" if failure is None else "failed"
+        flight.reason = failure or f"landed and disarmed{left}"
+        text = f"done: landed and disarmed, {_hits(len(flight.collisions))}{left}"
+        flight.tell(now_us, "done", text, outcome=flight.outcome)
         return LetGo()
 
     def _aborted(self, move: Move, now_us: int) -> Activity:
         flight = self.flight
         flight.outcome = "failed" if move.trigger is Trigger.REFUSED else "aborted"
         flight.reason = move.text
-        flight.tell(now_us, "aborted", f"{flight.outcome}: {move.text}", outcome=flight.outcome)
+        expecting.close(flight, now_us)
+        text = f"{flight.outcome}: {move.text}"
+        flight.tell(now_us, "aborted", text, outcome=flight.outcome, next_step=flight.step_index)
         return HandOver(flight) if move.hand_over else LetGo()
 
 

@@ -1,7 +1,25 @@
 """The plan a person confirms, and the words for mission items."""
 
 from companion.flight.context import FlightContext, as_text
-from companion.mission.model import Action, GoToItem, HoldItem, LandItem, OnCollision, TakeoffItem
+from companion.flight.expecting import describe
+from companion.mission.expectations import ExpectItem
+from companion.mission.fence import Fence
+from companion.mission.items import (
+    Action,
+    GoToItem,
+    HoldItem,
+    LandItem,
+    OrbitItem,
+    PathItem,
+    ReturnItem,
+    SetSpeedItem,
+    SetYawItem,
+    TakeoffItem,
+    VelocityItem,
+    WaitForItem,
+)
+from companion.mission.model import Mission, MissionItem
+from companion.mission.policy import AbortWhen, OnCollision
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05
@@ -12,12 +30,49 @@ def describe_item(action: Action) -> str:
         case TakeoffItem():
             return f"take off to {action.height_m:g} m"
         case GoToItem():
-            yaw = "" if action.yaw_deg is None else f", heading {action.yaw_deg:g} deg"
-            return f"go to {as_text(action.position_ned_m)} at {action.speed_m_s:g} m/s{yaw}"
+            return f"go to {as_text(action.position_ned_m)}{_speed(action.speed_m_s)}{_yaw(action.yaw_deg)}"
+        case VelocityItem():
+            return f"fly with {as_text(action.velocity_ned_m_s)} m/s for {action.duration_s:g} s{_yaw(action.yaw_deg)}"
+        case PathItem():
+            last = f"{len(action.points_ned_m)} points to {as_text(action.points_ned_m[-1])}"
+            return f"fly a smooth path through {last}{_speed(action.speed_m_s)}{_yaw(action.yaw_deg)}"
+        case OrbitItem():
+            sense = "clockwise" if action.clockwise else "anticlockwise"
+            circle = f"{as_text(action.centre_ned_m)} at {action.radius_m:g} m, {action.turns:g} times {sense}"
+            return f"orbit {circle}{_speed(action.speed_m_s)}{_yaw(action.yaw_deg)}"
         case HoldItem():
             return f"hold for {action.duration_s:g} s"
+        case WaitForItem():
+            return f"wait {_condition(action)}"
+        case SetSpeedItem():
+            return f"from here on fly at {action.speed_m_s:g} m/s"
+        case SetYawItem():
+            return f"turn to {action.yaw_deg:g} deg"
+        case ExpectItem():
+            return f"expect {describe(action)}"
+        case ReturnItem():
+            height = "" if action.height_m is None else f" at {action.height_m:g} m or higher"
+            return f"return to above the start{height}{_speed(action.speed_m_s)} and land"
         case LandItem():
             return "land"
+
+
+def _speed(speed_m_s: float | None) -> str:
+    return "" if speed_m_s is None else f" at {speed_m_s:g} m/s"
+
+
+def _yaw(yaw: float | str | None) -> str:
+    if isinstance(yaw, str):
+        return ", facing " + {"along": "ahead", "centre": "the centre"}[yaw]
+    return "" if yaw is None else f", heading {yaw:g} deg"
+
+
+def _condition(item: WaitForItem) -> str:
+    if item.flight_time_s is not None:
+        return f"until {item.flight_time_s:g} s after arming"
+    if item.steady is not None:
+        return f"until steady within {item.steady.within_m:g} m for {item.steady.for_s:g} s"
+    return "for a hit" if item.hit else f"for the file {item.file}"
 
 
 def describe_after_recovery(on_collision: OnCollision) -> str:
@@ -26,32 +81,88 @@ def describe_after_recovery(on_collision: OnCollision) -> str:
             return f"hold for {on_collision.hold_s:g} s, then go on with the next item"
         case "continue":
             return "go on with the next item at once"
+        case "retry":
+            return f"try the item again at {on_collision.retry_speed_factor:.0%} of the speed"
+        case "return":
+            return "return to above the start and land"
         case "land":
             return "land"
 
 
+def describe_limit(on_collision: OnCollision) -> str:
+    after = {"return": "return and land", "land": "land", "abort": "abort"}[on_collision.after_max_hits]
+    return f"hit {on_collision.max_hits}: {after}"
+
+
+def describe_modifiers(item: MissionItem) -> str:
+    """What an item has of its own beside its action, or nothing."""
+    parts = []
+    if item.on_collision is not None:
+        parts.append(f"on a hit: {describe_after_recovery(item.on_collision)}; {describe_limit(item.on_collision)}")
+    if item.timeout_s is not None:
+        parts.append(f"after {item.timeout_s:g} s: {item.on_timeout}")
+    return "; ".join(parts)
+
+
+def describe_fence(fence: Fence) -> str:
+    sides = [] if fence.radius_m is None else [f"within {fence.radius_m:g} m of the arming position"]
+    sides += [] if fence.polygon_ne_m is None else [f"inside a polygon of {len(fence.polygon_ne_m)} corners"]
+    return f"{' and '.join(sides)}, between {fence.min_height_m:g} m and {fence.max_height_m:g} m up"
+
+
+def describe_abort(abort_when: AbortWhen) -> str:
+    """The conditions that are set, or "never"."""
+    words = {
+        "outside_fence_by_m": "more than {:g} m outside the fence",
+        "battery_below_percent": "battery below {:g} %",
+        "flight_time_above_s": "more than {:g} s after arming",
+        "setpoint_missed_by_m": "more than {:g} m from the setpoint",
+        "hit_above_m_s": "hit at more than {:g} m/s",
+    }
+    given = abort_when.model_dump(exclude_none=True)
+    return ", ".join(words[name].format(value) for name, value in given.items()) or "never"
+
+
+def mission_lines(mission: Mission) -> list[str]:
+    """Items, fence and policies. Positions: NED from the arming position, metres."""
+    lines = []
+    for number, item in enumerate(mission.items, start=1):
+        lines += _item_lines(f"{number}.", item, "Items" if number == 1 else "")
+    gamma_1, gamma_2 = mission.recovery.gamma_per_axis
+    on_hit = mission.on_collision
+    lines += [
+        f"Fence      setpoints stay {describe_fence(mission.fence)}",
+        f"On a hit   detector {mission.companion.detector}, recovery law {mission.recovery.law} with gamma "
+        f"{gamma_1:g}, {gamma_2:g} s; then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
+        f"Abort      {describe_abort(mission.abort_when)}",
+        f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
+    ]
+    if max(gamma_1, gamma_2) > LARGE_GAMMA_S:
+        lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
+    return lines
+
+
+def _item_lines(number: str, item: MissionItem, lead: str = "") -> list[str]:
+    if item.repeat is not None:
+        lines = [f"{lead:<10} {number} {item.repeat.times} times:"]
+        for inner, below in enumerate(item.repeat.items, start=1):
+            lines += _item_lines(f"{number}{inner}.", below)
+        return lines
+    modifiers = describe_modifiers(item)
+    return [f"{lead:<10} {number} {describe_item(item.action)}" + (f" ({modifiers})" if modifiers else "")]
+
+
 def plan_text(flight: FlightContext) -> str:
-    """What will happen, for a person to agree to. Positions: NED from the arming position, metres."""
+    """What will happen, for a person to agree to."""
     mission = flight.mission
     identity = flight.vehicle.identity
     rates = ", ".join(f"{name} {rate_hz:.1f} Hz" for name, rate_hz in flight.streams.rates_hz().items())
-    gamma_1, gamma_2 = mission.recovery.gamma_per_axis
     lines = [
         f"Mission    {mission.name}" + (f": {mission.description}" if mission.description else ""),
         f"Vehicle    {flight.vehicle.autopilot_text()}, "
         + (f"{identity.vehicle_type}, system {identity.system_id}" if identity else "not connected"),
         f"Checks     disarmed, on the ground, streams: {rates}",
-    ]
-    for number, item in enumerate(mission.items, start=1):
-        lines.append(f"{'Items' if number == 1 else '':<10} {number}. {describe_item(item.action)}")
-    lines += [
-        f"Fence      setpoints stay within {mission.fence.radius_m:g} m of the arming position "
-        f"and below {mission.fence.max_height_m:g} m",
-        f"On a hit   detector {mission.companion.detector}, recovery law {mission.recovery.law} with gamma "
-        f"{gamma_1:g}, {gamma_2:g} s; then {describe_after_recovery(mission.on_collision)}",
-        f"On Ctrl-C  or a silent link: hand the vehicle to {mission.on_interrupt}",
+        *mission_lines(mission),
         "Pilot      any mode change or disarm by the pilot ends the flight; the companion does not come back",
     ]
-    if max(gamma_1, gamma_2) > LARGE_GAMMA_S:
-        lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
     return "\n".join(lines)

@@ -1,94 +1,149 @@
-"""State mission: one item after the other; state holding: the pause after a recovery."""
+"""State mission: one step after the other; state holding: the pause after a recovery."""
 
 import math
+from dataclasses import replace
 
-from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.flight import expecting
+from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
+from companion.flight.course import stay, way_of
+from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
-from companion.flight.trajectory import LineProfile
-from companion.mission.model import GoToItem, HoldItem
+from companion.flight.trajectory import Trajectory
+from companion.flight.waiting import Waiting
+from companion.mission.expectations import ExpectItem
+from companion.mission.items import (
+    GoToItem,
+    HoldItem,
+    LandItem,
+    OrbitItem,
+    PathItem,
+    ReturnItem,
+    SetSpeedItem,
+    SetYawItem,
+    VelocityItem,
+    WaitForItem,
+)
+from companion.mission.policy import OnTimeout
 
-# Below PX4's MC_YAWRATE_MAX (200 deg/s) and its MPC_YAWRAUTO_MAX (45 deg/s): the vehicle can follow.
-YAW_RATE_RAD_S = math.radians(45.0)
+_ON_TIMEOUT: dict[OnTimeout, Trigger] = {
+    "abort": Trigger.INTERRUPTED,
+    "return": Trigger.RETURN_DUE,
+    "land": Trigger.LAND_DUE,
+}
 
 
 class FlyItems:
-    """From `flight.item_index` on, until the item is land. Every item starts where the last setpoint was."""
+    """From `flight.step_index` on, until the step is land or return. Every step starts where the last setpoint was."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._begin(flight, now_us)
 
     def _begin(self, flight: FlightContext, now_us: int) -> None:
-        """Take up the present item: a way to go (of no length for a hold) and a heading to turn to."""
-        item = flight.mission.items[flight.item_index]
-        assert flight.target is not None, "setpoints have been streamed since before take-off"
-        start = flight.target.position_ned_m
-        self._action = item.action
+        """Take up the present step: a way to go (of no length for a hold) and a heading to turn to."""
+        assert flight.target is not None and flight.origin_ned_m is not None, "the flight is in the air"
+        if flight.tally.index != flight.step_index or flight.tally.began_us is None:
+            flight.tally = StepTally(flight.step_index, now_us)
+        step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
+        self._flight, self._action = flight, step.action
         self._started_us = now_us
-        self._yaw_from_rad = self._yaw_to_rad = flight.yaw_rad
-        self._line = LineProfile(start, start, 1.0, 1.0)
-        if isinstance(self._action, GoToItem):
-            goal = flight.local_ned_m(self._action.position_ned_m)
-            self._line = LineProfile(start, goal, self._action.speed_m_s, self._action.acceleration_m_s2)
-            if self._action.yaw_deg is not None:
-                self._yaw_to_rad = math.radians(self._action.yaw_deg)
-        text = f"item {flight.item_index + 1} of {len(flight.mission.items)}: {describe_item(self._action)}"
-        flight.tell(now_us, "item", text, number=flight.item_index + 1, name=item.name)
+        self._over_since_us: int | None = None
+        self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
+        self._waiting = Waiting(self._action, flight) if isinstance(self._action, WaitForItem) else None
+        self._way: Trajectory = stay(start)
+        match self._action:
+            case GoToItem() | VelocityItem() | PathItem() | OrbitItem():
+                self._way = way_of(self._action, start, replace(flight.pace, factor=flight.tally.pace_factor))
+            case SetSpeedItem():
+                flight.pace = flight.pace.changed_to(self._action)
+        again = "" if flight.tally.pace_factor == 1.0 else f", at {flight.tally.pace_factor:.0%} of the speed"
+        text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
+        number = int(step.label.partition(" ")[0].partition(".")[0])
+        flight.tell(now_us, "item", text, number=number, name=step.name, step=flight.step_index)
+        if isinstance(self._action, ExpectItem):
+            expecting.begin(flight, step.label, self._action, now_us)
 
     def target(self, now_us: int) -> Target | None:
         elapsed_s = (now_us - self._started_us) * 1e-6
-        position, velocity, acceleration = self._line.at(elapsed_s)
-        yaw_rad = self._yaw_at(elapsed_s)
-        if elapsed_s >= self._line.duration_s:
-            return Target(position, yaw_rad)
-        # Without the acceleration the vehicle falls behind the line as it speeds up and then overruns the speed.
-        return Target(position, yaw_rad, velocity, acceleration)
+        position, velocity, acceleration = self._way.at(elapsed_s)
+        yaw_rad = self._heading.turn(position, velocity, now_us)
+        place = self._flight.local_ned_m(position)
+        if elapsed_s >= self._way.duration_s:
+            return Target(place, yaw_rad)
+        # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
+        return Target(place, yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        while True:
+            if isinstance(self._action, ReturnItem):
+                flight.returning_as = self._action
+                return Move(Trigger.RETURN_DUE)
+            if isinstance(self._action, LandItem):
+                return Move(Trigger.LAND_DUE)
+            if not self._is_done(flight, now_us):
+                return self._overdue(flight, now_us)
+            self._leave(flight, now_us)
+
+    def _leave(self, flight: FlightContext, now_us: int) -> None:
+        """On to the next step, from the setpoint of this moment."""
+        flight.target = self.target(now_us)
+        flight.yaw_rad = self._heading.yaw_rad
+        flight.step_index += 1
+        self._begin(flight, now_us)
+
+    def _is_done(self, flight: FlightContext, now_us: int) -> bool:
         elapsed_s = (now_us - self._started_us) * 1e-6
         match self._action:
+            case SetSpeedItem() | ExpectItem():
+                return True
             case HoldItem(duration_s=duration_s):
-                done = elapsed_s >= duration_s
-            case GoToItem():
-                overdue_s = elapsed_s - max(self._line.duration_s, self._turn_s())
-                done = overdue_s >= 0.0 and self._arrived(flight)
-                if not done and overdue_s > flight.mission.companion.flight.arrival_timeout_s:
-                    return Move(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}", hand_over=True)
+                return elapsed_s >= duration_s
+            case WaitForItem():
+                assert self._waiting is not None
+                return self._waiting.is_over(flight, now_us)
+            case VelocityItem():
+                return elapsed_s >= self._way.duration_s and self._has_turned(now_us)
+            case SetYawItem():
+                return self._has_turned(now_us)
             case _:
-                return Move(Trigger.ITEMS_DONE)
-        if done:
-            flight.yaw_rad = self._yaw_to_rad
-            flight.target = self.target(now_us)
-            flight.item_index += 1
-            self._begin(flight, now_us)
-            return self.step(flight, inputs, now_us)
-        return None
+                over = elapsed_s >= self._way.duration_s and self._has_turned(now_us)
+                if over and self._over_since_us is None:
+                    self._over_since_us = now_us
+                return over and self._arrived(flight)
+
+    def _has_turned(self, now_us: int) -> bool:
+        if self._heading.is_fixed:
+            self._heading.turn(self._way.target_m, (0.0, 0.0, 0.0), now_us)
+        return self._heading.is_reached
 
     def _arrived(self, flight: FlightContext) -> bool:
         latest = flight.vehicle.history.latest()
+        goal = flight.local_ned_m(self._way.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
-        return latest is not None and math.dist(latest.position_ned_m, self._line.target_m) <= radius_m
+        return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
 
-    def _turn_rad(self) -> float:
-        """The shorter way round, clockwise positive."""
-        if self._yaw_from_rad is None or self._yaw_to_rad is None:
-            return 0.0
-        return math.remainder(self._yaw_to_rad - self._yaw_from_rad, math.tau)
-
-    def _turn_s(self) -> float:
-        return abs(self._turn_rad()) / YAW_RATE_RAD_S
-
-    def _yaw_at(self, elapsed_s: float) -> float | None:
-        if self._yaw_from_rad is None or elapsed_s >= self._turn_s():
-            return self._yaw_to_rad
-        return self._yaw_from_rad + math.copysign(YAW_RATE_RAD_S * elapsed_s, self._turn_rad())
+    def _overdue(self, flight: FlightContext, now_us: int) -> Move | None:
+        item, began_us = flight.step.item, flight.tally.began_us
+        assert began_us is not None
+        if item.timeout_s is not None and now_us - began_us > item.timeout_s * 1e6:
+            text = f"not done within {item.timeout_s:g} s: {describe_item(self._action)}"
+            flight.tell(now_us, "timeout", f"item {flight.step.label} {text}; then: {item.on_timeout}")
+            if item.on_timeout == "continue":
+                self._leave(flight, now_us)
+                return self.step(flight, Inputs(), now_us)
+            trigger = _ON_TIMEOUT[item.on_timeout]
+            return Move(trigger, text, hand_over=trigger is Trigger.INTERRUPTED)
+        patience_s = flight.mission.companion.flight.arrival_timeout_s
+        if self._over_since_us is not None and now_us - self._over_since_us > patience_s * 1e6:
+            return Move(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}", hand_over=True)
+        return None
 
 
 class HoldAfterRecovery:
-    """Stay at the recovery setpoint for the mission's time."""
+    """Stay at the recovery setpoint for the policy's time."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        hold_s = flight.mission.on_collision.hold_s
+        hold_s = flight.after_recovery.hold_s
         self._until_us = now_us + round(hold_s * 1e6)
         self._target = flight.target
         flight.tell(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)

@@ -5,18 +5,12 @@ import math
 from companion.estimate.impact import LEVEL, ImpactEstimate
 from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
+from companion.flight.after_hit import afterwards
 from companion.flight.collision import CollisionRecord, horizontal_unit
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
-from companion.flight.states import Trigger
 from companion.recovery.envelope import Envelope, away_from_both
 from companion.recovery.interface import Contact
 from companion.recovery.registry import RECOVERY_LAWS
-
-AFTERWARDS = {
-    "hold": Trigger.RECOVERED_TO_HOLD,
-    "continue": Trigger.RECOVERED_TO_CONTINUE,
-    "land": Trigger.RECOVERED_TO_LAND,
-}
 
 
 class Recover:
@@ -41,13 +35,13 @@ class Recover:
             if since_us is not None:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 flight.tell(now_us, "recovered", _recovered_text(record), settled_after_s=record.settled_after_s())
-                return Move(AFTERWARDS[flight.mission.on_collision.then])
+                return afterwards(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._started_us > timeout_s * 1e6:
             record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.tell(now_us, "recovered", text, settled_after_s=None)
-            return Move(AFTERWARDS[flight.mission.on_collision.then])
+            return afterwards(flight)
         return None
 
 
@@ -59,7 +53,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
     law = RECOVERY_LAWS[mission.recovery.law](mission.recovery)
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    fence = Envelope(flight.origin_ned_m, mission.fence.radius_m, mission.fence.max_height_m)
+    fence = Envelope(flight.origin_ned_m, mission.fence)
     wanted = law.setpoint_ned_m(contact)
     if flight.collisions and not flight.collisions[-1].is_over:
         earlier = flight.collisions[-1]

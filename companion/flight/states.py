@@ -13,6 +13,7 @@ class State(Enum):
     MISSION = "mission"
     RECOVERING = "recovering"
     HOLDING = "holding"
+    RETURNING = "returning"
     LANDING = "landing"
     DONE = "done"
     ABORTED = "aborted"
@@ -23,16 +24,21 @@ class Trigger(Enum):
 
     CONTROL_LOST = "pilot, failsafe or disarm took over"
     REFUSED = "the vehicle cannot or will not fly"
-    INTERRUPTED = "stop, silent link or a step that did not end in time"
+    INTERRUPTED = "stop, silent link, abort condition or a step that did not end in time"
     COLLISION = "hit detected"
     VEHICLE_READY = "identified, streams fast enough"
     PLAN_CONFIRMED = "person confirmed the plan"
     TAKEN_OFF = "height reached"
     RECOVERED_TO_HOLD = "settled, then: hold"
     RECOVERED_TO_CONTINUE = "settled, then: continue"
+    RECOVERED_TO_RETRY = "settled, then: retry"
+    RECOVERED_TO_RETURN = "settled, then: return"
     RECOVERED_TO_LAND = "settled, then: land"
+    RECOVERED_TO_ABORT = "settled, then: abort"
     HOLD_ENDED = "hold time over"
-    ITEMS_DONE = "next item is land"
+    RETURN_DUE = "next item is return, or a time-out says so"
+    LAND_DUE = "next item is land, or a time-out says so"
+    HOME_REACHED = "above the arming position"
     DISARMED = "vehicle disarmed itself"
 
 
@@ -58,7 +64,8 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
         Trigger.CONTROL_LOST: State.ABORTED,
         Trigger.INTERRUPTED: State.ABORTED,
         Trigger.COLLISION: State.RECOVERING,
-        Trigger.ITEMS_DONE: State.LANDING,
+        Trigger.RETURN_DUE: State.RETURNING,
+        Trigger.LAND_DUE: State.LANDING,
     },
     State.RECOVERING: {
         Trigger.CONTROL_LOST: State.ABORTED,
@@ -66,13 +73,22 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
         Trigger.COLLISION: State.RECOVERING,
         Trigger.RECOVERED_TO_HOLD: State.HOLDING,
         Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
+        Trigger.RECOVERED_TO_RETRY: State.MISSION,
+        Trigger.RECOVERED_TO_RETURN: State.RETURNING,
         Trigger.RECOVERED_TO_LAND: State.LANDING,
+        Trigger.RECOVERED_TO_ABORT: State.ABORTED,
     },
     State.HOLDING: {
         Trigger.CONTROL_LOST: State.ABORTED,
         Trigger.INTERRUPTED: State.ABORTED,
         Trigger.COLLISION: State.RECOVERING,
         Trigger.HOLD_ENDED: State.MISSION,
+    },
+    State.RETURNING: {
+        Trigger.CONTROL_LOST: State.ABORTED,
+        Trigger.INTERRUPTED: State.ABORTED,
+        Trigger.COLLISION: State.RECOVERING,
+        Trigger.HOME_REACHED: State.LANDING,
     },
     State.LANDING: {
         Trigger.CONTROL_LOST: State.ABORTED,

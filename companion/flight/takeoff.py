@@ -8,7 +8,7 @@ from companion.flight.context import FlightContext, Inputs, Move, Target, as_tex
 from companion.flight.states import Trigger
 from companion.flight.trajectory import LineProfile
 from companion.messages import SetArmed, SetMode, Vector3
-from companion.mission.model import TakeoffItem
+from companion.mission.items import TakeoffItem
 from companion.px4_mode import OFFBOARD
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.

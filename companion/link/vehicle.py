@@ -7,6 +7,7 @@ from companion.link.identity import Identity
 from companion.messages import (
     Attitude,
     AutopilotVersion,
+    Battery,
     CurrentMode,
     ExtendedState,
     Heartbeat,
@@ -38,6 +39,7 @@ class Vehicle:
     failsafe: bool = False
     landed: LandedState = LandedState.UNDEFINED
     attitude: Attitude | None = None
+    battery_percent: int | None = None
     history: MotionHistory = field(default_factory=MotionHistory)
     last_heard_us: int = 0
     last_position_us: int | None = None
@@ -61,6 +63,8 @@ class Vehicle:
                 self.mode = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
             case ExtendedState():
                 self.landed = sample.landed_state
+            case Battery():
+                self.battery_percent = sample.remaining_percent
             case AutopilotVersion():
                 self.version = sample.flight_version
             case _:

@@ -16,6 +16,7 @@ from companion.messages import (
     Attitude,
     AttitudeTarget,
     AutopilotVersion,
+    Battery,
     CommandAck,
     CommandResult,
     CurrentMode,
@@ -96,6 +97,11 @@ def _vibration(m: Any) -> Vibration | None:
     return Vibration(m.time_usec, m.vibration_y, m.vibration_z, counts)
 
 
+def _battery(m: Any) -> Battery | None:
+    # -1: the autopilot does not know.
+    return Battery(m.battery_remaining) if m.battery_remaining >= 0 else None
+
+
 def _extended_state(m: Any) -> ExtendedState | None:
     known = m.landed_state in LandedState.__members__.values()
     return ExtendedState(LandedState(m.landed_state)) if known else None
@@ -131,6 +137,7 @@ CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
     dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude,
     dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: _attitude_target,
     dialect.MAVLINK_MSG_ID_VIBRATION: _vibration,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS: _battery,
     dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
     dialect.MAVLINK_MSG_ID_CURRENT_MODE: _current_mode,
     dialect.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,

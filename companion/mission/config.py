@@ -4,6 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
+from companion.detection.fused import FusedConfig
 from companion.detection.lateral import LateralConfig
 from companion.detection.registry import DETECTORS, check_known_detector
 from companion.detection.sight import SightConfig
@@ -87,6 +88,10 @@ class FlightConfig(Written):
     # Below PX4's MPC_Z_VEL_MAX_UP of 3 m/s and near its MPC_TKO_SPEED of 1.5 m/s.
     takeoff_speed_m_s: Annotated[Positive, Field(le=3.0)] = 1.0
     takeoff_acceleration_m_s2: Annotated[Positive, Field(le=5.0)] = 1.0
+    # Of items that state no speed: a quick walk, at which a hit does no harm to an airframe with guards.
+    cruise_speed_m_s: Annotated[Positive, Field(le=12.0)] = 1.0
+    # A tilt of 11 degrees, well inside every multicopter's.
+    cruise_acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 2.0
     # A waypoint is passed, not settled on. A PX4 that flies by GPS wanders by this much around a setpoint (its own
     # simulator's noise moves a hover by 0.5 m); a quarter of it could be missed for a long time.
     acceptance_radius_m: Positive = 0.5
@@ -100,6 +105,7 @@ class CompanionConfig(Written):
     detector: str = "lateral"
     # Ground handling, landing gear and ground effect are below this height above the arming position.
     min_detection_height_m: NotNegative = 0.5
+    fused: FusedConfig = FusedConfig()
     lateral: LateralConfig = LateralConfig()
     sight: SightConfig = SightConfig()
     streams: StreamsConfig = StreamsConfig()

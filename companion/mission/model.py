@@ -1,106 +1,103 @@
 """The mission file as a model. Coordinates: NED, relative to the arming position, aligned north."""
 
 import math
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from companion.mission.config import CompanionConfig
+from companion.mission.expectations import ExpectItem
+from companion.mission.fence import Fence
+from companion.mission.items import (
+    Action,
+    GoToItem,
+    HoldItem,
+    LandItem,
+    OrbitItem,
+    PathItem,
+    ReturnItem,
+    SetSpeedItem,
+    SetYawItem,
+    TakeoffItem,
+    VelocityItem,
+    WaitForItem,
+)
+from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, OnTimeout
 from companion.recovery.interface import RecoveryConfig
 from companion.recovery.registry import RECOVERY_LAWS, check_known_law
-from companion.written import NotNegative, Number, PositionNed, Positive, Written
+from companion.written import Positive, Written, with_bare_keys
 
-# PX4 flies no faster than MPC_XY_VEL_MAX, 12 m/s by default: a larger wish is a slip of the pen.
-MAX_SPEED_M_S = 12.0
-# One g sideways is a tilt of 45 degrees, PX4's default limit MPC_TILTMAX_AIR.
-MAX_ACCELERATION_M_S2 = 9.81
+# A mission longer than this once its repeats are written out is a slip of the pen.
+MOST_STEPS = 10_000
 
-Handover: TypeAlias = Literal["hold", "land"]
-
-
-class TakeoffItem(Written):
-    """Climb to a height above the arming position."""
-
-    height_m: Positive
+ACTIONS = (
+    *("takeoff", "go_to", "velocity", "path", "orbit", "hold", "wait_for"),
+    *("set_speed", "set_yaw", "expect", "repeat", "return", "land"),
+)
 
 
-class GoToItem(Written):
-    """Fly a straight line; without `yaw_deg` (clockwise from north) the heading stays as it is."""
+class RepeatItem(Written):
+    """Fly the items one after the other, `times` times."""
 
-    position_ned_m: PositionNed
-    speed_m_s: Annotated[Positive, Field(le=MAX_SPEED_M_S)]
-    acceleration_m_s2: Annotated[Positive, Field(le=MAX_ACCELERATION_M_S2)] = 2.0
-    yaw_deg: Annotated[Number, Field(ge=-360.0, le=360.0)] | None = None
-
-
-class HoldItem(Written):
-    """Stay where the vehicle is."""
-
-    duration_s: Positive
-
-
-class LandItem(Written):
-    """Land where the vehicle is; the flight is complete when the vehicle has disarmed itself."""
-
-
-Action: TypeAlias = TakeoffItem | GoToItem | HoldItem | LandItem
+    times: Annotated[int, Field(strict=True, ge=1, le=1000)]
+    items: Annotated[tuple["MissionItem", ...], Field(min_length=1)]
 
 
 class MissionItem(Written):
-    """One step: a map with exactly one key."""
+    """One step: a map with exactly one action, and beside it what shall be different for this item."""
+
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [name]} for name in ACTIONS]})
 
     takeoff: TakeoffItem | None = None
     go_to: GoToItem | None = None
+    velocity: VelocityItem | None = None
+    path: PathItem | None = None
+    orbit: OrbitItem | None = None
     hold: HoldItem | None = None
+    wait_for: WaitForItem | None = None
+    set_speed: SetSpeedItem | None = None
+    set_yaw: SetYawItem | None = None
+    expect: ExpectItem | None = None
+    repeat: RepeatItem | None = None
+    return_: Annotated[ReturnItem | None, Field(alias="return")] = None
     land: LandItem | None = None
 
-    @field_validator("land", mode="before")
+    on_collision: OnCollision | None = None
+    timeout_s: Positive | None = None
+    on_timeout: OnTimeout = "abort"
+
+    @model_validator(mode="before")
     @classmethod
-    def _bare_land(cls, value: object) -> object:
+    def _bare(cls, data: object) -> object:
         """`- land:` without braces reads as null in YAML and means the same."""
-        return {} if value is None else value
+        return with_bare_keys(data, ("land", "return"))
 
     @model_validator(mode="after")
-    def _exactly_one_key(self) -> Self:
-        if len(self.model_fields_set) != 1:
-            raise ValueError("an item is a map with exactly one key: takeoff, go_to, hold or land")
+    def _exactly_one_action(self) -> Self:
+        if len(self._actions_given()) != 1:
+            raise ValueError(f"an item is a map with exactly one key of: {', '.join(ACTIONS)}")
+        if self.on_timeout != "abort" and self.timeout_s is None:
+            raise ValueError("on_timeout says what follows a time-out: give timeout_s too")
+        if self.name in ("takeoff", "land", "return", "repeat") and self.timeout_s is not None:
+            raise ValueError(f"timeout_s has no meaning beside {self.name}")
+        if self.name in ("takeoff", "land", "repeat") and self.on_collision is not None:
+            raise ValueError(f"on_collision has no meaning beside {self.name}")
         return self
+
+    def _actions_given(self) -> list[str]:
+        return [name for name in (field.removesuffix("_") for field in self.model_fields_set) if name in ACTIONS]
 
     @property
     def name(self) -> str:
-        return next(iter(self.model_fields_set))
+        return self._actions_given()[0]
 
     @property
     def action(self) -> Action:
-        action = self.takeoff or self.go_to or self.hold or self.land
-        assert action is not None, "the validator admits exactly one key"
+        """What is done; a repeat is no action of its own but what stands in it (see program)."""
+        name = self.name
+        action: Action | None = getattr(self, "return_" if name == "return" else name)
+        assert action is not None and self.repeat is None, "the validator admits exactly one action"
         return action
-
-
-class OnCollision(Written):
-    """After the recovery: hold for `hold_s` and go on, go on at once (`continue`), or land."""
-
-    then: Literal["hold", "continue", "land"] = "hold"
-    hold_s: NotNegative = 3.0
-
-
-class Fence(Written):
-    """A cylinder around the arming position that no setpoint leaves."""
-
-    radius_m: Positive = 15.0
-    max_height_m: Positive = 6.0
-
-    def complaint(self, position_ned_m: PositionNed) -> str | None:
-        """What is wrong with a position in mission coordinates, or None when it is inside."""
-        north_m, east_m, down_m = position_ned_m
-        distance_m = math.hypot(north_m, east_m)
-        if distance_m > self.radius_m:
-            return f"lies {distance_m:.2f} m out, beyond fence.radius_m = {self.radius_m:g}"
-        if -down_m > self.max_height_m:
-            return f"lies {-down_m:.2f} m up, above fence.max_height_m = {self.max_height_m:g}"
-        if down_m >= 0.0:
-            return f"has down = {down_m:g} m, which is not above the ground; up is negative"
-        return None
 
 
 class Mission(Written):
@@ -109,9 +106,11 @@ class Mission(Written):
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9._-]+$")]
     description: str = ""
     fence: Fence = Fence()
+    limits: Limits = Limits()
     items: Annotated[tuple[MissionItem, ...], Field(min_length=2)]
     on_collision: OnCollision = OnCollision()
     recovery: RecoveryConfig = RecoveryConfig()
+    abort_when: AbortWhen = AbortWhen()
     on_interrupt: Handover = "hold"
     companion: CompanionConfig = CompanionConfig()
     sim: dict[str, object] | None = None
@@ -127,21 +126,38 @@ class Mission(Written):
         names = [item.name for item in self.items]
         if names[0] != "takeoff":
             raise ValueError(f"items: the first item must be takeoff, not {names[0]}")
-        if names[-1] != "land":
-            raise ValueError(f"items: the last item must be land, not {names[-1]}")
-        for number, name in enumerate(names[1:-1], start=2):
-            if name in ("takeoff", "land"):
-                raise ValueError(f"items: item {number} is {name}, which may only come first (takeoff) or last (land)")
+        if names[-1] not in ("land", "return"):
+            raise ValueError(f"items: the last item must be land or return, not {names[-1]}")
+        for number, item in enumerate(self.items[1:-1], start=2):
+            self._check_between(str(number), item)
+        self._check_speed(str(len(names)), self.items[-1])
         return self
 
+    def _check_between(self, number: str, item: MissionItem) -> None:
+        if item.name in ("takeoff", "land", "return"):
+            where = "first" if item.name == "takeoff" else "last"
+            raise ValueError(f"items: item {number} is {item.name}, which may only come {where}")
+        self._check_speed(number, item)
+        for inner, below in enumerate(item.repeat.items if item.repeat else (), start=1):
+            self._check_between(f"{number}.{inner}", below)
+
+    def _check_speed(self, number: str, item: MissionItem) -> None:
+        speed_m_s = 0.0
+        if item.velocity is not None:
+            speed_m_s = math.hypot(*item.velocity.velocity_ned_m_s)
+        elif item.repeat is None:
+            speed_m_s = getattr(item.action, "speed_m_s", None) or 0.0
+        limit_m_s = self.limits.max_speed_m_s
+        if speed_m_s > limit_m_s:
+            flies = f"item {number} ({item.name}) flies at {speed_m_s:g} m/s"
+            raise ValueError(f"items: {flies}, above limits.max_speed_m_s = {limit_m_s:g}")
+
     @model_validator(mode="after")
-    def _items_inside_fence(self) -> Self:
-        for number, item in enumerate(self.items, start=1):
-            complaint = None
-            if item.go_to is not None:
-                complaint = self.fence.complaint(item.go_to.position_ned_m)
-            elif item.takeoff is not None:
-                complaint = self.fence.complaint((0.0, 0.0, -item.takeoff.height_m))
-            if complaint is not None:
-                raise ValueError(f"items: the position of item {number} ({item.name}) {complaint}")
+    def _ways_inside_fence(self) -> Self:
+        # Curves need scipy, whose import is slow: only missions that are otherwise sound pay for it.
+        from companion.mission.itinerary import first_complaint
+
+        complaint = first_complaint(self)
+        if complaint is not None:
+            raise ValueError(complaint)
         return self

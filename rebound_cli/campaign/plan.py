@@ -31,11 +31,17 @@ class Campaign:
     parameters: Mapping[str, Any]
     cases: Sequence[Any]
     work_out: Callable[[Any], Json]
+    uses: tuple[str, ...] = ()
+    """Packages on which results depend beside both programs and the function's own."""
+
+    @property
+    def rooms(self) -> tuple[str, ...]:
+        """Modules in the folders of which all code that decides a case's result is."""
+        return ("companion", "sim_vehicle", self.work_out.__module__, *self.uses)
 
     @property
     def version(self) -> str:
-        """Of the code that decides a case's result."""
-        return code_version(self.work_out.__module__)
+        return code_version(self.rooms)
 
     @property
     def key(self) -> str:
@@ -66,13 +72,10 @@ def _outcome(function: Callable[[Any], Json], number: int, case: Any) -> Outcome
         return Outcome(number, None, f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})")
 
 
-def code_version(module_name: str) -> str:
-    """Release and a digest of the code on which a result depends: both programs and the function's own room."""
-    room = importlib.import_module(module_name)
-    rooms = [importlib.import_module(name) for name in ("companion", "sim_vehicle")]
-    folders = [_folder(module) for module in (*rooms, room)]
+def code_version(rooms: Sequence[str]) -> str:
+    """Release and a digest of the code in the folders of these modules."""
     digest = hashlib.sha256()
-    for folder in folders:
+    for folder in [_folder(importlib.import_module(room)) for room in rooms]:
         for path in sorted(folder.rglob("*")):
             if path.suffix in (".py", ".yaml"):
                 digest.update(path.relative_to(folder).as_posix().encode())

@@ -118,7 +118,7 @@ class _LocalClient(Client):  # type: ignore[misc]
 
 def _check_versions(client: Client, campaign: Campaign) -> None:
     """The same result whoever computes needs the same code everywhere."""
-    versions: dict[str, str] = client.run(code_version, campaign.work_out.__module__)
+    versions: dict[str, str] = client.run(code_version, campaign.rooms)
     if not versions:
         raise CampaignError("the Dask scheduler has no workers; start some with `dask worker ADDRESS`")
     for address, version in versions.items():

@@ -1,10 +1,24 @@
 """The campaigns of the bench: how many cases of which family."""
 
-from dataclasses import asdict
-from typing import Any
+from pathlib import Path
 
 from rebound_cli.campaign.plan import Campaign
-from rebound_cli.detectors.hits import HitCase, draw_case, work_out_hit
+from rebound_cli.detectors.flights import AIRBORNE_S, FlightCase, work_out_flight
+from rebound_cli.detectors.hits import AIRFRAMES, HitCase, draw_case, work_out_hit
+from rebound_cli.detectors.recorded import (
+    SCALES,
+    STRIKE_LOG,
+    HealthyCase,
+    InjectedCase,
+    data_files,
+    work_out_healthy,
+    work_out_injected,
+)
+from rebound_cli.detectors.watching import detector_names
+
+# Measured on everything; the others are compared on a share of it.
+THOROUGH = ("fused", "threshold")
+COMPARED_EVERY = 4
 
 # Beside the hits of the airframes as they are, one in so many again with more vibration, and with a worse velocity.
 VARIED_SHARE = 8
@@ -12,22 +26,63 @@ VARIED_SHARE = 8
 VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
 # Of the vehicle's velocity estimate, RMS on each axis: motion capture, GPS with RTK, plain GPS.
 VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
-# Every so manyeth hit is heard by each detector at other thresholds too.
-SWEEP_EVERY = 25
+# Every so manyeth pair of hits (flights) is heard by each detector at other thresholds too.
+SWEEP_HITS_EVERY, SWEEP_FLIGHTS_EVERY = 20, 16
+
+USES = ("rebound_cli.logs", "rebound_cli.replay")
+
+# Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
+FLIGHT_S = AIRBORNE_S + 40.0
 
 
 def hits_campaign(hits: int) -> Campaign:
     """So many hits as the airframes are, and an eighth more of each variation."""
-    cases: list[HitCase] = [draw_case("plain", seed, sweeps=seed % SWEEP_EVERY < 2) for seed in range(hits)]
+    cases: list[HitCase] = [
+        draw_case("plain", seed, _compared(seed), sweeps=seed // 2 % SWEEP_HITS_EVERY == 0) for seed in range(hits)
+    ]
     for seed in range(hits, hits + hits // VARIED_SHARE):
         level = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
-        cases.append(draw_case("vibration", seed, vibration_m_s2=level))
+        cases.append(draw_case("vibration", seed, _compared(seed), vibration_m_s2=level))
     for seed in range(2 * hits, 2 * hits + hits // VARIED_SHARE):
         noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
-        cases.append(draw_case("velocity", seed, velocity_noise_m_s=noise))
+        cases.append(draw_case("velocity", seed, _thorough(), velocity_noise_m_s=noise))
     return Campaign("hits", {"hits": hits}, cases, work_out_hit)
 
 
-def as_text(case: Any) -> str:
-    """All that is needed to see a case again."""
-    return ", ".join(f"{name}={value!r}" for name, value in asdict(case).items() if value is not None)
+def flights_campaign(hours: float) -> Campaign:
+    """At least so many hours of flight, airframes in turn."""
+    count = max(2, round(3600.0 * hours / FLIGHT_S))
+    cases = [
+        FlightCase("plain", seed, AIRFRAMES[seed % 2], _compared(seed), sweeps=seed % SWEEP_FLIGHTS_EVERY < 2)
+        for seed in range(count)
+    ]
+    return Campaign("flights", {"hours": hours}, cases, work_out_flight)
+
+
+def healthy_campaign(folder: Path) -> Campaign:
+    """Every recorded flight, at half, whole and double magnitude. Raises DataError."""
+    logs, _ = data_files(folder)
+    cases = [HealthyCase(str(folder), log, scale, detector_names()) for scale in SCALES for log in logs]
+    return Campaign("recorded-flights", {"logs": logs}, cases, work_out_healthy, USES)
+
+
+def injected_campaign(folder: Path, rounds: int) -> Campaign:
+    """Every recorded impact so many times, each time in another flight. Raises DataError."""
+    logs, drops = data_files(folder)
+    healthy = [log for log in logs if log != STRIKE_LOG]
+    cases = [
+        InjectedCase(str(folder), healthy[(number + turn) % len(healthy)], drop, turn * len(drops) + number, names)
+        for turn in range(rounds)
+        for number, drop in enumerate(drops)
+        if (names := _compared(number))
+    ]
+    return Campaign("recorded-impacts", {"logs": healthy, "rounds": rounds}, cases, work_out_injected, USES)
+
+
+def _compared(seed: int) -> tuple[str, ...]:
+    """All detectors on some, in pairs so that both airframes are among them."""
+    return detector_names() if seed // 2 % COMPARED_EVERY == 0 else _thorough()
+
+
+def _thorough() -> tuple[str, ...]:
+    return tuple(name for name in detector_names() if name in THOROUGH) or detector_names()

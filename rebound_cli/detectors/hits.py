@@ -13,6 +13,7 @@ from companion.messages import LandedState
 from rebound_cli.detectors.cruise import Cruise
 from rebound_cli.detectors.recording import Recording
 from rebound_cli.detectors.scoring import score_hit
+from rebound_cli.detectors.watching import detector_names
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
@@ -61,6 +62,7 @@ class HitCase:
     airframe: str
     approach: str
     speed_m_s: float
+    detectors: tuple[str, ...]
     vibration_m_s2: float | None = None
     """Standard deviation of an IMU sample on each axis; None: the airframe's own."""
     velocity_noise_m_s: float | None = None
@@ -69,7 +71,7 @@ class HitCase:
     """Whether the detectors' thresholds are swept, too."""
 
 
-def draw_case(family: str, seed: int, **settings: Any) -> HitCase:
+def draw_case(family: str, seed: int, detectors: tuple[str, ...] | None = None, **settings: Any) -> HitCase:
     """The case that belongs to a seed: airframes and approaches in turn, speeds at random."""
     rng = np.random.default_rng([seed, 0])
     speeds = SLOW_SPEEDS_M_S if rng.random() < SLOW_SHARE else SPEEDS_M_S
@@ -79,6 +81,7 @@ def draw_case(family: str, seed: int, **settings: Any) -> HitCase:
         airframe=AIRFRAMES[seed % 2],
         approach=APPROACHES[seed // 2 % len(APPROACHES)],
         speed_m_s=round(float(rng.uniform(*speeds)), 3),
+        detectors=detector_names() if detectors is None else detectors,
         **settings,
     )
 
@@ -87,7 +90,7 @@ def work_out_hit(case: HitCase) -> dict[str, Any]:
     """Fly it once, then let every detector hear it at every rate."""
     airframe = airframe_of(case)
     recording, hit = fly_hit(case, airframe)
-    return score_hit(recording, hit, airframe, case.seed, case.sweeps)
+    return score_hit(recording, hit, airframe, case.seed, case.detectors, case.sweeps)
 
 
 def airframe_of(case: HitCase) -> Airframe:

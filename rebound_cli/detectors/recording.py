@@ -1,14 +1,17 @@
 """A stretch of simulated flight as its intervals went by: what the vehicle's software knew, and the truth beside it."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from companion.detection.interface import Situation
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
-from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_IMPULSE, HIT_START_US
+from sim_vehicle.physics.layout import HIT_IMPULSE, HIT_START_US
 from sim_vehicle.physics.plant import Plant, PlantOutput
 
+Floats = npt.NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 
 
@@ -21,6 +24,7 @@ class Recording:
     situations: list[Situation] = field(default_factory=list)
     contact_m_s2: list[float] = field(default_factory=list)
     """The obstacles' mean force on the vehicle over the interval, per unit mass. The ground's is not in it."""
+    _hit: Floats | None = None
     _impulse: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
 
     def add(self, plant: Plant, sample: PlantOutput, situation: Situation, mass_kg: float) -> None:
@@ -34,9 +38,12 @@ class Recording:
 
     def _contact_n_s(self, plant: Plant) -> float:
         """Size of the impulse that the obstacles gave in the latest interval."""
-        hit = plant.state.hit
-        started_us = float(hit[HIT_START_US]) if hit[HIT_ACTIVE] or self._impulse[0] else 0.0
-        x, y, z = (float(value) for value in hit[HIT_IMPULSE])
+        if self._hit is None:
+            self._hit = plant.state.hit
+        started_us = float(self._hit[HIT_START_US])
+        if started_us == 0.0:
+            return 0.0
+        x, y, z = self._hit[HIT_IMPULSE].tolist()
         before = self._impulse[1] if started_us == self._impulse[0] else (0.0, 0.0, 0.0)
         self._impulse = (started_us, (x, y, z))
-        return float(np.linalg.norm((x - before[0], y - before[1], z - before[2])))
+        return math.dist((x, y, z), before)

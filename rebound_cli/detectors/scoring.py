@@ -13,11 +13,10 @@ from rebound_cli.detectors.watching import (
     SWEPT_FACTORS,
     Found,
     configuration,
-    detector_names,
     streams_asked_hz,
     watch_all,
 )
-from rebound_cli.detectors.wire import Heard, heard
+from rebound_cli.detectors.wire import Heard, Wire
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.truth import Hit
 
@@ -61,7 +60,9 @@ def first_possible(recording: Recording, arrived: Sequence[Heard], touch_boot_us
     return Possible(first, times)
 
 
-def score_hit(recording: Recording, hit: Hit, airframe: Airframe, seed: int, sweeps: bool) -> dict[str, Any]:
+def score_hit(
+    recording: Recording, hit: Hit, airframe: Airframe, seed: int, detectors: Sequence[str], sweeps: bool
+) -> dict[str, Any]:
     """What the tables need of one hit, for every rate and detector."""
     touch_us = hit.contact_at_boot_us
     floor_m_s2 = NOISE_FLOOR_SIGMAS * airframe.imu.accelerometer_noise_m_s2
@@ -72,17 +73,18 @@ def score_hit(recording: Recording, hit: Hit, airframe: Airframe, seed: int, swe
         "contact_s": hit.contact_duration_s,
         "rates": {},
     }
+    wire = Wire(recording)
     for rate in ASKED_HZ:
-        arrived = heard(recording, streams_asked_hz(rate), seed + rate)
+        arrived = wire.heard(streams_asked_hz(rate), seed + rate)
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
-        detectors, swept = {}, {}
-        for name in detector_names():
+        entries, swept = {}, {}
+        for name in detectors:
             found, _, blind = watch_all(configuration(name), arrived, recording.situations)
-            detectors[name] = _entry(found, hit, possible, blind)
+            entries[name] = _entry(found, hit, possible, blind)
             if sweeps and rate in SWEPT_RATES:
                 swept[name] = [_is_found(name, factor, arrived, recording, touch_us) for factor in SWEPT_FACTORS]
         possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
-        result["rates"][str(rate)] = {"possible_ms": possible_ms, "detectors": detectors, "swept": swept}
+        result["rates"][str(rate)] = {"possible_ms": possible_ms, "detectors": entries, "swept": swept}
     return result
 
 

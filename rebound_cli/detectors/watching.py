@@ -41,7 +41,8 @@ def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
 
 def swept_field(detector: str) -> str:
     """Name of the setting that is swept: by convention the first of the detector's settings."""
-    return next(iter(type(getattr(CompanionConfig(), detector)).model_fields))
+    fields: dict[str, object] = type(getattr(CompanionConfig(), detector)).model_fields
+    return next(iter(fields))
 
 
 def detector_names() -> tuple[str, ...]:

@@ -23,7 +23,8 @@ from companion.messages import (
 )
 from rebound_cli.detectors.recording import Recording
 from sim_vehicle.mavlink import vibration
-from sim_vehicle.mavlink.streams import KINDS, LateLoops, Stream, Topic, interval_from_request
+from sim_vehicle.mavlink.streams import KINDS, LateLoops, Stream, interval_from_request
+from sim_vehicle.mavlink.topics import Topic
 from sim_vehicle.physics.plant import PlantOutput
 
 
@@ -36,35 +37,48 @@ class Heard:
     samples: tuple[Sample, ...]
 
 
-def heard(recording: Recording, asked_hz: Mapping[MessageId, float], seed: int) -> list[Heard]:
-    """All that arrives of a recording, on a link that is asked for these rates when the recording begins."""
-    first = recording.samples[0].time_boot_us
-    kinds = [kind for kind in KINDS if kind.message_id in asked_hz]
-    streams = [Stream(kind, first) for kind in kinds]
-    for stream in streams:
-        stream.set_interval(interval_from_request(1e6 / asked_hz[MessageId(stream.kind.message_id)]))
-    build = [BUILDERS[MessageId(kind.message_id)](recording) for kind in kinds]
-    waits_for_position = [kind.topic is Topic.POSITION for kind in kinds]
-    loops = LateLoops(seed)
-    arrived = []
-    # The first interval is there before anybody asks.
-    for index in range(1, len(recording.samples)):
-        sample, published = recording.samples[index], recording.published[index]
-        if loops.misses_this_one():
-            continue
-        now_us, due = sample.time_boot_us, []
-        for number, stream in enumerate(streams):
-            if now_us <= stream.due_after_us:
+class Wire:
+    """The link of a recorded vehicle; `heard` any number of times, at other rates."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._builders: dict[MessageId, Builder] = {}
+
+    def heard(self, asked_hz: Mapping[MessageId, float], seed: int) -> list[Heard]:
+        """All that arrives on a link that is asked for these rates when the recording begins."""
+        samples, published = self._recording.samples, self._recording.published
+        kinds = [kind for kind in KINDS if kind.message_id in asked_hz]
+        streams = [Stream(kind, samples[0].time_boot_us) for kind in kinds]
+        for stream in streams:
+            stream.set_interval(interval_from_request(1e6 / asked_hz[MessageId(stream.kind.message_id)]))
+        rows = [
+            (stream, kind.topic is Topic.POSITION, self._builder(MessageId(kind.message_id)))
+            for stream, kind in zip(streams, kinds, strict=True)
+        ]
+        loops = LateLoops(seed)
+        arrived = []
+        # The first interval is there before anybody asks.
+        for index in range(1, len(samples)):
+            if loops.misses_this_one():
                 continue
-            version = published.time_boot_us if waits_for_position[number] else now_us
-            if version == stream.seen:
-                continue
-            stream.seen = version
-            stream.sent(now_us)
-            due.append(build[number](index))
-        if due:
-            arrived.append(Heard(index, now_us, tuple(due)))
-    return arrived
+            now_us, due = samples[index].time_boot_us, []
+            for stream, waits_for_position, build in rows:
+                if now_us <= stream.due_after_us:
+                    continue
+                version = published[index].time_boot_us if waits_for_position else now_us
+                if version == stream.seen:
+                    continue
+                stream.seen = version
+                stream.sent(now_us)
+                due.append(build(index))
+            if due:
+                arrived.append(Heard(index, now_us, tuple(due)))
+        return arrived
+
+    def _builder(self, message: MessageId) -> "Builder":
+        if message not in self._builders:
+            self._builders[message] = BUILDERS[message](self._recording)
+        return self._builders[message]
 
 
 Builder = Callable[[int], Sample]

@@ -1,10 +1,10 @@
 """What a detector made of a flight: impacts with their evidence, when it could not see, what happened around."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.detection.interface import Situation
-from companion.detection.watch import Seen, Watch
+from companion.detection.watch import Watch
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ExtendedState, Heartbeat, LandedState
 from companion.px4_mode import mode_name
@@ -13,7 +13,7 @@ from rebound_cli.logs.log import Told
 
 @dataclass(slots=True)
 class Finding:
-    """One impact: as known at once, and as known when the contact was over (the same until then)."""
+    """One impact: as known at once, and as known in the end."""
 
     at_us: int
     threshold_m_s2: float
@@ -28,7 +28,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A time in which the detector was off or blind, and why. Microseconds of the log's clock."""
+    """A time in which the detector was off or blind, and why at its beginning. Microseconds of the log's clock."""
 
     start_us: int
     end_us: int
@@ -69,27 +69,29 @@ class Findings:
 class Notebook:
     """Writes findings down as the watch makes them."""
 
-    def __init__(self, situation_at: Callable[[], Situation]) -> None:
+    def __init__(self) -> None:
         self.findings = Findings()
-        self._situation_at = situation_at
         self._open: dict[str, tuple[int, str]] = {}
+        self._off_reason: str | None = None
         self._landed = LandedState.UNDEFINED
         self._armed: bool | None = None
         self._mode: int | None = None
 
-    def note_seen(self, watch: Watch, seen: Seen, at_us: int) -> None:
-        for estimate in seen.impacts:
-            threshold = watch.state.threshold_m_s2
-            self.findings.impacts.append(Finding(at_us, threshold, self._situation_at(), estimate, estimate))
-        for estimate in seen.finished:
-            for finding in reversed(self.findings.impacts):
-                if finding.first.impact is estimate.impact:
-                    finding.final = estimate
-                    break
-        for notice in seen.notices:
-            self.findings.happenings.append(Happening(at_us, notice.text))
+    def note(self, watch: Watch, situation: Situation, at_us: int) -> None:
+        """After each step: what the watch knows of the latest impact, and whether it sees."""
+        estimate, impacts = watch.estimate, self.findings.impacts
+        if estimate is not None:
+            if not impacts or impacts[-1].first.impact is not estimate.impact:
+                impacts.append(Finding(at_us, watch.state.threshold_m_s2, situation, estimate, estimate))
+            impacts[-1].final = estimate
         self._note_span("blind", watch.blind_reason, self.findings.blind, at_us)
-        self._note_span("off", self._situation_at().off_reason, self.findings.off, at_us)
+        if situation.off_reason != self._off_reason:
+            self._note_span("off", None, self.findings.off, at_us)
+            self._off_reason = situation.off_reason
+        self._note_span("off", situation.off_reason, self.findings.off, at_us)
+
+    def tell(self, at_us: int, text: str) -> None:
+        self.findings.happenings.append(Happening(at_us, text))
 
     def note_samples(self, samples: Sequence[Told], at_us: int) -> None:
         """Take-offs, landings, arming and modes, as the vehicle reports them."""
@@ -98,9 +100,9 @@ class Notebook:
                 self._note_landed(sample.landed_state, at_us)
             elif isinstance(sample, Heartbeat):
                 if sample.armed != self._armed and (self._armed is not None or sample.armed):
-                    self._tell(at_us, "armed" if sample.armed else "disarmed")
+                    self.tell(at_us, "armed" if sample.armed else "disarmed")
                 if sample.custom_mode != self._mode:
-                    self._tell(at_us, f"mode {mode_name(sample.custom_mode)}")
+                    self.tell(at_us, f"mode {mode_name(sample.custom_mode)}")
                 self._armed, self._mode = sample.armed, sample.custom_mode
 
     def close(self, at_us: int) -> Findings:
@@ -111,16 +113,13 @@ class Notebook:
     def _note_landed(self, landed: LandedState, at_us: int) -> None:
         was_down, is_down = self._landed is LandedState.ON_GROUND, landed is LandedState.ON_GROUND
         if was_down and not is_down:
-            self._tell(at_us, "took off")
+            self.tell(at_us, "took off")
         elif is_down and not was_down and self._landed is not LandedState.UNDEFINED:
-            self._tell(at_us, "landed")
+            self.tell(at_us, "landed")
         self._landed = landed
 
-    def _tell(self, at_us: int, text: str) -> None:
-        self.findings.happenings.append(Happening(at_us, text))
-
     def _note_span(self, name: str, reason: str | None, spans: list[Span], at_us: int) -> None:
-        """A span lasts as long as there is a reason, and goes by its first one."""
+        """A span lasts as long as there is a reason and goes by its first: a blind detector's changes its figures."""
         if reason is not None:
             self._open.setdefault(name, (at_us, reason))
         elif name in self._open:

@@ -1,8 +1,8 @@
 """A run folder as the companion lived it: for each step what came, when, and what the companion did."""
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -14,7 +14,7 @@ from companion.shell.tlog import read_tlog
 from rebound_cli.documents import load_document
 from rebound_cli.inputs import mission_from
 from rebound_cli.logs.log import LogError
-from rebound_cli.run_folder import EVENTS_NAME, INPUTS_NAME, RESOLVED_NAME, TLOG_NAME
+from rebound_cli.run_folder import EVENTS_NAME, INPUTS_NAME, RESOLVED_NAME, SUMMARY_NAME, TLOG_NAME, VERSIONS_NAME
 
 _MAGIC_V2 = 0xFD
 
@@ -28,16 +28,22 @@ class Step:
     sent: Sequence[bytes] = ()
     confirms: bool = False
     stop_reason: str | None = None
+    file_appears: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A flight as its folder has it; `event_lines` as they stand in the file."""
+    """A flight as its folder has it; `event_lines` as they stand in the file.
+
+    `is_cut`: the program was ended at once, and the flight is known only to the last packet that it had written.
+    `versions` are those it was flown with.
+    """
 
     mission: Mission
     steps: Sequence[Step]
     event_lines: Sequence[str]
-    versions: dict[str, str] = field(default_factory=dict)
+    is_cut: bool
+    versions: Mapping[str, str]
 
 
 def is_run_folder(path: Path) -> bool:
@@ -54,12 +60,27 @@ def read_recording(folder: Path) -> Recording:
         )
     mission = mission_from(load_document(folder / RESOLVED_NAME))
     steps = _steps(folder / TLOG_NAME)
-    for record in _records(inputs_file):
+    if not steps:
+        raise LogError(f"{folder / TLOG_NAME}: no packet in it: nothing was ever heard in this flight.")
+    last_packet_us = max(steps)
+    for record in _records(inputs_file, _text(inputs_file)):
         step = steps.setdefault(record["time_us"], Step(record["time_us"]))
         step.confirms |= record["kind"] == "confirm"
+        step.file_appears |= record["kind"] == "file"
         step.stop_reason = record.get("reason", step.stop_reason)
-    lines = (folder / EVENTS_NAME).read_text(encoding="utf-8").splitlines(keepends=True)
-    return Recording(mission, [steps[time_us] for time_us in sorted(steps)], lines)
+    lines = _text(folder / EVENTS_NAME).splitlines(keepends=True)
+    is_cut = not (folder / SUMMARY_NAME).exists()
+    if is_cut:
+        # Of the last step perhaps not all was written.
+        steps = {time_us: step for time_us, step in steps.items() if time_us < last_packet_us}
+        whole = "".join(line for line in lines if line.endswith("\n"))
+        events = zip(lines, _records(folder / EVENTS_NAME, whole), strict=False)
+        lines = [line for line, event in events if event["time_us"] < last_packet_us]
+    try:
+        versions = dict(json.loads(_text(folder / VERSIONS_NAME)))
+    except ValueError as error:
+        raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
+    return Recording(mission, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
 
 
 def _steps(tlog: Path) -> dict[int, Step]:
@@ -78,11 +99,18 @@ def _is_ours(packet: bytes) -> bool:
     return packet[6 if packet[0] == _MAGIC_V2 else 4] == int(COMPONENT_ID)
 
 
-def _records(path: Path) -> Iterator[dict[str, Any]]:
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+def _records(path: Path, text: str) -> Iterator[dict[str, Any]]:
+    for number, line in enumerate(text.splitlines(), start=1):
         try:
             record = json.loads(line)
             record["time_us"], record["kind"] = int(record["time_us"]), str(record["kind"])
         except (ValueError, KeyError, TypeError) as error:
-            raise LogError(f"{path}:{number}: not a record of a step; the file is damaged.") from error
+            raise LogError(f"{path}:{number}: not a record of a flight; the file is damaged.") from error
         yield record
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: cannot be read; a replay needs it.") from error

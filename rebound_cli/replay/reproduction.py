@@ -1,45 +1,62 @@
 """A recorded flight decided again: the same bytes at the same times through the whole companion."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.companion import Companion, StepResult
+from companion.core import situation
+from companion.detection.interface import Situation
 from companion.report import FlightReport
+from rebound_cli.replay.findings import Findings, Notebook
 from rebound_cli.replay.recording import Recording, Step
 from rebound_cli.run_folder import event_line
+
+_BEFORE_THE_FIRST_STEP = Situation(off_reason="connect")
 
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
     """What became of it; `first_difference` is None when every packet sent and every event is the same to the bit."""
 
+    findings: Findings
     report: FlightReport
     steps: int
     packets_received: int
     packets_sent: int
     events: int
+    is_cut: bool
     first_difference: str | None
 
 
-def reproduce(recording: Recording, watch: Callable[[Companion, Step, StepResult], None]) -> Reproduction:
-    """Fly the recording to its end, whatever differs. `watch` sees the companion after each step."""
+def reproduce(recording: Recording) -> Reproduction:
+    """Fly the recording to its end, whatever differs."""
     companion = Companion(recording.mission)
     comparison = _Comparison(recording.event_lines)
+    notebook = Notebook()
     for step in recording.steps:
+        # What the flight knew when the packets came; they may move it on.
+        known = _BEFORE_THE_FIRST_STEP if companion.core is None else situation(companion.core)
         result = companion.step(b"".join(step.received), step.time_us)
         comparison.compare(step, result)
-        watch(companion, step, result)
+        for event in result.events:
+            notebook.tell(event.time_us, f"{event.kind}: {event.text}")
+        assert companion.core is not None, "the first step begins it"
+        notebook.note(companion.core.watch, known, step.time_us)
         if step.confirms:
             companion.confirm_plan()
+        if step.file_appears:
+            companion.file_is_there()
         if step.stop_reason is not None:
             companion.stop(step.stop_reason)
     comparison.finish()
     return Reproduction(
+        findings=notebook.close(recording.steps[-1].time_us),
         report=companion.report(),
         steps=len(recording.steps),
         packets_received=sum(len(step.received) for step in recording.steps),
         packets_sent=sum(len(step.sent) for step in recording.steps),
         events=len(recording.event_lines),
+        is_cut=recording.is_cut,
         first_difference=comparison.first_difference,
     )
 

@@ -13,9 +13,6 @@ class Reason(StrEnum):
     """Who armed or disarmed, in PX4's words."""
 
     COMMAND = "external command"
-    GESTURE = "stick gesture"
-    MISSION = "mission start"
-    FAILSAFE = "failsafe"
     LANDING = "landing"
     INACTION = "auto preflight disarming"
 
@@ -28,6 +25,7 @@ class Arming:
         self.armed = False
         self.armed_at_us = 0
         self.taken_off = False
+        self.taken_off_at_us = 0
         self._landed_since_us: int | None = None
 
     def arm(self, now_us: int, checks_pass: bool, forced: bool) -> Result:
@@ -52,7 +50,8 @@ class Arming:
     def disarm_by_itself(self, now_us: int, landed: bool) -> Reason | None:
         """Disarm after landing or after standing armed for too long; call at every step while armed."""
         if not landed:
-            self.taken_off = True
+            if not self.taken_off:
+                self.taken_off, self.taken_off_at_us = True, now_us
             self._landed_since_us = None
             return None
         if not self.taken_off:

@@ -7,7 +7,8 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.mavlink.encode import Message, Telemetry
+from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.telemetry import Telemetry
 
 # Where the local frame's origin lies on the Earth: where PX4's own simulators put their home.
 HOME_LATITUDE_DEG, HOME_LONGITUDE_DEG, HOME_ALTITUDE_M = 47.397742, 8.545594, 488.0

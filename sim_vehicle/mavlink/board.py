@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity
-from sim_vehicle.mavlink.encode import Telemetry
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import Topics
 from sim_vehicle.parameters.store import Parameters
 

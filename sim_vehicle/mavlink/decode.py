@@ -8,7 +8,7 @@ from typing import TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, Identity, PeerHeartbeat, PositionTarget, TimeSyncRequest
-from sim_vehicle.mavlink import flight_reader, mission_reader
+from sim_vehicle.mavlink import parameter_reader
 from sim_vehicle.setpoint import Axis3
 
 _MARKER = re.compile(rb"[\xfd\xfe]")
@@ -175,8 +175,7 @@ READERS: dict[int, Reader] = {
     76: _command_long,
     84: _position_target,
     111: _timesync,
-    **flight_reader.READERS,
-    **mission_reader.READERS,
+    **parameter_reader.READERS,
 }
 
 # Commands may go to other components and still be answered: whom they are for is decided where they are handled.

@@ -5,20 +5,15 @@ Source: PX4's mavlink/streams/*.hpp. All times are the vehicle's boot clock.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.estimate import Estimate
 from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
-from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.mavlink.vibration import Vibration
-from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
+from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.setpoint import Axis3
 
 # pymavlink's messages carry no types; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
@@ -26,34 +21,8 @@ Message: TypeAlias = Any
 NAN = math.nan
 _NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
 _TEXT_BYTES = 50
-# HIGHRES_IMU.fields_updated: accelerometer and gyroscope. No magnetometer and no barometer is simulated.
-_INERTIAL_FIELDS = 0x3F
-
-# Between v1.16 and v1.17, the PX4 whose behaviour was measured: version 1.17.0, type alpha (64).
-FLIGHT_VERSION = 1 << 24 | 17 << 16 | 0 << 8 | 64
-# In place of a git hash, so that nobody takes this vehicle for PX4's own build.
-CUSTOM_VERSION = tuple(b"rebound\0")
-
-# MAV_SYS_STATUS_SENSOR: gyro, accelerometer, attitude stabilisation, xy position control, motor outputs.
-_SENSORS = 0x1 | 0x2 | 0x800 | 0x4000 | 0x8000
-_AHRS, _PREARM_CHECK = 0x200000, 0x10000000
-
-
-@dataclass(slots=True)
-class Telemetry:
-    """What the streams send: the newest sample, the last published position, and who flies."""
-
-    sample: Estimate
-    published: Estimate
-    autopilot: Autopilot
-    vibration: Vibration
-    position_variance_m2: float
-    velocity_variance_m2_s2: float
-    attitude_variance_rad2: float
-    flow: FlowSample | None = None
-    range: RangeSample | None = None
-    true_body: npt.NDArray[np.float64] | None = None
-    """The plant's own state (13,), for the truth channel alone."""
+# HIGHRES_IMU.fields_updated: accelerometer and gyroscope; magnetometer; pressure, its altitude and temperature.
+_INERTIAL_FIELDS, _MAGNETIC_FIELDS, _AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
 
 
 class Encoder:
@@ -84,11 +53,36 @@ def heartbeat(state: Telemetry) -> Message:
 
 
 def highres_imu(state: Telemetry) -> Message:
-    sample = state.sample
+    sample, air = state.sample, state.air
     ax, ay, az = sample.specific_force_frd_m_s2
     p, q, r = sample.angular_velocity_frd_rad_s
+    mx, my, mz = state.magnetic_field_frd_gauss
+    fields = _INERTIAL_FIELDS
+    field_is_new, air_is_new = state.renewed
+    if field_is_new:
+        fields |= _MAGNETIC_FIELDS
+    if air is None:
+        return dialect.MAVLink_highres_imu_message(
+            sample.time_boot_us, ax, ay, az, p, q, r, mx, my, mz, 0.0, 0.0, 0.0, 0.0, fields
+        )
+    if air_is_new:
+        fields |= _AIR_FIELDS
     return dialect.MAVLink_highres_imu_message(
-        sample.time_boot_us, ax, ay, az, p, q, r, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, _INERTIAL_FIELDS
+        sample.time_boot_us,
+        ax,
+        ay,
+        az,
+        p,
+        q,
+        r,
+        mx,
+        my,
+        mz,
+        air.pressure_hpa,
+        0.0,
+        air.altitude_m,
+        air.temperature_c,
+        fields,
     )
 
 
@@ -96,7 +90,7 @@ def local_position_ned(state: Telemetry) -> Message:
     estimate = state.published
     x, y, z = estimate.position_ned_m
     vx, vy, vz = estimate.velocity_ned_m_s
-    return dialect.MAVLink_local_position_ned_message(_boot_ms(estimate), x, y, z, vx, vy, vz)
+    return dialect.MAVLink_local_position_ned_message(boot_ms(estimate), x, y, z, vx, vy, vz)
 
 
 def attitude(state: Telemetry) -> Message:
@@ -106,14 +100,14 @@ def attitude(state: Telemetry) -> Message:
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     p, q, r = sample.angular_velocity_frd_rad_s
-    return dialect.MAVLink_attitude_message(_boot_ms(sample), roll, pitch, yaw, p, q, r)
+    return dialect.MAVLink_attitude_message(boot_ms(sample), roll, pitch, yaw, p, q, r)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
     sample = state.sample
     w, x, y, z = sample.attitude_wxyz
     p, q, r = sample.angular_velocity_frd_rad_s
-    return dialect.MAVLink_attitude_quaternion_message(_boot_ms(sample), w, x, y, z, p, q, r, _NO_OFFSET)
+    return dialect.MAVLink_attitude_quaternion_message(boot_ms(sample), w, x, y, z, p, q, r, _NO_OFFSET)
 
 
 def odometry(state: Telemetry) -> Message:
@@ -148,14 +142,6 @@ def extended_sys_state(state: Telemetry) -> Message:
     return dialect.MAVLink_extended_sys_state_message(dialect.MAV_VTOL_STATE_UNDEFINED, state.autopilot.landed_state)
 
 
-def sys_status(state: Telemetry) -> Message:
-    """No battery and no processor are simulated: their fields say so."""
-    health = _SENSORS | _AHRS | (_PREARM_CHECK if state.autopilot.checks_pass else 0)
-    return dialect.MAVLink_sys_status_message(
-        _SENSORS | _AHRS, _SENSORS | _AHRS, health, 0, 0xFFFF, -1, -1, 0, 0, 0, 0, 0, 0
-    )
-
-
 def vibration(state: Telemetry) -> Message:
     metrics = state.vibration
     clipped = sum(state.sample.clipping_counts)
@@ -173,25 +159,12 @@ def current_mode(state: Telemetry) -> Message:
     return dialect.MAVLink_current_mode_message(shown.standard_mode, shown.custom_mode, intended.custom_mode)
 
 
-def attitude_target(state: Telemetry) -> Message:
-    """Thrust alone; the mask says that attitude and rates are not given."""
-    mask = (
-        dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
-        | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_ROLL_RATE_IGNORE
-        | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
-        | dialect.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
-    )
-    return dialect.MAVLink_attitude_target_message(
-        _boot_ms(state.sample), mask, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, state.sample.thrust_fraction
-    )
-
-
 def position_target_local_ned(state: Telemetry) -> Message:
     """What the position control flies; all ignored while the motors idle or stand."""
     applied = state.autopilot.applied
-    if not isinstance(applied, TrajectorySetpoint):
+    if applied is None:
         return dialect.MAVLink_position_target_local_ned_message(
-            _boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)
+            boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)
         )
     position, velocity = applied.position_ned_m, applied.velocity_ned_m_s
     acceleration = applied.acceleration_ned_m_s2
@@ -199,7 +172,7 @@ def position_target_local_ned(state: Telemetry) -> Message:
     mask = sum(1 << bit for bit, value in enumerate(values) if value is None)
     mask |= (applied.yaw_rad is None) << 10 | (applied.yaw_rate_rad_s is None) << 11
     return dialect.MAVLink_position_target_local_ned_message(
-        _boot_ms(state.published),
+        boot_ms(state.published),
         dialect.MAV_FRAME_LOCAL_NED,
         mask,
         *_filled(position),
@@ -208,18 +181,6 @@ def position_target_local_ned(state: Telemetry) -> Message:
         _or_nan(applied.yaw_rad),
         _or_nan(applied.yaw_rate_rad_s),
     )
-
-
-def autopilot_version(state: Telemetry) -> Message:
-    capabilities = (
-        dialect.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-        | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-        | dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    )
-    versions = (FLIGHT_VERSION, FLIGHT_VERSION, 0, 0)
-    hashes = (CUSTOM_VERSION, CUSTOM_VERSION, (0,) * 8)
-    ids = (0, 0, 0, (0,) * 18)
-    return dialect.MAVLink_autopilot_version_message(capabilities, *versions, *hashes, *ids)
 
 
 def message_interval(message_id: int, interval_us: int) -> Message:
@@ -243,7 +204,7 @@ def status_texts(text: StatusText, number: int) -> Iterator[Message]:
         )
 
 
-def _boot_ms(estimate: Estimate) -> int:
+def boot_ms(estimate: Estimate) -> int:
     return (estimate.time_boot_us // 1000) & 0xFFFFFFFF
 
 

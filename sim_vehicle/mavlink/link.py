@@ -11,7 +11,7 @@ from sim_vehicle.mavlink.service import Handler
 from sim_vehicle.mavlink.services import SERVICES
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams
-from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
+from sim_vehicle.mavlink.texts import TextLink
 
 
 class Link:
@@ -24,7 +24,6 @@ class Link:
         self._decoder = Decoder(board.identity)
         self.streams = Streams(board.telemetry, board.topics, Encoder(board.identity), kind, seed)
         self._texts = TextLink()
-        self._autopilot = board.autopilot
         self._services = tuple(service(self, board) for service in SERVICES)
         self._handlers: dict[type, Handler] = {PeerHeartbeat: self._hear_heartbeat}
         for service in self._services:
@@ -43,6 +42,10 @@ class Link:
     def send(self, message: Message) -> None:
         """Send something that is no stream."""
         self.streams.send(message)
+
+    def burst(self, fast: int, serial: int) -> int:
+        """How many packets of a long answer may be sent in this interval: ``serial`` on a serial line."""
+        return fast
 
     # --- what the vehicle's step calls, in this order ----------------------------------------------------
 
@@ -71,5 +74,3 @@ class Link:
 
     def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
         self._texts.heard(heartbeat, self.now_us)
-        if heartbeat.type == GROUND_STATION_TYPE:
-            self._autopilot.ground_station_heard()

@@ -24,6 +24,19 @@ _ONBOARD: dict[int, float] = {
     85: 10.0,  # POSITION_TARGET_LOCAL_NED
     1: 5.0,  # SYS_STATUS
     241: 0.5,  # VIBRATION
+    33: 50.0,  # GLOBAL_POSITION_INT
+    141: 10.0,  # ALTITUDE
+    74: 10.0,  # VFR_HUD
+    36: 10.0,  # SERVO_OUTPUT_RAW
+    24: UNLIMITED,  # GPS_RAW_INT
+    87: 10.0,  # POSITION_TARGET_GLOBAL_INT
+    230: 1.0,  # ESTIMATOR_STATUS
+    49: 1.0,  # GPS_GLOBAL_ORIGIN
+    242: 0.5,  # HOME_POSITION
+    147: 0.5,  # BATTERY_STATUS
+    2: 1.0,  # SYSTEM_TIME
+    4: 1.0,  # PING
+    29: 1.0,  # SCALED_PRESSURE
 }
 
 _NORMAL: dict[int, float] = {
@@ -37,10 +50,26 @@ _NORMAL: dict[int, float] = {
     85: 1.5,
     1: 1.0,
     241: 0.1,
+    33: 5.0,
+    141: 1.0,
+    74: 4.0,
+    36: 1.0,
+    24: 5.0,
+    87: 1.0,
+    230: 0.5,
+    49: 1.0,
+    242: 0.5,
+    147: 0.5,
+    4: 0.1,
+    29: 1.0,
 }
 
 # What px4-rc.mavlink asks for beyond that on the ground station's UDP link.
-_NORMAL_SITL: dict[int, float] = {**_NORMAL, 85: 50.0, 32: 50.0, 30: 50.0, 31: 50.0, 83: 50.0, 106: 10.0}
+_NORMAL_SITL: dict[int, float] = {
+    **_NORMAL,
+    **dict.fromkeys((85, 32, 33, 30, 31, 83, 36), 50.0),
+    106: 10.0,
+}
 
 
 class LinkKind(Enum):

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_vehicle.mavlink import aiding, encode
-from sim_vehicle.mavlink.encode import Encoder, Message, Telemetry
+from sim_vehicle.mavlink import aiding, condition, encode, navigation
+from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import NEVER_SENT, Topic, Topics
 
 # A message is sent this much before it is due: 0.3 of the link's loop, which sleeps 1.5 ms.
@@ -31,9 +32,13 @@ class StreamKind:
     message_id: int
     topic: Topic
     build: Callable[[Telemetry], Message]
+    notes: tuple[Topic, ...] = ()
+    """Slower topics whose news the message marks as such: `Telemetry.renewed`, in this order."""
 
 
 HEARTBEAT_ID = 0
+# Topics whose messages are sent on request even if they were sent already.
+SENT_AGAIN = (Topic.ALWAYS_NEW, Topic.ORIGIN)
 # On every link, whatever its set.
 HEARTBEAT_HZ = 1.0
 
@@ -41,20 +46,36 @@ HEARTBEAT_HZ = 1.0
 KINDS: tuple[StreamKind, ...] = (
     StreamKind(HEARTBEAT_ID, Topic.ALWAYS_NEW, encode.heartbeat),
     StreamKind(111, Topic.ALWAYS_NEW, encode.timesync),
-    StreamKind(105, Topic.SAMPLE, encode.highres_imu),
+    StreamKind(105, Topic.SAMPLE, encode.highres_imu, notes=(Topic.MAGNETIC_FIELD, Topic.AIR)),
     StreamKind(32, Topic.POSITION, encode.local_position_ned),
     StreamKind(30, Topic.SAMPLE, encode.attitude),
     StreamKind(331, Topic.POSITION, encode.odometry),
     StreamKind(31, Topic.SAMPLE, encode.attitude_quaternion),
-    StreamKind(83, Topic.POSITION, encode.attitude_target),
+    StreamKind(83, Topic.POSITION, condition.attitude_target),
     StreamKind(132, Topic.RANGE, aiding.distance_sensor),
     StreamKind(106, Topic.FLOW, aiding.optical_flow_rad),
     StreamKind(436, Topic.STATUS, encode.current_mode),
     StreamKind(245, Topic.ALWAYS_NEW, encode.extended_sys_state),
     StreamKind(85, Topic.POSITION, encode.position_target_local_ned),
-    StreamKind(1, Topic.SAMPLE, encode.sys_status),
+    StreamKind(1, Topic.SAMPLE, condition.sys_status),
     StreamKind(241, Topic.SAMPLE, encode.vibration),
-    StreamKind(148, Topic.ALWAYS_NEW, encode.autopilot_version),
+    StreamKind(148, Topic.ALWAYS_NEW, condition.autopilot_version),
+    StreamKind(33, Topic.POSITION, navigation.global_position_int),
+    StreamKind(141, Topic.POSITION, navigation.altitude),
+    StreamKind(74, Topic.POSITION, navigation.vfr_hud),
+    StreamKind(36, Topic.SAMPLE, condition.servo_output_raw),
+    StreamKind(24, Topic.GPS, navigation.gps_raw_int),
+    StreamKind(87, Topic.TARGET, navigation.position_target_global_int),
+    StreamKind(230, Topic.POSITION, navigation.estimator_status),
+    StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin),
+    StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position),
+    StreamKind(147, Topic.BATTERY, condition.battery_status),
+    StreamKind(2, Topic.ALWAYS_NEW, condition.system_time),
+    StreamKind(4, Topic.ALWAYS_NEW, condition.ping),
+    StreamKind(29, Topic.AIR, condition.scaled_pressure),
+    StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
+    StreamKind(375, Topic.SAMPLE, condition.actuator_output_status),
+    StreamKind(264, Topic.ALWAYS_NEW, condition.flight_information),
     # The truth, as PX4's simulation has it too: for whoever studies a flight, on request alone.
     StreamKind(115, Topic.TRUTH, aiding.hil_state_quaternion),
 )
@@ -78,11 +99,12 @@ def interval_from_request(interval_us: float) -> int:
 class Stream:
     """One running or stopped stream: due when `now_us > due_after_us`; then tell it that it was `sent`."""
 
-    __slots__ = ("_last_us", "default_interval_us", "due_after_us", "interval_us", "kind", "seen")
+    __slots__ = ("_last_us", "default_interval_us", "due_after_us", "interval_us", "kind", "noted", "seen")
 
     def __init__(self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US) -> None:
         self.kind = kind
         self.seen = NEVER_SENT
+        self.noted = [NEVER_SENT for _ in kind.notes]
         self.default_interval_us = default_interval_us
         self.restart(default_interval_us, now_us)
 
@@ -95,6 +117,13 @@ class Stream:
         """Go on with another interval."""
         self.interval_us = interval_us
         self.due_after_us = self._last_us + interval_us - EARLY_US
+
+    def renewed(self, versions: list[int]) -> tuple[bool, ...]:
+        """Which of the noted topics have news since the last message."""
+        now = [versions[topic] for topic in self.kind.notes]
+        new = tuple(a != b for a, b in zip(now, self.noted, strict=True))
+        self.noted = now
+        return new
 
     def sent(self, now_us: int) -> None:
         """Keep the mean rate by counting from when it was due, unless that is long ago."""
@@ -150,6 +179,8 @@ class Streams:
                 continue
             stream.seen = version
             stream.sent(now_us)
+            if kind.notes:
+                self._state.renewed = stream.renewed(versions)
             outbox.append(self._encoder.packet(kind.build(self._state)))
 
     # --- commands ----------------------------------------------------------------------------------------
@@ -179,14 +210,16 @@ class Streams:
         self.send(encode.message_interval(message_id, interval_us))
 
     def send_now(self, message_id: int) -> bool:
-        """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent."""
+        """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
         stream = self._by_id.get(message_id)
         if stream is None:
             return False
         version = self._versions[stream.kind.topic]
-        if stream.kind.topic is not Topic.ALWAYS_NEW and version == stream.seen:
+        if stream.kind.topic not in SENT_AGAIN and version == stream.seen:
             return False
         stream.seen = version
+        if stream.kind.notes:
+            self._state.renewed = stream.renewed(self._versions)
         self.send(stream.kind.build(self._state))
         return True
 

@@ -3,7 +3,8 @@
 from enum import IntEnum
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
-from sim_vehicle.mavlink.encode import Telemetry
+from sim_vehicle.hil.messages import Air, HilGps
+from sim_vehicle.mavlink.telemetry import Telemetry
 
 # vehicle_status is published when it changes and at least at 2 Hz.
 STATUS_PERIOD_US = 500_000
@@ -20,10 +21,18 @@ class Topic(IntEnum):
     FLOW = 4
     RANGE = 5
     TRUTH = 6
+    GPS = 7
+    AIR = 8
+    BATTERY = 9
+    ORIGIN = 10
+    """New once: it does not move."""
+    TARGET = 11
+    """New with every position, while a mode flies somewhere by itself."""
+    MAGNETIC_FIELD = 12
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.TARGET)
 
 
 class Topics:
@@ -34,6 +43,10 @@ class Topics:
         self.versions = [NEVER_SENT if topic in OPTIONAL else 0 for topic in Topic]
         self._flow: FlowSample | None = None
         self._range: RangeSample | None = None
+        self._fix: HilGps | None = None
+        self._battery = 0
+        self._air: Air | None = None
+        self._field = state.magnetic_field_frd_gauss
         self._status: tuple[int, bool, int] | None = None
         self._status_us = state.sample.time_boot_us
 
@@ -42,9 +55,22 @@ class Topics:
         versions = self.versions
         versions[0] += 1
         versions[1] += 1
+        state = self._state
         if new_position:
             versions[2] += 1
-        state = self._state
+            self._count_target()
+        if state.air is not self._air:
+            self._air = state.air
+            versions[8] += 1
+        if state.magnetic_field_frd_gauss is not self._field:
+            self._field = state.magnetic_field_frd_gauss
+            versions[12] += 1
+        if state.gps is not self._fix:
+            self._fix = state.gps
+            versions[7] += 1
+        if state.autopilot.battery.version != self._battery:
+            self._battery = state.autopilot.battery.version
+            versions[9] += 1
         if state.flow is not self._flow:
             self._flow = state.flow
             versions[Topic.FLOW] += 1
@@ -58,3 +84,7 @@ class Topics:
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[3] += 1
+
+    def _count_target(self) -> None:
+        if self._state.autopilot.auto_target_ned_m is not None:
+            self.versions[Topic.TARGET] += 1

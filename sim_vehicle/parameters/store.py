@@ -21,6 +21,9 @@ class Parameters(dict[str, float]):
         self._stored = dict(self.defaults)
         self.changes = 0
         """Grows with every change of a value that counts."""
+        self.sets = 0
+        """Grows with every change of a stored value."""
+        self._last_set: dict[str, int] = {}
         super().__init__(self.defaults)
 
     @property
@@ -39,9 +42,17 @@ class Parameters(dict[str, float]):
     def set(self, name: str, value: float) -> None:
         """Store ``value``; it counts at once, or after the next reboot where PX4 needs one."""
         row = self._definitions[name]
-        self._stored[name] = int(value) if row.is_whole else value
+        stored = int(value) if row.is_whole else value
+        if stored != self._stored[name]:
+            self.sets += 1
+            self._last_set[name] = self.sets
+        self._stored[name] = stored
         if not row.needs_reboot:
             self._make_count(row)
+
+    def set_after(self, sets: int) -> list[str]:
+        """The names whose stored value has changed since `sets` was that number."""
+        return sorted(name for name, at in self._last_set.items() if at > sets)
 
     def reset(self) -> None:
         """Every parameter back to its default (PREFLIGHT_STORAGE)."""

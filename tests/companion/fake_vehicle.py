@@ -42,6 +42,7 @@ class FakeVehicle:
     silent: bool = False
     deaf: bool = False  # hears nothing, keeps talking
     no_positions: bool = False
+    battery_percent: int | None = None
     no_imu: bool = False
     no_current_mode: bool = False
     ack: Callable[[int, int], list[int]] = lambda command, count: [0]  # (command, how often) -> results
@@ -155,6 +156,8 @@ class FakeVehicle:
             status = 5 if self.failsafe else 4 if self.armed else 3
             base = 0x1D | (0x80 if self.armed else 0)
             self.send(mav.MAVLink_heartbeat_message(self.vehicle_type, self.autopilot, base, self.mode, status, 3))
+        if n % 50 == 6 and self.battery_percent is not None:
+            self.send(mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, self.battery_percent, 0, 0, 0, 0, 0, 0))
         if n % 25 == 5:
             self.send(mav.MAVLink_timesync_message(0, self.time_us * 1000))
 

@@ -11,6 +11,7 @@ from companion.messages import (
     Attitude,
     AttitudeTarget,
     AutopilotVersion,
+    Battery,
     CommandAck,
     CommandResult,
     CurrentMode,
@@ -78,6 +79,7 @@ CASES = [
         mav.MAVLink_autopilot_version_message(0, 0x010F02FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),
         AutopilotVersion((1, 15, 2)),
     ),
+    (mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 42, 0, 0, 0, 0, 0, 0), Battery(42)),
 ]
 UNUSED = mav.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0, 0, 0)
 

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from companion.mission.fence import Fence
 from companion.recovery.envelope import Envelope, away_from_both
 from companion.recovery.interface import Contact, RecoveryConfig
 from companion.recovery.paper import PaperLaw
@@ -33,7 +34,7 @@ def test_hit_while_hovering_asks_to_stay():
     assert PaperLaw(RecoveryConfig()).setpoint_ned_m(contact((0.0, 0.0, 0.0))) == (4.0, -2.0, -1.5)
 
 
-FENCE = Envelope((10.0, 0.0, 2.0), 5.0, 6.0)
+FENCE = Envelope((10.0, 0.0, 2.0), Fence(radius_m=5.0, max_height_m=6.0))
 
 
 def test_a_setpoint_inside_the_fence_is_left_alone():

@@ -6,6 +6,9 @@ import sys
 import time
 from pathlib import Path
 
+from rebound_cli.replay.recording import read_recording
+from rebound_cli.replay.reproduction import reproduce
+
 ROOT = Path(__file__).parents[2]
 WALL = ROOT / "missions" / "wall.yaml"
 SQUARE = ROOT / "missions" / "square.yaml"
@@ -68,6 +71,13 @@ def wait_until_gone(text, timeout_s=5.0):
     while processes_naming(text):
         assert time.monotonic() < end_s, f"still running: {processes_naming(text)}"
         time.sleep(0.05)
+
+
+def assert_comes_again(folder):
+    """What the companion decided in this flight, it decides again from the folder alone, to the bit."""
+    reproduction = reproduce(read_recording(folder))
+    assert reproduction.first_difference is None
+    return reproduction
 
 
 def assert_one_clear_sentence(result, *words):

@@ -9,7 +9,7 @@ from rebound_cli.detectors.hits import airframe_of, draw_case, fly_hit
 from rebound_cli.detectors.recording import Recording
 from rebound_cli.detectors.scoring import first_possible
 from rebound_cli.detectors.watching import ASKED_HZ, streams_asked_hz
-from rebound_cli.detectors.wire import BUILDERS, heard
+from rebound_cli.detectors.wire import BUILDERS, Wire
 from sim_vehicle.physics.plant import Plant
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
@@ -43,7 +43,7 @@ def test_the_samples_without_bytes_are_those_of_the_whole_wire(rate, monkeypatch
     kinds = {type(BUILDERS[message](recording)(1)) for message in asked_hz}
     decoded = [sample for raw in client.sent for _, sample in decoder.feed(raw) if type(sample) in kinds]
     # Then they are, bit by bit and in this order, what the bench makes of the recording
-    made = [sample for step in heard(recording, asked_hz, seed) for sample in step.samples]
+    made = [sample for step in Wire(recording).heard(asked_hz, seed) for sample in step.samples]
     assert len(made) > 6 * rate and kinds == {type(sample) for sample in made}
     assert without_landed_state(decoded) == without_landed_state(made)
 
@@ -91,7 +91,7 @@ def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     recording, hit = fly_hit(case, airframe_of(case))
     first_us = {}
     for rate in ASKED_HZ:
-        arrived = heard(recording, streams_asked_hz(rate), case.seed)
+        arrived = Wire(recording).heard(streams_asked_hz(rate), case.seed)
         possible = first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1.5)
         first_us[rate] = possible.time_boot_us
         # Then the report that came with it was not late, and one with the next sample was late by one

@@ -45,8 +45,8 @@ def test_an_unknown_key_suggests_the_close_one_and_lists_all():
 
 
 def test_a_missing_key_is_named_at_the_part_that_lacks_it():
-    text = complaint(mission_from, document("      speed_m_s: 1.0\n"))
-    assert text == "demo.yaml:4: items.1.go_to.speed_m_s: is missing; add it."
+    text = complaint(mission_from, document("      position_ned_m: [1, 0, -1.5]\n"))
+    assert text == "demo.yaml:4: items.1.go_to.position_ned_m: is missing; add it."
 
 
 def test_a_rule_about_the_whole_mission_points_at_the_item():

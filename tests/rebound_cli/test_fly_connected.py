@@ -10,7 +10,7 @@ import time
 import pytest
 
 from companion.shell.tlog import read_tlog
-from tests.rebound_cli.command import HOP, SQUARE, events_of, start, wait_for_event
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
 
 COMPANION = 191
 HEARTBEAT, SET_POSITION_TARGET, COMMAND_LONG = 0, 84, 76
@@ -59,6 +59,7 @@ def test_without_a_yes_nothing_is_armed(address, tmp_path):
     assert sent_by_companion(folder, SET_POSITION_TARGET) == []
     heartbeats_s = [at_s for at_s, _ in sent_by_companion(folder, HEARTBEAT)]
     assert max(b - a for a, b in itertools.pairwise(heartbeats_s)) < 1.5
+    assert_comes_again(folder)
 
 
 def test_the_end_of_input_is_no(address, tmp_path):
@@ -90,6 +91,7 @@ def test_a_yes_flies_the_plan_of_a_vehicle_without_truth(address, tmp_path):
     assert [summary[key] for key in unknown] == [None] * 5
     assert "Fly this plan?" in stderr
     assert not (folder / "truth.npz").exists()
+    assert_comes_again(folder)
 
 
 def test_yes_on_the_command_line_shows_the_plan_and_does_not_ask(address, tmp_path):

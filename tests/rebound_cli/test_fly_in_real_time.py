@@ -12,6 +12,7 @@ from tests.rebound_cli.command import (
     ROOT,
     SQUARE,
     WALL,
+    assert_comes_again,
     events_of,
     processes_naming,
     run,
@@ -41,6 +42,8 @@ def test_a_short_flight_beside_the_simulated_vehicle(tmp_path):
         assert (folder / "flight.png").stat().st_size > 10_000
         assert (folder / "truth.npz").exists()
         wait_until_gone(folder)
+        # And each can be decided again
+        assert_comes_again(folder)
 
 
 def test_ctrl_c_hands_the_vehicle_over_and_finishes_the_log(tmp_path):
@@ -58,6 +61,8 @@ def test_ctrl_c_hands_the_vehicle_over_and_finishes_the_log(tmp_path):
     assert "Ctrl-C" in stdout
     assert any("HOLD" in event["text"].upper() or "LOITER" in event["text"] for event in events_of(folder)[-4:])
     wait_until_gone(folder)
+    # And the hand-over can be decided again
+    assert "Ctrl-C" in assert_comes_again(folder).report.reason
 
 
 def test_a_killed_flight_takes_its_vehicle_with_it(tmp_path):
@@ -72,6 +77,8 @@ def test_a_killed_flight_takes_its_vehicle_with_it(tmp_path):
     # Then the vehicle's process ends by itself, and the log holds what had happened
     wait_until_gone(folder)
     assert (folder / "flight.tlog").stat().st_size > 10_000
+    # And all of it can be decided again
+    assert assert_comes_again(folder).is_cut
 
 
 def test_a_second_ctrl_c_ends_at_once(tmp_path):

@@ -44,7 +44,7 @@ CASES = [
     (dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3), PeerHeartbeat(1, 191, 18)),
     (dialect.MAVLink_timesync_message(0, 123_456_789_012), TimeSyncRequest(123_456_789_012)),
     (dialect.MAVLink_timesync_message(5, 123), None),
-    (dialect.MAVLink_param_request_list_message(1, 1), None),
+    (dialect.MAVLink_ping_message(0, 1, 2, 2), None),
     (
         dialect.MAVLink_command_long_message(1, 1, 511, 0, 105.0, 4000.0, 0.5, 0.25, 5.0, 6.0, 7.0),
         Command(1, 191, 1, 1, 511, 105.0, 4000.0, 0.5, 0.25, 5.0, 6.0, 7.0),

@@ -1,0 +1,69 @@
+"""What this vehicle shakes, axis by axis: running means and spreads of the specific force, learnt in its own flight."""
+
+import math
+from dataclasses import dataclass
+
+# The mean follows what is not noise: drag as the speed changes, a gust that builds up in a few tenths of a second.
+MEAN_MEMORY_S = 0.25
+# A spread good to 5 % needs 200 samples; at the slowest useful rates it is still good to 12 %.
+SPREAD_MEMORY_S = 2.0
+# More throttle shakes more within a second: the spread of what changes from sample to sample rises fast and falls
+# slowly. Of normal noise it then reads half too much, 1.5 standard deviations.
+JITTER_RISE_S = 0.3
+JITTER_EXCESS = 1.5
+# A gap says nothing about what was in it: a sample after one weighs as one of this length.
+LONGEST_STEP_S = 0.05
+
+
+@dataclass(slots=True)
+class Floor:
+    """Exponentially weighted, on body x, y, z. Changed only by `learn`.
+
+    Two variances on each axis: of the departures from the mean (vibration that the stream's rate folds into slow
+    waves shows here) and, as half the squared change from sample to sample, of the jitter (which a force that only
+    grows does not feign, and which may rise fast for that).
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    last_x: float = 0.0
+    last_y: float = 0.0
+    last_z: float = 0.0
+    variance_x: float = 0.0
+    variance_y: float = 0.0
+    variance_z: float = 0.0
+    jitter_x: float = 0.0
+    jitter_y: float = 0.0
+    jitter_z: float = 0.0
+    known_s: float = 0.0
+    side_m_s2: float = 0.0  # spread on the noisier of x and y
+    vertical_m_s2: float = 0.0  # spread on z
+
+    def learn(self, f_x: float, f_y: float, f_z: float, elapsed_s: float) -> None:
+        """Take one sample, m/s^2, ``elapsed_s`` after the last; the first ones count as a plain mean."""
+        step_s = elapsed_s if elapsed_s < LONGEST_STEP_S else LONGEST_STEP_S
+        if self.known_s <= 0.0:
+            self.x, self.y, self.z = self.last_x, self.last_y, self.last_z = f_x, f_y, f_z
+        known_s = self.known_s = min(self.known_s + step_s, SPREAD_MEMORY_S)
+        mean_share = step_s / (known_s if known_s < MEAN_MEMORY_S else MEAN_MEMORY_S)
+        share = step_s / known_s
+        rise = share if share > step_s / JITTER_RISE_S else step_s / JITTER_RISE_S
+        x, y, z = f_x - self.x, f_y - self.y, f_z - self.z
+        self.x += mean_share * x
+        self.y += mean_share * y
+        self.z += mean_share * z
+        variance_x = self.variance_x = self.variance_x + share * (x * x - self.variance_x)
+        variance_y = self.variance_y = self.variance_y + share * (y * y - self.variance_y)
+        variance_z = self.variance_z = self.variance_z + share * (z * z - self.variance_z)
+        x, y, z = f_x - self.last_x, f_y - self.last_y, f_z - self.last_z
+        self.last_x, self.last_y, self.last_z = f_x, f_y, f_z
+        change = 0.5 * x * x - self.jitter_x
+        jitter_x = self.jitter_x = self.jitter_x + (rise if change > 0.0 else share) * change
+        change = 0.5 * y * y - self.jitter_y
+        jitter_y = self.jitter_y = self.jitter_y + (rise if change > 0.0 else share) * change
+        change = 0.5 * z * z - self.jitter_z
+        jitter_z = self.jitter_z = self.jitter_z + (rise if change > 0.0 else share) * change
+        excess = JITTER_EXCESS * JITTER_EXCESS
+        self.side_m_s2 = math.sqrt(max(excess * variance_x, excess * variance_y, jitter_x, jitter_y))
+        self.vertical_m_s2 = math.sqrt(max(excess * variance_z, jitter_z))

@@ -1,0 +1,315 @@
+"""Detector `fused`, the default: force that nothing else explains, and what an unseen contact leaves behind.
+
+By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs of a
+contact, each against what this vehicle shows in its own flight:
+
+* sideways: a departure of f_x, f_y from their running mean (see `lateral`), with room for the drag that changes as
+  the vehicle turns;
+* vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
+  fall, a dropped payload and every manoeuvre stay inside;
+* aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
+  the rates jumped, too.
+
+What was touched is `classify`'s; a touch that begins softly on a vehicle that hardly moves is looked at for a moment
+before it is called a hit or a hand.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from companion.detection.aftermath import Aftermath
+from companion.detection.classify import HOVER_M_S, kind_of
+from companion.detection.floor import Floor
+from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.detection.thrust import ThrustGain
+from companion.estimate.rotation import body_to_ned, ned_to_body
+from companion.messages import (
+    Attitude,
+    AttitudeTarget,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    MessageId,
+    Odometry,
+    Sample,
+    Vector3,
+)
+from companion.written import NotNegative, Positive, Written
+
+
+class FusedConfig(Written):
+    """Settings of the detector `fused`."""
+
+    # A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its spread reads half too much, to be safe); a gust
+    # of 5 m/s adds 1.1 m/s^2 of drag at most. Eq. 2 begins with b_s v_c = 15 m/s^2 at 0.5 m/s.
+    side_threshold_m_s2: Positive = 1.75
+    # Beyond nothing and beyond the propellers' most: those bounds are themselves uncertain by a tenth of hover.
+    vertical_threshold_m_s2: Positive = 4.0
+    # Of the spread as `floor` has it, at least 1.5 times the true one: 6.3 standard deviations, which sideways two of
+    # 10^9 normal samples exceed, one in half a thousand hours at 250 Hz.
+    noise_factor: Positive = 4.2
+    # Drag per mass is 0.2 to 0.4 /s times the speed and turns with the vehicle.
+    drag_per_s: NotNegative = 0.3
+    # A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; ten times that. A rigid vehicle's hit
+    # at 0.5 m/s changes its velocity by 0.95 m/s, a foldable one's by 0.7.
+    velocity_step_m_s: Positive = 0.2
+    # With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by 2 rad/s changes its velocity
+    # by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s.
+    velocity_step_turned_m_s: Positive = 0.07
+    rate_step_rad_s: Positive = 2.0
+    # Thrust that turns at 1 rad/s changes the acceleration by 0.6 m/s^2 in 60 ms; the estimate's 20 ms of delay make
+    # 0.012 m/s of that. Turning about the thrust itself changes nothing.
+    velocity_per_rate_m: NotNegative = 0.01
+    # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
+    rearm_quiet_s: Positive = 0.04
+    # Longer loud than this is no contact but a new way to shake, and is learnt.
+    longest_contact_s: Positive = 0.5
+    # After a contact the estimate swings (its delay, a filter's switching): velocities count again after this.
+    velocity_rest_s: Positive = 0.15
+    # A hand is slower than an obstacle: below `soft_m_s2` on a hovering vehicle wait for the force to show itself.
+    soft_m_s2: Positive = 8.0
+    soft_wait_s: Positive = 0.02
+
+
+# On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
+# 11 m/s^2 in one sample, nothing in the next): the next one must show it, too.
+CLEAR = 1.6
+# Velocities of ODOMETRY are taken for as long as they come; LOCAL_POSITION_NED has no reset counter.
+ODOMETRY_KEPT_US = 500_000
+
+
+@dataclass(slots=True)
+class FusedState(DetectorState):
+    """Changed in place by `FusedDetector.step`."""
+
+    floor: Floor = field(default_factory=Floor)
+    thrust: ThrustGain = field(default_factory=ThrustGain)
+    aftermath: Aftermath = field(default_factory=Aftermath)
+    velocity_ned_m_s: Vector3 | None = None
+    odometry_boot_us: int | None = None
+    reset_counter: int = 0
+    contact_began_boot_us: int = 0
+    held_since_boot_us: int | None = None
+    held_free_until_us: int = 0
+
+
+class FusedDetector:
+    """See the module's text."""
+
+    name = "fused"
+    losses: ClassVar[Mapping[MessageId, str]] = {
+        MessageId.ATTITUDE_TARGET: "pushes from below are seen only beyond 5 g",
+        MessageId.ODOMETRY: "the estimate's jumps look like unseen hits, which need a step twice as large",
+    }
+
+    def __init__(self, config: FusedConfig, averaging_interval_us: int) -> None:
+        self._config = config
+        self._averaging_us = averaging_interval_us
+        self._rearm_us = round(config.rearm_quiet_s * 1e6)
+        self._longest_us = round(config.longest_contact_s * 1e6)
+        self._rest_us = round(config.velocity_rest_s * 1e6)
+        self._soft_us = round(config.soft_wait_s * 1e6)
+
+    def initial(self) -> FusedState:
+        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2)
+
+    def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
+        kind = type(sample)
+        if kind is ImuSample:
+            return state, self._imu(state, sample, situation)  # type: ignore[arg-type]
+        match sample:
+            case Odometry():
+                return state, self._odometry(state, sample, situation)
+            case LocalPosition():
+                return state, self._local_position(state, sample, situation)
+            case Attitude():
+                state.aftermath.attitude(sample.time_boot_us, sample.attitude_wxyz)
+            case AttitudeTarget():
+                state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
+            case _:
+                pass
+        return state, None
+
+    # --- force ------------------------------------------------------------------------------------------------
+
+    def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
+        now_us, f, w = sample.time_boot_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+        s.aftermath.imu(now_us, f, w)
+        before_us, s.last_sample_boot_us = s.last_sample_boot_us, now_us
+        f_x, f_y, f_z = f
+        off = _why_off(situation)
+        x, y = f_x - s.floor.x, f_y - s.floor.y
+        side = math.sqrt(x * x + y * y)
+        turning = abs(w[0]) + abs(w[1]) + abs(w[2])
+        if side < s.threshold_m_s2 and off is None and s.phase is Phase.ARMED:
+            # Nearly every sample ends here.
+            room = self._vertical_threshold(s)
+            if -s.thrust.most_m_s2(now_us) - room < f_z < room:
+                s.held_since_boot_us = None
+                self._learn(s, f, before_us)
+                return None
+        if off is not None:
+            s.phase, s.off_reason = Phase.OFF, off
+            self._learn(s, f, before_us)
+            return None
+        room = self._vertical_threshold(s)
+        below, above = f_z - room, -f_z - s.thrust.most_m_s2(now_us) - room
+        threshold = s.threshold_m_s2 + self._drag_room(s, turning)
+        if side < threshold and below < 0.0 and above < 0.0:
+            self._quiet(s, f, before_us)
+            return None
+        force = (x, y, f_z - s.thrust.expected_m_s2(now_us, s.floor.z))
+        size = math.sqrt(x * x + y * y + force[2] * force[2])
+        return self._loud(s, sample, situation, force, size, max(side / threshold, 1.0 + max(below, above) / room))
+
+    def _vertical_threshold(self, s: FusedState) -> float:
+        return max(self._config.vertical_threshold_m_s2, self._config.noise_factor * s.floor.vertical_m_s2)
+
+    def _drag_room(self, s: FusedState, turning_rad_s: float) -> float:
+        """Drag goes round with the vehicle while the mean stays behind."""
+        v = s.velocity_ned_m_s
+        if v is None:
+            return 0.0
+        speed = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        return self._config.drag_per_s * speed * min(2.0, 0.25 * turning_rad_s)
+
+    def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
+        now_us = s.last_sample_boot_us
+        elapsed_s = (now_us - before_us) * 1e-6
+        if not 0.0 < elapsed_s < 1.0:
+            elapsed_s = 0.001
+        s.floor.learn(f[0], f[1], f[2], elapsed_s)
+        if s.phase is Phase.ARMED:
+            s.thrust.learn(now_us, f[2], elapsed_s)
+        s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
+
+    def _quiet(self, s: FusedState, f: Vector3, before_us: int) -> None:
+        now_us = s.last_sample_boot_us
+        s.held_since_boot_us = None
+        self._learn(s, f, before_us)
+        if s.phase is Phase.OFF:
+            s.phase, s.off_reason, s.last_loud_boot_us = Phase.QUIET, "", now_us
+        elif s.phase is not Phase.ARMED and now_us - s.last_loud_boot_us >= self._rearm_us:
+            s.phase = Phase.ARMED
+
+    def _loud(
+        self, s: FusedState, sample: ImuSample, situation: Situation, force: Vector3, size: float, ratio: float
+    ) -> Impact | None:
+        now_us = s.last_sample_boot_us
+        if s.phase is Phase.CONTACT:
+            s.last_loud_boot_us = now_us
+            s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
+            total = s.force_sum_frd_m_s2
+            s.force_sum_frd_m_s2 = (total[0] + force[0], total[1] + force[1], total[2] + force[2])
+            if now_us - s.contact_began_boot_us > self._longest_us:
+                self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
+            return None
+        if s.phase is not Phase.ARMED:
+            # Switched on in the middle of a shake: it is learnt too, or a threshold too low would never rise.
+            s.phase, s.off_reason, s.last_loud_boot_us = Phase.QUIET, "", now_us
+            self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
+            return None
+        free_until_us = min(now_us - self._averaging_us, s.aftermath.previous_imu_us)
+        if s.held_since_boot_us is not None:
+            free_until_us = s.held_free_until_us
+        kind = None
+        if size < self._config.soft_m_s2 and self._hovers(s):
+            if self._held_us(s, free_until_us) < self._soft_us:
+                return None
+            kind = ImpactKind.CONTACT
+        elif self._may_be_the_sensors(s, ratio) and self._held_us(s, free_until_us) == 0:
+            return None
+        confidence = min(1.0, 0.5 * ratio)
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, confidence, kind)
+
+    def _may_be_the_sensors(self, s: FusedState, ratio: float) -> bool:
+        return ratio < CLEAR and s.threshold_m_s2 > self._config.side_threshold_m_s2
+
+    def _held_us(self, s: FusedState, free_until_us: int) -> int:
+        """How long the present doubtful force has been looked at."""
+        if s.held_since_boot_us is None:
+            s.held_since_boot_us, s.held_free_until_us = s.last_sample_boot_us, free_until_us
+        return s.last_sample_boot_us - s.held_since_boot_us
+
+    def _hovers(self, s: FusedState) -> bool:
+        v = s.velocity_ned_m_s
+        return v is not None and math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) < HOVER_M_S
+
+    def _fire(
+        self,
+        s: FusedState,
+        now_us: int,
+        situation: Situation,
+        force: Vector3,
+        free_until_us: int,
+        evidence: Evidence,
+        confidence: float,
+        kind: ImpactKind | None = None,
+        velocity_before_ned_m_s: Vector3 | None = None,
+    ) -> Impact:
+        if kind is None:
+            force_ned = body_to_ned(s.aftermath.attitude_wxyz, force)
+            velocity = velocity_before_ned_m_s or s.velocity_ned_m_s
+            kind = kind_of(force_ned, velocity, s.aftermath.rate_step_near(now_us), situation)
+        s.phase, s.off_reason = Phase.CONTACT, ""
+        s.last_loud_boot_us = s.contact_began_boot_us = now_us
+        s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+        s.force_sum_frd_m_s2 = force
+        s.held_since_boot_us = None
+        return Impact(now_us, free_until_us, force, kind, evidence, confidence)
+
+    # --- aftermath --------------------------------------------------------------------------------------------
+
+    def _odometry(self, s: FusedState, sample: Odometry, situation: Situation) -> Impact | None:
+        if s.odometry_boot_us is None or sample.reset_counter != s.reset_counter:
+            s.aftermath.forget()
+        s.odometry_boot_us, s.reset_counter = sample.time_boot_us, sample.reset_counter
+        return self._velocity(s, sample.time_boot_us, sample.velocity_ned_m_s, situation, 1.0)
+
+    def _local_position(self, s: FusedState, sample: LocalPosition, situation: Situation) -> Impact | None:
+        told = s.odometry_boot_us
+        if told is not None and sample.time_boot_us - told < ODOMETRY_KEPT_US:
+            s.velocity_ned_m_s = sample.velocity_ned_m_s
+            return None
+        return self._velocity(s, sample.time_boot_us, sample.velocity_ned_m_s, situation, 2.0)
+
+    def _velocity(
+        self, s: FusedState, time_us: int, velocity_ned_m_s: Vector3, situation: Situation, caution: float
+    ) -> Impact | None:
+        s.velocity_ned_m_s = velocity_ned_m_s
+        aftermath, config = s.aftermath, self._config
+        step = aftermath.step_m_s(time_us, velocity_ned_m_s)
+        if s.phase is Phase.CONTACT or time_us - s.last_loud_boot_us < self._rest_us:
+            aftermath.forget()
+            return None
+        if step is None:
+            return None
+        spread_m_s = aftermath.spread_m_s
+        aftermath.learn(step)
+        size = math.sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2])
+        turned = aftermath.rate_step_near(time_us) >= config.rate_step_rad_s
+        least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
+        p, q, _ = aftermath.rates_frd_rad_s
+        room = config.velocity_per_rate_m * (abs(p) + abs(q))
+        threshold = caution * max(least, config.noise_factor * spread_m_s) + room
+        if size < threshold or s.phase is not Phase.ARMED:
+            return None
+        free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)
+        now_us = max(time_us, s.last_sample_boot_us)
+        over_s = max(now_us - free_until_us, 1) * 1e-6
+        force_ned = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
+        force = ned_to_body(aftermath.attitude_wxyz, force_ned)
+        aftermath.forget()
+        confidence = min(1.0, 0.5 * size / threshold)
+        v = velocity_ned_m_s
+        before = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence, None, before)
+
+
+def _why_off(situation: Situation) -> str | None:
+    """The flight's reason, or the ground: feet that stand on it shake and push."""
+    if situation.off_reason is not None:
+        return situation.off_reason
+    return "on the ground" if situation.landed_state is LandedState.ON_GROUND else None

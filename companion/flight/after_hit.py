@@ -1,0 +1,56 @@
+"""The mission's policy for hits: decided at each hit, acted on when the vehicle has settled."""
+
+from companion.flight.context import AfterRecovery, FlightContext, Move
+from companion.flight.states import State, Trigger
+from companion.mission.policy import OnCollision
+
+_TRIGGERS = {
+    "hold": Trigger.RECOVERED_TO_HOLD,
+    "continue": Trigger.RECOVERED_TO_CONTINUE,
+    "retry": Trigger.RECOVERED_TO_RETRY,
+    "return": Trigger.RECOVERED_TO_RETURN,
+    "land": Trigger.RECOVERED_TO_LAND,
+    "abort": Trigger.RECOVERED_TO_ABORT,
+}
+# Of these the interrupted step is over.
+_STEP_LEFT = ("hold", "continue")
+
+
+def decide(flight: FlightContext, state: State, now_us: int) -> None:
+    """Count the newest hit and settle what follows its recovery. `state`: in which it happened.
+
+    A hit during a recovery, or during the hold after it, belongs to the step in which the first one happened.
+    """
+    policy, hits = _policy_and_hits(flight)
+    then, reason = _verdict(flight, policy, hits)
+    if then == "retry" and state is State.MISSION:
+        flight.tally.pace_factor *= policy.retry_speed_factor
+    flight.after_recovery = AfterRecovery(_TRIGGERS[then], policy.hold_s, reason)
+    # What an interrupted flight resumes with.
+    flight.step_index = flight.tally.index + (1 if then in _STEP_LEFT else 0)
+    if reason:
+        flight.tell(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)
+
+
+def _policy_and_hits(flight: FlightContext) -> tuple[OnCollision, int]:
+    flight.tally.hits += 1
+    own = flight.steps[flight.tally.index].item.on_collision
+    return (own, flight.tally.hits) if own is not None else (flight.mission.on_collision, len(flight.collisions))
+
+
+def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str, str]:
+    """What follows, and why where it is not what the policy says first."""
+    limit_m_s = flight.mission.abort_when.hit_above_m_s
+    speed_m_s = flight.collisions[-1].report().impact_speed_m_s
+    if limit_m_s is not None and speed_m_s > limit_m_s:
+        return "abort", f"hit at {speed_m_s:.2f} m/s, above abort_when.hit_above_m_s = {limit_m_s:g}"
+    if hits >= policy.max_hits:
+        # A way home on which there are obstacles too is none.
+        return "land" if flight.going_home else policy.after_max_hits, f"hit {hits} of at most {policy.max_hits}"
+    return "return" if flight.going_home else policy.then, ""
+
+
+def afterwards(flight: FlightContext) -> Move:
+    """What was decided, as a move."""
+    after = flight.after_recovery
+    return Move(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)

@@ -1,0 +1,93 @@
+"""From an item to the way it is flown. Mission coordinates, metres."""
+
+import math
+from dataclasses import dataclass
+
+from companion.flight.curve import CurveProfile
+from companion.flight.trajectory import Chain, CircleProfile, LineProfile, Trajectory
+from companion.messages import Vector3
+from companion.mission.config import FlightConfig
+from companion.mission.fence import Fence
+from companion.mission.items import (
+    GoToItem,
+    Motion,
+    OrbitItem,
+    PathItem,
+    ReturnItem,
+    SetSpeedItem,
+    VelocityItem,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Speed and acceleration of items that state none; `factor` slows down an item that is tried again."""
+
+    speed_m_s: float
+    acceleration_m_s2: float
+    factor: float = 1.0
+
+    def changed_to(self, item: SetSpeedItem) -> "Pace":
+        acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
+        return Pace(item.speed_m_s, acceleration)
+
+    def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> tuple[float, float]:
+        """Those of an item, or else its pace's."""
+        speed = self.speed_m_s if speed_m_s is None else speed_m_s
+        return speed * self.factor, self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
+
+
+def climb(start_m: Vector3, height_m: float, config: FlightConfig) -> LineProfile:
+    """Straight up."""
+    top = (start_m[0], start_m[1], -height_m)
+    return LineProfile(start_m, top, config.takeoff_speed_m_s, config.takeoff_acceleration_m_s2)
+
+
+def stay(place_m: Vector3) -> LineProfile:
+    """A way of no length."""
+    return LineProfile(place_m, place_m, 1.0, 1.0)
+
+
+def way_of(item: Motion, start_m: Vector3, pace: Pace) -> Trajectory:
+    """How to fly the item from where the setpoint is."""
+    if isinstance(item, VelocityItem):
+        return _with_velocity(item, start_m, pace)
+    speed, acceleration = pace.limits(item.speed_m_s, item.acceleration_m_s2)
+    match item:
+        case GoToItem():
+            return LineProfile(start_m, item.position_ned_m, speed, acceleration)
+        case PathItem():
+            return CurveProfile((start_m, *item.points_ned_m), speed, acceleration)
+        case OrbitItem():
+            return _round(item, start_m, speed, acceleration)
+
+
+def _with_velocity(item: VelocityItem, start_m: Vector3, pace: Pace) -> LineProfile:
+    """The line that is covered in the time, ramps included."""
+    speed = math.hypot(*item.velocity_ned_m_s)
+    _, acceleration = pace.limits(None, item.acceleration_m_s2)
+    # With ramps of top / acceleration at both ends; a time too short for the speed is all ramps.
+    top = min(speed * pace.factor, 0.5 * acceleration * item.duration_s)
+    length = top * (item.duration_s - top / acceleration)
+    n, e, d = (component / speed * length for component in item.velocity_ned_m_s)
+    target = (start_m[0] + n, start_m[1] + e, start_m[2] + d)
+    return LineProfile(start_m, target, top, acceleration)
+
+
+def _round(item: OrbitItem, start_m: Vector3, speed: float, acceleration: float) -> Chain:
+    """To the nearest point of the circle, which for a start in its middle is the one in the north, and round."""
+    n, e, _ = item.centre_ned_m
+    start_rad = math.atan2(start_m[1] - e, start_m[0] - n)
+    angle_rad = math.tau * item.turns * (1.0 if item.clockwise else -1.0)
+    circle = CircleProfile(item.centre_ned_m, item.radius_m, start_rad, angle_rad, speed, acceleration)
+    return Chain((LineProfile(start_m, circle.at(0.0)[0], speed, acceleration), circle))
+
+
+def way_home(start_m: Vector3, item: ReturnItem, pace: Pace, fence: Fence) -> Chain:
+    """Up first where that is asked for, then straight to above the arming position, never above the fence."""
+    speed, acceleration = pace.limits(item.speed_m_s, None)
+    wanted_m = max(-start_m[2], item.height_m or 0.0)
+    down_m = -min(max(wanted_m, fence.min_height_m), fence.max_height_m)
+    up = (start_m[0], start_m[1], down_m)
+    home = (0.0, 0.0, down_m)
+    return Chain((LineProfile(start_m, up, speed, acceleration), LineProfile(up, home, speed, acceleration)))

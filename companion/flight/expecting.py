@@ -1,0 +1,163 @@
+"""The item `expect`: assertions of a mission about its own flight, from their step on until they are decided."""
+
+import math
+
+from companion.flight.context import Expectation, FlightContext, as_text
+from companion.messages import LocalPosition
+from companion.mission.expectations import (
+    ExpectFlightTime,
+    ExpectHeight,
+    ExpectHit,
+    ExpectHits,
+    ExpectItem,
+    ExpectNoHit,
+    ExpectPosition,
+    ExpectRecovered,
+    ExpectSpeed,
+)
+from companion.report import CollisionReport
+
+
+def describe(item: ExpectItem) -> str:
+    """For people, as a wish."""
+    match item.check:
+        case ExpectHit() as hit:
+            return f"a hit within {hit.within_s:g} s{_bounds(hit.min_speed_m_s, hit.max_speed_m_s, 'm/s')}"
+        case ExpectNoHit(for_s=for_s):
+            return "no hit from here on" if for_s is None else f"no hit for {for_s:g} s"
+        case ExpectHits() as hits:
+            if hits.exactly is not None:
+                return f"{hits.exactly} hits so far"
+            return f"hits so far{_bounds(hits.at_least, hits.at_most, '')}"
+        case ExpectRecovered() as recovered:
+            within = "" if recovered.within_s is None else f" within {recovered.within_s:g} s"
+            past = "" if recovered.max_overshoot_m is None else f", at most {recovered.max_overshoot_m:g} m too far"
+            return f"the latest hit recovered from{within}{past}"
+        case ExpectPosition(ned_m=place, within_m=within_m):
+            return f"within {within_m:g} m of {as_text(place)}"
+        case ExpectHeight() as height:
+            return f"height{_bounds(height.min_m, height.max_m, 'm')}"
+        case ExpectSpeed(max_m_s=max_m_s):
+            return f"speed at most {max_m_s:g} m/s"
+        case ExpectFlightTime(at_most_s=at_most_s):
+            return f"at most {at_most_s:g} s since arming"
+
+
+def begin(flight: FlightContext, label: str, item: ExpectItem, now_us: int) -> None:
+    """Take up an expectation; what can be said at once is said."""
+    expectation = Expectation(label, describe(item), item, now_us, len(flight.collisions))
+    flight.expectations.append(expectation)
+    match item.check:
+        case ExpectHit() | ExpectNoHit():
+            return
+        case ExpectHits() as hits:
+            met, detail = _count(hits, len(flight.collisions))
+        case ExpectRecovered() as recovered:
+            met, detail = _recovered(recovered, [record.report() for record in flight.collisions])
+        case ExpectFlightTime(at_most_s=at_most_s):
+            assert flight.armed_at_us is not None
+            flown_s = (now_us - flight.armed_at_us) * 1e-6
+            met, detail = flown_s <= at_most_s, f"{flown_s:.1f} s"
+        case _ as check:
+            latest = flight.vehicle.history.latest()
+            assert latest is not None, "the flight is in the air"
+            met, detail = _motion(check, flight, latest)
+    _decide(flight, expectation, met, detail, now_us)
+
+
+def review(flight: FlightContext, now_us: int) -> None:
+    """Look at those that are still open: has the hit come, is the time over?"""
+    for expectation in flight.expectations:
+        if expectation.met is not None:
+            continue
+        hits = [record.report() for record in flight.collisions[expectation.hits_before :]]
+        waited_s = (now_us - expectation.began_us) * 1e-6
+        match expectation.item.check:
+            case ExpectHit() as wanted:
+                found = next((hit for hit in hits if _fits(wanted, hit)), None)
+                if found is not None:
+                    after_s = (found.detected_at_us - expectation.began_us) * 1e-6
+                    detail = f"{found.impact_speed_m_s:.2f} m/s after {after_s:.2f} s"
+                    _decide(flight, expectation, after_s <= wanted.within_s, detail, now_us)
+                elif waited_s > wanted.within_s:
+                    _decide(flight, expectation, False, _heard_of(hits), now_us)
+            case ExpectNoHit(for_s=for_s):
+                if hits:
+                    _decide(flight, expectation, False, _heard_of(hits), now_us)
+                elif for_s is not None and waited_s > for_s:
+                    _decide(flight, expectation, True, "none", now_us)
+
+
+def close(flight: FlightContext, now_us: int) -> None:
+    """The flight is over: a hit that has not come will not, and none is none."""
+    review(flight, now_us)
+    for expectation in flight.expectations:
+        if expectation.met is None:
+            met = isinstance(expectation.item.check, ExpectNoHit)
+            _decide(flight, expectation, met, "none until the end of the flight", now_us)
+
+
+def failure(flight: FlightContext) -> str | None:
+    """The sentence for the outcome, or None when everything was as expected."""
+    failed = [expectation for expectation in flight.expectations if expectation.met is False]
+    if not failed:
+        return None
+    first = failed[0]
+    more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
+    return f"expectation of item {first.label} not met: {first.text} (was: {first.detail}){more}"
+
+
+def _decide(flight: FlightContext, expectation: Expectation, met: bool, detail: str, now_us: int) -> None:
+    expectation.met, expectation.detail = met, detail
+    word = "met" if met else "NOT met"
+    flight.tell(now_us, "expect", f"{word}: {expectation.text} ({detail})", met=met)
+
+
+def _fits(wanted: ExpectHit, hit: CollisionReport) -> bool:
+    low, high = wanted.min_speed_m_s or 0.0, wanted.max_speed_m_s or math.inf
+    return low <= hit.impact_speed_m_s <= high
+
+
+def _heard_of(hits: list[CollisionReport]) -> str:
+    return ", ".join(f"hit at {hit.impact_speed_m_s:.2f} m/s" for hit in hits) or "no hit"
+
+
+def _count(wanted: ExpectHits, count: int) -> tuple[bool, str]:
+    fits = (
+        (wanted.exactly is None or count == wanted.exactly)
+        and (wanted.at_least is None or count >= wanted.at_least)
+        and (wanted.at_most is None or count <= wanted.at_most)
+    )
+    return fits, f"{count}"
+
+
+def _recovered(wanted: ExpectRecovered, hits: list[CollisionReport]) -> tuple[bool, str]:
+    if not hits:
+        return False, "no hit"
+    settled_s, overshoot_m = hits[-1].settled_after_s, hits[-1].overshoot_m
+    if settled_s is None:
+        return False, "not settled"
+    in_time = wanted.within_s is None or settled_s <= wanted.within_s
+    near = wanted.max_overshoot_m is None or overshoot_m <= wanted.max_overshoot_m
+    return in_time and near, f"settled after {settled_s:.2f} s, {overshoot_m:.2f} m too far"
+
+
+def _motion(
+    wanted: ExpectPosition | ExpectHeight | ExpectSpeed, flight: FlightContext, latest: LocalPosition
+) -> tuple[bool, str]:
+    place = flight.mission_ned_m(latest.position_ned_m)
+    match wanted:
+        case ExpectPosition(ned_m=goal, within_m=within_m):
+            return math.dist(place, goal) <= within_m, as_text(place)
+        case ExpectHeight(min_m=min_m, max_m=max_m):
+            height_m = -place[2]
+            return (min_m or 0.0) <= height_m <= (max_m or math.inf), f"{height_m:.2f} m"
+        case ExpectSpeed(max_m_s=max_m_s):
+            speed_m_s = math.hypot(*latest.velocity_ned_m_s)
+            return speed_m_s <= max_m_s, f"{speed_m_s:.2f} m/s"
+
+
+def _bounds(low: float | None, high: float | None, unit: str) -> str:
+    least = "" if low is None else f" at least {low:g} {unit}".rstrip()
+    most = "" if high is None else f" at most {high:g} {unit}".rstrip()
+    return least + (" and" if least and most else "") + most

@@ -1,0 +1,150 @@
+"""The geofence: where no setpoint lies and no vehicle should be. Mission coordinates, metres."""
+
+import math
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from companion.written import NotNegative, Number, PositionNed, Positive, Written
+
+NorthEast = tuple[Number, Number]
+
+# A fence for someone who gives none: a large room, and well inside the range of sight.
+DEFAULT_RADIUS_M = 15.0
+# A corner nearer to another than this is the same corner typed twice.
+LEAST_EDGE_M = 0.01
+
+
+class Fence(Written):
+    """A cylinder around the arming position, a polygon of (north, east) corners, or both; with a floor and a top.
+
+    The floor is for the flight between take-off and landing.
+    """
+
+    radius_m: Positive | None = None
+    polygon_ne_m: Annotated[tuple[NorthEast, ...], Field(min_length=3)] | None = None
+    max_height_m: Positive = 6.0
+    # Guards and landing gear reach 0.1 m below the centre of a small vehicle; as much again for its wavering.
+    min_height_m: NotNegative = 0.2
+
+    @model_validator(mode="before")
+    @classmethod
+    def _some_fence(cls, data: object) -> object:
+        if isinstance(data, dict) and data.get("radius_m") is None and data.get("polygon_ne_m") is None:
+            return {**data, "radius_m": DEFAULT_RADIUS_M}
+        return data
+
+    @model_validator(mode="after")
+    def _sound(self) -> Self:
+        if self.min_height_m >= self.max_height_m:
+            raise ValueError(f"min_height_m = {self.min_height_m:g} is not below max_height_m = {self.max_height_m:g}")
+        edges = _edges(self.polygon_ne_m or ())
+        for number, (a, b) in enumerate(edges):
+            if math.dist(a, b) < LEAST_EDGE_M:
+                raise ValueError(f"polygon_ne_m: corner {number + 1} is the same as the next")
+            for c, d in edges[number + 2 : len(edges) - (number == 0)]:
+                if _crossing(a, b, c, d) is not None:
+                    raise ValueError(f"polygon_ne_m: the edge after corner {number + 1} crosses another")
+        if not self.contains(0.0, 0.0):
+            raise ValueError("polygon_ne_m does not contain the arming position [0, 0]")
+        return self
+
+    def contains(self, north_m: float, east_m: float) -> bool:
+        """Whether a place is inside, whatever its height."""
+        if self.radius_m is not None and math.hypot(north_m, east_m) > self.radius_m:
+            return False
+        return self.polygon_ne_m is None or _in_polygon(north_m, east_m, self.polygon_ne_m)
+
+    def outside_by_m(self, position_ned_m: PositionNed) -> float:
+        """How far beyond the fence a position is, upwards or sideways; 0 inside. The floor does not count."""
+        north_m, east_m, down_m = position_ned_m
+        above_m = -down_m - self.max_height_m
+        beside_m = 0.0
+        if not self.contains(north_m, east_m):
+            inside = self.nearest_inside(north_m, east_m)
+            beside_m = math.dist((north_m, east_m), inside)
+        return max(0.0, above_m, beside_m)
+
+    def complaint(self, position_ned_m: PositionNed) -> str | None:
+        """What is wrong with a position, or None when it is inside."""
+        north_m, east_m, down_m = position_ned_m
+        distance_m = math.hypot(north_m, east_m)
+        if self.radius_m is not None and distance_m > self.radius_m:
+            return f"lies {distance_m:.2f} m out, beyond fence.radius_m = {self.radius_m:g}"
+        if not self.contains(north_m, east_m):
+            return f"lies at [{north_m:g}, {east_m:g}], outside fence.polygon_ne_m"
+        if -down_m > self.max_height_m:
+            return f"lies {-down_m:.2f} m up, above fence.max_height_m = {self.max_height_m:g}"
+        if down_m >= 0.0:
+            return f"has down = {down_m:g} m, which is not above the ground; up is negative"
+        if -down_m < self.min_height_m:
+            return f"lies {-down_m:.2f} m up, below fence.min_height_m = {self.min_height_m:g}"
+        return None
+
+    def nearest_inside(self, north_m: float, east_m: float) -> tuple[float, float]:
+        """The place inside nearest to one outside; of a polygon within a circle, nearly the nearest."""
+        if self.contains(north_m, east_m):
+            return north_m, east_m
+        place = (north_m, east_m)
+        if self.polygon_ne_m is not None and not _in_polygon(*place, self.polygon_ne_m):
+            place = min(
+                (_nearest_on_edge(place, a, b) for a, b in _edges(self.polygon_ne_m)),
+                key=lambda candidate: math.dist(candidate, (north_m, east_m)),
+            )
+        distance_m = math.hypot(*place)
+        if self.radius_m is not None and distance_m > self.radius_m:
+            place = (place[0] * self.radius_m / distance_m, place[1] * self.radius_m / distance_m)
+        return place
+
+    def shortened(self, start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:
+        """Where the straight way from `start`, which is inside, to `end` leaves the fence; `end` if it does not."""
+        leaves_at = 1.0
+        way = (end[0] - start[0], end[1] - start[1])
+        if self.radius_m is not None and math.hypot(*end) > self.radius_m:
+            # |start + s * way| = radius, for the s in [0, 1] that leaves the circle
+            a = way[0] ** 2 + way[1] ** 2
+            b = start[0] * way[0] + start[1] * way[1]
+            c = start[0] ** 2 + start[1] ** 2 - self.radius_m**2
+            leaves_at = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
+        for a_corner, b_corner in _edges(self.polygon_ne_m or ()):
+            crossing = _crossing(start, end, a_corner, b_corner)
+            if crossing is not None:
+                leaves_at = min(leaves_at, crossing)
+        return (start[0] + leaves_at * way[0], start[1] + leaves_at * way[1])
+
+
+Corners = tuple[tuple[float, float], ...]
+
+
+def _edges(corners: Corners) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    return [(corner, corners[(number + 1) % len(corners)]) for number, corner in enumerate(corners)]
+
+
+def _in_polygon(north_m: float, east_m: float, corners: Corners) -> bool:
+    """Even-odd rule: how often a ray to the north crosses the boundary."""
+    inside = False
+    for (n_1, e_1), (n_2, e_2) in _edges(corners):
+        if (e_1 > east_m) != (e_2 > east_m) and north_m < n_1 + (east_m - e_1) * (n_2 - n_1) / (e_2 - e_1):
+            inside = not inside
+    return inside
+
+
+def _crossing(
+    start: tuple[float, float], end: tuple[float, float], a: tuple[float, float], b: tuple[float, float]
+) -> float | None:
+    """How far along from start (0) to end (1) the two segments cross; None when they do not."""
+    way, edge = (end[0] - start[0], end[1] - start[1]), (b[0] - a[0], b[1] - a[1])
+    turn = way[0] * edge[1] - way[1] * edge[0]
+    if turn == 0.0:
+        return None
+    offset = (a[0] - start[0], a[1] - start[1])
+    along = (offset[0] * edge[1] - offset[1] * edge[0]) / turn
+    across = (offset[0] * way[1] - offset[1] * way[0]) / turn
+    return along if 0.0 <= along <= 1.0 and 0.0 <= across <= 1.0 else None
+
+
+def _nearest_on_edge(place: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    edge = (b[0] - a[0], b[1] - a[1])
+    along = ((place[0] - a[0]) * edge[0] + (place[1] - a[1]) * edge[1]) / (edge[0] ** 2 + edge[1] ** 2)
+    along = min(1.0, max(0.0, along))
+    return (a[0] + along * edge[0], a[1] + along * edge[1])

@@ -1,0 +1,124 @@
+"""The mission's ways worked out beforehand: where each step begins, how it goes, how long it takes."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from companion.flight.course import Pace, climb, way_home, way_of
+from companion.flight.trajectory import Chain, LineProfile, Trajectory
+from companion.messages import Vector3
+from companion.mission.expectations import ExpectItem
+from companion.mission.fence import Fence
+from companion.mission.items import HoldItem, LandItem, ReturnItem, SetSpeedItem, SetYawItem, TakeoffItem, WaitForItem
+from companion.mission.model import Mission
+from companion.mission.program import Step, program
+
+# Setpoints this far apart in time are looked at for the fence: 4 cm at 2 m/s, as they are sent.
+_LOOK_EVERY_S = 0.02
+_MOST_LOOKS = 20_000
+# A point on the boundary, computed, may lie outside by a rounding error.
+_ROUNDING_M = 1e-6
+# PX4's MPC_LAND_SPEED, and the second and two it takes to be sure and to disarm.
+LANDING_SPEED_M_S = 0.7
+LANDING_EXTRA_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One step in mission coordinates. `lasts_s` is None for a wait without a known end."""
+
+    step: Step
+    start_ned_m: Vector3
+    way: Trajectory | None
+    lasts_s: float | None
+
+    @property
+    def end_ned_m(self) -> Vector3:
+        return self.start_ned_m if self.way is None else self.way.target_m
+
+
+def itinerary(mission: Mission) -> tuple[Leg, ...]:
+    """The mission when nothing is hit."""
+    return tuple(_legs(mission))
+
+
+def _legs(mission: Mission) -> Iterator[Leg]:
+    place: Vector3 = (0.0, 0.0, 0.0)
+    flight = mission.companion.flight
+    pace = Pace(flight.cruise_speed_m_s, flight.cruise_acceleration_m_s2)
+    for step in program(mission):
+        action = step.action
+        way: Trajectory | None = None
+        lasts_s: float | None = 0.0
+        match action:
+            case TakeoffItem():
+                way = climb(place, action.height_m, flight)
+            case HoldItem():
+                lasts_s = action.duration_s
+            case WaitForItem():
+                lasts_s = step.item.timeout_s
+            case SetSpeedItem():
+                pace = pace.changed_to(action)
+            case SetYawItem():
+                lasts_s = 180.0 / action.rate_deg_s
+            case ExpectItem():
+                pass
+            case ReturnItem():
+                way = way_home(place, action, pace, mission.fence)
+                lasts_s = _landing_s(way.target_m)
+            case LandItem():
+                lasts_s = _landing_s(place)
+            case _:
+                way = way_of(action, place, pace)
+        if way is not None:
+            assert lasts_s is not None
+            lasts_s += way.duration_s
+        leg = Leg(step, place, way, lasts_s)
+        yield leg
+        place = leg.end_ned_m
+
+
+def _landing_s(place: Vector3) -> float:
+    return -place[2] / LANDING_SPEED_M_S + LANDING_EXTRA_S
+
+
+def first_complaint(mission: Mission) -> str | None:
+    """What is wrong with the first way that leaves the fence, or None."""
+    seen: set[tuple[int, Vector3]] = set()
+    for leg in _legs(mission):
+        # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.
+        if leg.way is None or (id(leg.step.action), leg.start_ned_m) in seen:
+            continue
+        seen.add((id(leg.step.action), leg.start_ned_m))
+        number = leg.step.label.partition(" ")[0]
+        complaint = mission.fence.complaint(leg.end_ned_m)
+        if complaint is not None:
+            return f"items: the position of item {number} ({leg.step.name}) {complaint}"
+        if not isinstance(leg.step.action, TakeoffItem):
+            complaint = _way_complaint(mission.fence, leg.way)
+        if complaint is not None:
+            return f"items: on its way item {number} ({leg.step.name}) {complaint}"
+    return None
+
+
+def _way_complaint(fence: Fence, way: Trajectory) -> str | None:
+    if isinstance(way, Chain):
+        return next((complaint for part in way.parts if (complaint := _way_complaint(fence, part))), None)
+    if isinstance(way, LineProfile):
+        # Between two heights that are allowed, and two places in a round fence, a line is allowed too.
+        start, end = way.start_m[:2], way.target_m[:2]
+        leaves = fence.shortened(start, end)
+        is_out = math.dist(leaves, end) > _ROUNDING_M
+        return f"leaves fence.polygon_ne_m at [{leaves[0]:.2f}, {leaves[1]:.2f}]" if is_out else None
+    looks = min(_MOST_LOOKS, math.ceil(way.duration_s / _LOOK_EVERY_S))
+    for look in range(looks):
+        position = way.at(way.duration_s * look / looks)[0]
+        beyond_m = max(fence.outside_by_m(position), position[2] + fence.min_height_m)
+        if beyond_m > _ROUNDING_M:
+            return fence.complaint(position)
+    return None
+
+
+def longest_s(mission: Mission, wait_s: float) -> float:
+    """Time of all steps, `wait_s` for each wait without a known end."""
+    return sum(wait_s if leg.lasts_s is None else leg.lasts_s for leg in itinerary(mission))

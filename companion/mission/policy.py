@@ -1,0 +1,47 @@
+"""What follows a hit, a time-out and an interruption."""
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
+
+from companion.written import NotNegative, Positive, Written
+
+Handover: TypeAlias = Literal["hold", "land"]
+OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
+
+
+class OnCollision(Written):
+    """After the recovery. `max_hits` counts the hits of the flight; in an item's own policy, those of the item."""
+
+    # hold: for `hold_s`, then the next item; continue: the next item at once; retry: the same item again, slower.
+    then: Literal["hold", "continue", "retry", "return", "land"] = "hold"
+    hold_s: NotNegative = 3.0
+    # Half the speed is a quarter of the energy: the second hit is harmless where the first was bearable.
+    retry_speed_factor: Annotated[Positive, Field(le=1.0)] = 0.5
+    # A mission that meets ten obstacles it does not know of is not being flown where it was planned.
+    max_hits: Annotated[int, Field(strict=True, ge=1)] = 10
+    # abort: hand the vehicle over as `on_interrupt` says.
+    after_max_hits: Literal["return", "land", "abort"] = "land"
+
+
+class AbortWhen(Written):
+    """Conditions that end the mission wherever it is; the vehicle is then handed over as `on_interrupt` says."""
+
+    # The vehicle itself, not its setpoint. A PX4 that flies by GPS wavers by half a metre around a setpoint.
+    outside_fence_by_m: Positive | None = 1.0
+    battery_below_percent: Annotated[Positive, Field(le=100.0)] | None = None
+    flight_time_above_s: Positive | None = None
+    # Further from the setpoint than this, the vehicle is not being flown by it.
+    setpoint_missed_by_m: Positive | None = None
+    # After the recovery from a hit this hard: the airframe wants to be looked at.
+    hit_above_m_s: Positive | None = None
+
+
+class Limits(Written):
+    """What no setpoint exceeds, whatever asks for it; see also the fence."""
+
+    # PX4's own MPC_XY_VEL_MAX.
+    max_speed_m_s: Annotated[Positive, Field(le=20.0)] = 12.0
+    # PX4 answers a setpoint that lies d ahead with MPC_XY_P * d = 0.95/s * d: 5 m are 4.75 m/s. Recoveries ask for
+    # up to 3 m; a setpoint further off than this is an estimate that jumped or a mistake.
+    max_step_m: Annotated[Positive, Field(ge=0.5)] = 5.0

@@ -1,0 +1,140 @@
+"""What a healthy vehicle shakes, on each axis and in each phase of its flight: the floor under every threshold."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.detection.noise import MEMORY_US
+from companion.messages import ExtendedState, Heartbeat, LandedState, LocalPosition
+from rebound_cli.logs.log import Log
+
+Floats = npt.NDArray[np.float64]
+
+
+class Stage(Enum):
+    """A phase of a flight; the value is the word shown to people."""
+
+    GROUND = "on the ground"
+    TAKEOFF = "take-off"
+    HOVER = "hover"
+    UNDER_WAY = "under way"
+    LANDING = "landing"
+
+
+# PX4's take-off ramp lasts MPC_TKO_RAMP_T, 3 s.
+TAKEOFF_US = 3_000_000
+# The land detector says "landed" a second or more after the touch; the slowest of four real landings took 2.4 s.
+LANDING_US = 4_000_000
+# Slower than this is hovering: an estimate's own noise and a pilot's corrections.
+HOVER_M_S = 0.5
+# PX4's limit of the accelerometer it was made for: +-16 g. A sample this near to it holds clipped readings.
+CLIPPED_M_S2 = 150.0
+
+
+@dataclass(frozen=True, slots=True)
+class Shaking:
+    """Departures of the specific force from its own running mean, (n, 3) body FRD, and what the vehicle was doing."""
+
+    at_us: npt.NDArray[np.int64]
+    force_frd_m_s2: Floats
+    departure_frd_m_s2: Floats
+    stages: npt.NDArray[np.object_]
+    interval_us: float
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second; gaps count for nothing."""
+        return 1e6 / self.interval_us
+
+    def during(self, *stages: Stage) -> Floats:
+        """Departures in these stages."""
+        return self.departure_frd_m_s2[[stage in stages for stage in self.stages]]
+
+    def noise_m_s2(self) -> Mapping[Stage, Floats]:
+        """RMS on each axis for every stage with more than a second of samples."""
+        rows = {stage: self.during(stage) for stage in Stage}
+        return {
+            stage: np.sqrt((row**2).mean(axis=0)) for stage, row in rows.items() if len(row) * self.interval_us > 1e6
+        }
+
+
+def shaking(log: Log) -> Shaking:
+    """Of all IMU samples of the log."""
+    imu = log.imu()
+    at_us = np.array([time_us for time_us, _ in imu], dtype=np.int64)
+    force = np.array([sample.specific_force_frd_m_s2 for _, sample in imu])
+    intervals_us = np.diff(np.array([sample.time_boot_us for _, sample in imu]))
+    interval_us = float(np.median(intervals_us[intervals_us > 0])) if (intervals_us > 0).any() else 1e6
+    return Shaking(at_us, force, _departures(force, interval_us), _stages(log, at_us), interval_us)
+
+
+def _departures(force: Floats, interval_us: float) -> Floats:
+    """From the exponential mean of the samples before, as the detectors' noise floor has it."""
+    share = min(1.0, interval_us / MEMORY_US)
+    departures = np.empty_like(force)
+    mean = force[0].copy()
+    for index, row in enumerate(force):
+        departures[index] = row - mean
+        mean += share * departures[index]
+    return departures
+
+
+def _stages(log: Log, at_us: npt.NDArray[np.int64]) -> npt.NDArray[np.object_]:
+    """By the land detector and the speed; without a land detector whatever is armed flies."""
+    stages = np.full(len(at_us), Stage.UNDER_WAY, dtype=object)
+    down, slow = _is_down(log), _is_slow(log)
+    for (start_us, is_slow), (end_us, _) in pairwise([*slow, (int(at_us[-1]) + 1, False)]):
+        if is_slow:
+            stages[_slice(at_us, start_us, end_us)] = Stage.HOVER
+    for (start_us, is_down), (end_us, _) in pairwise([*down, (int(at_us[-1]) + 1, False)]):
+        if not is_down:
+            continue
+        stages[_slice(at_us, end_us, end_us + TAKEOFF_US)] = Stage.TAKEOFF
+        stages[_slice(at_us, start_us - LANDING_US, start_us)] = Stage.LANDING
+    for (start_us, is_down), (end_us, _) in pairwise([*down, (int(at_us[-1]) + 1, False)]):
+        if is_down:
+            stages[_slice(at_us, start_us, end_us)] = Stage.GROUND
+    return stages
+
+
+def _slice(at_us: npt.NDArray[np.int64], start_us: int, end_us: int) -> slice:
+    return slice(*np.searchsorted(at_us, (start_us, end_us)))
+
+
+def _is_down(log: Log) -> list[tuple[int, bool]]:
+    """Changes of: on the ground, or not even armed."""
+    changes: list[tuple[int, bool]] = []
+    landed = disarmed = False
+    for heard in log.heard:
+        if isinstance(heard.sample, ExtendedState):
+            landed = heard.sample.landed_state is LandedState.ON_GROUND
+        elif isinstance(heard.sample, Heartbeat):
+            disarmed = not heard.sample.armed
+        else:
+            continue
+        if not changes or changes[-1][1] != (landed or disarmed):
+            changes.append((heard.at_us, landed or disarmed))
+    return changes
+
+
+def _is_slow(log: Log) -> list[tuple[int, bool]]:
+    changes: list[tuple[int, bool]] = []
+    for heard in log.heard:
+        if isinstance(heard.sample, LocalPosition):
+            n, e, d = heard.sample.velocity_ned_m_s
+            is_slow = n * n + e * e + d * d < HOVER_M_S**2
+            if not changes or changes[-1][1] != is_slow:
+                changes.append((heard.at_us, is_slow))
+    return changes
+
+
+def clipped(log: Log) -> tuple[int, str]:
+    """IMU samples with clipped readings in them, and how that is known."""
+    if log.clipped_at_us is not None:
+        return len(log.clipped_at_us), "by the sensor's own flags"
+    count = sum(max(map(abs, sample.specific_force_frd_m_s2)) >= CLIPPED_M_S2 for _, sample in log.imu())
+    return count, f"samples of {CLIPPED_M_S2:g} m/s^2 or more"

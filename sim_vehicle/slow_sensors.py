@@ -1,0 +1,52 @@
+"""The sensors that only telemetry shows: GPS, magnetometer and barometer. The built-in control does without them."""
+
+import random
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.hil.messages import Air, HilGps
+from sim_vehicle.hil.sensors import Barometer, Gps, Magnetometer
+from sim_vehicle.world import Vector3
+
+# SENS_MAG_RATE 15 Hz and SENS_BARO_RATE 20 Hz, in whole intervals of 4 ms; PX4's simulated receiver gives 8 fixes a
+# second.
+MAGNETOMETER_PERIOD_US = 64_000
+BAROMETER_PERIOD_US = 48_000
+GPS_PERIOD_US = 124_000
+
+Quaternion = tuple[float, float, float, float]
+
+
+class SlowSensors:
+    """Newest samples; each is a new object when it is renewed."""
+
+    def __init__(self, airframe: Airframe, seed: int) -> None:
+        rng = random.Random(seed)
+        self._magnetometer, self._barometer, self._gps = Magnetometer(rng), Barometer(rng), Gps(airframe, rng)
+        self._due_us = [0, 0, 0]
+        self._next_us = 0
+        self.magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
+        self.air: Air | None = None
+        self.gps: HilGps | None = None
+        self.gps_is_blocked = False
+        """No fix while it is: the receiver goes on without one."""
+
+    def update(self, now_us: int, body: npt.NDArray[np.float64]) -> None:
+        """Renew what is due; ``body`` (13,): true position and velocity NED, attitude (w, x, y, z), rates, SI units."""
+        due_us = self._due_us
+        if now_us < self._next_us:
+            return
+        north, east, down, v_north, v_east, v_down, w, x, y, z = body[:10].tolist()
+        if now_us >= due_us[0]:
+            due_us[0] = now_us + MAGNETOMETER_PERIOD_US
+            self.magnetic_field_frd_gauss = self._magnetometer.sample((w, x, y, z))
+        if now_us >= due_us[1]:
+            due_us[1] = now_us + BAROMETER_PERIOD_US
+            self.air = self._barometer.sample((north, east, down))
+        if now_us >= due_us[2]:
+            due_us[2] = now_us + GPS_PERIOD_US
+            fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))
+            self.gps = None if self.gps_is_blocked else fix
+        self._next_us = min(due_us)

@@ -1,0 +1,128 @@
+"""What a mission does after a hit: its policy, the items' own, and the limit on hits."""
+
+import pytest
+
+from tests.companion.fake_vehicle import LOITER, FakeVehicle, Flight, flight
+
+TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
+INTO_WALL = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}
+ASIDE = {"go_to": {"position_ned_m": [0, 2, -1.5], "speed_m_s": 2.0}}
+
+
+def at_wall(*items, **changes) -> Flight:
+    return flight(FakeVehicle(wall_north_m=3.0), items=[TAKEOFF, *items, LAND], **changes)
+
+
+def items_flown(f: Flight) -> list[int]:
+    return [event.data["number"] for event in f.events if event.kind == "item"]
+
+
+def speeds_m_s(f: Flight) -> list[float]:
+    return [hit.impact_speed_m_s for hit in f.companion.report().collisions]
+
+
+def strike(f: Flight) -> None:
+    """Something hits the vehicle from the south."""
+    f.vehicle.push_m_s2 = (12.0, 0.0)
+    f.step()
+
+
+@pytest.mark.parametrize("then", ["hold", "continue"])
+def test_the_interrupted_item_is_left_behind(then):
+    f = at_wall(INTO_WALL, ASIDE, on_collision={"then": then, "hold_s": 1})
+    f.run_to_end()
+    assert items_flown(f) == [2, 3, 4]
+    assert ("hold" in f.kinds()) is (then == "hold")
+
+
+def test_an_item_is_tried_again_slower_each_time_until_the_limit():
+    on_collision = {"then": "retry", "retry_speed_factor": 0.7, "max_hits": 3, "after_max_hits": "return"}
+    f = at_wall(INTO_WALL, ASIDE, on_collision=on_collision)
+    f.run_to_end(200)
+    assert items_flown(f) == [2, 2, 2], "the rest of the mission is not flown"
+    assert speeds_m_s(f) == pytest.approx([2.0, 1.4, 0.98], rel=0.15)
+    assert "at 49% of the speed" in f.event("item", 2).text
+    assert "hit 3 of at most 3; after the recovery: return" in f.event("policy").text
+    report = f.companion.report()
+    assert report.outcome == "completed" and "not flown from item 2 on" in report.reason
+    assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.3)
+
+
+def test_the_next_item_is_flown_at_its_full_speed_again():
+    f = at_wall({**INTO_WALL, "on_collision": {"then": "retry"}, "timeout_s": 6, "on_timeout": "continue"}, INTO_WALL)
+    f.run_to_end(300)
+    third = next(event for event in f.events if event.kind == "item" and event.data["number"] == 3)
+    assert "of the speed" not in third.text
+
+
+def test_an_items_own_policy_counts_its_own_hits():
+    own = {"then": "continue", "max_hits": 1, "after_max_hits": "land"}
+    f = at_wall(INTO_WALL, {**INTO_WALL, "on_collision": own}, ASIDE, on_collision={"then": "continue", "max_hits": 9})
+    f.run_to_end()
+    assert items_flown(f) == [2, 3]
+    assert f.companion.report().reason.endswith("not flown from item 3 on")
+
+
+def test_after_a_hit_home_and_down():
+    f = at_wall(INTO_WALL, ASIDE, on_collision={"then": "return"})
+    f.run_to("returning")
+    f.run_to("landing")
+    assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.6)
+
+
+def test_a_hit_on_the_way_home_is_recovered_from_and_the_way_goes_on():
+    f = at_wall(INTO_WALL, on_collision={"then": "return"})
+    f.run_to("returning")
+    f.run_for(0.3)
+    strike(f)
+    assert f.state == "recovering"
+    f.run_to("returning")
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_a_way_home_that_is_blocked_ends_where_it_is():
+    f = at_wall(INTO_WALL, on_collision={"then": "return", "max_hits": 2, "after_max_hits": "return"})
+    f.run_to("returning")
+    f.run_for(0.3)
+    strike(f)
+    f.run_to("landing")
+    assert "hit 2 of at most 2; after the recovery: land" in f.event("policy").text
+
+
+def test_a_second_hit_during_the_hold_does_not_skip_another_item():
+    f = at_wall(INTO_WALL, ASIDE)
+    f.run_to("holding")
+    f.run_for(0.3)
+    strike(f)
+    f.run_to_end()
+    assert items_flown(f) == [2, 3, 4]
+    assert len(f.companion.report().collisions) == 2
+
+
+@pytest.mark.parametrize("abort", [{"on_collision": {"max_hits": 1, "after_max_hits": "abort"}}, {"hard": 1.5}])
+def test_giving_up_hands_the_vehicle_over_once_it_has_settled(abort):
+    changes = {"abort_when": {"hit_above_m_s": abort["hard"]}} if "hard" in abort else abort
+    f = at_wall(INTO_WALL, ASIDE, **changes)
+    f.run_to("aborted")
+    assert "recovered" in f.kinds()
+    f.run_to_end()
+    assert f.vehicle.mode == LOITER
+    report = f.companion.report()
+    assert report.outcome == "aborted"
+    assert "of at most 1" in report.reason or "hit_above_m_s = 1.5" in report.reason
+
+
+def test_a_softer_hit_than_the_limit_is_no_reason_to_give_up():
+    f = at_wall(INTO_WALL, abort_when={"hit_above_m_s": 2.5})
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_waiting_to_be_hit():
+    f = at_wall({"wait_for": {"hit": True}, "timeout_s": 20}, on_collision={"then": "continue"})
+    f.run_to("mission")
+    f.run_for(3.0)
+    assert f.state == "mission"
+    strike(f)
+    f.run_to("landing", 10.0)

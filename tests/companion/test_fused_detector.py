@@ -1,0 +1,225 @@
+"""Detector `fused` on a point mass that flies by eq. 1, its messages thinned as a link thins them."""
+
+import math
+import random
+
+import pytest
+
+from companion.detection.fused import FusedConfig, FusedDetector
+from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
+
+TICK_US = 1_000
+WINDOW_US = 4_000
+GRAVITY = 9.81
+HOVER_FRACTION = 0.7
+IN_FLIGHT = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=5.0)
+HIT_US = 3_001_000
+
+
+def nothing(t_us):
+    return (0.0, 0.0, 0.0)
+
+
+def pulse(force_frd, start_us=HIT_US, length_us=1_000):
+    return lambda t_us: force_frd if start_us <= t_us < start_us + length_us else (0.0, 0.0, 0.0)
+
+
+class Flight:
+    """Level at `velocity`, pushed by `push(t)` (m/s^2, body); everything else is the scene's."""
+
+    def __init__(self, push=nothing, imu_every_us=4_000, velocity=(2.0, 0.0, 0.0), noise=0.25, seed=1, **scene):
+        self.push, self.imu_every_us, self.noise = push, imu_every_us, noise
+        self.velocity = list(velocity)
+        self.lift = scene.pop("lift", lambda t: GRAVITY)  # what the propellers push up, m/s^2
+        self.rates = scene.pop("rates", lambda t: (0.0, 0.0, 0.0))
+        self.jump = scene.pop("jump", None)  # (time, velocity step, counted): the estimator's own
+        self.heard = scene.pop("heard", (LocalPosition, Odometry, Attitude, AttitudeTarget))
+        self.situation = scene.pop("situation", lambda t: IN_FLIGHT)
+        self.lost = scene.pop("lost", lambda t: False)
+        assert not scene
+        self.rng = random.Random(seed)
+
+    def samples(self, until_us):
+        window, resets, offset = [], 0, (0.0, 0.0, 0.0)
+        for t in range(TICK_US, until_us, TICK_US):
+            push, lift = self.push(t), self.lift(t)
+            force = (push[0], push[1], push[2] - lift)
+            self.velocity = [
+                v + a * TICK_US * 1e-6
+                for v, a in zip(self.velocity, (force[0], force[1], force[2] + GRAVITY), strict=True)
+            ]
+            window = [*window[-(WINDOW_US // TICK_US - 1) :], force]
+            if self.jump is not None and t == self.jump[0]:
+                offset, resets = self.jump[1], resets + self.jump[2]
+            seen = tuple(v + o + self.rng.gauss(0.0, 0.01) for v, o in zip(self.velocity, offset, strict=True))
+            if t % self.imu_every_us == 0 and not self.lost(t):
+                mean = [
+                    sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)
+                ]
+                yield t, ImuSample(t, tuple(mean), self.rates(t))
+            if t % 20_000 == 0:
+                yield t, LocalPosition(t, (0.0, 0.0, -5.0), seen)
+                yield t, Attitude(t, (1.0, 0.0, 0.0, 0.0))
+                yield t, AttitudeTarget(t, HOVER_FRACTION * lift / GRAVITY)
+            if t % 32_000 == 0:
+                yield t, Odometry(t, (0.0, 0.0, -5.0), seen, resets)
+
+    def fly(self, until_us=4_000_000, **config):
+        detector = FusedDetector(FusedConfig(**config), WINDOW_US)
+        self.state, impacts = detector.initial(), []
+        for t, sample in self.samples(until_us):
+            if not isinstance(sample, (ImuSample, *self.heard)):
+                continue
+            self.state, impact = detector.step(self.state, sample, self.situation(t))
+            if impact is not None:
+                impacts.append(impact)
+        return impacts
+
+
+# --- force --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("direction_deg", [0, 77, 180, 301])
+@pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
+def test_a_foldable_hit_shows_in_the_first_sample_that_holds_it(speed_m_s, direction_deg):
+    c, s = math.cos(math.radians(direction_deg)), math.sin(math.radians(direction_deg))
+    force = 30.0 * speed_m_s
+    impacts = Flight(pulse((force * c, force * s, 0.0), length_us=20_000)).fly()
+    assert [(i.sample_time_boot_us, i.evidence) for i in impacts] == [(3_004_000, Evidence.FORCE)]
+    assert impacts[0].contact_free_until_boot_us <= HIT_US
+    assert impacts[0].kind is ImpactKind.WALL
+
+
+@pytest.mark.parametrize(
+    ("push", "kind"),
+    [((0.0, 0.0, 900.0), ImpactKind.CEILING), ((0.0, 0.0, -900.0), ImpactKind.STRUCK)],
+)
+def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push, kind):
+    velocity = (0.0, 0.0, -1.0) if kind is ImpactKind.CEILING else (0.0, 0.0, 0.0)
+    impacts = Flight(pulse(push), velocity=velocity).fly()
+    assert [(i.sample_time_boot_us, i.kind) for i in impacts] == [(3_004_000, kind)]
+
+
+# --- aftermath ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("imu_every_us", [10_000, 20_000])
+@pytest.mark.parametrize("push", [(-950.0, 0.0, 0.0), (0.0, 0.0, 950.0), (400.0, 400.0, -400.0)])
+def test_a_hit_between_the_samples_is_found_from_the_velocity_it_leaves(push, imu_every_us):
+    """A rigid hit of 1 ms at 0.5 m/s, where the wire shows 4 ms of every 10 or 20."""
+    impacts = Flight(pulse(push), imu_every_us=imu_every_us, velocity=(0.5, 0.0, 0.0)).fly()
+    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH]
+    assert impacts[0].contact_free_until_boot_us <= HIT_US < impacts[0].sample_time_boot_us <= HIT_US + 100_000
+    along = sum(a * b for a, b in zip(impacts[0].specific_force_frd_m_s2, push, strict=True))
+    assert along > 0.97 * math.hypot(*impacts[0].specific_force_frd_m_s2) * math.hypot(*push)
+
+
+def test_a_hit_in_the_one_sample_that_was_lost_is_found_too():
+    impacts = Flight(pulse((-950.0, 0.0, 0.0)), lost=lambda t: t == 3_004_000).fly()
+    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH]
+
+
+def test_a_hit_far_from_the_centre_moves_little_and_turns_much():
+    def rates(t):
+        return (0.0, 0.0, 4.0 if t > HIT_US else 0.0)
+
+    slight = pulse((-120.0, 0.0, 0.0))
+    assert Flight(slight, imu_every_us=20_000).fly() == []
+    assert [i.evidence for i in Flight(slight, imu_every_us=20_000, rates=rates).fly()] == [Evidence.AFTERMATH]
+
+
+@pytest.mark.parametrize(("counted", "heard_odometry", "hits"), [(1, True, 0), (0, True, 1), (1, False, 1)])
+def test_a_jump_that_the_estimator_counts_as_its_own_is_no_hit(counted, heard_odometry, hits):
+    """Without ODOMETRY nothing tells the two apart: that is what is lost."""
+    heard = (LocalPosition, Odometry, Attitude) if heard_odometry else (LocalPosition, Attitude)
+    jump = (3_000_000, (0.8, 0.0, 0.0), counted)
+    assert len(Flight(imu_every_us=20_000, jump=jump, heard=heard).fly()) == hits
+
+
+# --- no collision -------------------------------------------------------------------------------------------
+
+
+def gone(t):
+    return max(0.0, 1.0 - (t - HIT_US) / 60_000) if t > HIT_US else 1.0
+
+
+def spinning_up(t):
+    return (80e-6 * max(0, t - HIT_US), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("imu_every_us", [4_000, 20_000])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        {"lift": lambda t: GRAVITY * gone(t)},  # free fall
+        {
+            "lift": lambda t: GRAVITY * (0.75 + 0.25 * gone(t)),
+            "rates": lambda t: (80e-6 * max(0, t - HIT_US), 0.0, 0.0),
+        },
+        {"lift": lambda t: GRAVITY * (1.0 if t < HIT_US else 1.3)},  # payload dropped: 30 % more lift for its mass
+        {"lift": lambda t: GRAVITY * (1.0 + 0.4 * math.sin(t * 20e-6))},  # climbs and dives
+        {"push": lambda t: (1.1 * min(1.0, max(0.0, (t - HIT_US) / 3e5)), 0.0, 0.0)},  # a gust of 5 m/s in 0.3 s
+        {"noise": 2.5},
+    ],
+    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking"],
+)
+def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
+    until_us = 3_150_000 if "rates" in scene else 6_000_000
+    assert Flight(imu_every_us=imu_every_us, **scene).fly(until_us) == []
+
+
+def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
+    once = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 4_000), noise=1.5)
+    assert once.fly() == []
+    assert once.state.threshold_m_s2 > 8.0
+    twice = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 20_000), noise=1.5)
+    assert [i.sample_time_boot_us for i in twice.fly()] in ([3_004_000], [3_008_000])
+    strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5)
+    assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
+def test_landing_and_strike_are_told_apart_by_what_was_asked_for_not_by_their_force(scale):
+    touch = pulse((0.0, 5.0 * scale, -60.0 * scale), length_us=20_000)
+    down = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=0.3, descent_commanded=True)
+    hop = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=0.3)
+
+    landing = Flight(touch, velocity=(0.0, 0.0, 0.7), situation=lambda t: down).fly()
+    strike = Flight(touch, velocity=(0.0, 0.0, 0.7), situation=lambda t: hop).fly()
+
+    assert [(i.kind, i.is_collision) for i in landing] == [(ImpactKind.LANDING, False)]
+    assert [(i.kind, i.is_collision) for i in strike] == [(ImpactKind.FLOOR, True)]
+
+
+def test_a_wall_hit_on_the_way_down_is_a_collision():
+    down = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0, descent_commanded=True)
+    impacts = Flight(pulse((-60.0, 0.0, 0.0), length_us=20_000), situation=lambda t: down).fly()
+    assert [(i.kind, i.is_collision) for i in impacts] == [(ImpactKind.WALL, True)]
+
+
+def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
+    def grip(t):
+        return (6.0 * min(1.0, (t - HIT_US) / 150_000), 0.0, 0.0) if HIT_US < t < HIT_US + 400_000 else (0.0, 0.0, 0.0)
+
+    hand = Flight(grip, velocity=(0.0, 0.0, 0.0)).fly()
+    ball = Flight(pulse((80.0, 0.0, 0.0), length_us=8_000), velocity=(0.0, 0.0, 0.0)).fly()
+    assert [(i.kind, i.is_collision) for i in hand] == [(ImpactKind.CONTACT, False)]
+    assert [(i.kind, i.is_collision) for i in ball] == [(ImpactKind.STRUCK, True)]
+
+
+# --- phases -------------------------------------------------------------------------------------------------
+
+
+def test_on_the_ground_nothing_is_a_hit():
+    ground = Situation(armed=True, landed_state=LandedState.ON_GROUND, height_m=0.0)
+    flight = Flight(pulse((50.0, 0.0, 0.0), length_us=20_000), situation=lambda t: ground)
+    assert flight.fly() == []
+    assert flight.state.describe() == "off (on the ground)"
+
+
+def test_one_contact_is_one_impact_and_a_shaking_that_stays_is_learnt():
+    loud = Flight(lambda t: (20.0 * math.sin(t * 1e-3), 0.0, 0.0) if t > HIT_US else (0.0, 0.0, 0.0))
+    assert len(loud.fly(8_000_000)) == 1
+    assert loud.state.phase is Phase.ARMED
+    assert loud.state.threshold_m_s2 > 20.0

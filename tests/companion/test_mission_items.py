@@ -1,0 +1,186 @@
+"""The items of a mission on the wire: what the vehicle is asked to do, and when the next item comes."""
+
+import itertools
+import math
+
+import pytest
+from pydantic import ValidationError
+
+from companion.mission.model import Mission
+from companion.mission.program import program
+from tests.companion.fake_vehicle import LOITER, Flight, flight
+
+TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
+
+
+def flown(*items, vehicle=None, **changes) -> Flight:
+    """The flight over, completed or not."""
+    f = flight(vehicle, items=[TAKEOFF, *items, LAND], **changes)
+    f.run_to_end()
+    return f
+
+
+def item_times_s(f: Flight) -> list[float]:
+    """How long each item took, take-off left out."""
+    times = [event.time_us for event in f.events if event.kind in ("item", "landing")]
+    return [(b - a) / 1e6 for a, b in itertools.pairwise(times)]
+
+
+def setpoints_in(f: Flight, name: str) -> list:
+    """Setpoints heard by the vehicle during the item of that name."""
+    items = [event for event in f.events if event.kind == "item"]
+    index = next(k for k, event in enumerate(items) if event.data["name"] == name)
+    start, end = (items[k].time_us - f.now_us + f.vehicle.time_us for k in (index, index + 1))
+    return [message for time_us, message in f.vehicle.setpoints if start < time_us <= end]
+
+
+def test_a_path_is_flown_through_all_its_points():
+    points = [[2, 2, -1.5], [6, -1, -1.5], [9, 1, -2.0]]
+    f = flown({"path": {"points_ned_m": points, "speed_m_s": 1.0, "yaw_deg": "along"}})
+    assert f.companion.report().outcome == "completed"
+    asked = setpoints_in(f, "path")
+    for point in points:
+        assert min(math.dist((m.x, m.y, m.z), point) for m in asked) < 0.02
+    assert {m.type_mask for m in asked} <= {0x800, 0x9F8}
+    moving = [m for m in asked if math.hypot(m.vx, m.vy) > 0.3]
+    behind = [abs(math.remainder(m.yaw - math.atan2(m.vy, m.vx), math.tau)) for m in moving]
+    assert sorted(behind)[len(behind) // 2] < math.radians(25), "turns at 45 deg/s to where it flies"
+
+
+def test_an_orbit_keeps_its_distance_and_looks_at_the_centre():
+    f = flown({"orbit": {"centre_ned_m": [2, 0, -1.5], "radius_m": 1.5, "turns": 1.25, "speed_m_s": 1.0}})
+    assert f.companion.report().outcome == "completed"
+    asked = setpoints_in(f, "orbit")
+    on_circle = [m for m in asked if abs(math.hypot(m.x - 2, m.y) - 1.5) < 1e-3]
+    assert len(on_circle) * 0.02 == pytest.approx(1.25 * math.tau * 1.5, rel=0.2), "at 1 m/s"
+    facing = [abs(math.remainder(m.yaw - math.atan2(-m.y, 2 - m.x), math.tau)) for m in on_circle]
+    assert max(facing) < math.radians(5)
+
+
+def test_a_velocity_is_flown_for_its_time_and_ends_at_rest():
+    f = flown({"velocity": {"velocity_ned_m_s": [0, 1, 0], "duration_s": 3.0}})
+    assert item_times_s(f)[0] == pytest.approx(3.0, abs=0.03)
+    last = f.vehicle.setpoints[-1][1]
+    assert (last.x, last.y, last.z) == pytest.approx((0.0, 2.5, -1.5), abs=1e-3), "3 s less one ramp of half a second"
+
+
+def test_speed_and_acceleration_can_be_set_for_all_that_follows():
+    go = [{"go_to": {"position_ned_m": [2.0 * k, 0, -1.5]}} for k in (1, 0, 1)]
+    f = flown(go[0], {"set_speed": {"speed_m_s": 2.0, "acceleration_m_s2": 4.0}}, *go[1:])
+    durations = item_times_s(f)
+    assert [durations[k] for k in (0, 2, 3)] == pytest.approx([2.5, 1.5, 1.5], abs=0.1)
+
+
+def test_turning_on_the_spot():
+    f = flown({"set_yaw": {"yaw_deg": -90, "rate_deg_s": 60}})
+    assert item_times_s(f)[0] == pytest.approx(1.5, abs=0.05)
+    assert f.vehicle.setpoints[-1][1].yaw == pytest.approx(-math.pi / 2)
+    assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.01)
+
+
+def test_what_is_repeated_is_flown_as_often_as_asked_and_told_by_lap():
+    lap = [{"go_to": {"position_ned_m": [1, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 0, -1.5]}}]
+    f = flown({"repeat": {"times": 2, "items": lap}})
+    labels = [event.text.split(":")[0] for event in f.events if event.kind == "item"]
+    assert labels == [
+        *("item 2.1 (1 of 2) of 3", "item 2.2 (1 of 2) of 3", "item 2.1 (2 of 2) of 3", "item 2.2 (2 of 2) of 3"),
+        "item 3 of 3",
+    ]
+
+
+def test_repeats_may_stand_in_repeats_and_too_many_steps_are_refused():
+    inner = {"repeat": {"times": 3, "items": [{"hold": {"duration_s": 1}}]}}
+    mission = Mission.model_validate(
+        {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LAND]}
+    )
+    steps = program(mission)
+    assert len(steps) == 8 and steps[4].label == "2.1.1 (2 of 2) (1 of 3)"
+    with pytest.raises(ValidationError, match="more than 10000 steps"):
+        items = [inner | {"repeat": inner["repeat"] | {"times": 1000}}]
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, {"repeat": {"times": 1000, "items": items}}, LAND]})
+
+
+def test_waiting_until_a_time_after_arming():
+    f = flown({"wait_for": {"flight_time_s": 9.0}})
+    waited_until = next(event.time_us for event in f.events if event.kind == "item" and event.data["name"] == "land")
+    assert (waited_until - f.companion.report().armed_at_us) / 1e6 == pytest.approx(9.0, abs=0.01)
+
+
+def test_waiting_for_a_file():
+    f = flight(items=[TAKEOFF, {"wait_for": {"file": "go"}}, LAND])
+    f.run_to("mission")
+    f.run_for(5.0)
+    assert f.companion.file_awaited == "go" and f.state == "mission"
+    f.companion.file_is_there()
+    f.run_to("landing", 0.1)
+    assert f.companion.file_awaited is None
+
+
+def test_waiting_until_steady():
+    settle = {"wait_for": {"steady": {"within_m": 0.05, "speed_m_s": 0.02, "for_s": 0.5}}}
+    f = flown({"go_to": {"position_ned_m": [2, 0, -1.5], "speed_m_s": 2.0}}, settle)
+    assert item_times_s(f)[1] > 0.6
+    assert f.vehicle.position[0] == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("on_timeout", "mode", "outcome"), [("abort", LOITER, "aborted"), ("land", None, "completed")])
+def test_an_item_that_takes_too_long(on_timeout, mode, outcome):
+    wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": on_timeout}
+    f = flight(items=[TAKEOFF, wait, {"go_to": {"position_ned_m": [3, 0, -1.5]}}, LAND])
+    f.run_to_end()
+    assert f.companion.report().outcome == outcome
+    assert "not done within 2 s" in f.event("timeout").text
+    assert f.vehicle.position[0] == pytest.approx(0.0, abs=0.05)
+    assert mode is None or f.vehicle.mode == mode
+
+
+def test_an_item_that_takes_too_long_can_be_passed_over():
+    wait = {"wait_for": {"file": "never"}, "timeout_s": 2.0, "on_timeout": "continue"}
+    f = flown(wait, {"go_to": {"position_ned_m": [1, 0, -1.5]}})
+    assert f.companion.report().outcome == "completed"
+    assert item_times_s(f)[0] == pytest.approx(2.0, abs=0.02)
+    assert f.vehicle.position[0] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_mission_can_end_with_the_way_home():
+    f = flight(items=[TAKEOFF, {"go_to": {"position_ned_m": [2, 2, -1.5]}}, {"return": {"height_m": 2.5}}])
+    f.run_to("returning")
+    f.run_to("landing")
+    assert f.vehicle.position == pytest.approx([0.0, 0.0, -2.5], abs=0.4)
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_the_way_home_stays_below_the_fences_top():
+    f = flight(items=[TAKEOFF, {"return": {"height_m": 5}}], fence={"max_height_m": 2})
+    f.run_to("landing")
+    assert min(message.z for _, message in f.vehicle.setpoints) == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize(
+    ("items", "words"),
+    [
+        ([{"path": {"points_ned_m": []}}], "at least 1 item"),
+        ([{"velocity": {"velocity_ned_m_s": [0, 0, 0], "duration_s": 1}}], "not above 0"),
+        ([{"set_speed": {"speed_m_s": 6}}], r"item 2 \(set_speed\) flies at 6 m/s, above limits.max_speed_m_s = 5"),
+        ([{"velocity": {"velocity_ned_m_s": [0, 4, 4], "duration_s": 1}}], "flies at 5.65685 m/s"),
+        ([{"wait_for": {}}], "exactly one condition"),
+        ([{"wait_for": {"file": "a", "flight_time_s": 3}}], "exactly one condition"),
+        ([{"hold": {"duration_s": 1}, "on_timeout": "land"}], "give timeout_s"),
+        ([{"repeat": {"times": 2, "items": [{"land": {}}]}}], "item 2.1 is land"),
+        ([{"expect": {"no_collision": {}, "speed": {"max_m_s": 1}}}], "exactly one key"),
+        ([{"velocity": {"velocity_ned_m_s": [5, 0, 0], "duration_s": 9}}], r"item 2 \(velocity\) lies"),
+        ([{"orbit": {"centre_ned_m": [0, 0, -1.5], "radius_m": 20}}], r"item 2 \(orbit\) lies"),
+        ([{"path": {"points_ned_m": [[9, 0, -1.5], [9, 9, -0.1], [9, 12, -1.5]]}}], "below fence.min_height_m"),
+    ],
+)
+def test_items_that_cannot_be_flown(items, words):
+    with pytest.raises(ValidationError, match=words):
+        Mission.model_validate({"name": "t", "limits": {"max_speed_m_s": 5}, "items": [TAKEOFF, *items, LAND]})
+
+
+def test_a_way_that_leaves_a_room_on_its_way_is_refused():
+    room = {"polygon_ne_m": [[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]]}
+    there = [{"go_to": {"position_ned_m": [5, 0, -1.5]}}, {"go_to": {"position_ned_m": [0, 5, -1.5]}}]
+    with pytest.raises(ValidationError, match=r"item 3 \(go_to\) leaves fence.polygon_ne_m at \[4.00, 1.00\]"):
+        Mission.model_validate({"name": "t", "items": [TAKEOFF, *there, LAND], "fence": room})

@@ -1,0 +1,81 @@
+"""Ways to fly: whatever their shape, position, velocity and acceleration belong together and stay within the limits."""
+
+import math
+
+import numpy as np
+import pytest
+
+from companion.flight.course import Pace, way_of
+from companion.flight.curve import CurveProfile
+from companion.flight.trajectory import Chain, CircleProfile, LineProfile
+from companion.mission.items import VelocityItem
+
+ZIGZAG = [(0.0, 0.0, -2.0), (2.0, 1.0, -2.0), (4.0, -1.0, -2.5), (6.0, 0.0, -3.0)]
+CIRCLE = CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, 1.5 * math.tau, 2.0, 2.0)
+WAYS = {
+    "curve": CurveProfile(ZIGZAG, 2.0, 2.0),
+    "hairpin": CurveProfile([(0.0, 0.0, -2.0), (5.0, 0.0, -2.0), (5.0, 0.4, -2.0), (0.0, 0.4, -2.0)], 3.0, 2.0),
+    "straight curve": CurveProfile([(0.0, 0.0, -2.0), (1.0, 0.0, -2.0), (5.0, 0.0, -2.0)], 2.0, 2.0),
+    "circle": CIRCLE,
+    "anticlockwise": CircleProfile((0.0, 0.0, -2.0), 0.5, 0.0, -math.tau, 2.0, 2.0),
+    "chain": Chain((LineProfile((0.0, 0.0, -2.0), (1.0, 0.0, -2.0), 2.0, 2.0), CIRCLE)),
+}
+
+
+@pytest.mark.parametrize("name", WAYS)
+def test_velocity_is_the_derivative_of_position_within_the_limits(name):
+    way, dt = WAYS[name], 0.002
+    times = np.arange(0.0, way.duration_s + dt, dt)
+    position, velocity, acceleration = (np.array(part) for part in zip(*map(way.at, times), strict=True))
+    assert np.linalg.norm(velocity, axis=1).max() <= (3.0 if name == "hairpin" else 2.0) + 1e-9
+    assert np.linalg.norm(acceleration, axis=1).max() <= 2.0 * 1.02
+    # within a setpoint's time the table is linear, and at the ends of a ramp the acceleration jumps
+    moved = np.diff(position, axis=0)
+    assert np.abs(moved - 0.5 * (velocity[1:] + velocity[:-1]) * dt).max() < 0.03 * dt
+    mean = 0.5 * (acceleration[1:] + acceleration[:-1])
+    misfit = np.abs(np.diff(velocity, axis=0) / dt - mean).max(axis=1)
+    assert np.quantile(misfit, 0.9) < 0.1
+    assert np.allclose(velocity[[0, -1]], 0.0, atol=1e-6)
+    assert np.linalg.norm(moved, axis=1).sum() == pytest.approx(way.distance_m, rel=2e-3)
+    assert tuple(position[-1]) == pytest.approx(way.target_m, abs=1e-6)
+
+
+def test_a_curve_passes_through_its_points_and_does_not_stop_there():
+    way = WAYS["curve"]
+    samples = [way.at(t) for t in np.arange(0.0, way.duration_s, 0.005)]
+    for point in ZIGZAG[1:-1]:
+        place, velocity, _ = min(samples, key=lambda sample: math.dist(sample[0], point))
+        assert math.dist(place, point) < 0.01
+        assert math.hypot(*velocity) > 0.7
+
+
+def test_a_curve_is_slow_where_it_bends_and_fast_where_it_does_not():
+    way = WAYS["hairpin"]
+    speeds = [math.hypot(*way.at(t)[1]) for t in np.arange(0.0, way.duration_s, 0.01)]
+    turn = [s for t, s in zip(np.arange(0.0, way.duration_s, 0.01), speeds, strict=True) if way.at(t)[0][0] > 4.95]
+    assert max(speeds) > 2.0
+    assert min(turn) < 0.8
+
+
+def test_points_on_one_another_are_one_point():
+    way = CurveProfile([(0.0, 0.0, -1.0), (0.0, 0.0, -1.0), (2.0, 0.0, -1.0)], 1.0, 1.0)
+    assert way.distance_m == pytest.approx(2.0)
+    nowhere = CurveProfile([(1.0, 0.0, -1.0), (1.0, 0.0, -1.0)], 1.0, 1.0)
+    assert (nowhere.duration_s, nowhere.at(0.0)[0]) == (0.0, (1.0, 0.0, -1.0))
+
+
+def test_clockwise_is_seen_from_above():
+    """From the north of the centre a clockwise circle begins towards the east."""
+    clockwise = CircleProfile((0.0, 0.0, -2.0), 2.0, 0.0, math.tau, 1.0, 1.0)
+    assert clockwise.at(0.0)[0] == (2.0, 0.0, -2.0)
+    assert clockwise.at(1.0)[1][1] > 0.0 and clockwise.at(0.3 * clockwise.duration_s)[0][1] > 0.0
+
+
+@pytest.mark.parametrize(("velocity", "duration_s", "top"), [([1, 0, 0], 3.0, 1.0), ([0, -3, 0], 2.0, 2.0)])
+def test_a_velocity_lasts_its_time_with_its_ramps(velocity, duration_s, top):
+    item = VelocityItem(velocity_ned_m_s=velocity, duration_s=duration_s)
+    way = way_of(item, (1.0, 1.0, -2.0), Pace(1.0, 2.0))
+    assert way.duration_s == pytest.approx(duration_s)
+    middle = way.at(0.5 * duration_s)[1]
+    assert math.hypot(*middle) == pytest.approx(top, abs=0.01)
+    assert np.dot(middle, velocity) > 0.0

@@ -1,0 +1,148 @@
+"""Telemetry logs of any program: several systems on one link, one PX4 vehicle chosen, its samples in order."""
+
+import struct
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState
+from rebound_cli.logs.log import Demand, LogError
+from rebound_cli.logs.reader import read_log
+
+EPOCH_US = 1_600_000_000_000_000
+PX4, ARDUPILOT, GROUND_STATION, NO_AUTOPILOT = 12, 3, 6, 8
+
+
+class Writer:
+    """Packets of several systems on one log, one every 4 ms."""
+
+    def __init__(self):
+        self.content = b""
+        self.count = 0
+        self._senders = {}
+
+    def send(self, message, system=1, component=1, at_us=None):
+        mavlink = self._senders.setdefault((system, component), dialect.MAVLink(None, system, component))
+        packet = message.pack(mavlink)
+        mavlink.seq = (mavlink.seq + 1) % 256
+        self.content += struct.pack(">Q", EPOCH_US + 4000 * self.count if at_us is None else at_us) + packet
+        self.count += 1
+
+    def heartbeat(self, system=1, component=1, kind=2, autopilot=PX4):
+        self.send(dialect.MAVLink_heartbeat_message(kind, autopilot, 0x81, 6 << 16, 4, 3), system, component)
+
+    def imu(self, system=1, x=0.0, at_us=None):
+        message = dialect.MAVLink_highres_imu_message(
+            5000 * self.count, x, 0.0, -9.8, 0.1, 0.2, 0.3, 0, 0, 0, 0, 0, 0, 0, 0x3F
+        )
+        self.send(message, system, at_us=at_us)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "flight.tlog"
+
+
+def test_the_vehicles_samples_come_with_the_time_they_were_heard(path):
+    log = Writer()
+    log.heartbeat()
+    for x in (1.0, 2.0, 3.0):
+        log.imu(x=x)
+    log.send(dialect.MAVLink_extended_sys_state_message(0, 2))
+    path.write_bytes(log.content)
+    read = read_log(path)
+    assert [type(heard.sample) for heard in read.heard] == [Heartbeat, ImuSample, ImuSample, ImuSample, ExtendedState]
+    assert [heard.at_us - EPOCH_US for heard in read.heard] == [0, 4000, 8000, 12_000, 16_000]
+    assert [sample.specific_force_frd_m_s2[0] for _, sample in read.imu()] == [1.0, 2.0, 3.0]
+    assert read.heard[-1].sample.landed_state is LandedState.IN_AIR
+    assert "ATTITUDE_TARGET is not in it" in read.losses
+    assert "EXTENDED_SYS_STATE is not in it" not in read.losses
+
+
+def test_of_several_systems_the_px4_vehicle_with_imu_samples_is_taken(path):
+    # Given a ground station, a gimbal, an ArduPilot vehicle and two PX4 vehicles on one link
+    log = Writer()
+    log.heartbeat(system=255, component=190, kind=GROUND_STATION, autopilot=NO_AUTOPILOT)
+    log.heartbeat(system=1, component=154, kind=26, autopilot=NO_AUTOPILOT)
+    log.heartbeat(system=3, autopilot=ARDUPILOT)
+    log.heartbeat(system=4)
+    log.heartbeat(system=5)
+    for _ in range(3):
+        log.imu(system=3, x=3.0)
+        log.imu(system=5, x=5.0)
+    path.write_bytes(log.content)
+    # Then the one that can be looked at is, and the other is named
+    read = read_log(path)
+    assert [sample.specific_force_frd_m_s2[0] for _, sample in read.imu()] == [5.0] * 3
+    assert any("system 5 was taken, not 4" in loss for loss in read.losses)
+
+
+@pytest.mark.parametrize(
+    ("fill", "words"),
+    [
+        (lambda log: log.heartbeat(autopilot=ARDUPILOT), "autopilot is not PX4 but ArduPilot"),
+        (lambda log: log.imu(), "no autopilot's heartbeat"),
+        (lambda log: log.heartbeat(), "no HIGHRES_IMU from system 1"),
+    ],
+)
+def test_a_log_without_a_vehicle_to_look_at_is_one_sentence(path, fill, words):
+    log = Writer()
+    fill(log)
+    fill(log)
+    path.write_bytes(log.content)
+    with pytest.raises(LogError, match=words):
+        read_log(path)
+
+
+def test_bytes_that_are_no_log_are_one_sentence(path):
+    path.write_bytes(bytes(range(256)) * 20)
+    with pytest.raises(LogError, match="not a telemetry log"):
+        read_log(path)
+    path.write_bytes(b"")
+    with pytest.raises(LogError, match="empty"):
+        read_log(path)
+    with pytest.raises(LogError, match="no such file"):
+        read_log(path.with_name("other.tlog"))
+
+
+def test_damage_in_the_middle_costs_only_what_it_hit(path):
+    log = Writer()
+    log.heartbeat()
+    for _ in range(50):
+        log.imu()
+    damaged = bytearray(log.content)
+    damaged[len(damaged) // 2 : len(damaged) // 2 + 30] = b"\xfd" * 30
+    path.write_bytes(damaged)
+    assert 46 <= len(read_log(path).imu()) < 50
+
+
+def test_a_clock_that_is_set_back_loses_nothing(path):
+    log = Writer()
+    log.heartbeat()
+    log.imu()
+    for _ in range(5):
+        log.imu(at_us=EPOCH_US - 3_600_000_000)
+    path.write_bytes(log.content)
+    assert len(read_log(path).imu()) == 6
+
+
+@pytest.mark.parametrize(
+    ("mask", "expected"),
+    [
+        (0x000, Demand(7000, (1.0, 2.0, -3.0), (0.5, 0.0, 0.25), 0.25)),
+        (0x038, Demand(7000, (1.0, 2.0, -3.0), None, None)),
+        (0x007, Demand(7000, None, (0.5, 0.0, 0.25), 0.25)),
+    ],
+)
+def test_what_the_position_control_was_asked_for(path, mask, expected):
+    log = Writer()
+    log.heartbeat()
+    log.imu()
+    log.imu()
+    log.send(
+        dialect.MAVLink_position_target_local_ned_message(
+            7, 1, mask, 1.0, 2.0, -3.0, 0.5, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0
+        )
+    )
+    path.write_bytes(log.content)
+    assert [heard.sample for heard in read_log(path).heard if isinstance(heard.sample, Demand)] == [expected]

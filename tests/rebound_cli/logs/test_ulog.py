@@ -1,0 +1,229 @@
+"""PX4's logs as the wire would have carried them: each topic of each version, and what is said of what is missing."""
+
+import struct
+
+import pytest
+
+from companion.messages import (
+    Attitude,
+    AttitudeTarget,
+    ExtendedState,
+    Heartbeat,
+    ImuSample,
+    LandedState,
+    LocalPosition,
+    Odometry,
+    Vibration,
+)
+from companion.px4_mode import AUTO_LAND, OFFBOARD
+from rebound_cli.logs.log import Demand, LogError
+from rebound_cli.logs.reader import read_log
+from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
+
+START = 1_000_000
+IMU = {"sensor_combined": sensor_combined(every(5000, START, START + 500_000))}
+POSITION = [
+    *[("float", name) for name in ("x", "y", "z", "vx", "vy", "vz")],
+    *[("bool", name) for name in ("v_xy_valid", "v_z_valid")],
+    *[("uint8_t", f"{name}_reset_counter") for name in ("xy", "z", "vxy", "vz")],
+]
+
+
+def read(tmp_path, topics, **more):
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(ulog(topics, started_us=START, **more))
+    return read_log(path)
+
+
+def of(log, kind):
+    return [heard.sample for heard in log.heard if isinstance(heard.sample, kind)]
+
+
+def test_sensor_combined_is_the_mean_over_the_interval_that_ends_at_its_time(tmp_path):
+    log = read(tmp_path, {"sensor_combined": sensor_combined([START, START + 5000], clipped=[START + 5000])})
+    first, second = of(log, ImuSample)
+    assert (first.time_boot_us, second.time_boot_us) == (START, START + 5000)
+    assert first.specific_force_frd_m_s2 == pytest.approx((0.0, 0.0, -9.8), abs=1e-6)
+    assert first.angular_velocity_frd_rad_s == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
+    assert log.clipped_at_us == (START + 5000,)
+
+
+def test_vehicle_imu_is_increments_over_the_time_they_took(tmp_path):
+    # Given a log of vehicle_imu at full rate, as a logging profile for high rates has it, and sensor_combined beside it
+    fields = [
+        ("uint64_t", "timestamp_sample"),
+        ("float[3]", "delta_angle"),
+        ("float[3]", "delta_velocity"),
+        ("uint32_t", "delta_angle_dt"),
+        ("uint32_t", "delta_velocity_dt"),
+        ("uint8_t", "delta_velocity_clipping"),
+    ]
+    rows = [
+        (t + 700, t, (0.0005, 0.0, 0.0), (0.01, 0.0, -0.049), 2500, 5000, 0) for t in every(5000, START, START + 50_000)
+    ]
+    slow = sensor_combined(every(20_000, START, START + 50_000))
+    log = read(tmp_path, {"vehicle_imu": (fields, rows), "sensor_combined": slow})
+    # Then the faster one is taken: force = velocity / time, rate = angle / time, stamped with the sample's time
+    samples = of(log, ImuSample)
+    assert len(samples) == 10 and samples[0].time_boot_us == START
+    assert samples[0].specific_force_frd_m_s2 == pytest.approx((2.0, 0.0, -9.8), abs=1e-5)
+    assert samples[0].angular_velocity_frd_rad_s == pytest.approx((0.2, 0.0, 0.0), abs=1e-6)
+    assert log.heard[0].at_us == START + 700
+
+
+def test_the_estimators_bias_is_taken_off_as_highres_imu_does(tmp_path):
+    # Given a bias of 0.5 m/s^2 that the estimator finds at 0.1 s
+    fields = [("uint32_t", "accel_device_id"), ("float[3]", "accel_bias"), ("float[3]", "gyro_bias")]
+    bias = (fields, [(START + 100_000, 7, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1))])
+    log = read(tmp_path, {**IMU, "estimator_sensor_bias": bias})
+    forces = [sample.specific_force_frd_m_s2[0] for sample in of(log, ImuSample)]
+    assert forces[19:21] == pytest.approx([0.0, -0.5], abs=1e-6)
+
+
+def test_a_position_is_both_messages_of_the_wire_with_the_jumps_counted(tmp_path):
+    row = (START + 123_456, 1.0, 2.0, -3.0, 0.1, 0.2, 0.3, True, True, 1, 2, 3, 255)
+    log = read(tmp_path, {**IMU, "vehicle_local_position": (POSITION, [row])})
+    (position,) = of(log, LocalPosition)
+    # LOCAL_POSITION_NED's stamp is cut to milliseconds, ODOMETRY's is not
+    assert position.time_boot_us == START + 123_000
+    assert position.position_ned_m == (1.0, 2.0, -3.0)
+    assert position.velocity_ned_m_s == pytest.approx((0.1, 0.2, 0.3), abs=1e-6)
+    (odometry,) = of(log, Odometry)
+    assert (odometry.time_boot_us, odometry.reset_counter) == (START + 123_456, (1 + 2 + 3 + 255) % 256)
+
+
+def test_an_invalid_velocity_is_said(tmp_path):
+    rows = [(START + 1000 * n, *[0.0] * 6, n % 2 == 0, True, 0, 0, 0, 0) for n in range(10)]
+    log = read(tmp_path, {**IMU, "vehicle_local_position": (POSITION, rows)})
+    assert any("horizontal velocity is invalid" in loss and "50 %" in loss for loss in log.losses)
+    assert not any("vertical velocity" in loss for loss in log.losses)
+
+
+def test_attitude_thrust_and_vibration(tmp_path):
+    topics = {
+        **IMU,
+        "vehicle_attitude": ([("float[4]", "q")], [(START + 10, (1.0, 0.0, 0.0, 0.0))]),
+        "vehicle_attitude_setpoint": (
+            [("float[4]", "q_d"), ("float[3]", "thrust_body")],
+            [
+                (START + 20, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -0.6)),
+                (START + 30, (float("nan"),) * 4, (0.3, 0.0, -0.4)),
+            ],
+        ),
+        "vehicle_imu_status": (
+            [
+                ("uint32_t[3]", "accel_clipping"),
+                ("float", "gyro_vibration_metric"),
+                ("float", "accel_vibration_metric"),
+            ],
+            [(START + 40, (1, 2, 3), 0.25, 4.5)],
+        ),
+    }
+    log = read(tmp_path, topics)
+    assert of(log, Attitude)[0].attitude_wxyz == (1.0, 0.0, 0.0, 0.0)
+    whole, without_attitude = of(log, AttitudeTarget)
+    assert (whole.thrust_fraction, without_attitude.thrust_fraction) == pytest.approx((0.6, 0.5))
+    assert whole.attitude_wxyz is not None and without_attitude.attitude_wxyz is None
+    assert of(log, Vibration) == [Vibration(START + 40, 0.25, 4.5, (6, 0, 0))]
+
+
+def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
+    fields = [("uint8_t", "nav_state"), ("uint8_t", "arming_state"), ("bool", "failsafe")]
+    rows = [(START, 14, 1, False), (START + 10, 14, 2, False), (START + 20, 18, 2, True)]
+    beats = of(read(tmp_path, {**IMU, "vehicle_status": (fields, rows)}), Heartbeat)
+    seen = [(beat.custom_mode, beat.armed, beat.system_status) for beat in beats]
+    assert seen == [(OFFBOARD, False, 3), (OFFBOARD, True, 4), (AUTO_LAND, True, 5)]
+
+
+def test_landed_state_is_what_px4_would_send(tmp_path):
+    topics = {
+        **IMU,
+        "vehicle_land_detected": ([("bool", "landed")], [(START, True), (START + 10, False), (START + 90, True)]),
+        "vehicle_control_mode": (
+            [("bool", "flag_control_auto_enabled")],
+            [(START, False), (START + 30, True), (START + 70, False)],
+        ),
+        "position_setpoint_triplet": (
+            [("position_setpoint", "current")],
+            [(START + 20, (True, 3)), (START + 50, (True, 4))],
+        ),
+    }
+    log = read(tmp_path, topics)
+    # A take-off or landing setpoint counts only while an automatic mode flies
+    heard = [heard for heard in log.heard if isinstance(heard.sample, ExtendedState)]
+    states = {one.at_us - START: one.sample.landed_state for one in heard}
+    assert states == {
+        0: LandedState.ON_GROUND,
+        10: LandedState.IN_AIR,
+        20: LandedState.IN_AIR,
+        30: LandedState.TAKEOFF,
+        50: LandedState.LANDING,
+        70: LandedState.IN_AIR,
+        90: LandedState.ON_GROUND,
+    }
+
+
+@pytest.mark.parametrize(
+    ("fields", "row"),
+    [
+        # since v1.13
+        ([("float[3]", "position"), ("float[3]", "velocity")], ((1.0, 2.0, 3.0), (float("nan"),) * 2 + (0.5,))),
+        # before
+        (
+            [("float", name) for name in ("x", "y", "z", "vx", "vy", "vz")],
+            (1.0, 2.0, 3.0, float("nan"), float("nan"), 0.5),
+        ),
+    ],
+)
+def test_what_was_asked_for_in_the_words_of_two_versions(tmp_path, fields, row):
+    log = read(tmp_path, {**IMU, "trajectory_setpoint": (fields, [(START + 5, *row)])})
+    assert of(log, Demand) == [Demand(START + 5, (1.0, 2.0, 3.0), None, 0.5)]
+
+
+def test_the_vehicle_is_named_and_its_hover_thrust_found(tmp_path):
+    info = [
+        ("uint32_t", "ver_sw_release", struct.pack("<I", 0x010C03FF)),
+        ("char[12]", "ver_hw", b"PX4_FMU_V5XX"),
+    ]
+    log = read(tmp_path, IMU, info=info, parameters=[("MPC_THR_HOVER", 0.42)])
+    assert log.vehicle == "PX4 1.12.3 on PX4_FMU_V5XX"
+    assert log.hover_thrust_fraction == pytest.approx(0.42)
+    estimate = ([("float", "hover_thrust"), ("bool", "valid")], [(START, 0.1, False), (START, 0.5, True)])
+    log = read(tmp_path, {**IMU, "hover_thrust_estimate": estimate}, parameters=[("MPC_THR_HOVER", 0.42)])
+    assert log.hover_thrust_fraction == 0.5
+
+
+def test_what_is_missing_is_said_with_its_cost(tmp_path):
+    late = ([("float[4]", "q")], [(START + 2_000_000, (1.0, 0.0, 0.0, 0.0))])
+    log = read(tmp_path, {**IMU, "vehicle_attitude": late})
+    said = "\n".join(log.losses)
+    assert "no vehicle_local_position: height and velocity are not known" in said
+    assert "no vehicle_attitude before 2.0 s" in said
+    assert "no vehicle_status: armed or not" in said
+
+
+def test_samples_come_in_the_order_of_time(tmp_path):
+    rows = [(START + 7000 * n, *[0.0] * 6, True, True, 0, 0, 0, 0) for n in range(50)]
+    log = read(tmp_path, {"vehicle_local_position": (POSITION, rows), **IMU})
+    times = [heard.at_us for heard in log.heard]
+    assert times == sorted(times)
+
+
+def test_a_log_without_inertial_samples_is_one_sentence(tmp_path):
+    with pytest.raises(LogError, match=r"flight\.ulg: neither sensor_combined nor vehicle_imu"):
+        read(tmp_path, {"vehicle_attitude": ([("float[4]", "q")], [(START, (1.0, 0.0, 0.0, 0.0))])})
+
+
+@pytest.mark.parametrize("length", [0, 3, 8, 20, 60, 150, 400])
+def test_a_log_cut_short_in_its_head_is_one_sentence(tmp_path, length):
+    path = tmp_path / "cut.ulg"
+    path.write_bytes(ulog(IMU, started_us=START)[:length])
+    with pytest.raises(LogError, match=r"^[^\n]*cut\.ulg: [^\n]*\.$"):
+        read_log(path)
+
+
+def test_a_log_cut_short_in_its_data_is_read_to_there(tmp_path):
+    whole = ulog(IMU, started_us=START)
+    path = tmp_path / "cut.ulg"
+    path.write_bytes(whole[: len(whole) * 2 // 3])
+    assert 40 < len(read_log(path).imu()) < 100

@@ -1,0 +1,137 @@
+"""`rebound replay` of our own flights: every decision again, to the bit, and the first difference where not."""
+
+import json
+import shutil
+
+import pytest
+import yaml
+
+from rebound_cli.main import main
+from rebound_cli.replay.recording import read_recording
+from rebound_cli.replay.reproduction import reproduce
+from tests.rebound_cli.command import WALL
+
+
+@pytest.fixture(scope="module")
+def wall_flight(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flights") / "wall"
+    assert (
+        main(["fly", str(WALL), "--lockstep", "--json", "--set", "companion.detector=lateral", "--out", str(folder)])
+        == 0
+    )
+    return folder
+
+
+@pytest.fixture
+def flight(wall_flight, tmp_path):
+    """A copy to spoil."""
+    return shutil.copytree(wall_flight, tmp_path / "wall")
+
+
+def replay(capsys, *arguments):
+    code = main(["replay", *map(str, arguments)])
+    out = capsys.readouterr()
+    return code, out.out, out.err
+
+
+def test_a_lockstep_flight_is_decided_again_to_the_bit(wall_flight, tmp_path, capsys):
+    code, text, _ = replay(capsys, wall_flight, "--expect", "1", "--out", tmp_path)
+    assert code == 0
+    assert "identical: every decision of the flight came again to the bit" in text
+    assert "1 collision" in text
+    # With its picture, and with the flight's own times
+    (picture,) = tmp_path.iterdir()
+    assert picture.name == "impact-1.png" and picture.stat().st_size > 20_000
+    (hit,) = json.loads((wall_flight / "summary.json").read_text())["collisions"]
+    assert f"{hit['detected_at_s']:.3f} s  HIT" in text
+
+
+def test_a_program_reads_the_same_and_an_expectation_that_fails_is_exit_code_1(wall_flight, tmp_path, capsys):
+    code, text, error = replay(capsys, wall_flight, "--json", "--expect", "none", "--out", tmp_path)
+    found = json.loads(text)
+    (hit,) = json.loads((wall_flight / "summary.json").read_text())["collisions"]
+    (impact,) = found["impacts"]
+    assert found["reproduction"]["identical"]
+    assert impact["at_s"] == hit["detected_at_s"]
+    assert impact["impact_velocity_m_s"] == hit["impact_velocity_ned_m_s"]
+    assert found["blind"] == [] and {span["reason"] for span in found["off"]} >= {"connect", "takeoff", "landing"}
+    assert code == 1 and "expected no collisions, found 1" in error
+
+
+def test_another_setting_is_another_flight(flight):
+    # Given a folder in which somebody has raised the threshold afterwards
+    resolved = flight / "resolved.yaml"
+    mission = yaml.safe_load(resolved.read_text())
+    mission["companion"]["lateral"]["threshold_m_s2"] = 40.0
+    resolved.write_text(yaml.safe_dump(mission))
+    assert "'lateral' on the watch" in reproduce(read_recording(flight)).first_difference
+
+
+def test_a_changed_packet_is_found(flight):
+    # Given a flight in whose log one setpoint has another byte
+    recording = read_recording(flight)
+    step = next(step for step in recording.steps if len(step.sent) == 1 and len(step.sent[0]) > 40)
+    step.sent = [step.sent[0][:20] + bytes([step.sent[0][20] ^ 1]) + step.sent[0][21:]]
+    assert reproduce(recording).first_difference == f"at {step.time_us} us another packet was sent"
+
+
+def test_an_event_that_does_not_come_again_is_found(flight):
+    (flight / "events.jsonl").open("a").write('{"time_us": 1, "kind": "x", "text": "", "data": {}}\n')
+    assert "did not come again" in reproduce(read_recording(flight)).first_difference
+
+
+def test_steps_in_which_nothing_came_count(flight):
+    # Given a folder without the instants at which the companion only waited
+    (flight / "inputs.jsonl").write_text("")
+    # Then nobody confirms the plan, and that is the difference
+    assert reproduce(read_recording(flight)).first_difference is not None
+
+
+def test_another_detector_or_rate_is_looked_at_without_comparing(wall_flight, tmp_path, capsys):
+    code, text, _ = replay(capsys, wall_flight, "--rate", "50", "--detector", "lateral", "--out", tmp_path)
+    assert code == 0
+    assert "with --detector, --rate the flight's own decisions cannot come again" in text
+    assert "IMU at 50 Hz (recorded at 250)" in text
+    assert "identical" not in text
+
+
+def test_a_flight_that_was_killed_is_decided_again_as_far_as_it_is_known(flight, tmp_path, capsys):
+    # Given a folder whose program was killed: no summary, a log that ends in the middle of a packet
+    (flight / "summary.json").unlink()
+    tlog = flight / "flight.tlog"
+    tlog.write_bytes(tlog.read_bytes()[: tlog.stat().st_size // 2 + 7])
+    code, text, _ = replay(capsys, flight, "--out", tmp_path / "pictures")
+    assert code == 0
+    assert "identical" in text and "ended at once" in " ".join(text.split())
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: (folder / "inputs.jsonl").unlink(), "replay"),
+        (lambda folder: (folder / "inputs.jsonl").write_text("{\n"), "inputs.jsonl:1"),
+        (lambda folder: (folder / "versions.json").write_text("["), "versions.json"),
+        (lambda folder: (folder / "events.jsonl").unlink(), "events.jsonl"),
+        (lambda folder: (folder / "resolved.yaml").unlink(), "resolved.yaml"),
+        (lambda folder: (folder / "flight.tlog").write_bytes(b""), "flight.tlog"),
+    ],
+)
+def test_a_damaged_folder_is_one_sentence(flight, spoil, words, capsys):
+    spoil(flight)
+    code, text, error = replay(capsys, flight)
+    assert code == 1 and text == ""
+    assert error.startswith("rebound: ") and words in error and len(error.strip().splitlines()) == 1
+
+
+def test_arguments_that_make_no_sense_are_refused(wall_flight, tmp_path, capsys):
+    for arguments, words in (
+        ((tmp_path,), "no flight.tlog in this folder"),
+        ((tmp_path / "none.ulg",), "no such file"),
+        ((wall_flight, "--detector", "magic"), "there is no detector 'magic'"),
+        ((wall_flight, "--set", "companion.lateral.treshold_m_s2=1"), "did you mean 'threshold_m_s2'?"),
+    ):
+        code, _, error = replay(capsys, *arguments)
+        assert code == 1 and words in error, error
+    for arguments in (("--rate", "0"), ("--rate", "fast"), ("--expect", "some")):
+        with pytest.raises(SystemExit):
+            main(["replay", str(wall_flight), *arguments])

@@ -1,0 +1,131 @@
+"""A log through the watch: what the flight would have known, at the recorded and at other rates."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.detection.interface import Situation
+from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState, LocalPosition
+from companion.mission.config import CompanionConfig
+from companion.px4_mode import AUTO_LAND, OFFBOARD
+from rebound_cli.logs.log import Demand, Heard, Log
+from rebound_cli.logs.shaking import Stage, shaking
+from rebound_cli.replay.circumstances import DESCENT_M_S, Circumstances
+from rebound_cli.replay.watching import thinned, watch_log
+
+LATERAL = CompanionConfig(detector="lateral")
+SECOND = 1_000_000
+HIT_US = 6 * SECOND
+
+
+def beat(armed, mode=OFFBOARD):
+    return Heartbeat(1, 1, 2, 12, armed, mode, 4 if armed else 3)
+
+
+def position(time_us, height_m, speed_m_s=0.0):
+    return LocalPosition(time_us, (0.0, 0.0, -height_m), (speed_m_s, 0.0, 0.0))
+
+
+def flight(duration_s=10.0, interval_us=4000, hit_us=HIT_US, gap=None):
+    """Armed at 1 s, in the air from 2 s on, 1 m/s north; a hit from ahead at `hit_us`, 40 m/s^2 for 24 ms."""
+    noise = np.random.default_rng(1).normal(0.0, 0.3, (round(duration_s * 1e6 / interval_us), 3))
+    heard = [Heard(0, beat(False)), Heard(0, ExtendedState(LandedState.ON_GROUND)), Heard(SECOND, beat(True))]
+    heard.append(Heard(2 * SECOND, ExtendedState(LandedState.IN_AIR)))
+    for index, (x, y, z) in enumerate(noise.tolist()):
+        time_us = index * interval_us
+        if gap is not None and gap[0] <= time_us < gap[1]:
+            continue
+        push = -40.0 if hit_us is not None and hit_us < time_us <= hit_us + 24_000 else 0.0
+        heard.append(Heard(time_us, ImuSample(time_us, (x + push, y, -9.8 + z), (0.0, 0.0, 0.0))))
+        if time_us % 20_000 == 0:
+            heard.append(Heard(time_us, position(time_us, 1.5 if time_us > 2 * SECOND else 0.0, 1.0)))
+    heard.sort(key=lambda item: item.at_us)
+    return Log(Path("flight.tlog"), "PX4", 0, tuple(heard), ())
+
+
+def test_a_hit_is_found_with_what_was_known_then():
+    (finding,) = watch_log(flight(), LATERAL).impacts
+    assert HIT_US < finding.at_us <= HIT_US + 4000
+    assert finding.is_collision and finding.threshold_m_s2 == 4.0
+    assert finding.first.velocity_ned_m_s[0] == pytest.approx(1.0, abs=0.05)
+    assert finding.situation == Situation(None, True, LandedState.IN_AIR, 1.5, False, None, None)
+    # And what was known when the contact was over
+    assert finding.final.is_final and not finding.first.is_final
+    assert finding.final.peak_specific_force_m_s2 == pytest.approx(40.0, abs=1.5)
+
+
+def test_a_flight_without_a_hit_has_none_and_its_story_is_told():
+    findings = watch_log(flight(hit_us=None), LATERAL)
+    assert findings.impacts == [] and findings.blind == []
+    assert [happening.text for happening in findings.happenings if "watch" not in happening.text] == [
+        "mode OFFBOARD",
+        "armed",
+        "took off",
+    ]
+    (off,) = findings.off
+    assert (off.start_us, off.end_us, off.reason) == (0, SECOND, "disarmed")
+
+
+def test_a_gap_in_the_log_is_a_blind_time():
+    findings = watch_log(flight(hit_us=None, gap=(5 * SECOND, 7 * SECOND)), LATERAL)
+    (blind,) = findings.blind
+    assert "no HIGHRES_IMU" in blind.reason
+    assert blind.start_us == pytest.approx(5.25e6, abs=60_000)
+    # and is over when the rate has been judged anew, within a second of the samples' return
+    assert 7 * SECOND <= blind.end_us <= 8 * SECOND
+
+
+@pytest.mark.parametrize(("asked_hz", "received_hz"), [(250, 250), (200, 125), (100, 100), (50, 50), (25, 25)])
+def test_a_requested_rate_is_what_px4_would_send(asked_hz, received_hz):
+    # measured on PX4 with a 4 ms IMU: 200 asked for gives 124
+    log = flight(hit_us=None)
+    kept = replace(log, heard=tuple(thinned(log.heard, asked_hz)))
+    assert len(kept.imu()) / 10.0 == pytest.approx(received_hz, rel=0.015)
+    # nothing but IMU samples is left out
+    assert len(log.heard) - len(kept.heard) == len(log.imu()) - len(kept.imu())
+
+
+def test_a_hit_between_the_samples_of_a_slow_stream_is_not_seen_by_its_force():
+    log = flight()
+    assert watch_log(replace(log, heard=tuple(thinned(log.heard, 25))), LATERAL).impacts == []
+
+
+def situation_after(*samples):
+    circumstances = Circumstances()
+    for sample in samples:
+        circumstances.hear(sample)
+    return circumstances.situation
+
+
+def test_height_counts_from_the_place_of_arming():
+    situation = situation_after(beat(False), position(0, 0.2), beat(True), position(1, 2.2))
+    assert situation.height_m == pytest.approx(2.0)
+    # A log that begins armed on the ground counts from there, one that begins in the air cannot tell
+    ground = ExtendedState(LandedState.ON_GROUND)
+    assert situation_after(beat(True), ground, position(0, 0.2), position(1, 2.2)).height_m == pytest.approx(2.0)
+    assert situation_after(beat(True), position(0, 0.2), position(1, 2.2)).height_m is None
+
+
+@pytest.mark.parametrize(
+    ("samples", "expected"),
+    [
+        ((beat(True, AUTO_LAND),), True),
+        ((beat(True),), False),
+        ((beat(True), ExtendedState(LandedState.LANDING)), True),
+        ((beat(True), Demand(0, None, None, DESCENT_M_S)), True),
+        ((beat(True), Demand(0, None, None, 0.9 * DESCENT_M_S)), False),
+        ((beat(True), Demand(0, None, None, None)), False),
+    ],
+)
+def test_a_descent_is_commanded_by_mode_by_landing_or_by_its_speed(samples, expected):
+    assert situation_after(*samples).descent_commanded is expected
+
+
+def test_noise_is_told_for_each_stage_of_a_flight():
+    log = flight(hit_us=None)
+    noise = shaking(log).noise_m_s2()
+    assert set(noise) == {Stage.GROUND, Stage.TAKEOFF, Stage.UNDER_WAY}
+    for values in noise.values():
+        assert values == pytest.approx([0.3, 0.3, 0.3], rel=0.15)

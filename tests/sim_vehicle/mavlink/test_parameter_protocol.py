@@ -1,0 +1,156 @@
+"""The parameter protocol as PX4 speaks it."""
+
+import struct
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.parameters.store import Parameters
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, Client
+
+INT32, REAL32, UINT32 = 6, 9, 5
+
+
+def as_float(whole: int) -> float:
+    return struct.unpack("<f", struct.pack("<i", whole))[0]
+
+
+def whole_of(message) -> int:
+    return struct.unpack_from("<i", message.get_msgbuf(), 10)[0]
+
+
+def values(client: Client) -> list:
+    return client.all("PARAM_VALUE")
+
+
+def request(client: Client, name: str = "", index: int = -1, target: tuple[int, int] = (1, 1)) -> list:
+    client.forget()
+    client.send(dialect.MAVLink_param_request_read_message(*target, name.encode(), index))
+    client.run(0.02)
+    return values(client)
+
+
+def set_to(client: Client, name: str, value: float, kind: int, target: tuple[int, int] = (1, 1)) -> list:
+    client.forget()
+    client.send(dialect.MAVLink_param_set_message(*target, name.encode(), value, kind))
+    client.run(0.05)
+    return values(client)
+
+
+def test_the_list_is_whole_in_order_and_begins_with_the_hash():
+    client = Client()
+    client.send(dialect.MAVLink_param_request_list_message(1, 1))
+    client.run(0.5)
+    hash_value, *rest = values(client)
+    assert (hash_value.param_id, hash_value.param_type, hash_value.param_index) == ("_HASH_CHECK", UINT32, 0xFFFF)
+    assert [message.param_index for message in rest] == list(range(hash_value.param_count))
+    assert [message.param_id for message in rest] == sorted(Parameters())
+    kinds = {message.param_id: message.param_type for message in rest}
+    assert (kinds["MAV_SYS_ID"], kinds["MPC_XY_P"]) == (INT32, REAL32)
+
+
+def test_a_list_asked_for_again_starts_anew_without_the_hash_and_the_hash_stops_it():
+    client = Client()
+    client.send(dialect.MAVLink_param_request_list_message(1, 1))
+    client.step()
+    client.send(dialect.MAVLink_param_request_list_message(1, 1))
+    client.forget()
+    client.step()
+    assert values(client)[0].param_index == 0
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"_HASH_CHECK", 0.0, UINT32))
+    client.step()
+    client.forget()
+    client.run(0.2)
+    assert values(client) == []
+
+
+def test_one_by_name_and_by_index():
+    client = Client()
+    (by_name,) = request(client, "MIS_TAKEOFF_ALT")
+    assert by_name.param_value == 2.5
+    (by_index,) = request(client, index=by_name.param_index)
+    assert by_index.param_id == "MIS_TAKEOFF_ALT"
+    (whole,) = request(client, "CAL_ACC0_ID")
+    assert whole_of(whole) == 1310988
+    (name_of_sixteen,) = request(client, "MPC_XY_VEL_P_ACC")
+    assert name_of_sixteen.param_id == "MPC_XY_VEL_P_ACC"
+
+
+@pytest.mark.parametrize("wrong", [{"name": "NO_SUCH"}, {"index": 9999}, {"name": ""}])
+def test_what_there_is_not_is_not_answered(wrong):
+    assert request(Client(), **wrong) == []
+
+
+@pytest.mark.parametrize("target", [(2, 1), (0, 1), (1, 191)])
+def test_a_request_for_another_or_for_everybody_is_not_answered(target):
+    assert request(Client(), "MPC_XY_P", target=target) == []
+    assert set_to(Client(), "MPC_XY_P", 1.0, REAL32, target) == []
+
+
+def test_a_value_is_set_told_and_told_again():
+    client = Client()
+    first, second = set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)
+    assert first.param_value == second.param_value == 4.0
+    assert client.vehicle.parameters["MIS_TAKEOFF_ALT"] == 4.0
+    # The same once more is answered, but nothing has changed
+    assert len(set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)) == 1
+
+
+# Among them numbers that are signalling NaNs as floats
+@pytest.mark.parametrize("whole", [3, -1, -5_000_000, 2_139_100_000, 2**31 - 1, -(2**31)])
+def test_whole_numbers_travel_byte_by_byte(whole):
+    client = Client()
+    message = dialect.MAVLink_param_set_message(1, 1, b"SYS_AUTOSTART", 0.0, INT32)
+    link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+    payload = struct.pack("<iBB16sB", whole, 1, 1, b"SYS_AUTOSTART", INT32)
+    client.send_raw(bytes(message._pack(link, message.crc_extra, payload)))
+    client.run(0.05)
+    assert whole_of(values(client)[0]) == whole
+    assert client.vehicle.parameters.stored("SYS_AUTOSTART") == whole
+
+
+@pytest.mark.parametrize(("name", "kind"), [("MAV_SYS_ID", REAL32), ("MPC_XY_P", INT32), ("MPC_XY_P", UINT32)])
+def test_a_wrong_type_is_silently_ignored(name, kind):
+    client = Client()
+    before = client.vehicle.parameters.stored(name)
+    assert set_to(client, name, 2.0, kind) == []
+    assert client.vehicle.parameters.stored(name) == before
+
+
+def test_the_hash_changes_with_a_value_and_comes_back_with_it():
+    client = Client()
+    (before,) = request(client, "_HASH_CHECK")
+    set_to(client, "COM_RC_IN_MODE", as_float(4), INT32)
+    (changed,) = request(client, "_HASH_CHECK")
+    set_to(client, "COM_RC_IN_MODE", as_float(1), INT32)
+    (after,) = request(client, "_HASH_CHECK")
+    assert whole_of(before) == whole_of(after) != whole_of(changed)
+
+
+def height_after_takeoff(client: Client) -> float:
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(14.0)
+    return -client.position()[2] - client.vehicle._plant._contact.foot_depth_m
+
+
+def test_the_takeoff_height_is_obeyed():
+    client = Client()
+    set_to(client, "MIS_TAKEOFF_ALT", 4.0, REAL32)
+    assert height_after_takeoff(client) == pytest.approx(4.0, abs=0.15)
+
+
+def test_a_gain_changes_how_the_vehicle_flies():
+    # Given two vehicles that are asked 2 m to the side, one with half of the gain
+    def distance_after(gain: float) -> float:
+        client = Client()
+        set_to(client, "MPC_XY_P", gain, REAL32)
+        client.command(TAKEOFF)
+        client.command(ARM_DISARM, 1)
+        client.run(8.0)
+        client.run(0.2, lambda: client.setpoint(2.0, 0.0, -2.0))
+        client.command(176, 1, 6)
+        client.run(1.0, lambda: client.setpoint(2.0, 0.0, -2.0))
+        return client.position()[0]
+
+    assert distance_after(0.5) < 0.75 * distance_after(1.5)

@@ -1,0 +1,202 @@
+"""What a client is told unasked on each kind of link, and whether it fits together."""
+
+import math
+from collections import Counter
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
+from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, TAKEOFF, Client
+
+# Measured on a running PX4 SITL over ten seconds, less what this vehicle has no equipment for.
+ONBOARD_HZ = {
+    "ALTITUDE": 10,
+    "ATTITUDE": 100,
+    "ATTITUDE_QUATERNION": 50,
+    "ATTITUDE_TARGET": 10,
+    "BATTERY_STATUS": 0.5,
+    "CURRENT_MODE": 0.5,
+    "ESTIMATOR_STATUS": 1,
+    "EXTENDED_SYS_STATE": 5,
+    "GLOBAL_POSITION_INT": 50,
+    "GPS_RAW_INT": 8,
+    "HEARTBEAT": 1,
+    "HIGHRES_IMU": 50,
+    "HOME_POSITION": 0.5,
+    "LOCAL_POSITION_NED": 30,
+    "ODOMETRY": 30,
+    "PING": 1,
+    "POSITION_TARGET_LOCAL_NED": 10,
+    "SCALED_PRESSURE": 1,
+    "SERVO_OUTPUT_RAW": 10,
+    "SYS_STATUS": 5,
+    "SYSTEM_TIME": 1,
+    "TIMESYNC": 10,
+    "VFR_HUD": 10,
+    "VIBRATION": 0.5,
+}
+GROUND_HZ = {
+    "ALTITUDE": 1,
+    "ATTITUDE": 50,
+    "ATTITUDE_QUATERNION": 50,
+    "ATTITUDE_TARGET": 50,
+    "BATTERY_STATUS": 0.5,
+    "CURRENT_MODE": 0.5,
+    "ESTIMATOR_STATUS": 0.5,
+    "EXTENDED_SYS_STATE": 1,
+    "GLOBAL_POSITION_INT": 50,
+    "GPS_RAW_INT": 5,
+    "HEARTBEAT": 1,
+    "HOME_POSITION": 0.5,
+    "LOCAL_POSITION_NED": 50,
+    "PING": 0.1,
+    "POSITION_TARGET_LOCAL_NED": 50,
+    "SCALED_PRESSURE": 1,
+    "SERVO_OUTPUT_RAW": 50,
+    "SYS_STATUS": 1,
+    "VFR_HUD": 4,
+    "VIBRATION": 0.1,
+}
+
+
+def rates_hz(kind: LinkKind, seconds: float = 40.0) -> dict[str, float]:
+    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
+    link, parser = vehicle.add_link(kind), dialect.MAVLink(None)
+    counts: Counter[str] = Counter()
+    for _ in range(round(seconds * 250)):
+        vehicle.advance()
+        counts.update(parser.decode(bytearray(raw)).get_type() for raw in link.take())
+    return {name: count / seconds for name, count in counts.items()}
+
+
+@pytest.mark.parametrize(("kind", "expected"), [(LinkKind.ONBOARD, ONBOARD_HZ), (LinkKind.GROUND, GROUND_HZ)])
+def test_each_links_set_is_px4s_at_px4s_rates(kind, expected):
+    measured = rates_hz(kind)
+    # Sent once, when the origin is known
+    assert measured.pop("GPS_GLOBAL_ORIGIN") == pytest.approx(1 / 40)
+    assert measured.keys() == expected.keys()
+    for name, rate in expected.items():
+        assert measured[name] == pytest.approx(rate, rel=0.05), name
+
+
+@pytest.fixture(scope="module")
+def hovering() -> Client:
+    """A vehicle that has taken off and holds, with everything asked for that is not sent unasked."""
+    client = Client()
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(14.0)
+    return client
+
+
+@pytest.mark.parametrize(
+    ("message_id", "name"),
+    [
+        *((0, "HEARTBEAT"), (1, "SYS_STATUS"), (2, "SYSTEM_TIME"), (26, "SCALED_IMU")),
+        *((29, "SCALED_PRESSURE"), (30, "ATTITUDE"), (33, "GLOBAL_POSITION_INT"), (36, "SERVO_OUTPUT_RAW")),
+        *((49, "GPS_GLOBAL_ORIGIN"), (74, "VFR_HUD"), (83, "ATTITUDE_TARGET"), (85, "POSITION_TARGET_LOCAL_NED")),
+        *((87, "POSITION_TARGET_GLOBAL_INT"), (105, "HIGHRES_IMU"), (141, "ALTITUDE"), (147, "BATTERY_STATUS")),
+        *((148, "AUTOPILOT_VERSION"), (230, "ESTIMATOR_STATUS"), (241, "VIBRATION"), (242, "HOME_POSITION")),
+        *((245, "EXTENDED_SYS_STATE"), (264, "FLIGHT_INFORMATION"), (331, "ODOMETRY")),
+        *((375, "ACTUATOR_OUTPUT_STATUS"), (436, "CURRENT_MODE")),
+    ],
+)
+def test_every_message_can_be_asked_for(hovering, message_id, name):
+    # As on a PX4, what the stream has already sent is denied until there is a new sample
+    for _ in range(40):
+        hovering.forget()
+        hovering.command(REQUEST_MESSAGE, message_id)
+        hovering.step()
+        if hovering.results(REQUEST_MESSAGE) == [0]:
+            break
+    kinds = [message.get_type() for _, message in hovering.received]
+    assert kinds.index(name) < kinds.index("COMMAND_ACK")
+
+
+def test_places_agree(hovering):
+    local, place = hovering.last("LOCAL_POSITION_NED"), hovering.last("GLOBAL_POSITION_INT")
+    home, fix = hovering.last("HOME_POSITION"), hovering.last("GPS_RAW_INT")
+    origin = hovering.last("GPS_GLOBAL_ORIGIN")
+    to_local = Origin(Place(origin.latitude / 1e7, origin.longitude / 1e7, origin.altitude / 1e3)).position_of
+    by_place = to_local(Place(place.lat / 1e7, place.lon / 1e7, place.alt / 1e3))
+    assert by_place == pytest.approx((local.x, local.y, local.z), abs=0.05)
+    assert to_local(Place(fix.lat / 1e7, fix.lon / 1e7, fix.alt / 1e3)) == pytest.approx(by_place, abs=0.2)
+    assert to_local(Place(home.latitude / 1e7, home.longitude / 1e7, home.altitude / 1e3)) == pytest.approx(
+        (home.x, home.y, home.z), abs=0.02
+    )
+    assert place.relative_alt / 1e3 == pytest.approx(home.z - local.z, abs=0.05)
+    assert hovering.last("ALTITUDE").altitude_relative == pytest.approx(home.z - local.z, abs=0.05)
+    assert hovering.last("VFR_HUD").alt == pytest.approx(place.alt / 1e3, abs=0.05)
+    assert (fix.fix_type, fix.satellites_visible) == (3, 10)
+
+
+def test_what_a_hovering_vehicle_says_of_itself(hovering):
+    assert 50 < hovering.last("VFR_HUD").throttle < 100
+    motors = hovering.last("SERVO_OUTPUT_RAW")
+    assert all(1500 < width < 2000 for width in (motors.servo1_raw, motors.servo4_raw))
+    assert motors.servo5_raw == 900
+    target = hovering.last("ATTITUDE_TARGET")
+    assert math.hypot(*target.q) == pytest.approx(1.0) and target.q[0] == pytest.approx(1.0, abs=0.05)
+    field = hovering.last("HIGHRES_IMU")
+    # The field of Zurich: 0.2 gauss north, 0.43 down; the nose points north
+    assert (field.xmag, field.zmag) == (pytest.approx(0.21, abs=0.03), pytest.approx(0.43, abs=0.03))
+    assert 950 < field.abs_pressure < 960
+
+
+def test_magnetometer_and_barometer_are_marked_when_they_are_new():
+    client = Client()
+    client.run(10.0)
+    fields = [message.fields_updated for message in client.all("HIGHRES_IMU")]
+    # 15 and 20 times a second against 50
+    assert sum(bool(f & 0x1C0) for f in fields) / 10 == pytest.approx(15.6, abs=0.5)
+    assert sum(bool(f & 0x1A00) for f in fields) / 10 == pytest.approx(20.8, abs=0.5)
+
+
+def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_ground():
+    client = Client()
+    client.run(3.0)
+    at_rest = client.last("BATTERY_STATUS")
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(6.0)
+    flying = client.last("BATTERY_STATUS")
+    # A minute empties it (SIM_BAT_DRAIN), but not below half (SIM_BAT_MIN_PCT)
+    client.run(60.0)
+    late = client.last("BATTERY_STATUS")
+    assert at_rest.battery_remaining == 100 and at_rest.charge_state == 1
+    assert flying.current_battery > 1000 > at_rest.current_battery
+    assert at_rest.voltages[0] - flying.voltages[0] > 200
+    assert late.battery_remaining == 50 and late.voltages[0] < flying.voltages[0] - 500
+    assert late.current_consumed > 100
+    assert client.last("SYS_STATUS").battery_remaining == 50
+
+
+def test_a_low_battery_shows():
+    client = Client()
+    for name, value in (("SIM_BAT_DRAIN", 5.0), ("SIM_BAT_MIN_PCT", 0.0)):
+        client.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(4.7)
+    assert client.vehicle._board.autopilot.battery.warning > 0
+    client.run(0.3)
+    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x2000000
+
+
+@pytest.mark.parametrize("ned", [(0.0, 0.0, 0.0), (120.0, -75.0, -30.0), (-4_000.0, 9_000.0, 12.0)])
+def test_local_to_geographic_and_back(ned):
+    origin = Origin()
+    assert origin.position_of(origin.place_at(ned)) == pytest.approx(ned, abs=1e-3)
+
+
+def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
+    place = Origin().place_at((0.0, 100.0, -12.0))
+    degrees = 100.0 / (111_194.93 * math.cos(math.radians(47.397742)))
+    assert place.longitude_deg - 8.545594 == pytest.approx(degrees, rel=1e-5)
+    assert place.altitude_m == 500.0
