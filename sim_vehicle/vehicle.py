@@ -4,7 +4,8 @@ from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.board import Board
-from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import Topics
@@ -16,6 +17,9 @@ from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.slow_sensors import SlowSensors
 from sim_vehicle.truth import TruthRecorder
+
+# A signature has one byte for the link.
+_LINK_NUMBERS = 256
 
 
 class SimulatedVehicle:
@@ -61,34 +65,50 @@ class SimulatedVehicle:
         self.time_boot_us = first.time_boot_us
         self._topics = Topics(self._telemetry)
         identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
-        self._board = Board(identity, self._autopilot, parameters, self._telemetry, self._topics, self.interval_us)
+        self._board = Board(
+            identity, self._autopilot, parameters, self._telemetry, self._topics, Signing(), self.interval_us
+        )
         self._links: list[Link] = []
-        self._companion_link = self.add_link(LinkKind.ONBOARD)
+        self._links_so_far = 0
+        self._companion_link: Link | None = None
 
     @property
     def truth(self) -> TruthRecorder:
         """What really happened, never sent."""
         return self._plant.truth
 
-    def add_link(self, kind: LinkKind) -> Link:
+    def add_link(self, options: LinkOptions) -> Link:
         """One more connection, from now on."""
-        link = Link(kind, self._board, self._seed + len(self._links))
+        link = Link(options, self._board, self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far)
+        self._links_so_far += 1
         self._links.append(link)
         return link
 
+    def remove_link(self, link: Link) -> None:
+        """The connection has ended."""
+        self._links.remove(link)
+
     def step(self, received: bytes) -> tuple[bytes, ...]:
         """One interval for a lone companion: apply the bytes received since the last, return the packets to send."""
-        self._companion_link.push(received)
+        link = self._companion_link
+        if link is None:
+            link = self._companion_link = self.add_link(LinkOptions(LinkKind.ONBOARD))
+        link.push(received)
         self.advance()
-        return self._companion_link.take()
+        return link.take()
 
     def advance(self) -> None:
         """One interval: act on what the links have received, fly, leave what they are to send."""
         # The commander runs beside the receivers: it answers in the interval after a command came.
         acks = self._autopilot.run_commander()
-        for link in self._links:
+        links = self._links
+        for link in links:
             link.acknowledge(acks)
-            link.receive()
+            foreign = link.receive(collects_foreign=len(links) > 1)
+            if foreign:
+                for other in links:
+                    if other is not link:
+                        other.forward(foreign)
         self._tune()
         sample = self._fly(self._autopilot.run_control())
         self._topics.count(new_position=self._publish(sample))

@@ -96,6 +96,31 @@ class TimeSyncRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class SigningSetup:
+    """SETUP_SIGNING."""
+
+    key: bytes
+    time_stamp: int
+
+
+@dataclass(frozen=True, slots=True)
+class PingRequest:
+    """PING to everybody: it is sent back."""
+
+    time_us: int
+    number: int
+    source_system: int
+    source_component: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """SET_MODE, as the command that PX4 makes of it."""
+
+    command: Command
+
+
+@dataclass(frozen=True, slots=True)
 class CommandAck:
     command: int
     result: Result

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import Topics
 from sim_vehicle.parameters.store import Parameters
@@ -18,5 +19,6 @@ class Board:
     parameters: Parameters
     telemetry: Telemetry
     topics: Topics
+    signing: Signing
     interval_us: int
     """Of the inertial samples, and so of the vehicle's steps."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from sim_vehicle.autopilot import commands
-from sim_vehicle.autopilot.messages import Command
+from sim_vehicle.autopilot.messages import Command, SetMode
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.service import Handler
@@ -22,10 +22,14 @@ class CommandService:
 
     @property
     def handlers(self) -> Mapping[type, Handler]:
-        return {Command: self._command}
+        return {Command: self._command, SetMode: self._set_mode}
 
     def update(self, now_us: int) -> None:
         """Nothing waits: every answer is given when it is known."""
+
+    def _set_mode(self, request: SetMode) -> None:
+        """The commander's answer is the only one, unlike with the command."""
+        self._board.autopilot.command(request.command)
 
     def _command(self, command: Command) -> None:
         if not commands.is_for_us(command, self._board.identity):

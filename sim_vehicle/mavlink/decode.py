@@ -3,12 +3,24 @@
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.messages import EVERY_ID, Command, Identity, PeerHeartbeat, PositionTarget, TimeSyncRequest
+from sim_vehicle.autopilot.messages import (
+    EVERY_ID,
+    Command,
+    Identity,
+    PeerHeartbeat,
+    PingRequest,
+    PositionTarget,
+    SetMode,
+    SigningSetup,
+    TimeSyncRequest,
+)
 from sim_vehicle.mavlink import parameter_reader
+from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
 from sim_vehicle.setpoint import Axis3
 
 _MARKER = re.compile(rb"[\xfd\xfe]")
@@ -17,20 +29,36 @@ _MARKER_V2 = 0xFD
 _AROUND_V2, _AROUND_V1, _SIGNATURE = 12, 8, 13
 _SIGNED_FLAG = 0x01
 
+_DO_SET_MODE = 176
 _GREATEST_INT32 = 2**31 - 1
 _FORCE_BIT = 0x200
 _YAW_IGNORED, _YAW_RATE_IGNORED = 0x400, 0x800
 
 
+@dataclass(frozen=True, slots=True)
+class ForeignPacket:
+    """A packet and whom it is for."""
+
+    raw: bytes
+    target_system: int
+    target_component: int
+
+
 class Decoder:
     """Finds the packets in a stream of bytes that may be split, damaged or anything else."""
 
-    def __init__(self, us: Identity) -> None:
+    def __init__(self, us: Identity, signing: Signing | None = None) -> None:
         self._us = us
+        self._signing = signing or Signing()
+        self.signing_is_optional = False
+        """MAV_SIGN_CFG = 0: unsigned packets are read although there is a key."""
         self._parser = dialect.MAVLink(None)
         self._rest = b""
         self.sources: set[tuple[int, int]] = set()
         """System and component of everybody who was heard here."""
+        self.heard_mavlink_2 = False
+        self.foreign: list[ForeignPacket] | None = None
+        """Where set: packets that are not for this vehicle alone, for other links to pass on."""
 
     def push(self, data: bytes) -> list[object]:
         """The messages completed by ``data``, in order; what this vehicle does not read or is not meant for is dropped.
@@ -56,6 +84,7 @@ class Decoder:
                 position = start + 1
                 continue
             kept, position = len(buffer), end
+            self._hear(packet, buffer[start:end])
             message = self._read(packet)
             if message is not None:
                 messages.append(message)
@@ -70,10 +99,23 @@ class Decoder:
         except dialect.MAVError:
             return None
         # Without its definition, a packet's checksum cannot be judged.
-        return None if isinstance(message, dialect.MAVLink_unknown) else message
+        if isinstance(message, dialect.MAVLink_unknown):
+            return None
+        is_signed = packet[0] == _MARKER_V2 and bool(packet[2] & _SIGNED_FLAG)
+        source = message.get_srcSystem(), message.get_srcComponent()
+        accepted = self._signing.accepts(packet, is_signed, source, message.id, self.signing_is_optional)
+        return message if accepted else None
+
+    def _hear(self, packet: dialect.MAVLink_message, raw: bytes) -> None:
+        self.sources.add((packet.get_srcSystem(), packet.get_srcComponent()))
+        self.heard_mavlink_2 |= raw[0] == _MARKER_V2
+        if self.foreign is None:
+            return
+        target = _target(packet) if hasattr(packet, "target_system") else (EVERY_ID, EVERY_ID)
+        if target != self._us:
+            self.foreign.append(ForeignPacket(raw, *target))
 
     def _read(self, packet: dialect.MAVLink_message) -> object | None:
-        self.sources.add((packet.get_srcSystem(), packet.get_srcComponent()))
         message_id: int = packet.id
         read = READERS.get(message_id)
         if read is None or (message_id in _ADDRESSED and not self._us.is_addressed(*_target(packet))):
@@ -103,6 +145,22 @@ def _heartbeat(packet: dialect.MAVLink_heartbeat_message) -> PeerHeartbeat:
 
 def _timesync(packet: dialect.MAVLink_timesync_message) -> TimeSyncRequest | None:
     return TimeSyncRequest(packet.ts1) if packet.tc1 == 0 else None
+
+
+def _ping(packet: dialect.MAVLink_ping_message) -> PingRequest | None:
+    if (packet.target_system, packet.target_component) != (EVERY_ID, EVERY_ID):
+        return None
+    return PingRequest(packet.time_usec, packet.seq, packet.get_srcSystem(), packet.get_srcComponent())
+
+
+def _set_mode(packet: dialect.MAVLink_set_mode_message) -> SetMode:
+    main, sub = packet.custom_mode >> 16 & 0xFF, packet.custom_mode >> 24
+    source, target = (packet.get_srcSystem(), packet.get_srcComponent()), (packet.target_system, EVERY_ID)
+    return SetMode(Command(*source, *target, _DO_SET_MODE, packet.base_mode, main, sub))
+
+
+def _setup_signing(packet: dialect.MAVLink_setup_signing_message) -> SigningSetup:
+    return SigningSetup(bytes(packet.secret_key), packet.initial_timestamp)
 
 
 def _command_long(packet: dialect.MAVLink_command_long_message) -> Command:
@@ -171,6 +229,9 @@ Reader: TypeAlias = Callable[[dialect.MAVLink_message], object | None]
 # By message id. What is in no table is dropped.
 READERS: dict[int, Reader] = {
     0: _heartbeat,
+    4: _ping,
+    11: _set_mode,
+    SETUP_SIGNING_ID: _setup_signing,
     75: _command_int,
     76: _command_long,
     84: _position_target,
@@ -178,7 +239,10 @@ READERS: dict[int, Reader] = {
     **parameter_reader.READERS,
 }
 
-# Commands may go to other components and still be answered: whom they are for is decided where they are handled.
+# Commands may go to other components and still be answered, and who is pinged is the one thing that a PING says.
+_NOT_ADDRESSED = (4, 75, 76)
 _ADDRESSED = frozenset(
-    number for number in READERS if "target_system" in dialect.mavlink_map[number].fieldnames and number not in (75, 76)
+    number
+    for number in READERS
+    if "target_system" in dialect.mavlink_map[number].fieldnames and number not in _NOT_ADDRESSED
 )

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.estimate import Estimate
-from sim_vehicle.autopilot.messages import CommandAck, Identity, StatusText, TimeSyncRequest
+from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3
@@ -21,6 +21,8 @@ Message: TypeAlias = Any
 NAN = math.nan
 _NO_OFFSET = (0.0, 0.0, 0.0, 0.0)
 _TEXT_BYTES = 50
+AUTOPILOT_VERSION_ID = 148
+_GREATEST_MAVLINK_1_ID = 255
 # HIGHRES_IMU.fields_updated: accelerometer and gyroscope; magnetometer; pressure, its altitude and temperature.
 _INERTIAL_FIELDS, _MAGNETIC_FIELDS, _AIR_FIELDS = 0x3F, 0x1C0, 0x1A00
 
@@ -30,13 +32,28 @@ class Encoder:
 
     def __init__(self, us: Identity) -> None:
         self._link = dialect.MAVLink(None, srcSystem=us.system, srcComponent=us.component)
+        self.speaks_mavlink_1 = False
 
-    def packet(self, message: Message) -> bytes:
-        """The message as a MAVLink 2 packet."""
+    def packet(self, message: Message) -> bytes | None:
+        """The message as a packet; None for one whose number MAVLink 1 has no room for."""
         link = self._link
-        packet: bytes = message.pack(link)
+        if self.speaks_mavlink_1 and message.id > _GREATEST_MAVLINK_1_ID:
+            return None
+        packet: bytes = message.pack(link, force_mavlink1=self.speaks_mavlink_1)
         link.seq = (link.seq + 1) & 0xFF
         return packet
+
+    def sign(self, key: bytes | None, link_number: int, time_stamp: int) -> None:
+        """From now on sign with this key and from this time stamp on; None for no more signing."""
+        signing = self._link.signing
+        signing.secret_key, signing.sign_outgoing = key, key is not None
+        signing.link_id, signing.timestamp = link_number, time_stamp
+
+
+def payload_bytes(message_id: int) -> int:
+    """Length of a message's whole payload."""
+    length: int = dialect.mavlink_map[message_id].unpacker.size
+    return length
 
 
 def heartbeat(state: Telemetry) -> Message:
@@ -189,6 +206,12 @@ def message_interval(message_id: int, interval_us: int) -> Message:
 
 def command_ack(ack: CommandAck) -> Message:
     return dialect.MAVLink_command_ack_message(ack.command, ack.result, 0, 0, ack.target_system, ack.target_component)
+
+
+def ping_answer(request: PingRequest) -> Message:
+    return dialect.MAVLink_ping_message(
+        request.time_us, request.number, request.source_system, request.source_component
+    )
 
 
 def timesync_reply(request: TimeSyncRequest, heard_at_us: int) -> Message:

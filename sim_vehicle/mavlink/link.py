@@ -1,33 +1,62 @@
 """One MAVLink connection: packets, streams, texts, services. The links of a vehicle know nothing of each other."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
-from sim_vehicle.autopilot.messages import CommandAck, PeerHeartbeat, StatusText
+from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, PeerHeartbeat, PingRequest, SigningSetup, StatusText
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.board import Board
-from sim_vehicle.mavlink.decode import Decoder
+from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
+from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line
+from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.service import Handler
 from sim_vehicle.mavlink.services import SERVICES
+from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams
 from sim_vehicle.mavlink.texts import TextLink
 
+# MAV_PROTO_VER: MAVLink 1 until somebody speaks MAVLink 2.
+_BEGINS_WITH_MAVLINK_1 = 1
+
+
+@dataclass(frozen=True, slots=True)
+class LinkOptions:
+    """What a link is for, what lies under it, and whether it passes on what is meant for others (MAV_n_FORWARD)."""
+
+    kind: LinkKind
+    line: Line = FAST_LINE
+    forwards: bool = True
+
 
 class Link:
-    """Bytes in, packets out."""
+    """Bytes in, packets out. ``number`` tells the links of a vehicle apart in signatures."""
 
-    def __init__(self, kind: LinkKind, board: Board, seed: int) -> None:
-        self.kind = kind
+    def __init__(self, options: LinkOptions, board: Board, number: int, seed: int) -> None:
+        self.options = options
         self.now_us = board.telemetry.sample.time_boot_us
+        self._board = board
+        self._number = number
         self._waiting = b""
-        self._decoder = Decoder(board.identity)
-        self.streams = Streams(board.telemetry, board.topics, Encoder(board.identity), kind, seed)
+        self._decoder = Decoder(board.identity, board.signing)
+        self._encoder = Encoder(board.identity)
+        self._signed_with: bytes | None = None
+        self._buffer = Buffer(options.line, self.now_us)
+        self._outbox = Outbox(self._encoder, self._buffer)
+        self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, options.line)
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
-        self._handlers: dict[type, Handler] = {PeerHeartbeat: self._hear_heartbeat}
+        self._handlers: dict[type, Handler] = {
+            PeerHeartbeat: self._hear_heartbeat,
+            PingRequest: self._answer_ping,
+            SigningSetup: self._set_up_signing,
+        }
         for service in self._services:
             self._handlers.update(service.handlers)
+        if options.line.baud is not None:
+            # Over a serial port PX4 introduces itself unasked.
+            self.streams.send_now(encode.AUTOPILOT_VERSION_ID)
 
     def push(self, data: bytes) -> None:
         """Bytes have arrived; they are read at the vehicle's next step."""
@@ -35,17 +64,19 @@ class Link:
 
     def take(self) -> tuple[bytes, ...]:
         """The packets to send, in order."""
-        return self.streams.take()
+        return self._outbox.take()
 
     # --- what services need ------------------------------------------------------------------------------
 
     def send(self, message: Message) -> None:
         """Send something that is no stream."""
-        self.streams.send(message)
+        self._outbox.send(message)
 
-    def burst(self, fast: int, serial: int) -> int:
-        """How many packets of a long answer may be sent in this interval: ``serial`` on a serial line."""
-        return fast
+    def burst(self, fast: int, serial: int, size: int) -> int:
+        """How many packets of ``size`` bytes of a long answer may be sent now: at most ``serial`` on a serial line."""
+        if self.options.line.baud is None:
+            return fast
+        return next((count for count in range(serial, 0, -1) if self._outbox.has_room(count * size)), 0)
 
     # --- what the vehicle's step calls, in this order ----------------------------------------------------
 
@@ -55,15 +86,33 @@ class Link:
             if (ack.target_system, ack.target_component) in self._decoder.sources:
                 self.send(encode.command_ack(ack))
 
-    def receive(self) -> None:
-        """Act on the packets that the waiting bytes complete."""
+    def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
+        """Act on the packets that the waiting bytes complete; those for others are returned, where asked for."""
+        if not self._waiting:
+            return []
         data, self._waiting = self._waiting, b""
-        for message in self._decoder.push(data):
-            self._handlers[type(message)](message)
+        decoder, parameters = self._decoder, self._board.parameters
+        decoder.foreign = [] if collects_foreign and self.options.forwards else None
+        decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == SIGNING_OPTIONAL
+        for message in decoder.push(data):
+            handler = self._handlers.get(type(message))
+            if handler is not None:
+                handler(message)
+        return decoder.foreign or []
+
+    def forward(self, packets: Iterable[ForeignPacket]) -> None:
+        """Pass on what came over other links, if somebody here may want it."""
+        if not self.options.forwards:
+            return
+        for packet in packets:
+            if self._has_heard(packet.target_system, packet.target_component):
+                self._outbox.forward(packet.raw)
 
     def update(self, now_us: int, texts: Sequence[StatusText]) -> None:
         """Send what is due at the end of the interval."""
         self.now_us = now_us
+        self._buffer.advance(now_us)
+        self._choose_protocol()
         for text in texts:
             self._texts.add(text, now_us)
         for message in self._texts.due(now_us):
@@ -72,5 +121,26 @@ class Link:
             service.update(now_us)
         self.streams.update()
 
+    def _has_heard(self, system: int, component: int) -> bool:
+        sources = self._decoder.sources
+        if system == EVERY_ID:
+            return bool(sources)
+        return any(source[0] == system and component in (EVERY_ID, source[1]) for source in sources)
+
+    def _choose_protocol(self) -> None:
+        board, encoder = self._board, self._encoder
+        begins_with_1 = board.parameters["MAV_PROTO_VER"] <= _BEGINS_WITH_MAVLINK_1
+        encoder.speaks_mavlink_1 = begins_with_1 and not self._decoder.heard_mavlink_2
+        key = board.signing.key
+        if key is not None or self._signed_with is not None:
+            self._signed_with = key
+            encoder.sign(key, self._number, board.signing.next_stamp(board.telemetry.epoch_at_boot_us + self.now_us))
+
     def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
         self._texts.heard(heartbeat, self.now_us)
+
+    def _answer_ping(self, request: PingRequest) -> None:
+        self.send(encode.ping_answer(request))
+
+    def _set_up_signing(self, setup: SigningSetup) -> None:
+        self._board.signing.set_up(setup.key, setup.time_stamp)

@@ -22,6 +22,8 @@ HASH_NAME = "_HASH_CHECK"
 NO_INDEX = 0xFFFF
 # PX4 sends so many of a list at a time where the link is fast, and so many on a serial line.
 BURST, BURST_SERIAL = 20, 3
+# A whole PARAM_VALUE with header and checksum.
+PACKET_BYTES = 25 + 12
 # A changed value is told to everybody this long after it was set, whoever set it.
 ANNOUNCE_AFTER_US = 5_000
 _ALL_BITS = 0xFFFFFFFF
@@ -83,7 +85,7 @@ class ParameterService:
         self._send(request.name)
 
     def _send_burst(self) -> None:
-        for _ in range(self._link.burst(BURST, BURST_SERIAL)):
+        for _ in range(self._link.burst(BURST, BURST_SERIAL, PACKET_BYTES)):
             if self._next is None:
                 return
             if self._next < 0:

@@ -8,17 +8,18 @@ sends a 250 Hz topic at 125 Hz; asked for 100 Hz, in gaps of 12 and 8 ms.
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sim_vehicle.mavlink import aiding, condition, encode, navigation
-from sim_vehicle.mavlink.encode import Encoder, Message
+from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.line import FAST_LINE, Line
+from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.topics import NEVER_SENT, Topic, Topics
+from sim_vehicle.mavlink.topics import NEVER_SENT, OPTIONAL, Topic, Topics
 
-# A message is sent this much before it is due: 0.3 of the link's loop, which sleeps 1.5 ms.
-EARLY_US = 3 * (1500 // 10)
 # Now and then the link's loop comes too late and misses one sample: PX4 asked for 250 Hz sends 246.
 MISSED_LOOPS_SHARE = 0.012
 NOT_STREAMED_US = -1
@@ -35,8 +36,16 @@ class StreamKind:
     notes: tuple[Topic, ...] = ()
     """Slower topics whose news the message marks as such: `Telemetry.renewed`, in this order."""
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether a slow line leaves its rate alone."""
+        return self.message_id in CONSTANT_IDS
+
 
 HEARTBEAT_ID = 0
+# Streams that PX4 never slows: HEARTBEAT and PING.
+CONSTANT_IDS = (HEARTBEAT_ID, 4)
+_AROUND_PAYLOAD = 12
 # Topics whose messages are sent on request even if they were sent already.
 SENT_AGAIN = (Topic.ALWAYS_NEW, Topic.ORIGIN)
 # On every link, whatever its set.
@@ -96,13 +105,36 @@ def interval_from_request(interval_us: float) -> int:
     return max(int(np.float32(1_000_000) / rate_hz), 1)
 
 
+class Pace(NamedTuple):
+    """How a link slows its streams: see `line.py`."""
+
+    early_us: int
+    share: float = 1.0
+
+
+FAST_PACE = Pace(Line().early_us)
+
+
 class Stream:
     """One running or stopped stream: due when `now_us > due_after_us`; then tell it that it was `sent`."""
 
-    __slots__ = ("_last_us", "default_interval_us", "due_after_us", "interval_us", "kind", "noted", "seen")
+    __slots__ = (
+        "_last_us",
+        "_paced_us",
+        "default_interval_us",
+        "due_after_us",
+        "interval_us",
+        "kind",
+        "noted",
+        "pace",
+        "seen",
+    )
 
-    def __init__(self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US) -> None:
+    def __init__(
+        self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US, pace: Pace = FAST_PACE
+    ) -> None:
         self.kind = kind
+        self.pace = pace
         self.seen = NEVER_SENT
         self.noted = [NEVER_SENT for _ in kind.notes]
         self.default_interval_us = default_interval_us
@@ -116,7 +148,16 @@ class Stream:
     def set_interval(self, interval_us: int) -> None:
         """Go on with another interval."""
         self.interval_us = interval_us
-        self.due_after_us = self._last_us + interval_us - EARLY_US
+        self._plan()
+
+    def set_pace(self, pace: Pace) -> None:
+        """Go on with what the link can carry."""
+        self.pace = pace
+        self._plan()
+
+    def _plan(self) -> None:
+        self._paced_us = int(self.interval_us / self.pace.share)
+        self.due_after_us = self._last_us + self._paced_us - self.pace.early_us
 
     def renewed(self, versions: list[int]) -> tuple[bool, ...]:
         """Which of the noted topics have news since the last message."""
@@ -127,10 +168,10 @@ class Stream:
 
     def sent(self, now_us: int) -> None:
         """Keep the mean rate by counting from when it was due, unless that is long ago."""
-        interval_us = self.interval_us
+        interval_us = self._paced_us
         late = now_us - self._last_us >= 1.5 * interval_us
         self._last_us = now_us if late else self._last_us + interval_us
-        self.due_after_us = self._last_us + interval_us - EARLY_US
+        self.due_after_us = self._last_us + interval_us - self.pace.early_us
 
 
 class LateLoops:
@@ -148,28 +189,45 @@ class LateLoops:
 
 
 class Streams:
-    """All streams of the one link; packets wait in ``outbox`` until they are taken."""
+    """All streams of one link; their messages go to its ``outbox``."""
 
-    def __init__(self, state: Telemetry, topics: Topics, encoder: Encoder, link: LinkKind, seed: int) -> None:
+    def __init__(
+        self, state: Telemetry, topics: Topics, outbox: Outbox, link: LinkKind, seed: int, line: Line = FAST_LINE
+    ) -> None:
         self._state = state
-        self._encoder = encoder
+        self._outbox = outbox
+        self._line = line
         self._now_us = state.sample.time_boot_us
         rates_hz = {HEARTBEAT_ID: HEARTBEAT_HZ, **link.rates_hz}
         self._streams = [
             Stream(kind, self._now_us, interval_from_rate(rates_hz.get(kind.message_id))) for kind in KINDS
         ]
         self._by_id = {stream.kind.message_id: stream for stream in self._streams}
-        self._running = [stream for stream in self._streams if stream.interval_us >= 0]
         self._versions = topics.versions
         self._loops = LateLoops(seed)
-        self.outbox: list[bytes] = []
+        self._run()
+
+    def _run(self) -> None:
+        """Find the streams that run, and at what pace the line lets them."""
+        self._running = [stream for stream in self._streams if stream.interval_us >= 0]
+        if self._line.baud is None:
+            return
+        planned = [(stream, _size(stream.kind), stream.interval_us) for stream in self._running if self._exists(stream)]
+        varying = [(size, interval_us) for stream, size, interval_us in planned if not stream.kind.is_constant]
+        constant = [(size, interval_us) for stream, size, interval_us in planned if stream.kind.is_constant]
+        share, early_us = self._line.share(varying, constant), self._line.early_us
+        for stream in self._streams:
+            stream.set_pace(Pace(early_us, 1.0 if stream.kind.is_constant else share))
+
+    def _exists(self, stream: Stream) -> bool:
+        return stream.kind.topic not in OPTIONAL or self._versions[stream.kind.topic] != NEVER_SENT
 
     def update(self) -> None:
         """Send what is due at the newest sample."""
         self._now_us = now_us = self._state.sample.time_boot_us
         if self._loops.misses_this_one():
             return
-        versions, outbox = self._versions, self.outbox
+        versions, outbox, state = self._versions, self._outbox, self._state
         for stream in self._running:
             if now_us <= stream.due_after_us:
                 continue
@@ -180,8 +238,8 @@ class Streams:
             stream.seen = version
             stream.sent(now_us)
             if kind.notes:
-                self._state.renewed = stream.renewed(versions)
-            outbox.append(self._encoder.packet(kind.build(self._state)))
+                state.renewed = stream.renewed(versions)
+            outbox.send(kind.build(state))
 
     # --- commands ----------------------------------------------------------------------------------------
 
@@ -200,14 +258,14 @@ class Streams:
             stream.set_interval(wanted_us)
         else:
             stream.restart(wanted_us, self._now_us)
-        self._running = [stream for stream in self._streams if stream.interval_us >= 0]
+        self._run()
         return True
 
     def announce_interval(self, message_id: int) -> None:
         """MESSAGE_INTERVAL: what was asked for, not what is received; -1 where nothing is streamed."""
         stream = self._by_id.get(message_id)
         interval_us = NOT_STREAMED_US if stream is None else stream.interval_us
-        self.send(encode.message_interval(message_id, interval_us))
+        self._outbox.send(encode.message_interval(message_id, interval_us))
 
     def send_now(self, message_id: int) -> bool:
         """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
@@ -220,15 +278,10 @@ class Streams:
         stream.seen = version
         if stream.kind.notes:
             self._state.renewed = stream.renewed(self._versions)
-        self.send(stream.kind.build(self._state))
+        self._outbox.send(stream.kind.build(self._state))
         return True
 
-    def send(self, message: Message) -> None:
-        """Send something that is no stream."""
-        self.outbox.append(self._encoder.packet(message))
 
-    def take(self) -> tuple[bytes, ...]:
-        """All packets since the last call, in order."""
-        packets = tuple(self.outbox)
-        self.outbox.clear()
-        return packets
+def _size(kind: StreamKind) -> int:
+    """As PX4 reckons: the whole payload, header and checksum."""
+    return encode.payload_bytes(kind.message_id) + _AROUND_PAYLOAD

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
+from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -67,7 +68,7 @@ GROUND_HZ = {
 
 def rates_hz(kind: LinkKind, seconds: float = 40.0) -> dict[str, float]:
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
-    link, parser = vehicle.add_link(kind), dialect.MAVLink(None)
+    link, parser = vehicle.add_link(LinkOptions(kind)), dialect.MAVLink(None)
     counts: Counter[str] = Counter()
     for _ in range(round(seconds * 250)):
         vehicle.advance()

@@ -12,6 +12,8 @@ from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import streams as module
 from sim_vehicle.mavlink.encode import Encoder
+from sim_vehicle.mavlink.line import Buffer, Line
+from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams, interval_from_request
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -34,7 +36,8 @@ class Link:
         telemetry = Telemetry(self.sample, self.sample, self.autopilot, Vibration(), 1e-4, 1e-3, 1e-5)
         self.telemetry = telemetry
         self.topics = Topics(telemetry)
-        self.streams = Streams(telemetry, self.topics, Encoder(Identity()), LinkKind.ONBOARD, seed)
+        self.outbox = Outbox(Encoder(Identity()), Buffer(Line(), 0))
+        self.streams = Streams(telemetry, self.topics, self.outbox, LinkKind.ONBOARD, seed)
         self.parser = dialect.MAVLink(None)
         self.sent_us: dict[int, list[int]] = {}
         self.last: dict[int, object] = {}
@@ -53,7 +56,7 @@ class Link:
             self.take()
 
     def take(self) -> None:
-        for raw in self.streams.take():
+        for raw in self.outbox.take():
             message = self.parser.decode(bytearray(raw))
             self.sent_us.setdefault(message.get_msgId(), []).append(self.sample.time_boot_us)
             self.last[message.get_msgId()] = message
@@ -211,6 +214,6 @@ def test_sequence_numbers_count_every_packet():
         link.telemetry.sample = link.telemetry.published = link.sample
         link.topics.count(True)
         link.streams.update()
-        numbers += [raw[4] for raw in link.streams.take()]
+        numbers += [raw[4] for raw in link.outbox.take()]
     assert all((b - a) % 256 == 1 for a, b in pairwise(numbers))
     assert len(numbers) > 1_000
