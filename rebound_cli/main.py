@@ -106,14 +106,15 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     sim.add_argument(
         "--port",
         type=port,
-        help="UDP port to listen on (default 14580; 0: any free one); with --autopilot px4 the TCP port (4560)",
+        help="UDP port to listen on for the companion (default 14580 + instance; 0: any free one); "
+        "with --autopilot px4 the TCP port (4560)",
     )
     sim.add_argument(
         "--speed",
         type=speed,
         default=1.0,
         metavar="N",
-        help="with --autopilot px4: at most N times real time, 0 for as fast as PX4 answers (default 1)",
+        help="at most N times real time, 0 for as fast as it goes (default 1)",
     )
     sim.add_argument(
         "--sensor-rate",
@@ -125,9 +126,18 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     sim.add_argument(
         "--remote",
         type=host_and_port,
-        default=("127.0.0.1", 14540),
         metavar="HOST:PORT",
-        help="where to send unasked (default 127.0.0.1:14540)",
+        help="where the companion's link sends unasked (default 127.0.0.1:14540 + instance)",
+    )
+    sim.add_argument(
+        "--link",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="one more link, e.g. tcpin://0.0.0.0:5760 or serial:///dev/ttyUSB0:57600; see docs/vehicle.md",
+    )
+    sim.add_argument(
+        "--instance", type=instance, default=0, metavar="N", help="adds N to the UDP ports and to the system's number"
     )
     sim.add_argument(
         "--truth", type=Path, metavar="FILE", help="write what really happened to this .npz file at the end"

@@ -3,14 +3,16 @@
 import os
 import signal
 import threading
+import time
 from argparse import Namespace
 
 from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
 from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.shell.addresses import COMPANION_PORT, open_port, px4_ports
 from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
-from sim_vehicle.shell.udp import LISTEN_PORT, serve
+from sim_vehicle.shell.realtime import serve
 from sim_vehicle.vehicle import SimulatedVehicle
 
 
@@ -30,14 +32,22 @@ def run_sim(options: Namespace) -> int:
 
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
-    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
-    host, port = options.remote
+    vehicle = SimulatedVehicle(
+        world.airframe,
+        world.scene,
+        world.seed,
+        epoch_at_boot_us=time.time_ns() // 1000,
+        parameters={"MAV_SYS_ID": options.instance + 1},
+    )
+    remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
+    ports = px4_ports(vehicle, options.instance, options.port, remote)
+    ports += [open_port(vehicle, address) for address in options.link]
+    host, port = remote
     print(
         f"{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.",
         flush=True,
     )
-    listen_port = LISTEN_PORT if options.port is None else options.port
-    serve(vehicle, listen_port, options.remote, options.truth, stopped.is_set)
+    serve(vehicle, ports, options.truth, stopped.is_set, options.speed)
 
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:

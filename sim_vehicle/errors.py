@@ -17,5 +17,9 @@ class PortInUse(SimulationError):  # noqa: N818 - reads as the sentence it is
     """The port on which the vehicle listens cannot be had."""
 
 
+class LinkAddressError(SimulationError):
+    """An address that names no link of the simulated vehicle."""
+
+
 class NotInLockstep(SimulationError):  # noqa: N818 - reads as the sentence it is
     """A PX4 that keeps its own time instead of the simulator's."""

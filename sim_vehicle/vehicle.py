@@ -1,5 +1,7 @@
 """The simulated vehicle: MAVLink bytes in, one interval of flight, MAVLink bytes out."""
 
+from collections.abc import Mapping
+
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.messages import Identity
@@ -32,21 +34,23 @@ class SimulatedVehicle:
         seed: int,
         keeps_path: bool = True,
         epoch_at_boot_us: int = 0,
+        parameters: Mapping[str, float] | None = None,
     ) -> None:
         """``keeps_path`` off: the truth holds the hits but no path, for a simulation without an end.
 
         ``epoch_at_boot_us``: Unix time when the vehicle's clock was at zero, which it tells who asks for the time.
+        ``parameters``: values in place of PX4's defaults and the airframe's.
 
         Raises SceneError where a wall passes through the start position.
         """
         check_start_is_free(scene, airframe)
         self._seed = seed
-        self.parameters = parameters = Parameters(defaults_from(airframe))
-        self._tuned_at = parameters.changes
+        self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
+        self._tuned_at = self.parameters.changes
         self._plant = Plant(airframe, scene, seed, keeps_path)
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
-        self._autopilot = Autopilot(airframe.hover_fraction, first, parameters)
+        self._autopilot = Autopilot(airframe.hover_fraction, first, self.parameters)
         self._telemetry = Telemetry(
             sample=first,
             published=first,
@@ -58,15 +62,15 @@ class SimulatedVehicle:
             true_body=self._plant.state.body,
             attitude_setpoint=self._plant.state.attitude_setpoint,
             epoch_at_boot_us=epoch_at_boot_us,
-            system=int(parameters["MAV_SYS_ID"]),
+            system=int(self.parameters["MAV_SYS_ID"]),
         )
         self._slow = SlowSensors(airframe, seed)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = first.time_boot_us
         self._topics = Topics(self._telemetry)
-        identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
+        identity = Identity(int(self.parameters["MAV_SYS_ID"]), int(self.parameters["MAV_COMP_ID"]))
         self._board = Board(
-            identity, self._autopilot, parameters, self._telemetry, self._topics, Signing(), self.interval_us
+            identity, self._autopilot, self.parameters, self._telemetry, self._topics, Signing(), self.interval_us
         )
         self._links: list[Link] = []
         self._links_so_far = 0

@@ -13,8 +13,9 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import PortInUse
 from sim_vehicle.scene import Scene
+from sim_vehicle.shell.addresses import px4_ports
+from sim_vehicle.shell.realtime import Pace, serve
 from sim_vehicle.shell.truth_file import load_truth
-from sim_vehicle.shell.udp import Pace, serve
 from sim_vehicle.vehicle import SimulatedVehicle
 
 TIMEOUT_S = 5.0
@@ -32,19 +33,14 @@ def bound() -> Iterator[socket.socket]:
         yield peer
 
 
-def free_port() -> int:
-    with bound() as probe:
-        return int(probe.getsockname()[1])
-
-
 @contextmanager
 def served(vehicle, remote: tuple[str, int], truth_path: Path | None = None) -> Iterator[int]:
     """The vehicle in a thread, sending to ``remote``; the port on which it listens."""
-    stop, port = threading.Event(), free_port()
-    thread = threading.Thread(target=serve, args=(vehicle, port, remote, truth_path, stop.is_set))
+    stop, ports = threading.Event(), px4_ports(vehicle, 0, 0, remote)
+    thread = threading.Thread(target=serve, args=(vehicle, ports, truth_path, stop.is_set))
     thread.start()
     try:
-        yield port
+        yield ports[0].local_port
     finally:
         stop.set()
         thread.join(TIMEOUT_S)
@@ -64,7 +60,7 @@ def test_a_port_in_use_is_one_sentence():
     with bound() as other:
         port = other.getsockname()[1]
         with pytest.raises(PortInUse) as raised:
-            serve(new_vehicle(), listen_port=port, stop=lambda: True)
+            px4_ports(new_vehicle(), 0, port)
     assert str(raised.value).startswith(f"UDP port {port} is in use")
 
 
@@ -122,7 +118,7 @@ class Machine:
 def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_ms: int):
     """800 ms away: the interval that was due then is flown, the other 796 ms are left out."""
     machine = Machine()
-    pace = Pace(0, machine.monotonic_ns, machine.sleep_s)
+    pace = Pace(0, 1.0, machine.monotonic_ns, machine.sleep_s)
     start_ns, boot_us = machine.now_ns, 0
     while machine.now_ns - start_ns < 2_000_000_000:
         pace.wait_until(boot_us + 4_000)
@@ -134,7 +130,7 @@ def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_m
 
 def test_an_interval_is_never_flown_before_it_has_passed():
     machine = Machine()
-    pace = Pace(4_000, machine.monotonic_ns, machine.sleep_s)
+    pace = Pace(4_000, 1.0, machine.monotonic_ns, machine.sleep_s)
     begun_ns = machine.now_ns
     pace.wait_until(8_000)
     assert machine.now_ns - begun_ns == 4_000_000

@@ -1,0 +1,87 @@
+"""Ports from addresses in MAVSDK's convention, seen from the vehicle, and PX4's own two UDP links.
+
+udpout://127.0.0.1:14550          sends to this address, unasked
+udpin://0.0.0.0:14551             waits for clients, as many as come
+tcpin://0.0.0.0:5760              the same on TCP
+serial:///dev/ttyUSB0:57600       a serial line
+
+With `?set=onboard`, `normal` or `ground` at the end: whose streams it begins with.
+"""
+
+import re
+
+from sim_vehicle.errors import LinkAddressError
+from sim_vehicle.mavlink.line import Line
+from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.shell.port import Address, Port
+from sim_vehicle.shell.serial_port import SerialPort
+from sim_vehicle.shell.tcp_port import TcpServerPort
+from sim_vehicle.shell.udp_ports import UdpPeerPort, UdpServerPort
+from sim_vehicle.vehicle import SimulatedVehicle
+
+# Where PX4's SITL listens and sends unasked, plus its instance: a companion's link and a ground station's.
+COMPANION_LISTEN_PORT, COMPANION_PORT = 14580, 14540
+GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
+
+_ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?$")
+_FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
+
+
+def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
+    """The port at ``address``. Raises LinkAddressError for one that is none, PortInUse for one that cannot be had."""
+    found = _ADDRESS.match(address)
+    if found is None:
+        raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
+    scheme, rest = found["scheme"], found["rest"]
+    if scheme == "serial":
+        device, baud = _split(address, rest)
+        options = LinkOptions(_kind(address, found["set"], LinkKind.ONBOARD), Line(baud), forwards=False)
+        return SerialPort(vehicle, options, device, baud)
+    options = LinkOptions(_kind(address, found["set"], LinkKind.GROUND))
+    host, port = _split(address, rest)
+    if scheme == "udpout":
+        return UdpPeerPort(vehicle, options, 0, (host, port))
+    if scheme == "udpin":
+        return UdpServerPort(vehicle, options, host, port)
+    if scheme == "tcpin":
+        return TcpServerPort(vehicle, options, host, port)
+    raise LinkAddressError(f"{address!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+
+
+def px4_ports(
+    vehicle: SimulatedVehicle, instance: int, listen_port: int | None = None, companion: Address | None = None
+) -> list[Port]:
+    """PX4's two UDP links: to a companion and to a ground station on this machine.
+
+    ``listen_port`` 0: both listen wherever there is room.
+    """
+    onboard, ground = LinkOptions(LinkKind.ONBOARD), LinkOptions(LinkKind.GROUND)
+    ground_listen_port = 0 if listen_port == 0 else GROUND_LISTEN_PORT + instance
+    listen_port = COMPANION_LISTEN_PORT + instance if listen_port is None else listen_port
+    ports: list[Port] = []
+    try:
+        ports.append(UdpPeerPort(vehicle, onboard, listen_port, companion or ("127.0.0.1", COMPANION_PORT + instance)))
+        ports.append(UdpPeerPort(vehicle, ground, ground_listen_port, ("127.0.0.1", GROUND_PORT)))
+    except Exception:
+        for port in ports:
+            port.close()
+        raise
+    return ports
+
+
+def _kind(address: str, name: str | None, default: LinkKind) -> LinkKind:
+    if name is None:
+        return default
+    try:
+        return LinkKind(name)
+    except ValueError as problem:
+        names = ", ".join(kind.value for kind in LinkKind)
+        raise LinkAddressError(f"{address!r} names an unknown set of streams: use one of {names}.") from problem
+
+
+def _split(address: str, rest: str) -> tuple[str, int]:
+    name, separator, number = rest.rpartition(":")
+    if not separator or not name or not number.isdigit():
+        raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
+    return name, int(number)

@@ -1,0 +1,75 @@
+"""The simulated vehicle in real time, or so many times faster, on any number of ports."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from sim_vehicle.shell.port import Port
+from sim_vehicle.shell.truth_file import save_truth
+from sim_vehicle.vehicle import SimulatedVehicle
+
+# Lateness up to this is caught up by stepping faster, as a busy machine needs. A longer stop (a
+# suspended laptop) would end in a burst of old telemetry: there the vehicle's clock stands still instead.
+MOST_CAUGHT_UP_NS = 500_000_000
+
+
+def serve(
+    vehicle: SimulatedVehicle,
+    ports: Sequence[Port],
+    truth_path: Path | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    speed: float = 1.0,
+) -> None:
+    """Fly until ``stop()`` is true; then close the ports and write the truth, if a path is given.
+
+    ``speed``: how many times faster than the clock, at most; 0 for as fast as the machine allows.
+    """
+    pace = Pace(vehicle.time_boot_us, speed)
+    try:
+        while not stop():
+            pace.wait_until(vehicle.time_boot_us + vehicle.interval_us)
+            for port in ports:
+                port.receive()
+            vehicle.advance()
+            for port in ports:
+                port.send()
+    finally:
+        for port in ports:
+            port.close()
+        if truth_path is not None:
+            save_truth(truth_path, vehicle.truth, pace.epoch_at_boot_us())
+
+
+class Pace:
+    """Keeps a vehicle's clock on the machine's monotonic one."""
+
+    def __init__(
+        self,
+        time_boot_us: int,
+        speed: float = 1.0,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
+        sleep_s: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._monotonic_ns = monotonic_ns
+        self._sleep_s = sleep_s
+        self._ns_per_us = 1000 / speed if speed > 0 else 0.0
+        self._boot_ns = monotonic_ns() - round(self._ns_per_us * time_boot_us)
+        self._time_boot_us = time_boot_us
+
+    def wait_until(self, time_boot_us: int) -> None:
+        """Return when the vehicle's clock may show that; at once when it is late."""
+        self._time_boot_us = time_boot_us
+        if self._ns_per_us == 0.0:
+            return
+        now_ns = self._monotonic_ns()
+        due_ns = self._boot_ns + round(self._ns_per_us * time_boot_us)
+        if due_ns > now_ns:
+            self._sleep_s(1e-9 * (due_ns - now_ns))
+        elif now_ns - due_ns > MOST_CAUGHT_UP_NS:
+            self._boot_ns += now_ns - due_ns
+
+    def epoch_at_boot_us(self) -> int:
+        """Wall clock at the vehicle's boot time 0, as its clock stands now."""
+        if self._ns_per_us != 1000.0:
+            return time.time_ns() // 1000 - self._time_boot_us
+        return (time.time_ns() - self._monotonic_ns() + self._boot_ns) // 1000

@@ -1,0 +1,34 @@
+"""A serial line at a stated speed, with PX4's streams for it."""
+
+import contextlib
+
+import serial
+
+from sim_vehicle.errors import PortInUse
+from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.vehicle import SimulatedVehicle
+
+
+class SerialPort:
+    """The line carries no more than its baud rate allows, even where it is a pseudo-terminal that could."""
+
+    def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, device: str, baud: int) -> None:
+        """``options.line`` is of the same speed. Raises PortInUse where the device cannot be opened."""
+        try:
+            self._serial = serial.Serial(device, baud, timeout=0, write_timeout=0)
+        except (OSError, ValueError) as problem:
+            raise PortInUse(f"Serial port {device} cannot be opened: {problem}") from problem
+        self._link = vehicle.add_link(options)
+
+    def receive(self) -> None:
+        # A line that is unplugged falls silent.
+        with contextlib.suppress(OSError):
+            self._link.push(self._serial.read(self._serial.in_waiting))
+
+    def send(self) -> None:
+        for packet in self._link.take():
+            with contextlib.suppress(OSError, serial.SerialTimeoutException):
+                self._serial.write(packet)
+
+    def close(self) -> None:
+        self._serial.close()

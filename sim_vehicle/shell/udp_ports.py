@@ -1,0 +1,77 @@
+"""UDP as PX4 has it, with one peer, and as a server for any number of clients."""
+
+import socket
+
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.shell.port import Address, bound_socket, received_datagrams, send_datagrams
+from sim_vehicle.vehicle import SimulatedVehicle
+
+# A client that has been silent for so long is taken for gone; ground stations send a heartbeat a second.
+CLIENT_GONE_AFTER_US = 30_000_000
+# More clients than this are no ground stations: somebody sends from ever new ports.
+MOST_CLIENTS = 32
+
+
+class UdpPeerPort:
+    """Sends unasked to ``remote``, and from the first datagram on to its sender for good, as PX4 does."""
+
+    def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, listen_port: int, remote: Address) -> None:
+        self._socket = bound_socket(socket.SOCK_DGRAM, "0.0.0.0", listen_port)
+        self._remote = remote
+        self._has_peer = False
+        self._link = vehicle.add_link(options)
+
+    @property
+    def local_port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def receive(self) -> None:
+        for datagram, sender in received_datagrams(self._socket):
+            if not self._has_peer:
+                self._remote, self._has_peer = sender, True
+            self._link.push(datagram)
+
+    def send(self) -> None:
+        send_datagrams(self._socket, self._link.take(), self._remote)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class UdpServerPort:
+    """Waits for clients; each that sends something gets a link of its own."""
+
+    def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, host: str, port: int) -> None:
+        self._socket = bound_socket(socket.SOCK_DGRAM, host, port)
+        self._vehicle = vehicle
+        self._options = options
+        self._clients: dict[Address, Link] = {}
+        self._heard_us: dict[Address, int] = {}
+
+    @property
+    def local_port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def receive(self) -> None:
+        now_us = self._vehicle.time_boot_us
+        for datagram, sender in received_datagrams(self._socket):
+            link = self._clients.get(sender)
+            if link is None:
+                if len(self._clients) >= MOST_CLIENTS:
+                    continue
+                link = self._clients[sender] = self._vehicle.add_link(self._options)
+            self._heard_us[sender] = now_us
+            link.push(datagram)
+        for address, heard_us in list(self._heard_us.items()):
+            if now_us - heard_us > CLIENT_GONE_AFTER_US:
+                del self._heard_us[address]
+                self._vehicle.remove_link(self._clients.pop(address))
+
+    def send(self) -> None:
+        for address, link in self._clients.items():
+            send_datagrams(self._socket, link.take(), address)
+
+    def close(self) -> None:
+        self._socket.close()
