@@ -14,7 +14,7 @@ from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.run_folder import FIGURE_NAME, TLOG_NAME
 from rebound_cli.truth_match import FlightTruth, match_contacts
 from sim_vehicle.scene import Scene
-from sim_vehicle.world import Wall, distance_to_wall
+from sim_vehicle.world import Wall
 
 Floats = npt.NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -130,7 +130,7 @@ def _first_hit(mission: Mission, scene: Scene | None, report: FlightReport, trut
 
 def _nearest_wall(scene: Scene | None, position_ned_m: Vector3) -> Wall | None:
     walls = scene.walls_built() if scene else ()
-    return min(walls, key=lambda wall: distance_to_wall(wall, position_ned_m), default=None)
+    return min(walls, key=lambda wall: wall.distance_m(position_ned_m), default=None)
 
 
 def _seconds(times_us: Floats, report: FlightReport) -> Floats:

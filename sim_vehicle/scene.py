@@ -1,54 +1,16 @@
 """The `sim:` part of a mission file: which airframe starts where, among which walls, in which wind."""
 
-import math
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.errors import SceneError
-from sim_vehicle.world import Vector3, Wall, World, build_world, distance_to_wall
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Point = tuple[Finite, Finite, Finite]
-Length = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
+from sim_vehicle.obstacles import BoxSpec, Finite, Part, Point, PoleSpec, WallSpec
+from sim_vehicle.world import Obstacle, Vector3, Wall, World, build_world
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class WallSpec(_Part):
-    """A solid plate: its front face's centre, the direction it faces, its size."""
-
-    name: str | None = None
-    point_ned_m: Point
-    normal_ned: Point
-    width_m: Length = 10.0
-    height_m: Length = 10.0
-    thickness_m: Length = 0.1
-
-    @model_validator(mode="after")
-    def _has_direction(self) -> "WallSpec":
-        if math.hypot(*self.normal_ned) < 1e-6:
-            raise ValueError("normal_ned has no direction; give the way the face looks, e.g. [-1, 0, 0]")
-        return self
-
-    def wall(self, number: int) -> Wall:
-        """The same as a value, with its normal made unit and a name if it had none."""
-        length = math.hypot(*self.normal_ned)
-        x, y, z = self.normal_ned
-        return Wall(
-            name=self.name or f"wall {number}",
-            point_ned_m=self.point_ned_m,
-            normal_ned=(x / length, y / length, z / length),
-            width_m=self.width_m,
-            height_m=self.height_m,
-            thickness_m=self.thickness_m,
-        )
-
-
-class Start(_Part):
+class Start(Part):
     """Where the vehicle stands on the ground before it is armed; z is the ground's, 0."""
 
     position_ned_m: Point = (0.0, 0.0, 0.0)
@@ -61,7 +23,7 @@ class Start(_Part):
         return self
 
 
-class Scene(_Part):
+class Scene(Part):
     """Everything about the simulated world that a mission file may state."""
 
     airframe: str = "foldable"
@@ -69,26 +31,36 @@ class Scene(_Part):
     start: Start = Start()
     wind_ned_m_s: Point = (0.0, 0.0, 0.0)
     walls: tuple[WallSpec, ...] = ()
+    poles: tuple[PoleSpec, ...] = ()
+    boxes: tuple[BoxSpec, ...] = ()
 
     def walls_built(self) -> tuple[Wall, ...]:
         """The walls as values, in the file's order."""
         return tuple(spec.wall(number) for number, spec in enumerate(self.walls, start=1))
 
+    def obstacles(self) -> tuple[tuple[str, Obstacle], ...]:
+        """Everything that the vehicle can run into but the ground, each with its place in the file."""
+        walls = ((f"sim.walls.{index}", wall) for index, wall in enumerate(self.walls_built()))
+        poles = ((f"sim.poles.{index}", spec.pole(index + 1)) for index, spec in enumerate(self.poles))
+        boxes = ((f"sim.boxes.{index}", spec.box(index + 1)) for index, spec in enumerate(self.boxes))
+        return (*walls, *poles, *boxes)
+
     def world(self) -> World:
-        """Ground and walls as contact faces."""
-        return build_world(self.walls_built())
+        """Ground and obstacles as contact faces."""
+        return build_world(tuple(obstacle for _, obstacle in self.obstacles()))
 
 
 def check_start_is_free(scene: Scene, airframe: Airframe) -> None:
-    """Raise SceneError, naming the wall and the remedy, if one passes through the standing vehicle."""
+    """Raise SceneError, naming the obstacle and the remedy, if one passes through the standing vehicle."""
     x, y, _ = scene.start.position_ned_m
-    centre: Vector3 = (x, y, -airframe.geometry.foot_depth_m)
+    standing: Vector3 = (x, y, -airframe.geometry.foot_depth_m)
     reach_m = airframe.geometry.reach_m
-    for number, wall in enumerate(scene.walls_built()):
-        distance_m = distance_to_wall(wall, centre)
+    for place, obstacle in scene.obstacles():
+        moved = (0.0, 0.0, 0.0) if obstacle.motion is None else obstacle.motion.offset_ned_m(0.0)
+        distance_m = obstacle.distance_m((standing[0] - moved[0], standing[1] - moved[1], standing[2] - moved[2]))
         if distance_m < reach_m:
             raise SceneError(
-                f"sim.walls.{number}: '{wall.name}' passes through the vehicle's start position "
+                f"{place}: '{obstacle.name}' passes through the vehicle's start position "
                 f"({distance_m:.2f} m from its centre, which needs {reach_m:.2f} m); "
-                "move the wall or sim.start.position_ned_m"
+                "move it or sim.start.position_ned_m"
             )

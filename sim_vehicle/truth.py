@@ -15,8 +15,10 @@ from sim_vehicle.physics.layout import (
     HIT_LAST_US,
     HIT_NORMAL,
     HIT_PEAK_N,
+    HIT_POINT,
     HIT_POSITION,
     HIT_START_US,
+    HIT_SURFACE_VELOCITY,
     HIT_VELOCITY,
 )
 from sim_vehicle.world import Vector3, World
@@ -30,7 +32,7 @@ _FIRST_ROWS = 4096
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """One contact with a wall, from the first touch until everything was clear for 20 ms."""
+    """One contact with an obstacle, from the first touch until everything was clear for 20 ms."""
 
     obstacle: str
     contact_at_boot_us: float
@@ -39,17 +41,23 @@ class Hit:
     """The centre of mass at the first touch."""
     impact_velocity_ned_m_s: Vector3
     normal_ned: Vector3
-    """Out of the face that was hit."""
+    """Out of the surface that was hit, where it was touched first."""
     max_fold_m: float
     peak_force_n: float
     rebound_velocity_ned_m_s: Vector3
     """The centre of mass's at the last touch."""
     impulse_ned_n_s: Vector3
-    """Of the wall on the vehicle, friction included."""
+    """Of the obstacle on the vehicle, friction included."""
     energy_before_j: float
-    """Kinetic, moving and turning, at the first touch."""
+    """Kinetic, moving and turning, at the first touch, as seen from the obstacle."""
     energy_after_j: float
     """The same at the last touch."""
+    kind: str = "wall"
+    """wall, ceiling, floor, edge or pole."""
+    contact_point_ned_m: Vector3 | None = None
+    """On the surface, where it was touched first and hardest."""
+    surface_velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
+    """Of the obstacle at the first touch."""
 
     @property
     def contact_duration_s(self) -> float:
@@ -96,6 +104,9 @@ class TruthRecorder:
                 impulse_ned_n_s=_vector(row[HIT_IMPULSE]),
                 energy_before_j=float(row[HIT_ENERGY_BEFORE_J]),
                 energy_after_j=float(row[HIT_ENERGY_AFTER_J]),
+                kind=world.kinds[int(row[HIT_FACE])],
+                contact_point_ned_m=_vector(row[HIT_POINT]),
+                surface_velocity_ned_m_s=_vector(row[HIT_SURFACE_VELOCITY]),
             )
         )
 

@@ -1,4 +1,4 @@
-"""Contact of guards, hub and feet with the faces of the world: it pushes, it never pulls."""
+"""Contact of guards, hub and feet with the world: it pushes, it never pulls."""
 
 import math
 
@@ -7,16 +7,14 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GUARDS, HUB, Contact, Scratch, State
-from sim_vehicle.physics.proximity import contact_point, depth_in, points_at, within
+from sim_vehicle.physics.meeting import meet
+from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, points_at
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-from sim_vehicle.world import FACE_NORMAL
+from sim_vehicle.world import FACE_RADIUS, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# A disc lying flat against a face (a ceiling) cannot fold its arm towards it; below this share of the
-# normal in the disc's plane the push is taken as straight through the frame.
-LEAST_IN_PLANE = 0.2
 # Sliding speed over which friction reaches its full value: far below any speed of interest.
 FRICTION_SPEED_M_S = 0.02
 
@@ -40,7 +38,7 @@ def point_force(point: int, depth: float, speed_in: float, share: float, relaxed
     the force.
     """
     if point < GUARDS:
-        lever = max(share, LEAST_IN_PLANE)
+        lever = max(share, contact.least_in_plane)
         fold = depth / lever
         if fold < relaxed_m:
             return 0.0
@@ -64,51 +62,54 @@ def contact_wrench(
     normal_forces: Floats,
 ) -> None:
     """Add the contacts' force (NED, N) and moment (FRD, N m) to the scratch's and list every normal force."""
-    where, lever, speed, rates_ned = scratch.where, scratch.lever, scratch.speed, scratch.rates_ned
+    lever, speed, rates_ned = scratch.lever, scratch.speed, scratch.rates_ned
     for i in range(3):
         rates_ned[i] = rotation[i, 0] * body[10] + rotation[i, 1] * body[11] + rotation[i, 2] * body[12]
     for face in range(near.shape[0]):
         normal_forces[:, face] = 0.0
-        for point in range(*points_at(face, near)):
-            if behind[point, face] == 1:
+        for point in range(*points_at(face, near, faces)):
+            if behind[point, face] != IN_FRONT:
                 continue
-            share = contact_point(point, face, rotation, body, contact, faces, where)
-            depth = depth_in(face, where, faces)
-            if depth <= 0.0 or not within(face, where, faces):
+            depth, share = meet(point, face, rotation, body, contact, faces, scratch)
+            if depth <= 0.0 or (face != 0 and depth > scratch.deepest_m[point]):
                 continue
+            if faces[face, FACE_RADIUS] > 0.0 and scratch.share[point] > 0.0:
+                share = scratch.share[point]
             # The force acts where the face is, not where the unfolded guard would be.
             for i in range(3):
-                lever[i] = where[i] + depth * faces[face, FACE_NORMAL + i] - body[i]
+                lever[i] = scratch.where[i] - body[i]
+            # Speeds are against the face's own.
             speed[0] = body[3] + rates_ned[1] * lever[2] - rates_ned[2] * lever[1]
             speed[1] = body[4] + rates_ned[2] * lever[0] - rates_ned[0] * lever[2]
             speed[2] = body[5] + rates_ned[0] * lever[1] - rates_ned[1] * lever[0]
             speed_in = 0.0
             for i in range(3):
-                speed_in -= speed[i] * faces[face, FACE_NORMAL + i]
+                speed[i] -= faces[face, FACE_VELOCITY + i]
+                speed_in -= speed[i] * scratch.normal[i]
             relaxed = scratch.relaxed_m[point] if point < GUARDS else 0.0
             normal = point_force(point, depth, speed_in, share, relaxed, contact)
             if normal > 0.0:
                 normal_forces[point, face] = normal
-                _add_push(normal, speed_in, face, rotation, contact, faces, scratch)
+                friction = contact.ground_friction if point > HUB or face == 0 else contact.guard_friction
+                _add_push(normal, speed_in, friction, face != 0, rotation, scratch)
 
 
 @njit
 def _add_push(
-    normal: float, speed_in: float, face: int, rotation: Floats, contact: Contact, faces: Floats, scratch: Scratch
+    normal_n: float, speed_in: float, friction: float, is_obstacle: bool, rotation: Floats, scratch: Scratch
 ) -> None:
     """Add one contact's normal force and Coulomb friction, smooth around zero sliding speed."""
-    lever, push = scratch.lever, scratch.where
-    friction = contact.ground_friction if face == 0 else contact.guard_friction
+    lever, push, normal = scratch.lever, scratch.where, scratch.normal
     slide_squared = FRICTION_SPEED_M_S * FRICTION_SPEED_M_S
     for i in range(3):
-        slide = scratch.speed[i] + speed_in * faces[face, FACE_NORMAL + i]
+        slide = scratch.speed[i] + speed_in * normal[i]
         slide_squared += slide * slide
-    per_speed = friction * normal / math.sqrt(slide_squared)
+    per_speed = friction * normal_n / math.sqrt(slide_squared)
     for i in range(3):
-        slide = scratch.speed[i] + speed_in * faces[face, FACE_NORMAL + i]
-        push[i] = normal * faces[face, FACE_NORMAL + i] - per_speed * slide
+        slide = scratch.speed[i] + speed_in * normal[i]
+        push[i] = normal_n * normal[i] - per_speed * slide
         scratch.force_ned[i] += push[i]
-        if face != 0:
+        if is_obstacle:
             scratch.contact_ned[i] += push[i]
     x = lever[1] * push[2] - lever[2] * push[1]
     y = lever[2] * push[0] - lever[0] * push[2]
@@ -169,29 +170,38 @@ def settle_arms(
         state.pressed[arm] = 0
     if touches:
         settle_contacts(state, behind, near, contact, faces, scratch)
+    elif state.was_near == 1:
+        state.depth_m[:] = 0.0
+        state.share[:] = 0.0
+    state.was_near = 1 if touches else 0
     for arm in range(GUARDS):
         state.fold_rate_m_s[arm] = (state.fold_m[arm] - scratch.fold_before_m[arm]) / step_s
 
 
 @njit
 def settle_contacts(state: State, behind: Ints, near: Ints, contact: Contact, faces: Floats, scratch: Scratch) -> None:
-    """Press the arms that a face presses, and note which points are behind a face.
-
-    A point that gets behind a face beside its rectangle has passed it by and is not pushed until it is
-    in front again.
-    """
+    """Press the arms that a face presses, and note how deep every part is."""
     # The rotation of the step's end: the next step must find the arm exactly where this one leaves it.
     matrix_from_quaternion(state.body, scratch.turned)
+    state.depth_m[:] = 0.0
+    state.share[:] = 0.0
     for face in range(near.shape[0]):
-        for point in range(*points_at(face, near)):
-            share = contact_point(point, face, scratch.turned, state.body, contact, faces, scratch.where)
-            depth = depth_in(face, scratch.where, faces)
-            if depth <= 0.0:
-                behind[point, face] = 0
-            elif behind[point, face] == 0 and not within(face, scratch.where, faces):
-                behind[point, face] = 1
-            elif behind[point, face] == 0 and point < GUARDS:
-                fold = depth / max(share, LEAST_IN_PLANE)
-                if fold >= state.fold_m[point]:
-                    state.fold_m[point] = fold
-                    state.pressed[point] = 1
+        for point in range(*points_at(face, near, faces)):
+            depth, share = meet(point, face, scratch.turned, state.body, contact, faces, scratch)
+            if depth <= 0.0 and behind[point, face] == INSIDE:
+                behind[point, face] = IN_FRONT
+            elif behind[point, face] == IN_FRONT and face != 0 and depth > scratch.deepest_m[point]:
+                behind[point, face] = INSIDE
+            if behind[point, face] != IN_FRONT:
+                continue
+            state.depth_m[point] = max(state.depth_m[point], depth)
+            # A guard that rolls over a pole or an edge goes on pressing its arm as it began: else the same depth would
+            # cost more and more force, and the roll would make energy.
+            if faces[face, FACE_RADIUS] > 0.0 and depth > 0.0:
+                share = state.share[point] = scratch.share[point] if scratch.share[point] > 0.0 else share
+            if point >= GUARDS:
+                continue
+            fold = depth / max(share, contact.least_in_plane)
+            if depth > 0.0 and fold >= state.fold_m[point]:
+                state.fold_m[point] = fold
+                state.pressed[point] = 1

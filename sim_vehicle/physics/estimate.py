@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import State
+from sim_vehicle.physics.layout import Disturbance, State
 from sim_vehicle.physics.rotation import turn
 
 Floats = npt.NDArray[np.float64]
@@ -51,7 +51,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
 
 
 @njit
-def update_estimate(state: State, errors: EstimateErrors, noise: Floats) -> None:
+def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturbance: Disturbance) -> None:
     """Renew ``state.estimate`` at the end of an interval; ``noise`` is (9,), standard normal."""
     slots = errors.past.shape[0]
     if slots == 0:
@@ -64,7 +64,7 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats) -> None
     for i in range(9):
         errors.error[i] = errors.keep[i] * errors.error[i] + errors.drive[i] * noise[i]
     for i in range(6):
-        state.estimate[i] = delayed[i] + errors.error[i]
+        state.estimate[i] = delayed[i] + errors.error[i] + disturbance.estimate_jump[i]
     turn(state.body, errors.error[6], errors.error[7], errors.error[8], state.estimate)
 
 

@@ -16,14 +16,18 @@ from sim_vehicle.physics.layout import (
     HIT_LAST_US,
     HIT_NORMAL,
     HIT_PEAK_N,
+    HIT_POINT,
     HIT_POSITION,
     HIT_START_US,
+    HIT_SURFACE_VELOCITY,
     HIT_VELOCITY,
     SAME_HIT_US,
+    Contact,
     Scratch,
     State,
 )
-from sim_vehicle.world import FACE_NORMAL
+from sim_vehicle.physics.meeting import meet
+from sim_vehicle.world import FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
 
@@ -34,6 +38,7 @@ def note_contact(
     offset_us: float,
     step_s: float,
     normal_forces: Floats,
+    contact: Contact,
     faces: Floats,
     mass_kg: float,
     scratch: Scratch,
@@ -42,14 +47,16 @@ def note_contact(
 
     Called at the end of each step; the hit's beginning is the first step with a force in it.
     """
-    total_n, most_n, hardest = 0.0, 0.0, 0
+    total_n, most_n, hardest, first_point = 0.0, 0.0, 0, 0
     for face in range(1, normal_forces.shape[1]):
-        on_face = 0.0
+        on_face, most_on_face, point_on_face = 0.0, 0.0, 0
         for point in range(normal_forces.shape[0]):
             on_face += normal_forces[point, face]
+            if normal_forces[point, face] > most_on_face:
+                most_on_face, point_on_face = normal_forces[point, face], point
         total_n += on_face
         if on_face > most_n:
-            most_n, hardest = on_face, face
+            most_n, hardest, first_point = on_face, face, point_on_face
     if total_n <= 0.0:
         return
     now_us = state.time_us + offset_us
@@ -61,7 +68,10 @@ def note_contact(
         hit[HIT_PEAK_N], hit[HIT_FOLD_M] = 0.0, 0.0
         hit[HIT_POSITION] = state.body[0:3]
         hit[HIT_VELOCITY] = state.body[3:6]
-        hit[HIT_NORMAL] = faces[hardest, FACE_NORMAL : FACE_NORMAL + 3]
+        # A round has a normal only where something meets it.
+        meet(first_point, hardest, scratch.turned, state.body, contact, faces, scratch)
+        hit[HIT_NORMAL], hit[HIT_POINT] = scratch.normal, scratch.where
+        hit[HIT_SURFACE_VELOCITY] = faces[hardest, FACE_VELOCITY : FACE_VELOCITY + 3]
         hit[HIT_IMPULSE] = 0.0
         hit[HIT_ENERGY_BEFORE_J] = moving_energy(state, mass_kg)
     hit[HIT_LAST_US] = now_us
@@ -75,8 +85,9 @@ def note_contact(
 
 @njit
 def moving_energy(state: State, mass_kg: float) -> float:
-    """Kinetic energy of the vehicle, joules."""
-    x, y, z = state.body[3], state.body[4], state.body[5]
+    """Kinetic energy of the vehicle against what it hits, joules."""
+    against = state.hit[HIT_SURFACE_VELOCITY]
+    x, y, z = state.body[3] - against[0], state.body[4] - against[1], state.body[5] - against[2]
     turning: float = turning_energy(state.inertia, state.body[10], state.body[11], state.body[12])
     moving: float = 0.5 * mass_kg * (x * x + y * y + z * z)
     return moving + turning

@@ -1,16 +1,20 @@
-"""The inertial sensor: raw samples with noise and bias, clipped one by one, then summed for the mean."""
+"""The inertial sensor: raw samples with noise, bias and vibration, clipped one by one, then summed for the mean."""
+
+import math
 
 import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Scratch, State
+from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, Scratch, State
 
 Floats = npt.NDArray[np.float64]
 
 
 @njit
-def add_raw_sample(state: State, scratch: Scratch, noise: Floats, raw: int, constants: Constants) -> None:
+def add_raw_sample(
+    state: State, scratch: Scratch, noise: Floats, raw: int, constants: Constants, disturbance: Disturbance
+) -> None:
     """Add one raw sample (mean specific force over the raw interval, body FRD) to the interval's sums.
 
     Each axis is clipped at the sensor's range *before* the averaging, as in PX4's `vehicle_imu`: a hit
@@ -22,18 +26,55 @@ def add_raw_sample(state: State, scratch: Scratch, noise: Floats, raw: int, cons
     y = (state.body[4] - velocity_before[1]) / raw_s
     z = (state.body[5] - velocity_before[2]) / raw_s - GRAVITY_M_S2
     limit = constants.accelerometer_range_m_s2
+    shaken = scratch.shaken
+    if disturbance.shakes == 1:
+        shake(state, raw_s, constants, disturbance, shaken)
     for i in range(3):
         true = rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z
         seen = (
             true
             + constants.accelerometer_bias_frd_m_s2[i]
+            + disturbance.accelerometer_bias_frd_m_s2[i]
             + constants.accelerometer_raw_noise_m_s2 * noise[6 * raw + i]
+            + shaken[i]
         )
+        if disturbance.stuck[i] == 1:
+            seen = disturbance.stuck_at[i]
+        clipped = min(max(seen, -limit), limit)
         if abs(seen) >= limit:
             state.clip_counts[i] += 1
-        state.specific_force_sum[i] += min(max(seen, -limit), limit)
-        state.rate_sum[i] += (
+            state.clipped_off_m_s[i] += raw_s * (seen - clipped)
+        state.specific_force_sum[i] += clipped
+        rate = (
             state.body[10 + i]
             + constants.gyroscope_bias_frd_rad_s[i]
+            + disturbance.gyroscope_bias_frd_rad_s[i]
             + constants.gyroscope_raw_noise_rad_s * noise[6 * raw + 3 + i]
+            + shaken[3 + i]
         )
+        state.rate_sum[i] += disturbance.stuck_at[3 + i] if disturbance.stuck[3 + i] == 1 else rate
+
+
+@njit
+def shake(state: State, raw_s: float, constants: Constants, disturbance: Disturbance, shaken: Floats) -> None:
+    """Turn the rotors on and write the vibration that they make on the raw axes into ``shaken`` (6,), m/s2 and rad/s.
+
+    An unbalanced rotor pulls outward as it turns, with the square of its speed, as thrust goes: once a turn across the
+    rotors' axes, and twice a turn (two blades that do not track) along them.
+    """
+    shaken[:] = 0.0
+    hover_n = constants.mass_kg * GRAVITY_M_S2 / 4
+    for motor in range(4):
+        strength = max(state.motor_thrust_n[motor], 0.0) / hover_n
+        phase = state.rotor_phase[motor] + 2 * math.pi * disturbance.shake_hz * math.sqrt(strength) * raw_s
+        state.rotor_phase[motor] = phase % (2 * math.pi)
+        once, ahead, twice = math.cos(phase), math.sin(phase), math.sin(2 * phase)
+        # A sine's peak is the root of two times its RMS.
+        acceleration = math.sqrt(2.0) * strength * disturbance.shake_m_s2[motor]
+        turning = math.sqrt(2.0) * strength * disturbance.shake_rad_s[motor]
+        shaken[0] += acceleration * once
+        shaken[1] += acceleration * ahead
+        shaken[2] += acceleration * twice
+        shaken[3] += turning * ahead
+        shaken[4] += turning * once
+        shaken[5] += turning * twice

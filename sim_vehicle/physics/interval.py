@@ -12,11 +12,12 @@ from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import Asked, Constants, Contact, Gains, Scratch, State
-from sim_vehicle.physics.proximity import find_close, find_near
+from sim_vehicle.physics.layout import POINTS, Asked, Constants, Disturbance, Scratch, State
+from sim_vehicle.physics.proximity import find_close, find_near, wake_faces
 from sim_vehicle.physics.report import write_report
 from sim_vehicle.physics.rigid_body import runge_kutta_step
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
+from sim_vehicle.world import FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -26,6 +27,10 @@ MOTORS_OFF, MOTORS_IDLE, MOTORS_FLYING, MOTORS_DRIVEN = range(4)
 # Steps in one raw interval (125 us) while something stiff touches or is about to: 12.5 us is 80 steps in
 # the rigid vehicle's 1 ms of contact. Halving it changes no rebound speed by 0.1 %.
 FINE_STEPS = 10
+# How much deeper than before a part may be after a step: twice its travel, for what a rebound adds, and the rounding
+# where one face ends and the next begins.
+TRAVEL_FACTOR = 2.0
+NEWLY_TOUCHED_M = 2e-5
 # A guard this close to a face, beyond the travel of one raw interval, calls for fine steps.
 TOUCH_MARGIN_M = 0.0005
 
@@ -38,9 +43,9 @@ def advance_interval(
     noise: Floats,
     fine_steps: int,
     constants: Constants,
-    contact: Contact,
-    gains: Gains,
+    disturbance: Disturbance,
     faces: Floats,
+    moving: Ints,
     behind: Ints,
     near: Ints,
     forces: Floats,
@@ -53,41 +58,83 @@ def advance_interval(
     ``motors``: off, idling, flying the setpoint, or driven (as `State.motor_command_n` says). ``noise`` is
     standard normal: six values a raw sample, then nine for the estimate.
     ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
-    the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory.
+    the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory. ``moving`` are the rows of
+    ``faces`` that have a velocity: they are moved on.
     """
     state.peak_force_n = 0.0
     state.finished_count = 0
     state.specific_force_sum[:] = 0.0
     state.rate_sum[:] = 0.0
+    state.clipped_off_m_s[:] = 0.0
+    interval_s = 1e-6 * constants.raw_per_interval * constants.raw_interval_us
+    awake = wake_faces(state.body, interval_s, constants, faces, near, scratch)
     for raw in range(constants.raw_per_interval):
         if motors == MOTORS_FLYING:
-            run_loops(state, asked, constants, contact.motor_radius_m, gains)
+            run_loops(state, asked, constants)
         elif motors != MOTORS_DRIVEN:
             rest_loops(state)
             state.motor_command_n[:] = constants.motor_idle_n if motors == MOTORS_IDLE else 0.0
-        spin_motors(state, constants)
+        spin_motors(state, constants, disturbance)
         for i in range(3):
             scratch.velocity_before[i] = state.body[3 + i]
-        move_body(state, fine_steps, constants, contact, faces, behind, near, forces, scratch)
-        add_raw_sample(state, scratch, noise, raw, constants)
+        move_body(state, awake, fine_steps, constants, disturbance, faces, moving, behind, near, forces, scratch)
+        add_raw_sample(state, scratch, noise, raw, constants, disturbance)
         state.time_us += constants.raw_interval_us
     close_old_hit(state)
-    update_estimate(state, errors, noise[6 * constants.raw_per_interval :])
-    update_slope(state, errors, 1e-6 * constants.raw_per_interval * constants.raw_interval_us)
+    update_estimate(state, errors, noise[6 * constants.raw_per_interval :], disturbance)
+    update_slope(state, errors, interval_s)
     write_report(state, constants, report)
 
 
 @njit
-def run_loops(state: State, asked: Asked, constants: Constants, motor_radius_m: float, gains: Gains) -> None:
+def advance_boxed(
+    states: Floats,
+    asked: Floats,
+    motors: int,
+    noise: Floats,
+    fine_steps: int,
+    constants: Floats,
+    disturbances: Floats,
+    faces: Floats,
+    moving: Ints,
+    behind: Ints,
+    near: Ints,
+    forces: Floats,
+    scratches: Floats,
+    errors: EstimateErrors,
+    report: Floats,
+) -> None:
+    """The same, with each record as an array of one."""
+    advance_interval(
+        states[0],
+        asked[0],
+        motors,
+        noise,
+        fine_steps,
+        constants[0],
+        disturbances[0],
+        faces,
+        moving,
+        behind,
+        near,
+        forces,
+        scratches[0],
+        errors,
+        report,
+    )
+
+
+@njit
+def run_loops(state: State, asked: Asked, constants: Constants) -> None:
     """Run whichever inner loop is due: position at 100 Hz, attitude at 150 Hz (paper, section V)."""
     time_us = state.time_us
     if time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
         state.position_loops = time_us * POSITION_LOOP_HZ // 1_000_000 + 1
-        position_control(state, constants.mass_kg, asked, gains)
+        position_control(state, constants.mass_kg, asked, constants)
     if time_us * ATTITUDE_LOOP_HZ >= state.attitude_loops * 1_000_000:
         state.attitude_loops = time_us * ATTITUDE_LOOP_HZ // 1_000_000 + 1
-        attitude_control(state, constants, asked.yaw[2], gains)
-        allocate_motors(state, constants, motor_radius_m)
+        attitude_control(state, constants, asked.yaw[2], constants)
+        allocate_motors(state, constants, constants.motor_radius_m)
 
 
 @njit
@@ -98,42 +145,64 @@ def rest_loops(state: State) -> None:
 
 
 @njit
-def spin_motors(state: State, constants: Constants) -> None:
-    """First-order lag of each motor's thrust towards its command over one raw interval."""
+def spin_motors(state: State, constants: Constants, disturbance: Disturbance) -> None:
+    """First-order lag of each motor's thrust towards what it gives of its command, over one raw interval."""
     share = 1.0 - math.exp(-1e-6 * constants.raw_interval_us / constants.motor_time_constant_s)
     for motor in range(4):
         command = min(max(state.motor_command_n[motor], 0.0), constants.motor_max_n)
-        state.motor_thrust_n[motor] += share * (command - state.motor_thrust_n[motor])
+        given = disturbance.motor_share[motor] * command
+        state.motor_thrust_n[motor] += share * (given - state.motor_thrust_n[motor])
 
 
 @njit
 def move_body(
     state: State,
+    awake: bool,
     fine_steps: int,
     constants: Constants,
-    contact: Contact,
+    disturbance: Disturbance,
     faces: Floats,
+    moving: Ints,
     behind: Ints,
     near: Ints,
     forces: Floats,
     scratch: Scratch,
 ) -> None:
     """Move the body through one raw interval, in fine steps while something stiff may touch."""
-    body = state.body
+    body, contact = state.body, constants
     raw_s = 1e-6 * constants.raw_interval_us
-    touches = find_near(body, contact, faces, near)
-    steps = 1
+    touches = awake and find_near(body, contact, faces, near, scratch)
+    steps, travel_m = 1, 0.0
     if touches:
         matrix_from_quaternion(body, scratch.rotation)
         speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
         tip_speed = contact.reach_m * (abs(body[10]) + abs(body[11]) + abs(body[12]))
-        margin_m = (speed + tip_speed) * raw_s + TOUCH_MARGIN_M
-        if find_close(body, behind, near, margin_m, contact, faces, scratch):
+        travel_m = (speed + tip_speed + fastest_m_s(moving, faces)) * raw_s
+        if find_close(body, behind, near, travel_m + TOUCH_MARGIN_M, contact, faces, scratch):
             steps = fine_steps
     step_s = raw_s / steps
     for step in range(steps):
+        if touches:
+            for point in range(POINTS):
+                scratch.share[point] = state.share[point]
+                scratch.deepest_m[point] = state.depth_m[point] + TRAVEL_FACTOR * travel_m / steps + NEWLY_TOUCHED_M
         relax_arms(state, step_s, contact, scratch.relaxed_m)
-        runge_kutta_step(state, behind, near, touches, step_s, constants, contact, faces, forces, scratch)
+        runge_kutta_step(
+            state, behind, near, touches, step_s, constants, disturbance, contact, faces, moving, forces, scratch
+        )
         settle_arms(state, behind, near, touches, step_s, contact, faces, scratch)
         if touches:
-            note_contact(state, 1e6 * step * step_s, step_s, forces[0], faces, constants.mass_kg, scratch)
+            mass_kg = constants.mass_kg + disturbance.carried_kg
+            note_contact(state, 1e6 * step * step_s, step_s, forces[0], contact, faces, mass_kg, scratch)
+
+
+@njit
+def fastest_m_s(moving: Ints, faces: Floats) -> float:
+    """An upper bound of the speed of anything that moves."""
+    fastest = 0.0
+    for row in moving:
+        speed = 0.0
+        for i in range(3):
+            speed += abs(faces[row, FACE_VELOCITY + i])
+        fastest = max(fastest, speed)
+    return fastest

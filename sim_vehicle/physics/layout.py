@@ -30,7 +30,8 @@ class Contact:
     arm_damping: float
     fold_max_m: float
     hysteresis_m: float
-    tip_mass_kg: float
+    least_in_plane: float  # share of a face's normal in the guard's plane that counts at least
+    tip_mass_kg: float  # at the end of each arm
     stop_stiffness: float
     stop_damping: float
     hub_stiffness: float
@@ -48,26 +49,29 @@ class Contact:
     reach_m: float
 
 
-class Constants:
-    """Everything about the vehicle, but for its contacts, that does not change in a flight."""
+class Disturbance:
+    """What acts on the vehicle besides itself and what it runs into; in a calm flight zero, shares one."""
 
-    mass_kg: float
-    inertia_kg_m2: Vector3  # principal, body frame, arms out
-    motor_radius_m: float
-    tip_mass_kg: float  # at the end of each arm
-    drag_n_s_m: float
     wind_ned_m_s: Vector3
-    motor_max_n: float
-    motor_idle_n: float
-    motor_time_constant_s: float
-    moment_per_thrust_m: float
-    raw_interval_us: int
-    raw_per_interval: int
-    accelerometer_range_m_s2: float
-    accelerometer_raw_noise_m_s2: float
+    motor_share: Vector4  # thrust given of what is commanded
+    carried_kg: float  # at the centre of mass, unknown to the control
+    pushes: int  # 1 while the push acts
+    push_ned_n: Vector3
+    push_point_frd_m: Vector3
+    holds: int  # 1 while a hand holds the vehicle
+    hold_point_ned_m: Vector3
+    hold_stiffness_n_m: float
+    hold_damping_n_s_m: float
+    hold_turn_damping_n_m_s: float
+    shakes: int  # 1 where any of the next is not zero
+    shake_m_s2: Vector4  # of each rotor, RMS on each raw axis at hover thrust
+    shake_rad_s: Vector4
+    shake_hz: float  # turns of a rotor a second at hover thrust
     accelerometer_bias_frd_m_s2: Vector3
-    gyroscope_raw_noise_rad_s: float
     gyroscope_bias_frd_rad_s: Vector3
+    stuck: Annotated[Floats, (6,), int]  # 1 for each raw axis that shows ``stuck_at``: accelerometer, gyroscope
+    stuck_at: Annotated[Floats, (6,)]
+    estimate_jump: Annotated[Floats, (6,)]  # what the estimate of position and velocity is off by, NED
 
 
 class Gains:
@@ -83,6 +87,25 @@ class Gains:
     speed_max_m_s: float
     climb_max_m_s: float
     descent_max_m_s: float
+
+
+class Constants(Gains, Contact):
+    """Everything about the vehicle that does not change in a flight."""
+
+    mass_kg: float
+    inertia_kg_m2: Vector3  # principal, body frame, arms out
+    drag_n_s_m: float
+    motor_max_n: float
+    motor_idle_n: float
+    motor_time_constant_s: float
+    moment_per_thrust_m: float
+    raw_interval_us: int
+    raw_per_interval: int
+    accelerometer_range_m_s2: float
+    accelerometer_raw_noise_m_s2: float
+    accelerometer_bias_frd_m_s2: Vector3
+    gyroscope_raw_noise_rad_s: float
+    gyroscope_bias_frd_rad_s: Vector3
 
 
 class Asked:
@@ -103,6 +126,9 @@ class State:
     fold_m: Vector4  # of each arm, inward positive
     fold_rate_m_s: Vector4
     pressed: Annotated[Floats, (4,), int]  # 1 for the arms that a face presses
+    was_near: int  # 1 while the next two may be other than zero
+    depth_m: Annotated[Floats, (9,)]  # of each point, in whatever it is deepest in
+    share: Annotated[Floats, (9,)]  # of a round's normal in the guard's plane when it touched; 0 where none does
     inertia: Vector4  # J at these folds: xx, yy, zz, xy
     inertia_rate: Vector4
     estimate: Annotated[Floats, (10,)]  # position NED, velocity NED, attitude: what the vehicle itself knows
@@ -117,9 +143,11 @@ class State:
     specific_force_sum: Vector3  # of the clipped raw samples in this interval
     rate_sum: Vector3
     clip_counts: Annotated[Floats, (3,), int]  # since boot
+    clipped_off_m_s: Vector3  # velocity that clipping has hidden in this interval, body FRD
+    rotor_phase: Vector4  # rad, of the vibration
     peak_force_n: float  # in this interval
-    hit: Annotated[Floats, (23,)]  # the hit in progress
-    finished_hits: Annotated[Floats, (2, 23)]  # ended in this interval; it is too short for a third
+    hit: Annotated[Floats, (29,)]  # the hit in progress
+    finished_hits: Annotated[Floats, (2, 29)]  # ended in this interval; it is too short for a third
     finished_count: int
 
 
@@ -134,10 +162,16 @@ class Scratch:
     moment_frd: Vector3
     contact_ned: Vector3  # of the force, what the walls give
     where: Vector3
+    normal: Vector3
+    on_line: Vector3
+    centre: Vector3
+    share: Annotated[Floats, (9,)]  # as in the state, at the step's start
+    deepest_m: Annotated[Floats, (9,)]  # no point can be deeper at a step's end than this
     lever: Vector3
     speed: Vector3
     rates_ned: Vector3
     velocity_before: Vector3
+    shaken: Annotated[Floats, (6,)]  # vibration on the raw axes
     fold_before_m: Vector4
     relaxed_m: Vector4  # folds that arms pressed by nothing would have
 
@@ -146,6 +180,7 @@ class Scratch:
 HIT_ACTIVE, HIT_FACE, HIT_START_US, HIT_LAST_US, HIT_PEAK_N, HIT_FOLD_M = range(6)
 HIT_POSITION, HIT_VELOCITY, HIT_NORMAL, HIT_EXIT_VELOCITY = slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 18)
 HIT_IMPULSE, HIT_ENERGY_BEFORE_J, HIT_ENERGY_AFTER_J = slice(18, 21), 21, 22
+HIT_POINT, HIT_SURFACE_VELOCITY = slice(23, 26), slice(26, 29)
 
 # Contacts closer together than this are one hit: a bounce inside the springs, not a second approach.
 SAME_HIT_US = 20_000
@@ -179,69 +214,73 @@ def _ratio_for(restitution: float) -> float:
     return (low + high) / 2
 
 
-def contact_from(airframe: Airframe) -> Contact:
+# A disc lying flat against a face (a ceiling) cannot fold its arm towards it; below this share of the
+# normal in the disc's plane the push is taken as straight through the frame. A frame without arms that fold is as
+# stiff one way as another.
+LEAST_IN_PLANE = 0.2
+
+
+def _contact_values(airframe: Airframe) -> dict[str, float]:
     """Contact constants. Two guards share a head-on hit, so each arm carries half of eq. 2's mass."""
     mass_kg, arms, geometry = airframe.mass_kg, airframe.arms, airframe.geometry
     stop_stiffness, stop_damping = spring_and_damper(arms.stop, mass_kg / 2)
     hub_stiffness, hub_damping = spring_and_damper(arms.stop, mass_kg)
     foot_stiffness, foot_damping = spring_and_damper(airframe.surface.foot, mass_kg / 4)
-    return new_record(
-        Contact,
-        arm_stiffness=arms.stiffness_per_s2 * mass_kg / 2,
-        arm_damping=arms.damping_per_s * mass_kg / 2,
-        fold_max_m=arms.fold_max_m,
-        hysteresis_m=arms.hysteresis_m,
-        tip_mass_kg=arms.tip_mass_kg,
-        stop_stiffness=stop_stiffness,
-        stop_damping=stop_damping,
-        hub_stiffness=hub_stiffness,
-        hub_damping=hub_damping,
-        foot_stiffness=foot_stiffness,
-        foot_damping=foot_damping,
-        guard_friction=airframe.surface.guard_friction,
-        ground_friction=airframe.surface.ground_friction,
-        motor_radius_m=geometry.motor_radius_m,
-        guard_radius_m=geometry.guard_radius_m,
-        guard_half_height_m=geometry.guard_height_m / 2,
-        hub_radius_m=geometry.hub_solid_radius_m,
-        foot_radius_m=geometry.foot_radius_m,
-        foot_depth_m=geometry.foot_depth_m,
-        reach_m=geometry.reach_m,
-    )
+    return {
+        "arm_stiffness": arms.stiffness_per_s2 * mass_kg / 2,
+        "arm_damping": arms.damping_per_s * mass_kg / 2,
+        "fold_max_m": arms.fold_max_m,
+        "hysteresis_m": arms.hysteresis_m,
+        "least_in_plane": LEAST_IN_PLANE if arms.fold_max_m > 0.0 else 1.0,
+        "tip_mass_kg": arms.tip_mass_kg,
+        "stop_stiffness": stop_stiffness,
+        "stop_damping": stop_damping,
+        "hub_stiffness": hub_stiffness,
+        "hub_damping": hub_damping,
+        "foot_stiffness": foot_stiffness,
+        "foot_damping": foot_damping,
+        "guard_friction": airframe.surface.guard_friction,
+        "ground_friction": airframe.surface.ground_friction,
+        "motor_radius_m": geometry.motor_radius_m,
+        "guard_radius_m": geometry.guard_radius_m,
+        "guard_half_height_m": geometry.guard_height_m / 2,
+        "hub_radius_m": geometry.hub_solid_radius_m,
+        "foot_radius_m": geometry.foot_radius_m,
+        "foot_depth_m": geometry.foot_depth_m,
+        "reach_m": geometry.reach_m,
+    }
 
 
-def gains_from(airframe: Airframe) -> Gains:
+def _gain_values(airframe: Airframe) -> dict[str, float | Floats]:
     """Gains of eqs. 4-6; the attitude's from the closed loop w^2 and 2 z w, scaled by the inertia."""
     control = airframe.control
     inertia = np.array(airframe.inertia_kg_m2)
     frequency = np.array([control.attitude_frequency_rad_s] * 2 + [control.yaw_frequency_rad_s])
-    return new_record(
-        Gains,
-        position_p=control.position_p_per_s,
-        velocity_p=control.velocity_p_per_s,
-        velocity_i=control.velocity_i_per_s2,
-        velocity_d=control.velocity_d,
-        k_r=inertia * frequency**2,
-        k_omega=inertia * 2 * control.attitude_damping * frequency,
-        tilt_max_rad=control.tilt_max_rad,
-        speed_max_m_s=control.speed_max_m_s,
-        climb_max_m_s=control.climb_max_m_s,
-        descent_max_m_s=control.descent_max_m_s,
-    )
+    return {
+        "position_p": control.position_p_per_s,
+        "velocity_p": control.velocity_p_per_s,
+        "velocity_i": control.velocity_i_per_s2,
+        "velocity_d": control.velocity_d,
+        "k_r": inertia * frequency**2,
+        "k_omega": inertia * 2 * control.attitude_damping * frequency,
+        "tilt_max_rad": control.tilt_max_rad,
+        "speed_max_m_s": control.speed_max_m_s,
+        "climb_max_m_s": control.climb_max_m_s,
+        "descent_max_m_s": control.descent_max_m_s,
+    }
 
 
-def constants_from(airframe: Airframe, wind_ned_m_s: tuple[float, float, float], rng: np.random.Generator) -> Constants:
+def constants_from(airframe: Airframe, rng: np.random.Generator) -> Constants:
     """Constants of one flight; the sensor biases are drawn from ``rng``."""
     imu, motors = airframe.imu, airframe.motors
     raw_per_interval = imu.integration_interval_us // imu.raw_interval_us
     return new_record(
         Constants,
+        **_contact_values(airframe),
+        **_gain_values(airframe),
         mass_kg=airframe.mass_kg,
         inertia_kg_m2=np.array(airframe.inertia_kg_m2),
-        motor_radius_m=airframe.geometry.motor_radius_m,
-        tip_mass_kg=airframe.arms.tip_mass_kg,
         drag_n_s_m=airframe.drag_n_s_m,
-        wind_ned_m_s=np.array(wind_ned_m_s),
         motor_max_n=motors.max_thrust_n,
         motor_idle_n=motors.idle_fraction * motors.max_thrust_n,
         motor_time_constant_s=motors.time_constant_s,
@@ -254,6 +293,11 @@ def constants_from(airframe: Airframe, wind_ned_m_s: tuple[float, float, float],
         gyroscope_raw_noise_rad_s=imu.gyroscope_noise_rad_s * math.sqrt(raw_per_interval),
         gyroscope_bias_frd_rad_s=imu.gyroscope_bias_rad_s * rng.standard_normal(3),
     )
+
+
+def calm(wind_ned_m_s: tuple[float, float, float]) -> Disturbance:
+    """Nothing but a steady wind."""
+    return new_record(Disturbance, wind_ned_m_s=np.array(wind_ned_m_s), motor_share=np.ones(4))
 
 
 def initial_state(position_ned_m: tuple[float, float, float], yaw_rad: float) -> State:

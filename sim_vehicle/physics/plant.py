@@ -15,24 +15,24 @@ from sim_vehicle.physics.interval import (
     MOTORS_FLYING,
     MOTORS_IDLE,
     MOTORS_OFF,
-    advance_interval,
+    advance_boxed,
 )
 from sim_vehicle.physics.layout import (
     POINTS,
     Asked,
     Scratch,
+    calm,
     constants_from,
-    contact_from,
-    gains_from,
     initial_state,
 )
 from sim_vehicle.physics.proximity import points_behind
-from sim_vehicle.physics.record import new_record
+from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
+from sim_vehicle.physics.trim import trim
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.world import Vector3
+from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Vector3
 
 Quadruple = tuple[float, float, float, float]
 
@@ -72,9 +72,11 @@ class Plant:
     ) -> None:
         self._rng = np.random.default_rng(seed)
         self._world = scene.world()
-        self._constants = constants_from(airframe, scene.wind_ned_m_s, self._rng)
-        self._contact = contact_from(airframe)
-        self._gains = gains_from(airframe)
+        # What a camera or a beam sees: poles and edges are too thin.
+        self._flat_faces = self._world.faces[: self._world.flat_count]
+        self._moving = np.array([row for mover in self._world.movers for row in mover.rows], np.int64)
+        self._constants = constants_from(airframe, self._rng)
+        self.disturbance = calm(scene.wind_ned_m_s)
         self._fine_steps = fine_steps
         self._raw_samples = int(self._constants.raw_per_interval)
         north, east, _ = scene.start.position_ned_m
@@ -83,7 +85,7 @@ class Plant:
         self._errors = estimate_errors(airframe, self.state.body, self._rng)
         self.onboard: OnboardEstimator | None = None
         if airframe.estimate.kind == "ekf":
-            self.onboard = OnboardEstimator(airframe, self._world.faces, self.state.body, seed)
+            self.onboard = OnboardEstimator(airframe, self._flat_faces, self.state.body, seed)
         self._estimate = self.state.estimate
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
         self._body = self.state.body
@@ -102,13 +104,15 @@ class Plant:
         self._behind = points_behind(self._world.faces, centre)
         self._near = np.zeros(len(self._world.faces), np.int64)
         self._forces = np.zeros((2, POINTS, len(self._world.faces)))
-        self._scratch = new_record(Scratch)
+        self._state_box, self._asked_box = boxed(self.state), boxed(self._asked)
+        self._constants_box, self._disturbance_box = boxed(self._constants), boxed(self.disturbance)
+        self._scratch_box = boxed(new_record(Scratch))
         self.interval_us = airframe.imu.integration_interval_us
         self.truth = TruthRecorder(keeps_path)
 
     def tune(self, gains: PositionGains) -> None:
         """Change the gains and limits of the position control."""
-        record = self._gains
+        record = self._constants
         record.position_p[:] = gains.position_p_per_s
         record.velocity_p[:] = gains.velocity_p_per_s
         record.velocity_i[:] = gains.velocity_i_per_s2
@@ -121,6 +125,13 @@ class Plant:
     def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Put the level vehicle somewhere in flight, for studies of single hits."""
         self.state.body[0:6] = [*position_ned_m, *velocity_ned_m_s]
+        self._behind[:] = points_behind(self._world.faces, position_ned_m)
+        if self.onboard is not None:
+            self.onboard.start(self.state.body, self.state.time_us)
+
+    def cruise(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float) -> None:
+        """Put the vehicle into a flight that has been steady for a while."""
+        trim(self.state, self._errors, self._constants, self.disturbance, position_ned_m, velocity_ned_m_s, yaw_rad)
         self._behind[:] = points_behind(self._world.faces, position_ned_m)
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
@@ -139,20 +150,22 @@ class Plant:
         return self._advance(MOTORS_DRIVEN)
 
     def _advance(self, motors: int) -> PlantOutput:
-        advance_interval(
-            self.state,
-            self._asked,
+        if self._world.movers:
+            self._move_obstacles()
+        advance_boxed(
+            self._state_box,
+            self._asked_box,
             motors,
             self._rng.standard_normal(6 * self._raw_samples + 9),
             self._fine_steps,
-            self._constants,
-            self._contact,
-            self._gains,
+            self._constants_box,
+            self._disturbance_box,
             self._world.faces,
+            self._moving,
             self._behind,
             self._near,
             self._forces,
-            self._scratch,
+            self._scratch_box,
             self._errors,
             self._report,
         )
@@ -160,6 +173,16 @@ class Plant:
         if self.onboard is not None:
             self._estimate_state(self.onboard, motors == MOTORS_FLYING)
         return self._output()
+
+    def _move_obstacles(self) -> None:
+        """Put what moves where it is and give it the velocity that takes it to where it will be."""
+        faces, interval_s = self._world.faces, 1e-6 * self.interval_us
+        time_s = 1e-6 * self.state.time_us
+        for mover in self._world.movers:
+            now_ned_m = np.array(mover.motion.offset_ned_m(time_s))
+            then_ned_m = np.array(mover.motion.offset_ned_m(time_s + interval_s))
+            faces[mover.rows, FACE_POINT : FACE_POINT + 3] = mover.points_ned_m + now_ned_m
+            faces[mover.rows, FACE_VELOCITY : FACE_VELOCITY + 3] = (then_ned_m - now_ned_m) / interval_s
 
     def _estimate_state(self, onboard: OnboardEstimator, flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""

@@ -6,121 +6,118 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, POINTS, Contact, Scratch
-from sim_vehicle.world import (
-    FACE_ACROSS,
-    FACE_ALONG,
-    FACE_HALF_HEIGHT,
-    FACE_HALF_WIDTH,
-    FACE_NORMAL,
-    FACE_POINT,
-)
+from sim_vehicle.physics.layout import FEET, POINTS, Contact, Scratch
+from sim_vehicle.physics.meeting import deepest_point, depth_in, meet, nearest_on_line, part_centre, within
+from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# Values of `near`, per face: out of reach, within reach, and so close that guards and hub must be looked at.
-FAR, NEAR, CLOSE = range(3)
-# Leaning by this the hoop stands on one edge; less, on both of them in part, as a hoop that gives a little does.
-EDGE_LEAN_RAD = 0.1
+# Values of `near`, per face: out of reach for this interval, out of reach now, within reach, and so close that
+# guards and hub must be looked at.
+ASLEEP, FAR, NEAR, CLOSE = range(4)
+# Values of `behind`, per point and face. A part is past a face whose plane it crossed beside the rectangle, and inside
+# where it got deep without having come from outside, as one that slips off an edge may: no spring was pressed on the
+# way, so none may push.
+IN_FRONT, PASSED, INSIDE = range(3)
 # Room for the travel in one raw interval at any speed the vehicle can fly.
 NEAR_MARGIN_M = 0.01
+# Room for what a hit may add to the speed within one interval of the inertial sensor.
+WAKE_MARGIN_M = 0.03
 
 
 @njit
-def contact_point(
-    point: int, face: int, rotation: Floats, position: Floats, contact: Contact, faces: Floats, out: Floats
-) -> float:
-    """Write the point's position (NED, m) nearest to or deepest in a face into ``out``; return the share of
-    the face's normal that lies in the guard's plane (1 for hub and feet).
-
-    A guard is a hoop: its deepest point is on the rim, along the in-plane part of the inward normal, and on the
-    edge of the hoop that leans into the face.
-    """
-    share = 1.0
-    if point < GUARDS:
-        axis_dot = 0.0
+def wake_faces(body: Floats, interval_s: float, contact: Contact, faces: Floats, near: Ints, scratch: Scratch) -> bool:
+    """Set the faces that no part can reach in an interval of the inertial sensor ASLEEP; whether any is awake."""
+    speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
+    awake = False
+    for face in range(near.shape[0]):
+        moved = 0.0
         for i in range(3):
-            axis_dot -= faces[face, FACE_NORMAL + i] * rotation[i, 2]
-        share = math.sqrt(max(0.0, 1.0 - axis_dot * axis_dot))
-        edge = contact.guard_half_height_m * min(max(axis_dot / EDGE_LEAN_RAD, -1.0), 1.0)
-        for i in range(3):
-            arm = rotation[i, 0] * ARM_DIRECTIONS_FRD[point, 0] + rotation[i, 1] * ARM_DIRECTIONS_FRD[point, 1]
-            towards = -faces[face, FACE_NORMAL + i] - axis_dot * rotation[i, 2]
-            rim = contact.guard_radius_m * towards / share if share > 1e-9 else 0.0
-            out[i] = position[i] + contact.motor_radius_m * arm + rim + edge * rotation[i, 2]
-    elif point == HUB:
-        for i in range(3):
-            out[i] = position[i] - contact.hub_radius_m * faces[face, FACE_NORMAL + i]
-    else:
-        for i in range(3):
-            arm = (
-                rotation[i, 0] * ARM_DIRECTIONS_FRD[point - FEET, 0]
-                + rotation[i, 1] * ARM_DIRECTIONS_FRD[point - FEET, 1]
-            )
-            out[i] = position[i] + contact.foot_radius_m * arm + contact.foot_depth_m * rotation[i, 2]
-    return share
+            moved += abs(faces[face, FACE_VELOCITY + i])
+        reach_m = contact.reach_m + 2.0 * (speed + 2.0 * moved) * interval_s + WAKE_MARGIN_M
+        near[face] = FAR if _is_within_reach(body, face, reach_m, faces, scratch) else ASLEEP
+        awake = awake or near[face] == FAR
+    return awake
 
 
 @njit
-def depth_in(face: int, where: Floats, faces: Floats) -> float:
-    """How far a position is behind a face's plane, metres; negative in front of it."""
-    depth = 0.0
-    for i in range(3):
-        depth -= (where[i] - faces[face, FACE_POINT + i]) * faces[face, FACE_NORMAL + i]
-    return depth
-
-
-@njit
-def within(face: int, where: Floats, faces: Floats) -> bool:
-    """Whether a position projects onto the face's rectangle."""
-    across, along = 0.0, 0.0
-    for i in range(3):
-        offset = where[i] - faces[face, FACE_POINT + i]
-        across += offset * faces[face, FACE_ACROSS + i]
-        along += offset * faces[face, FACE_ALONG + i]
-    return bool(abs(across) <= faces[face, FACE_HALF_WIDTH] and abs(along) <= faces[face, FACE_HALF_HEIGHT])
-
-
-@njit
-def find_near(body: Floats, contact: Contact, faces: Floats, near: Ints) -> bool:
+def find_near(body: Floats, contact: Contact, faces: Floats, near: Ints, scratch: Scratch) -> bool:
     """Mark the faces that some part could reach; return whether there is any."""
     found = False
     for face in range(near.shape[0]):
+        if near[face] == ASLEEP:
+            continue
         near[face] = FAR
-        if abs(depth_in(face, body, faces)) < contact.reach_m + NEAR_MARGIN_M:
+        if _is_within_reach(body, face, contact.reach_m + NEAR_MARGIN_M, faces, scratch):
             near[face] = NEAR
             found = True
     return found
 
 
 @njit
+def _is_within_reach(body: Floats, face: int, reach_m: float, faces: Floats, scratch: Scratch) -> bool:
+    """Whether a face's plane, or a round's surface, is less than ``reach_m`` from the vehicle's centre."""
+    if faces[face, FACE_RADIUS] == 0.0:
+        return bool(abs(depth_in(face, body, faces)) < reach_m)
+    nearest_on_line(face, body, faces, scratch.on_line)
+    squared = 0.0
+    for i in range(3):
+        squared += (body[i] - scratch.on_line[i]) ** 2
+    return bool(squared < (reach_m + faces[face, FACE_RADIUS]) ** 2)
+
+
+@njit
 def find_close(
     body: Floats, behind: Ints, near: Ints, margin_m: float, contact: Contact, faces: Floats, scratch: Scratch
 ) -> bool:
-    """Raise to CLOSE the near faces that a guard or the hub touches, may touch within ``margin_m`` of travel,
-    or has passed by; return whether anything but passed points made it so.
+    """Raise to CLOSE the near faces that a guard or the hub touches or may touch within ``margin_m`` of travel;
+    note which parts have passed by a flat face; return whether any is CLOSE.
     """
     touching = False
     for face in range(near.shape[0]):
-        if near[face] == FAR:
+        if near[face] < NEAR:
             continue
-        for point in range(FEET):
-            if behind[point, face] == 1:
-                near[face] = CLOSE
+        flat = faces[face, FACE_RADIUS] == 0.0
+        for point in range(POINTS if faces[face, FACE_MEETS_FEET] == 1.0 else FEET):
+            if flat and face != 0:
+                note_passing(point, face, body, behind, contact, faces, scratch)
+            if point >= FEET or behind[point, face] != IN_FRONT:
                 continue
-            contact_point(point, face, scratch.rotation, body, contact, faces, scratch.where)
-            if depth_in(face, scratch.where, faces) > -margin_m:
+            if flat:
+                for i in range(3):
+                    scratch.normal[i] = faces[face, FACE_NORMAL + i]
+                _, further = deepest_point(point, scratch.normal, scratch.rotation, body, contact, scratch.where)
+                close = depth_in(face, scratch.where, faces) + further > -margin_m
+                close = close and within(face, scratch.where, faces, margin_m + contact.guard_radius_m)
+            else:
+                close = meet(point, face, scratch.rotation, body, contact, faces, scratch)[0] > -margin_m
+            if close:
                 near[face] = CLOSE
                 touching = True
     return touching
 
 
 @njit
-def points_at(face: int, near: Ints) -> tuple[int, int]:
-    """The range of points worth looking at: feet meet the ground alone, guards and hub what is close."""
-    last = POINTS if face == 0 else FEET
-    if near[face] == FAR:
+def note_passing(
+    point: int, face: int, body: Floats, behind: Ints, contact: Contact, faces: Floats, scratch: Scratch
+) -> None:
+    """A part whose middle gets behind a face's plane beside its rectangle has passed it by and is not pushed by it
+    until it is in front again.
+    """
+    part_centre(point, scratch.rotation, body, contact, scratch.where)
+    if depth_in(face, scratch.where, faces) <= 0.0:
+        if behind[point, face] == PASSED:
+            behind[point, face] = IN_FRONT
+    elif behind[point, face] == IN_FRONT and not within(face, scratch.where, faces, 0.0):
+        behind[point, face] = PASSED
+
+
+@njit
+def points_at(face: int, near: Ints, faces: Floats) -> tuple[int, int]:
+    """The range of points worth looking at: feet meet level faces alone, guards and hub what is close."""
+    last = POINTS if faces[face, FACE_MEETS_FEET] == 1.0 else FEET
+    if near[face] < NEAR:
         return last, last
     return (0 if near[face] == CLOSE else FEET), last
 
@@ -131,4 +128,5 @@ def points_behind(faces: Floats, centre_ned_m: tuple[float, float, float]) -> In
     """
     offset = np.array(centre_ned_m) - faces[:, FACE_POINT : FACE_POINT + 3]
     in_front = (offset * faces[:, FACE_NORMAL : FACE_NORMAL + 3]).sum(axis=1)
-    return np.tile((in_front < 0).astype(np.int64), (POINTS, 1))
+    is_flat = faces[:, FACE_RADIUS] == 0.0
+    return np.tile(((in_front < 0) & is_flat).astype(np.int64), (POINTS, 1))

@@ -3,6 +3,7 @@
 Passing numba a tuple of arrays makes every call copy and count each of them; a record is one pointer.
 """
 
+from functools import cache
 from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -23,13 +24,19 @@ def new_record(kind: type[RecordType], **values: Any) -> RecordType:
     `int` and `float` fields are 64 bits wide; an array field is `Annotated[..., shape]`, of integers if
     the annotation ends in `int`. Raises ValueError for a value that is no field.
     """
-    record = np.zeros(1, _layout(kind)).view(np.recarray)[0]
+    record = np.zeros(1, _layout(cast(Any, kind))).view(np.recarray)[0]
     for name, value in values.items():
         record[name] = value
     return cast(RecordType, record)
 
 
-def _layout(kind: type[Any]) -> np.dtype[Any]:
+def boxed(record: Any) -> npt.NDArray[Any]:
+    """The same memory as an array of one: handing numba a record costs 1 to 3 us, the array a tenth of that."""
+    return np.asarray(record.base).view(np.ndarray)
+
+
+@cache
+def _layout(kind: Any) -> np.dtype[Any]:
     fields = []
     for name, hint in get_type_hints(kind, include_extras=True).items():
         if get_origin(hint) is Annotated:

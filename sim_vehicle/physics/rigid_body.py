@@ -1,4 +1,4 @@
-"""The rigid body of the paper's eq. 1 with drag and contact, and one Runge-Kutta step of it."""
+"""The rigid body of the paper's eq. 1 with drag, contact and what else acts on it, and one Runge-Kutta step of it."""
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +13,12 @@ from sim_vehicle.physics.layout import (
     ROTOR_YAW_SIGNS,
     Constants,
     Contact,
+    Disturbance,
     Scratch,
     State,
 )
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
+from sim_vehicle.world import FACE_POINT, FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -32,6 +34,7 @@ def derivative(
     near: Ints,
     touches: bool,
     constants: Constants,
+    disturbance: Disturbance,
     contact: Contact,
     faces: Floats,
     rotation: Floats,
@@ -48,13 +51,17 @@ def derivative(
     force, moment = scratch.force_ned, scratch.moment_frd
     total_n = thrusts_n[0] + thrusts_n[1] + thrusts_n[2] + thrusts_n[3]
     for i in range(3):
-        force[i] = -total_n * rotation[i, 2] - constants.drag_n_s_m * (body[3 + i] - constants.wind_ned_m_s[i])
+        force[i] = -total_n * rotation[i, 2] - constants.drag_n_s_m * (body[3 + i] - disturbance.wind_ned_m_s[i])
         moment[i] = 0.0
     for motor in range(4):
         thrust = thrusts_n[motor]
         moment[0] -= contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
         moment[1] += contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust
         moment[2] += ROTOR_YAW_SIGNS[motor] * constants.moment_per_thrust_m * thrust
+    if disturbance.pushes == 1:
+        add_push(rotation, disturbance, scratch)
+    if disturbance.holds == 1:
+        add_hold(body, disturbance, scratch)
     scratch.contact_ned[:] = 0.0
     if touches:
         contact_wrench(body, rotation, behind, near, contact, faces, scratch, normal_forces)
@@ -62,7 +69,7 @@ def derivative(
     p, q, r = body[10], body[11], body[12]
     for i in range(3):
         slope[i] = body[3 + i]
-        slope[3 + i] = force[i] / constants.mass_kg
+        slope[3 + i] = force[i] / (constants.mass_kg + disturbance.carried_kg)
     slope[5] += GRAVITY_M_S2
     slope[6] = -0.5 * (body[7] * p + body[8] * q + body[9] * r)
     slope[7] = 0.5 * (body[6] * p + body[8] * r - body[9] * q)
@@ -78,6 +85,37 @@ def derivative(
 
 
 @njit
+def add_push(rotation: Floats, disturbance: Disturbance, scratch: Scratch) -> None:
+    """Add a force (NED) on a point of the body."""
+    push, point = scratch.where, disturbance.push_point_frd_m
+    for i in range(3):
+        scratch.force_ned[i] += disturbance.push_ned_n[i]
+        push[i] = 0.0
+        for j in range(3):
+            push[i] += rotation[j, i] * disturbance.push_ned_n[j]
+    scratch.moment_frd[0] += point[1] * push[2] - point[2] * push[1]
+    scratch.moment_frd[1] += point[2] * push[0] - point[0] * push[2]
+    scratch.moment_frd[2] += point[0] * push[1] - point[1] * push[0]
+
+
+@njit
+def add_hold(body: Floats, disturbance: Disturbance, scratch: Scratch) -> None:
+    """Add the spring and damper of a hand that holds the body where it caught it, and brakes its turning."""
+    for i in range(3):
+        scratch.force_ned[i] -= disturbance.hold_stiffness_n_m * (body[i] - disturbance.hold_point_ned_m[i])
+        scratch.force_ned[i] -= disturbance.hold_damping_n_s_m * body[3 + i]
+        scratch.moment_frd[i] -= disturbance.hold_turn_damping_n_m_s * body[10 + i]
+
+
+@njit
+def move_faces(moving: Ints, step_s: float, faces: Floats) -> None:
+    """Move the rows of obstacles that move on by ``step_s``."""
+    for row in moving:
+        for i in range(3):
+            faces[row, FACE_POINT + i] += step_s * faces[row, FACE_VELOCITY + i]
+
+
+@njit
 def runge_kutta_step(
     state: State,
     behind: Ints,
@@ -85,12 +123,14 @@ def runge_kutta_step(
     touches: bool,
     step_s: float,
     constants: Constants,
+    disturbance: Disturbance,
     contact: Contact,
     faces: Floats,
+    moving: Ints,
     forces: Floats,
     scratch: Scratch,
 ) -> None:
-    """Advance the body by ``step_s`` (classical fourth order), thrusts and inertia held.
+    """Advance the body and what moves around it by ``step_s`` (classical fourth order), thrusts and inertia held.
 
     Leaves the rotation of the step's *start* in the scratch and its normal forces in ``forces[0]``
     (2, POINTS, n faces).
@@ -99,6 +139,8 @@ def runge_kutta_step(
     inertia_of(state.fold_m, state.fold_rate_m_s, constants, inertia, inertia_rate)
     k, trial = scratch.slopes, scratch.trial
     for stage in range(4):
+        if moving.shape[0] > 0 and (stage == 1 or stage == 3):
+            move_faces(moving, 0.5 * step_s, faces)
         part_s = 0.0 if stage == 0 else step_s if stage == 3 else 0.5 * step_s
         for i in range(BODY_SIZE):
             trial[i] = body[i] + part_s * k[max(stage - 1, 0), i]
@@ -111,6 +153,7 @@ def runge_kutta_step(
             near,
             touches,
             constants,
+            disturbance,
             contact,
             faces,
             scratch.rotation if stage == 0 else scratch.turned,

@@ -10,8 +10,8 @@ from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of
 from sim_vehicle.physics.layout import (
     POINTS,
     Scratch,
+    calm,
     constants_from,
-    contact_from,
     initial_state,
 )
 from sim_vehicle.physics.plant import Plant
@@ -56,7 +56,7 @@ def test_no_hit_returns_more_energy_than_it_took(name: str, yaw_deg: float, rate
 def test_inertia_of_folded_arms() -> None:
     """Point masses at 0.145 m: both front arms in by 30 mm take 2 m (R^2 - (R - l)^2) from the yaw axis."""
     airframe = load_built_in("foldable")
-    constants = constants_from(airframe, (0.0, 0.0, 0.0), np.random.default_rng(1))
+    constants = constants_from(airframe, np.random.default_rng(1))
     inertia, rate = np.zeros(4), np.zeros(4)
     lost = 0.05 * (0.145**2 - 0.115**2)
 
@@ -72,7 +72,7 @@ def test_inertia_of_folded_arms() -> None:
 
 
 def test_the_inertias_rate_is_its_slope() -> None:
-    constants = constants_from(load_built_in("foldable"), (0.0, 0.0, 0.0), np.random.default_rng(1))
+    constants = constants_from(load_built_in("foldable"), np.random.default_rng(1))
     folds, rates, step_s = np.array([0.01, 0.02, 0.0, 0.03]), np.array([-0.5, 0.1, 0.3, -0.2]), 1e-6
     before, after, rate, unused = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
     inertia_of(folds, rates, constants, before, rate)
@@ -100,7 +100,7 @@ def test_the_integrator_is_of_fourth_order() -> None:
     """A tumble with drag: halving the step divides the error by sixteen."""
     airframe = load_built_in("foldable")
     world = build_world(())
-    constants = constants_from(airframe, (0.0, 0.0, 0.0), np.random.default_rng(1))
+    constants = constants_from(airframe, np.random.default_rng(1))
 
     def tumbled(steps: int) -> np.ndarray:
         state = initial_state((0.0, 0.0, -50.0), 0.3)
@@ -111,8 +111,8 @@ def test_the_integrator_is_of_fourth_order() -> None:
         forces = np.zeros((2, POINTS, count))
         for _ in range(steps):
             runge_kutta_step(
-                state, behind, near, False, 0.5 / steps, constants, contact_from(airframe), world.faces, forces,
-                new_record(Scratch),
+                state, behind, near, False, 0.5 / steps, constants, calm((0.0, 0.0, 0.0)), constants,
+                world.faces, np.zeros(0, np.int64), forces, new_record(Scratch),
             )  # fmt: skip
         return np.array(state.body)
 

@@ -12,7 +12,6 @@ from sim_vehicle.physics.layout import (
     ARM_DIRECTIONS_FRD,
     ROTOR_YAW_SIGNS,
     constants_from,
-    gains_from,
     initial_state,
 )
 from sim_vehicle.physics.plant import Plant, PlantOutput
@@ -77,14 +76,14 @@ def test_a_spun_vehicle_still_flies_where_it_should_while_it_turns_back(yaw_deg:
 def test_the_attitude_control_carries_what_turning_and_folding_do() -> None:
     """Eq. 5 without errors and damping: tau = W x J W + J' W, whatever J is."""
     airframe = load_built_in("foldable")
-    constants = constants_from(airframe, (0.0, 0.0, 0.0), np.random.default_rng(1))
+    constants = constants_from(airframe, np.random.default_rng(1))
     constants.gyroscope_bias_frd_rad_s[:] = 0.0
-    gains, state = gains_from(airframe), initial_state((0.0, 0.0, -2.0), 0.0)
-    gains.k_omega[:] = 0.0
+    state = initial_state((0.0, 0.0, -2.0), 0.0)
+    constants.k_omega[:] = 0.0
     state.body[10:13] = rates = np.array([2.0, -3.0, 5.0])
     state.inertia[:], state.inertia_rate[:] = [0.0031, 0.0030, 0.0049, 0.0002], [-0.01, -0.02, -0.03, 0.004]
 
-    attitude_control(state, constants, 0.0, gains)
+    attitude_control(state, constants, 0.0, constants)
 
     def full(entries: np.ndarray) -> np.ndarray:
         xx, yy, zz, xy = entries

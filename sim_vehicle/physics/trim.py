@@ -1,0 +1,68 @@
+"""A vehicle that has been cruising for a while: its lean, thrust, integrals and estimate at a steady velocity."""
+
+import math
+
+import numpy as np
+
+from sim_vehicle.physics.estimate import EstimateErrors
+from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, State
+from sim_vehicle.physics.record import Floats
+from sim_vehicle.world import Vector3
+
+
+def trim(
+    state: State,
+    errors: EstimateErrors,
+    constants: Constants,
+    disturbance: Disturbance,
+    position_ned_m: Vector3,
+    velocity_ned_m_s: Vector3,
+    yaw_rad: float,
+) -> None:
+    """Write the steady flight through a position (NED, m) at a velocity (NED, m/s) into the state.
+
+    The thrust carries the weight and the drag: R e3 lies along g e3 - a with m a = drag (eqs. 1 and 6).
+    """
+    velocity = np.array(velocity_ned_m_s)
+    acceleration = constants.drag_n_s_m * (velocity - disturbance.wind_ned_m_s) / constants.mass_kg
+    upheld = np.array([0.0, 0.0, GRAVITY_M_S2]) - acceleration
+    rotation = _leaning(upheld, yaw_rad)
+    state.body[:] = [*position_ned_m, *velocity_ned_m_s, *_quaternion(rotation), 0.0, 0.0, 0.0]
+    state.velocity_integral[:] = acceleration
+    state.attitude_setpoint[:] = rotation
+    state.yaw_setpoint_rad = yaw_rad
+    state.collective_n = constants.mass_kg * float(np.linalg.norm(upheld))
+    state.motor_command_n[:] = state.motor_thrust_n[:] = state.collective_n / 4
+    _remember(state, errors, 1e-6 * constants.raw_interval_us * constants.raw_per_interval)
+
+
+def _remember(state: State, errors: EstimateErrors, interval_s: float) -> None:
+    """Let the estimate have seen the steady flight before."""
+    slots, position, velocity = len(errors.past), state.body[0:3].copy(), state.body[3:6]
+    for step in range(slots):
+        row = errors.past[(errors.cursor[0] + step) % slots]
+        row[:] = state.body
+        row[0:3] = position + (step - slots + 1) * interval_s * velocity
+    delayed_s = max(slots - 1, 0) * interval_s
+    state.estimate[:] = state.body[:10]
+    state.estimate[0:3] += errors.error[0:3] - delayed_s * velocity
+    state.estimate[3:6] += errors.error[3:6]
+    state.acceleration_ned_m_s2[:] = 0.0
+
+
+def _leaning(upheld: Floats, yaw_rad: float) -> Floats:
+    """R (body to NED) with its third axis along ``upheld`` and the nose towards a heading."""
+    b3 = upheld / np.linalg.norm(upheld)
+    b2 = np.cross(b3, [math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
+    b2 /= np.linalg.norm(b2)
+    return np.column_stack([np.cross(b2, b3), b2, b3])
+
+
+def _quaternion(rotation: Floats) -> tuple[float, float, float, float]:
+    """(w, x, y, z) of a rotation that leaves the body's top up, where w and z are not both small."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    if xx + yy + zz > 0.0:
+        w = 0.5 * math.sqrt(1.0 + xx + yy + zz)
+        return w, (zy - yz) / (4 * w), (xz - zx) / (4 * w), (yx - xy) / (4 * w)
+    z = 0.5 * math.sqrt(1.0 + zz - xx - yy)
+    return (yx - xy) / (4 * z), (xz + zx) / (4 * z), (yz + zy) / (4 * z), z

@@ -1,0 +1,205 @@
+"""Poles, edges, boxes, level plates and things that move: geometry, symmetry, and that no energy comes of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.errors import SceneError
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.physics.trim import _quaternion
+from sim_vehicle.scene import Scene, check_start_is_free
+from tests.sim_vehicle.physics.throwing import quiet
+
+HEIGHT_M = 8.0
+POLE = {"poles": [{"point_ned_m": [2, 0, 0], "radius_m": 0.1, "height_m": 30}]}
+SCENES = {
+    "pole": POLE,
+    "slanted pole": {"poles": [{"point_ned_m": [-0.4, -4, 0], "axis_ned": [0.3, 0.5, -1], "radius_m": 0.05,
+                                "height_m": 30}]},
+    "bar": {"poles": [{"point_ned_m": [2, -3, -8], "axis_ned": [0, 1, 0], "radius_m": 0.03, "height_m": 6}]},
+    "upright edge": {"walls": [{"point_ned_m": [2, 1, -8], "normal_ned": [-1, 0, 0], "width_m": 2, "height_m": 6,
+                                "thickness_m": 0.02}]},
+    "ledge": {"walls": [{"point_ned_m": [3, 0, -8], "normal_ned": [0, 0, 1], "width_m": 2, "height_m": 2,
+                         "thickness_m": 0.04}]},
+    "box": {"boxes": [{"centre_ned_m": [2.5, 0.3, -8], "size_m": [1, 0.6, 0.8], "yaw_deg": 20}]},
+}  # fmt: skip
+
+
+def smooth(name: str) -> Airframe:
+    return quiet(load_built_in(name), surface__guard_friction=0.0)
+
+
+def thrown(
+    airframe: Airframe,
+    scene: dict,
+    position=(1.5, 0.0, -HEIGHT_M),
+    velocity=(2.0, 0.0, 0.0),
+    yaw_rad=0.0,
+    rates=(0.0, 0.0, 0.0),
+    lean_rad=(0.0, 0.0),
+    duration_s=0.48,
+) -> Plant:
+    """A vehicle without thrust, let go among obstacles; ``lean_rad``: pitch and roll."""
+    plant = Plant(airframe, Scene.model_validate(scene), seed=1)
+    plant.place(position, velocity)
+    cy, sy = math.cos(yaw_rad), math.sin(yaw_rad)
+    cp, sp = math.cos(lean_rad[0]), math.sin(lean_rad[0])
+    cr, sr = math.cos(lean_rad[1]), math.sin(lean_rad[1])
+    turn = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    plant.state.body[6:10] = _quaternion(turn @ np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]]))
+    plant.state.body[10:13] = rates
+    for _ in range(round(duration_s / 0.004)):
+        plant.step(None, armed=False)
+    return plant
+
+
+@pytest.mark.parametrize("offset_m", [0.0, 0.03, 0.1, 0.2, -0.25])
+def test_a_poles_normal_is_radial_where_the_guard_touches_it(offset_m: float) -> None:
+    (hit, *_) = thrown(smooth("rigid"), POLE, (1.5, offset_m, -HEIGHT_M)).truth.hits
+    off_axis = np.array(hit.contact_point_ned_m)[:2] - [2.0, 0.0]
+    assert hit.kind == "pole"
+    assert np.linalg.norm(off_axis) == pytest.approx(0.1, abs=1e-6)
+    assert np.array(hit.normal_ned) == pytest.approx([*(off_axis / 0.1), 0.0], abs=1e-6)
+    # and the guard's middle lies along it, its radius away
+    arm_m = 0.145 / math.sqrt(2)
+    guard = np.array(hit.contact_point_ned_m)[:2] + 0.08 * np.array(hit.normal_ned)[:2]
+    centre = np.array(hit.contact_position_ned_m)[:2]
+    assert np.abs(guard - centre) == pytest.approx(np.array([arm_m, arm_m]), abs=2e-4)
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("offset_m", [0.04, 0.15])
+def test_hits_mirrored_at_a_pole_are_mirrored(name: str, offset_m: float) -> None:
+    left, right = (
+        thrown(smooth(name), POLE, (1.5, side * offset_m, -HEIGHT_M), duration_s=0.24).state.body for side in (1, -1)
+    )
+    assert left[3] == pytest.approx(right[3], rel=1e-6)
+    assert left[4] == pytest.approx(-right[4], rel=1e-6)
+    assert left[12] == pytest.approx(-right[12], rel=1e-6)
+    assert abs(left[4]) > 0.1
+
+
+def test_a_pole_hit_through_the_hub_rebounds_as_the_hub_does() -> None:
+    """A pole that fits between the front guards meets the hub, a ball: straight back at its restitution."""
+    thin = {"poles": [{"point_ned_m": [2, 0, 0], "radius_m": 0.02, "height_m": 30}]}
+    plant = thrown(smooth("rigid"), thin, duration_s=0.3)
+    (hit,) = plant.truth.hits
+    assert hit.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
+    assert hit.contact_position_ned_m[0] == pytest.approx(2.0 - 0.02 - 0.05, abs=1e-3)
+    assert hit.rebound_speed_m_s / 2.0 == pytest.approx(0.9, abs=0.01)
+
+
+def test_a_thick_pole_is_a_wall() -> None:
+    thick = {
+        "poles": [{"point_ned_m": [52, 0, -HEIGHT_M - 500], "axis_ned": [0, 0, 1], "radius_m": 50, "height_m": 1000}]
+    }
+    wall = {"walls": [{"point_ned_m": [2, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]}]}
+    (at_pole,), (at_wall,) = (thrown(smooth("foldable"), scene).truth.hits for scene in (thick, wall))
+    assert at_pole.rebound_speed_m_s == pytest.approx(at_wall.rebound_speed_m_s, rel=0.01)
+    assert at_pole.contact_duration_s == pytest.approx(at_wall.contact_duration_s, rel=0.01)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+def test_no_obstacle_returns_more_energy_than_it_took(name: str, scene: str) -> None:
+    """Whatever part meets it, leaning and tumbling: kinetic energy and height together only fall."""
+    airframe, rng, hits = smooth(name), np.random.default_rng(4), 0
+    for number in range(16):
+        plant = thrown(
+            airframe,
+            SCENES[scene],
+            (1.5, rng.uniform(-0.3, 0.3), -HEIGHT_M - rng.uniform(0.0, 0.3)),
+            (rng.uniform(2, 4), rng.uniform(-1, 1), rng.uniform(-1, 1)),
+            rng.uniform(-3, 3),
+            rng.uniform(-3, 3, 3) * (number % 2),
+            rng.uniform(-0.5, 0.5, 2) * (number % 3 == 0),
+            duration_s=0.4,
+        )
+        series = plant.truth.series()
+        for hit in plant.truth.hits:
+            start_m, end_m = (
+                np.interp(time_us, series["time_boot_us"], series["position_ned_m"][:, 2])
+                for time_us in (hit.contact_at_boot_us, hit.ended_at_boot_us)
+            )
+            gained_j = hit.energy_after_j - hit.energy_before_j - airframe.mass_kg * 9.81 * (end_m - start_m)
+            assert gained_j < 5e-4 * hit.energy_before_j
+            hits += 1
+    assert hits >= 4
+
+
+def test_a_ceiling_is_hit_from_below_and_a_floor_from_above() -> None:
+    level = {"walls": [{"point_ned_m": [0, 0, -9], "normal_ned": [0, 0, 1], "name": "lid"},
+                       {"point_ned_m": [0, 0, -4], "normal_ned": [0, 0, -1], "name": "deck"}]}  # fmt: skip
+    (up,) = thrown(smooth("foldable"), level, (0, 0, -8.5), (0, 0, -4.0), duration_s=0.3).truth.hits
+    assert (up.obstacle, up.kind, up.normal_ned) == ("lid", "ceiling", (0.0, 0.0, 1.0))
+    assert up.rebound_velocity_ned_m_s[2] > 0
+    (down, *_) = thrown(smooth("foldable"), level, (0, 0, -5.0), (0, 0, 2.0)).truth.hits
+    assert (down.obstacle, down.kind, down.normal_ned) == ("deck", "floor", (0.0, 0.0, -1.0))
+    # It lands on its feet, 8 cm below the centre.
+    assert down.contact_position_ned_m[2] == pytest.approx(-4.08, abs=1e-3)
+
+
+def test_the_rim_of_a_plate_is_solid() -> None:
+    """Flown at the upright edge of a plate seen end-on, a vehicle is stopped; beside it, it passes."""
+    plate = {"walls": [{"point_ned_m": [3, 0.05, -HEIGHT_M], "normal_ned": [0, 1, 0], "width_m": 2, "height_m": 6}]}
+    (hit, *_) = thrown(smooth("rigid"), plate).truth.hits
+    assert hit.kind == "edge"
+    assert hit.rebound_velocity_ned_m_s[0] < 0
+    passed = thrown(smooth("rigid"), plate, (1.5, 0.3, -HEIGHT_M), duration_s=0.8)
+    assert passed.truth.hits == []
+    assert passed.state.body[0] > 3.0
+
+
+def test_from_rim_to_face_nothing_jumps() -> None:
+    """Touching nearer and nearer to a plate's upright edge, the hit changes little by little."""
+    plate = {"walls": [{"point_ned_m": [2, 1.0, -HEIGHT_M], "normal_ned": [-1, 0, 0], "width_m": 2, "height_m": 6}]}
+    airframe = quiet(smooth("foldable"), inertia_kg_m2=(9.0, 9.0, 9.0))
+    speeds = [
+        thrown(airframe, plate, (1.5, offset_m, -HEIGHT_M), yaw_rad=math.pi / 4).state.body[3]
+        for offset_m in np.arange(-0.02, 0.14, 0.01)
+    ]
+    assert np.abs(np.diff(speeds, 2)).max() < 0.1
+    assert speeds[-1] < -0.1
+
+
+@pytest.mark.parametrize("name", ["foldable", "rigid"])
+@pytest.mark.parametrize("kind", ["walls", "poles"])
+def test_a_moving_obstacle_hits_as_a_standing_one_is_hit(name: str, kind: str) -> None:
+    """Seen from the obstacle a hit is the same whichever of the two moves; only the fall differs by none."""
+    moving = {"motion": {"velocity_ned_m_s": [-2, 0, 0], "from_s": 0.0, "until_s": 5.0}}
+    obstacle = {
+        "walls": {"point_ned_m": [2, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]},
+        "poles": {"point_ned_m": [2, 0.03, 0], "radius_m": 0.1, "height_m": 30},
+    }[kind]
+    standing = thrown(smooth(name), {kind: [obstacle]}, velocity=(2.0, 0.0, 0.0), duration_s=0.3)
+    hovering = thrown(smooth(name), {kind: [obstacle | moving]}, velocity=(0.0, 0.0, 0.0), duration_s=0.3)
+    (at_rest, *_), (run_over, *_) = standing.truth.hits, hovering.truth.hits
+    assert run_over.surface_velocity_ned_m_s == pytest.approx((-2.0, 0.0, 0.0), abs=1e-9)
+    assert np.array(hovering.state.body[3:6]) - [-2, 0, 0] == pytest.approx(standing.state.body[3:6], abs=0.01)
+    assert run_over.contact_at_boot_us == pytest.approx(at_rest.contact_at_boot_us, abs=30)
+    assert run_over.energy_after_j / run_over.energy_before_j == pytest.approx(
+        at_rest.energy_after_j / at_rest.energy_before_j, rel=0.01
+    )
+
+
+def test_a_path_is_followed() -> None:
+    path = [{"at_s": 0.1, "offset_ned_m": [0, 0, 0]}, {"at_s": 0.2, "offset_ned_m": [-1, 0, 0]}]
+    scene = {"walls": [{"point_ned_m": [2, 0, -1], "normal_ned": [-1, 0, 0], "motion": {"path": path}}]}
+    motion = Scene.model_validate(scene).walls_built()[0].motion
+    assert motion.offset_ned_m(0.0) == (0, 0, 0)
+    assert motion.offset_ned_m(0.15) == pytest.approx((-0.5, 0, 0))
+    assert motion.offset_ned_m(9.0) == (-1, 0, 0)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"poles": [{"point_ned_m": [0.25, 0, 0], "radius_m": 0.1}]},
+        {"boxes": [{"centre_ned_m": [0.5, 0, 0], "size_m": [0.6, 0.6, 0.6]}]},
+    ],
+)
+def test_a_start_inside_an_obstacle_is_refused(part: dict) -> None:
+    with pytest.raises(SceneError, match=r"sim\.(poles|boxes)\.0: .* passes through"):
+        check_start_is_free(Scene.model_validate(part), load_built_in("foldable"))
