@@ -11,6 +11,7 @@ from companion.errors import ReboundError
 from rebound_cli import __version__
 from rebound_cli.arguments import count, host_and_port, hours, instance, port, speed
 from rebound_cli.replay.arguments import add_replay
+from rebound_cli.tune.arguments import add_tune
 
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
@@ -52,6 +53,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_paper(commands)
     _add_detectors(commands)
     add_replay(commands)
+    add_tune(commands)
     _add_airframe(commands)
     _add_identify(commands)
     return parser
