@@ -10,6 +10,8 @@ from pathlib import Path
 from companion.errors import ReboundError
 from rebound_cli import __version__
 from rebound_cli.arguments import count, host_and_port, hours, instance, port, speed
+from rebound_cli.check.arguments import add_check
+from rebound_cli.plan.arguments import add_plan
 from rebound_cli.replay.arguments import add_replay
 from rebound_cli.tune.arguments import add_tune
 
@@ -48,6 +50,8 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_fly(commands)
+    add_check(commands)
+    add_plan(commands)
     _add_sim(commands)
     _add_results(commands)
     _add_paper(commands)
