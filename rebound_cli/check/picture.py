@@ -18,6 +18,7 @@ from sim_vehicle.scene import Scene
 _WAY = "tab:orange"
 _FENCE = "tab:green"
 _OBSTACLE = "tab:brown"
+_MEETING = "tab:red"
 # A wait whose end nobody knows is drawn this long.
 _UNKNOWN_S = 5.0
 
@@ -46,6 +47,8 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
         axis.plot(points[:, 1], points[:, 0], color=_WAY, linewidth=1.6, label="way" if number == 0 else None)
         if way.length_m:
             axis.annotate(way.leg.step.label.partition(" ")[0], points[-1, 1::-1], fontsize=8)
+        if way.meets:
+            axis.plot(*points[way.meets.index, 1::-1], "x", color=_MEETING)
     axis.plot([0.0], [0.0], "^", color="black", label="arming position")
     axis.set_title("From above; numbers are items")
     axis.set_xlabel("east [m]")
@@ -79,8 +82,9 @@ def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
         if lasts_s:
             axis.annotate(way.leg.step.label.partition(" ")[0], (begins_s + 0.5 * lasts_s, heights[-1]), fontsize=8)
         if way.meets:
-            axis.axvspan(begins_s, begins_s + lasts_s, color=_OBSTACLE, alpha=0.15)
-            axis.annotate(f"meets {way.meets}", (begins_s, heights.max()), fontsize=7, color=_OBSTACLE, rotation=90)
+            met_s, height_m = times[way.meets.index], heights[way.meets.index]
+            axis.plot([met_s], [height_m], "x", color=_MEETING)
+            axis.annotate(f"  {way.meets.name}", (met_s, height_m), fontsize=7, color=_MEETING, rotation=60)
         begins_s += lasts_s
     axis.axhline(fence.max_height_m, color=_FENCE, linestyle="--", linewidth=1.2, label="fence")
     axis.axhline(fence.min_height_m, color=_FENCE, linestyle="--", linewidth=1.2)

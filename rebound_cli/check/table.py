@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from companion.flight.plan import describe_item, describe_modifiers, mission_lines
 from companion.mission.model import Mission
-from rebound_cli.check.ways import Way
+from rebound_cli.check.ways import Meeting, Way
 
 _ITEM_WIDTH = 62
 # A repeat's laps are shown whole up to so many rows; a longer list hides what matters.
@@ -14,9 +14,10 @@ _MOST_ROWS = 60
 def mission_text(mission: Mission, ways: Sequence[Way]) -> str:
     """For a person."""
     title = f"{mission.name}: {mission.description}" if mission.description else mission.name
-    head = f"  {'item':<18}{'':<{_ITEM_WIDTH}}{'length':>9}{'time':>9}{'begins':>9}"
     shown = ways if len(ways) <= _MOST_ROWS else ways[: _MOST_ROWS - 1]
-    rows = [row for way in shown for row in _rows(way)]
+    width = max(4, *(len(way.leg.step.label) for way in shown)) + 2
+    head = f"  {'item':<{width}}{'':<{_ITEM_WIDTH}}{'length':>9}{'time':>9}{'begins':>9}"
+    rows = [row for way in shown for row in _rows(way, width)]
     if len(shown) < len(ways):
         rows.append(f"  ... {len(ways) - len(shown)} more steps")
     # the policies, without the items: those are in the table
@@ -24,16 +25,21 @@ def mission_text(mission: Mission, ways: Sequence[Way]) -> str:
     return "\n".join([title, "", head, *rows, "", f"  {_total(ways)}", "", *rules])
 
 
-def _rows(way: Way) -> list[str]:
+def _rows(way: Way, width: int) -> list[str]:
     step, leg = way.leg.step, way.leg
     text = describe_item(step.action)
     length = f"{way.length_m:.1f} m" if way.length_m else ""
     begins = "?" if way.begins_s is None else f"{way.begins_s:.1f} s"
     lasts = "?" if leg.lasts_s is None else f"{leg.lasts_s:.1f} s"
-    lines = [f"  {step.label:<18}{text:<{_ITEM_WIDTH}}{length:>9}{lasts:>9}{begins:>9}"]
-    notes = [f"meets '{way.meets}'"] if way.meets else []
+    lines = [f"  {step.label:<{width}}{text:<{_ITEM_WIDTH}}{length:>9}{lasts:>9}{begins:>9}"]
+    notes = [_meeting(way.meets, way)] if way.meets else []
     notes += [describe_modifiers(step.item)] if describe_modifiers(step.item) else []
-    return lines + [f"  {'':<20}{note}" for note in notes]
+    return lines + [f"  {'':<{width + 2}}{note}" for note in notes]
+
+
+def _meeting(meeting: Meeting, way: Way) -> str:
+    north, east, down = way.points_ned_m[meeting.index]
+    return f"meets '{meeting.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
 
 
 def _total(ways: Sequence[Way]) -> str:

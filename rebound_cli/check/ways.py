@@ -1,7 +1,6 @@
 """The ways of a mission as points in time, and what of the simulated world stands in them."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +20,14 @@ _MOST_POINTS = 2_000
 
 
 @dataclass(frozen=True, slots=True)
+class Meeting:
+    """The first obstacle in a way, and at which of its points."""
+
+    name: str
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
 class Way:
     """A leg with its place in time. `begins_s` is None once a wait without a known end lies before it."""
 
@@ -28,7 +35,7 @@ class Way:
     begins_s: float | None
     points_ned_m: Floats  # (n, 3), mission coordinates; one point where the vehicle stays
     fractions: Floats  # (n,), of the leg's time
-    meets: str | None  # the first obstacle in the way
+    meets: Meeting | None
 
     @property
     def length_m(self) -> float:
@@ -59,18 +66,14 @@ def _points(leg: Leg) -> tuple[Floats, Floats]:
     return fractions, np.array([way.at(fraction * way.duration_s)[0] for fraction in fractions])
 
 
-def _first_met(points_ned_m: Floats, scene: Scene, airframe: Airframe) -> str | None:
-    """Name of the first obstacle, where it stands at first, that a vehicle on these points touches."""
+def _first_met(points_ned_m: Floats, scene: Scene, airframe: Airframe) -> Meeting | None:
+    """The first obstacle, where it stands at first, that a vehicle on these points touches."""
     start = scene.start.position_ned_m
     standing_m = airframe.geometry.foot_depth_m
-    for north, east, down in points_ned_m:
+    for index, (north, east, down) in enumerate(points_ned_m):
         # the arming position is that of the vehicle's centre as it stands
         place = (float(north) + start[0], float(east) + start[1], float(down) - standing_m)
         for _, obstacle in scene.obstacles():
             if obstacle.distance_m(place) < airframe.geometry.reach_m:
-                return obstacle.name
+                return Meeting(obstacle.name, index)
     return None
-
-
-def total_s(ways: Sequence[Way]) -> float | None:
-    return ways[-1].ends_s
