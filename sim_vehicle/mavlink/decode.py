@@ -19,7 +19,7 @@ from sim_vehicle.autopilot.messages import (
     SigningSetup,
     TimeSyncRequest,
 )
-from sim_vehicle.mavlink import parameter_reader
+from sim_vehicle.mavlink import flight_reader, mission_reader, parameter_reader
 from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
 from sim_vehicle.setpoint import Axis3
 
@@ -237,6 +237,8 @@ READERS: dict[int, Reader] = {
     84: _position_target,
     111: _timesync,
     **parameter_reader.READERS,
+    **flight_reader.READERS,
+    **mission_reader.READERS,
 }
 
 # Commands may go to other components and still be answered, and who is pinged is the one thing that a PING says.

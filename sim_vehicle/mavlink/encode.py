@@ -13,7 +13,7 @@ from sim_vehicle.autopilot.estimate import Estimate
 from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import Axis3
+from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
 # pymavlink's messages carry no types; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
@@ -179,7 +179,7 @@ def current_mode(state: Telemetry) -> Message:
 def position_target_local_ned(state: Telemetry) -> Message:
     """What the position control flies; all ignored while the motors idle or stand."""
     applied = state.autopilot.applied
-    if applied is None:
+    if not isinstance(applied, TrajectorySetpoint):
         return dialect.MAVLink_position_target_local_ned_message(
             boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)
         )
