@@ -103,7 +103,7 @@ class Decoder:
             return None
         is_signed = packet[0] == _MARKER_V2 and bool(packet[2] & _SIGNED_FLAG)
         source = message.get_srcSystem(), message.get_srcComponent()
-        accepted = self._signing.accepts(packet, is_signed, source, message.id, self.signing_is_optional)
+        accepted = self._signing.accepts(packet, is_signed, source, message.get_msgId(), self.signing_is_optional)
         return message if accepted else None
 
     def _hear(self, packet: dialect.MAVLink_message, raw: bytes) -> None:
@@ -116,7 +116,7 @@ class Decoder:
             self.foreign.append(ForeignPacket(raw, *target))
 
     def _read(self, packet: dialect.MAVLink_message) -> object | None:
-        message_id: int = packet.id
+        message_id: int = packet.get_msgId()
         read = READERS.get(message_id)
         if read is None or (message_id in _ADDRESSED and not self._us.is_addressed(*_target(packet))):
             return None

@@ -37,7 +37,7 @@ class Encoder:
     def packet(self, message: Message) -> bytes | None:
         """The message as a packet; None for one whose number MAVLink 1 has no room for."""
         link = self._link
-        if self.speaks_mavlink_1 and message.id > _GREATEST_MAVLINK_1_ID:
+        if self.speaks_mavlink_1 and message.get_msgId() > _GREATEST_MAVLINK_1_ID:
             return None
         packet: bytes = message.pack(link, force_mavlink1=self.speaks_mavlink_1)
         link.seq = (link.seq + 1) & 0xFF
