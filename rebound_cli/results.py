@@ -26,7 +26,12 @@ from rebound_cli.truth_match import match_contacts
 MISSION_FILE = Path("missions/wall.yaml")
 SPEED_PATH = "items.1.go_to.speed_m_s"
 # The paper's, whatever the defaults become.
-PINNED = (f"companion.detector={DETECTOR}", f"recovery.law={LAW}", f"recovery.gamma={GAMMA_S}")
+PINNED = (
+    f"companion.detector={DETECTOR}",
+    "companion.estimate.inertial=false",
+    f"recovery.law={LAW}",
+    f"recovery.gamma={GAMMA_S}",
+)
 AIRFRAMES = ("foldable", "rigid")
 SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
 

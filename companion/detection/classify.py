@@ -11,31 +11,31 @@ HOVER_M_S = 0.3
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
-# A push at 4 cm from the centre (of a vehicle of 0.145 m arms) turns it by 2.4 rad/s with each 0.2 m/s of impulse.
-TURN_RAD_S = 3.0
+# Turn for each m/s of impulse: lever over the squared radius of gyration, 0.04 m / 0.004 m^2 for the paper's vehicle.
+TURN_RAD_S_PER_M_S = 10.0
 
 
 def kind_of(
-    push_ned: Vector3, velocity_ned_m_s: Vector3 | None, rate_step_rad_s: float, situation: Situation
+    impulse_ned_m_s: Vector3, velocity_ned_m_s: Vector3 | None, turn_rad_s: float, situation: Situation
 ) -> ImpactKind:
     """By direction and circumstances alone: no magnitude of the push decides, so that none can be mistaken.
 
     Touching the ground at the end of a commanded descent is a landing however hard it is; the same push without a
-    descent having been asked for is a strike.
+    descent having been asked for is a strike. `turn_rad_s` is by how much the contact changed the rates.
     """
-    size = math.sqrt(push_ned[0] ** 2 + push_ned[1] ** 2 + push_ned[2] ** 2)
-    up = -push_ned[2] / size if size > 0.0 else 0.0
+    push = impulse_ned_m_s
+    size = math.sqrt(push[0] ** 2 + push[1] ** 2 + push[2] ** 2)
+    up = -push[2] / size if size > 0.0 else 0.0
     height_m = situation.height_m
     near_ground = height_m is None or height_m < GROUND_M
     if situation.descent_commanded and (near_ground or up > STEEP):
         return ImpactKind.LANDING
     v = velocity_ned_m_s
-    speed = 0.0 if v is None else math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
-    hovers = v is not None and speed < HOVER_M_S
+    hovers = v is not None and math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2) < HOVER_M_S
     if up > STEEP:
         return ImpactKind.STRUCK if hovers and not near_ground else ImpactKind.FLOOR
     if hovers:
         return ImpactKind.STRUCK
     if up < -STEEP:
         return ImpactKind.CEILING
-    return ImpactKind.OFF_CENTRE if rate_step_rad_s > TURN_RAD_S else ImpactKind.WALL
+    return ImpactKind.OFF_CENTRE if turn_rad_s > TURN_RAD_S_PER_M_S * size else ImpactKind.WALL

@@ -101,6 +101,7 @@ class FusedDetector:
     name = "fused"
     losses: ClassVar[Mapping[MessageId, str]] = {
         MessageId.ATTITUDE_TARGET: "pushes from below are seen only beyond 5 g",
+        MessageId.VIBRATION: "a peak that the sensor clipped is told by its size alone",
         MessageId.ODOMETRY: "the estimate's jumps look like unseen hits, which need a step twice as large",
     }
 
@@ -125,7 +126,7 @@ class FusedDetector:
             case LocalPosition():
                 return state, self._local_position(state, sample, situation)
             case Attitude():
-                state.aftermath.attitude(sample.time_boot_us, sample.attitude_wxyz)
+                state.aftermath.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
             case AttitudeTarget():
                 state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
             case _:
@@ -201,8 +202,6 @@ class FusedDetector:
         if s.phase is Phase.CONTACT:
             s.last_loud_boot_us = now_us
             s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
-            total = s.force_sum_frd_m_s2
-            s.force_sum_frd_m_s2 = (total[0] + force[0], total[1] + force[1], total[2] + force[2])
             if now_us - s.contact_began_boot_us > self._longest_us:
                 self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
             return None
@@ -250,13 +249,15 @@ class FusedDetector:
         velocity_before_ned_m_s: Vector3 | None = None,
     ) -> Impact:
         if kind is None:
-            force_ned = body_to_ned(s.aftermath.attitude_wxyz, force)
+            n, e, d = body_to_ned(s.aftermath.strapdown.attitude_wxyz, force)
+            over_s = max(now_us - free_until_us, 1) * 1e-6
             velocity = velocity_before_ned_m_s or s.velocity_ned_m_s
-            kind = kind_of(force_ned, velocity, s.aftermath.rate_step_near(now_us), situation)
+            kind = kind_of(
+                (n * over_s, e * over_s, d * over_s), velocity, s.aftermath.rate_step_near(now_us), situation
+            )
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.force_sum_frd_m_s2 = force
         s.held_since_boot_us = None
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
 
@@ -291,7 +292,7 @@ class FusedDetector:
         size = math.sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2])
         turned = aftermath.rate_step_near(time_us) >= config.rate_step_rad_s
         least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
-        p, q, _ = aftermath.rates_frd_rad_s
+        p, q, _ = aftermath.strapdown.rates_frd_rad_s
         room = config.velocity_per_rate_m * (abs(p) + abs(q))
         threshold = caution * max(least, config.noise_factor * spread_m_s) + room
         if size < threshold or s.phase is not Phase.ARMED:
@@ -300,7 +301,7 @@ class FusedDetector:
         now_us = max(time_us, s.last_sample_boot_us)
         over_s = max(now_us - free_until_us, 1) * 1e-6
         force_ned = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
-        force = ned_to_body(aftermath.attitude_wxyz, force_ned)
+        force = ned_to_body(aftermath.strapdown.attitude_wxyz, force_ned)
         aftermath.forget()
         confidence = min(1.0, 0.5 * size / threshold)
         v = velocity_ned_m_s

@@ -87,10 +87,8 @@ class Impact:
 class DetectorState:
     """What every detector's state shows; a detector that remembers more extends it.
 
-    `threshold_m_s2` is what a sample must reach now. The three before it describe the present contact, or the
-    latest one: time of its last loud sample, the largest contact force per unit mass in one sample so far, and the
-    sum of all samples' contact forces, whose direction is the impulse's: a steadier guide to the obstacle's normal
-    than any one sample.
+    `threshold_m_s2` is what a sample must reach now. The two before it describe the present contact, or the
+    latest one: time of its last loud sample, and the largest contact force per unit mass in one sample so far.
     """
 
     phase: Phase = Phase.OFF
@@ -98,7 +96,6 @@ class DetectorState:
     last_sample_boot_us: int = 0
     last_loud_boot_us: int = 0
     peak_specific_force_m_s2: float = 0.0
-    force_sum_frd_m_s2: Vector3 = (0.0, 0.0, 0.0)
     threshold_m_s2: float = 0.0
 
     def describe(self) -> str:

@@ -79,8 +79,7 @@ class LateralDetector:
             phase, last_loud_us = Phase.QUIET, now_us
         elif phase is not Phase.ARMED and now_us - last_loud_us >= self._rearm_quiet_us:
             phase = Phase.ARMED
-        peak_m_s2, force_sum = state.peak_specific_force_m_s2, state.force_sum_frd_m_s2
-        return LateralState(phase, "", now_us, last_loud_us, peak_m_s2, force_sum, threshold_m_s2, noise)
+        return LateralState(phase, "", now_us, last_loud_us, state.peak_specific_force_m_s2, threshold_m_s2, noise)
 
     def _learnt(self, state: LateralState, now_us: int, f_x: float, f_y: float) -> tuple[NoiseFloor, float]:
         """The noise floor with this sample, and the threshold that follows from it."""
@@ -95,17 +94,14 @@ class LateralDetector:
         if state.phase is Phase.ARMED:
             free_until_us = min(now_us - self._averaging_interval_us, state.last_sample_boot_us)
             impact = Impact(now_us, free_until_us, force_frd_m_s2)
-            return self._in_contact(state, now_us, departure_m_s2, force_frd_m_s2), impact
+            return self._in_contact(state, now_us, departure_m_s2), impact
         if state.phase is Phase.CONTACT:
-            peak_m_s2 = max(departure_m_s2, state.peak_specific_force_m_s2)
-            total, force = state.force_sum_frd_m_s2, force_frd_m_s2
-            force_sum = (total[0] + force[0], total[1] + force[1], total[2] + force[2])
-            return self._in_contact(state, now_us, peak_m_s2, force_sum), None
+            return self._in_contact(state, now_us, max(departure_m_s2, state.peak_specific_force_m_s2)), None
         # Switched on in the middle of a shake: it is learnt too, or a threshold that is too low would never rise.
         x, y, _ = force_frd_m_s2
         noise, threshold_m_s2 = self._learnt(state, now_us, x + state.noise.mean_x_m_s2, y + state.noise.mean_y_m_s2)
         return LateralState(Phase.QUIET, "", now_us, now_us, threshold_m_s2=threshold_m_s2, noise=noise), None
 
     @staticmethod
-    def _in_contact(state: LateralState, now_us: int, peak_m_s2: float, force_sum: Vector3) -> LateralState:
-        return LateralState(Phase.CONTACT, "", now_us, now_us, peak_m_s2, force_sum, state.threshold_m_s2, state.noise)
+    def _in_contact(state: LateralState, now_us: int, peak_m_s2: float) -> LateralState:
+        return LateralState(Phase.CONTACT, "", now_us, now_us, peak_m_s2, state.threshold_m_s2, state.noise)

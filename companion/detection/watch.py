@@ -85,8 +85,8 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
         watch.estimator.hear(sample)
         watch.state, impact = watch.detector.step(watch.state, sample, situation)
         if impact is not None:
-            impacts.append(watch.estimator.begin(impact))
-        if type(sample) is ImuSample:
+            impacts.append(watch.estimator.begin(impact, situation))
+        elif type(sample) is ImuSample:
             final = watch.estimator.follow(watch.state)
             if final is not None:
                 finished.append(final)

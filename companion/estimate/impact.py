@@ -1,19 +1,34 @@
 """What is known of an impact: at once, better while the contact lasts, final when it is over."""
 
 import math
+from collections import deque
 from dataclasses import dataclass, field, replace
 
-from companion.detection.interface import DetectorState, Impact, ImpactKind, Phase
-from companion.estimate.collision import BATCH_US, STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
+from companion.detection.classify import kind_of
+from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.estimate.approach import BATCH_US, VelocityFix, position_at, velocity_at
+from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
+from companion.estimate.collision import STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
 from companion.estimate.history import MotionHistory
-from companion.estimate.rotation import body_to_ned
-from companion.messages import Attitude, LocalPosition, Quaternion, Sample, Vector3
+from companion.estimate.normal import normal_of
+from companion.estimate.push import Push, unit
+from companion.estimate.rotation import body_to_ned, turned
+from companion.estimate.strapdown import Strapdown
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.mission.config import EstimateConfig
 
-# Attitude streams are required, so this is only for a hit before the first one: level, nose north.
-LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
+# Velocities of ODOMETRY are taken for as long as they come: they have microseconds and the reset counter.
+ODOMETRY_KEPT_US = 500_000
+# After a contact the estimate swings (delay, a filter's switching): velocities count again after this.
+REST_US = 150_000
+# PX4 sends VIBRATION every two seconds by default.
+CLIPPING_TOLD_US = 2_100_000
+# Sums kept to look back: a contact between samples is known 100 ms later.
+SUMS_KEPT = 64
+# What the detector leaves open or takes for soft is not classified anew.
+AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +36,10 @@ class ImpactEstimate:
     """One impact. Times are the vehicle's boot clock, vectors local NED, SI.
 
     `time_boot_us` is t_c, good to `time_error_us` either way; `velocity_ned_m_s` is v_c, the velocity just before
-    it. `normal_ned` is the unit direction of the obstacle's push. `impulse_m_s` is the contact's impulse per unit
-    mass. `peak_specific_force_m_s2` is the largest in one IMU sample. `is_lower_bound`: the sensor clipped, or part
-    of the contact was not seen, and both may be larger. `is_final`: the contact is over.
+    it, and `velocity_error_m_s` its standard deviation on an axis. `normal_ned` is the unit direction out of the
+    obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
+    IMU sample. `is_lower_bound`: the sensor clipped, or part of the contact was not seen, and both may be larger.
+    `is_final`: the contact is over.
     """
 
     impact: Impact
@@ -31,6 +47,7 @@ class ImpactEstimate:
     time_error_us: int
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
+    velocity_error_m_s: float
     normal_ned: Vector3
     peak_specific_force_m_s2: float
     impulse_m_s: float
@@ -46,71 +63,165 @@ class ImpactEstimator:
 
     config: EstimateConfig
     history: MotionHistory = field(default_factory=MotionHistory)
-    attitude_wxyz: Quaternion = LEVEL
+    strapdown: Strapdown = field(default_factory=Strapdown)
+    sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
+    fixes: deque[VelocityFix] = field(default_factory=deque)
+    odometry_boot_us: int | None = None
+    reset_counter: int = 0
+    imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
-    contact_ended_boot_us: int = 0
+    push: Push | None = None
+    situation: Situation | None = None
+    contact_ended_boot_us: int | None = None
+    clipping_counts: tuple[int, int, int] | None = None
 
     def hear(self, sample: Sample) -> None:
-        if isinstance(sample, LocalPosition):
+        """Take one sample of any kind."""
+        if isinstance(sample, ImuSample):
+            now_us = sample.time_boot_us
+            strapdown = self.strapdown
+            if not strapdown.imu(now_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s):
+                self.fixes.clear()
+                self.sums.clear()
+            self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
+            self.imu = sample
+        elif isinstance(sample, LocalPosition):
             self.history.add(sample)
+            told_us = self.odometry_boot_us
+            if told_us is None or sample.time_boot_us - told_us > ODOMETRY_KEPT_US:
+                self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
+        elif isinstance(sample, Odometry):
+            if self.odometry_boot_us is None or sample.reset_counter != self.reset_counter:
+                self.fixes.clear()
+            self.odometry_boot_us, self.reset_counter = sample.time_boot_us, sample.reset_counter
+            self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
+        elif isinstance(sample, Vibration):
+            self._clipped(sample)
         elif isinstance(sample, Attitude):
-            self.attitude_wxyz = sample.attitude_wxyz
+            self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
 
-    def begin(self, impact: Impact) -> ImpactEstimate:
-        """A new impact: what was known just before it."""
-        free_until_us = impact.contact_free_until_boot_us
-        motion = self._motion(impact)
-        strength = math.hypot(*impact.specific_force_frd_m_s2)
-        self.contact_ended_boot_us = impact.sample_time_boot_us
+    def _clipped(self, sample: Vibration) -> None:
+        """Counts that grew since the message before the contact: what was said of its size is a lower bound."""
+        before, self.clipping_counts = self.clipping_counts, sample.clipping_counts
+        estimate, ended_us = self.estimate, self.contact_ended_boot_us
+        if estimate is None or ended_us is None or before is None or before == sample.clipping_counts:
+            return
+        if sample.time_boot_us - ended_us < CLIPPING_TOLD_US:
+            self.estimate = replace(estimate, is_lower_bound=True)
+
+    def _fix(self, time_us: int, velocity_ned_m_s: Vector3) -> None:
+        sum_ned_m_s = self.strapdown.sum_at(time_us)
+        if sum_ned_m_s is None:
+            return
+        fixes = self.fixes
+        fixes.append(VelocityFix(time_us, velocity_ned_m_s, sum_ned_m_s, self.strapdown.acceleration_ned_m_s2))
+        while fixes[0].time_boot_us < time_us - BATCH_US:
+            fixes.popleft()
+
+    def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
+        """A new impact: what was known just before it, and what its first sample shows."""
+        free_until_us, sample_us = impact.contact_free_until_boot_us, impact.sample_time_boot_us
+        motion, error_m_s = self._motion(free_until_us)
+        force_ned = body_to_ned(self.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
+        size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
+        self.situation = situation
+        self.push = self._begin_push(impact) if impact.evidence is Evidence.FORCE else None
+        self.contact_ended_boot_us = sample_us
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
-            time_boot_us=motion.time_boot_us,
-            time_error_us=impact.sample_time_boot_us - free_until_us,
+            time_boot_us=(free_until_us + sample_us) // 2,
+            time_error_us=(sample_us - free_until_us) // 2,
             position_ned_m=motion.position_ned_m,
             velocity_ned_m_s=motion.velocity_ned_m_s,
-            normal_ned=unit(body_to_ned(self.attitude_wxyz, impact.specific_force_frd_m_s2)),
-            peak_specific_force_m_s2=strength,
-            impulse_m_s=strength * 1e-6 * (impact.sample_time_boot_us - free_until_us),
-            is_lower_bound=False,
+            velocity_error_m_s=error_m_s,
+            normal_ned=unit(force_ned),
+            peak_specific_force_m_s2=size,
+            impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
+            is_lower_bound=True,
             kind=impact.kind,
             confidence=impact.confidence,
             is_final=False,
         )
         return estimate
 
+    def _begin_push(self, impact: Impact) -> Push | None:
+        """The contact's course, its first sample taken."""
+        sample = self.imu
+        if sample is None:
+            return None
+        f, force, w = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+        behind_s = (sample.time_boot_us - self.strapdown.attitude_boot_us) * 1e-6
+        push = Push(
+            free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
+            attitude_wxyz=turned(self.strapdown.attitude_wxyz, w, behind_s if abs(behind_s) < 0.1 else 0.0),
+            averaging_us=round(self.config.imu_averaging_interval_s * 1e6),
+            range_m_s2=self.config.accelerometer_range_m_s2,
+            started_boot_us=impact.contact_free_until_boot_us,
+        )
+        push.add(sample, True)
+        return push
+
     def follow(self, state: DetectorState) -> ImpactEstimate | None:
         """After each IMU sample: its share in the present contact; the final estimate when that is over."""
-        estimate = self.estimate
-        if estimate is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
+        estimate, push, sample = self.estimate, self.push, self.imu
+        if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
+        self.contact_ended_boot_us = state.last_loud_boot_us
         is_final = state.phase is not Phase.CONTACT
-        if state.last_loud_boot_us > self.contact_ended_boot_us or is_final:
-            self.contact_ended_boot_us = state.last_loud_boot_us
-            self.estimate = replace(
-                estimate,
-                normal_ned=unit(body_to_ned(self.attitude_wxyz, state.force_sum_frd_m_s2)),
-                peak_specific_force_m_s2=state.peak_specific_force_m_s2,
-                is_final=is_final,
-            )
+        if push is not None and sample.time_boot_us > push.time_boot_us:
+            loud = state.last_loud_boot_us == sample.time_boot_us
+            push.add(sample, loud)
+            if loud or is_final:
+                estimate = self._refined(estimate, push, is_final)
+        self.estimate = replace(estimate, is_final=is_final) if is_final else estimate
         return self.estimate if is_final else None
 
-    def _motion(self, impact: Impact) -> ContactMotion:
-        """From the history before this contact and after the one before it."""
-        contact_us = impact.contact_free_until_boot_us
-        start_us = contact_us - BATCH_US
-        if self.estimate is not None:
-            start_us = max(start_us, self.contact_ended_boot_us + STAMP_RESOLUTION_US)
-        samples = self.history.between(start_us, contact_us)
+    def _refined(self, estimate: ImpactEstimate, push: Push, is_final: bool) -> ImpactEstimate:
+        velocity, impulse = estimate.velocity_ned_m_s, push.impulse_ned_m_s
+        begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
+        if push.begun_boot_us is not None:
+            begun_us, error_us = push.begun_boot_us, push.averaging_us // 4
+        kind = estimate.kind
+        if self.situation is not None and estimate.impact.kind not in AS_DETECTED:
+            kind = kind_of(impulse, velocity, push.turn_rad_s(), self.situation)
+        return replace(
+            estimate,
+            time_boot_us=begun_us,
+            time_error_us=error_us,
+            normal_ned=normal_of(push.parts, velocity, self.config.reach_m) if is_final else unit(impulse),
+            peak_specific_force_m_s2=push.peak_m_s2,
+            impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
+            is_lower_bound=push.is_lower_bound,
+            kind=kind,
+        )
+
+    def _motion(self, contact_us: int) -> tuple[ContactMotion, float]:
+        """From what was heard before this contact and after the one before it, and v_c's standard deviation."""
+        last_us = self.contact_ended_boot_us
+        start_us = contact_us - MOTION_BATCH_US
+        if last_us is not None:
+            start_us = max(start_us, last_us + STAMP_RESOLUTION_US)
+        samples = self.history.between(start_us, contact_us - STAMP_RESOLUTION_US)
+        found = self._velocity(contact_us) if self.config.inertial else None
+        if found is not None and samples:
+            return ContactMotion(contact_us, position_at(samples, contact_us, found[0]), found[0]), found[1]
         motion = motion_before_contact(samples, contact_us, self.config)
-        if motion is not None:
-            return motion
-        latest = self.history.latest()
-        if latest is None:
-            return ContactMotion(contact_us, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        return ContactMotion(latest.time_boot_us, latest.position_ned_m, latest.velocity_ned_m_s)
+        if motion is None:
+            latest = self.history.latest()
+            if latest is None:
+                return ContactMotion(contact_us, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), math.inf
+            motion = ContactMotion(latest.time_boot_us, latest.position_ned_m, latest.velocity_ned_m_s)
+        return motion, self.config.velocity_noise_m_s
 
-
-def unit(vector: Vector3) -> Vector3:
-    """Direction; zero when there is none."""
-    length = math.hypot(*vector)
-    return (vector[0] / length, vector[1] / length, vector[2] / length) if length > 0.0 else (0.0, 0.0, 0.0)
+    def _velocity(self, contact_us: int) -> tuple[Vector3, float] | None:
+        """v_c by velocities and accelerometer; None where too little was heard for it."""
+        since_us = 0 if self.contact_ended_boot_us is None else self.contact_ended_boot_us + REST_US
+        end_us = contact_us - STAMP_RESOLUTION_US
+        fixes = [fix for fix in self.fixes if since_us < fix.time_boot_us <= end_us]
+        before = [entry for entry in self.sums if entry[0] <= contact_us]
+        if not fixes or not before:
+            return None
+        time_us, u, a = before[-1]
+        ahead_s = (contact_us - time_us) * 1e-6
+        at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
+        return velocity_at(fixes, contact_us, at_contact, self.config)

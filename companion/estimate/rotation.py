@@ -24,6 +24,21 @@ def ned_to_body(attitude_wxyz: Quaternion, vector_ned: Vector3) -> Vector3:
     return body_to_ned((w, -x, -y, -z), vector_ned)
 
 
+def turned(attitude_wxyz: Quaternion, rates_frd_rad_s: Vector3, over_s: float) -> Quaternion:
+    """The attitude after turning at constant body rates: q exp(w t / 2)."""
+    w, x, y, z = attitude_wxyz
+    p, q, r = rates_frd_rad_s
+    half = 0.5 * over_s * math.sqrt(p * p + q * q + r * r)
+    scale = 0.5 * over_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    c, i, j, k = math.cos(half), scale * p, scale * q, scale * r
+    return (
+        w * c - x * i - y * j - z * k,
+        w * i + x * c + y * k - z * j,
+        w * j - x * k + y * c + z * i,
+        w * k + x * j - y * i + z * c,
+    )
+
+
 def yaw_rad(attitude_wxyz: Quaternion) -> float:
     """Heading of the nose, clockwise from north, in (-pi, pi]."""
     w, x, y, z = attitude_wxyz

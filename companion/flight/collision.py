@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 from companion.detection.interface import DetectorState
-from companion.estimate.impact import IN_OR_AFTER_CONTACT
-from companion.estimate.rotation import body_to_ned
-from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
+from companion.messages import LocalPosition, Vector3
 from companion.recovery.interface import Contact
 from companion.report import CollisionReport
 
@@ -35,7 +34,6 @@ class CollisionRecord:
     detector: str
     contact: Contact
     setpoint_ned_m: Vector3
-    attitude_wxyz: Quaternion
     normal_ned: Vector3
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
@@ -44,13 +42,15 @@ class CollisionRecord:
     overshoot_m: float = 0.0
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
-    def follow_contact(self, state: DetectorState) -> None:
-        """While the contact lasts: its largest force, the direction of its impulse, its end."""
-        if state.phase not in IN_OR_AFTER_CONTACT or state.last_loud_boot_us <= self.contact_ended_boot_us:
+    def follow_contact(self, state: DetectorState, estimate: ImpactEstimate | None) -> None:
+        """While the contact lasts: its largest force and its end; the normal as it is known by now."""
+        if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
             return
-        self.contact_ended_boot_us = state.last_loud_boot_us
-        self.peak_specific_force_m_s2 = state.peak_specific_force_m_s2
-        self.normal_ned = horizontal_unit(body_to_ned(self.attitude_wxyz, state.force_sum_frd_m_s2))
+        if estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
+            return
+        self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
+        self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
+        self.normal_ned = horizontal_unit(estimate.normal_ned)
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""

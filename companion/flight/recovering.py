@@ -2,8 +2,7 @@
 
 import math
 
-from companion.estimate.impact import LEVEL, ImpactEstimate
-from companion.estimate.rotation import body_to_ned
+from companion.estimate.impact import ImpactEstimate
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards
 from companion.flight.collision import CollisionRecord, horizontal_unit
@@ -34,8 +33,7 @@ class Recover:
             since_us = self._monitor.settled_since(sample)
             if since_us is not None:
                 record.settled_at_boot_us, record.is_over = since_us, True
-                figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
-                flight.tell(now_us, "recovered", _recovered_text(record), **figures)
+                flight.tell(now_us, "recovered", _recovered_text(record), settled_after_s=record.settled_after_s())
                 return afterwards(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._started_us > timeout_s * 1e6:
@@ -48,9 +46,8 @@ class Recover:
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """A new collision: what was known just before it, and from that the setpoint, set once."""
-    vehicle, mission, impact = flight.vehicle, flight.mission, estimate.impact
-    attitude = vehicle.attitude.attitude_wxyz if vehicle.attitude is not None else LEVEL
-    normal = horizontal_unit(body_to_ned(attitude, impact.specific_force_frd_m_s2))
+    mission, impact = flight.mission, estimate.impact
+    normal = horizontal_unit(estimate.normal_ned)
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
     law = RECOVERY_LAWS[mission.recovery.law](mission.recovery)
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
@@ -67,7 +64,6 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         detector=mission.companion.detector,
         contact=contact,
         setpoint_ned_m=setpoint,
-        attitude_wxyz=attitude,
         normal_ned=normal,
         peak_specific_force_m_s2=strength,
         contact_ended_boot_us=impact.sample_time_boot_us,
@@ -79,7 +75,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
 def _tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:
     report = record.report()
     text = (
-        f"hit {len(flight.collisions)}: {report.peak_specific_force_m_s2:.1f} m/s^2 sideways, v_c "
+        f"hit {len(flight.collisions)}: {report.peak_specific_force_m_s2:.1f} m/s^2, v_c "
         f"{as_text(report.impact_velocity_ned_m_s)} ({report.impact_speed_m_s:.2f} m/s) at "
         f"{as_text(flight.mission_ned_m(report.position_ned_m))}; recovery setpoint "
         f"{as_text(flight.mission_ned_m(record.setpoint_ned_m))}"

@@ -41,12 +41,21 @@ class StreamsConfig(Written):
 
 
 class EstimateConfig(Written):
-    """Numbers of the collision-velocity filter."""
+    """Numbers of the estimate of a collision."""
+
+    # v_c with the accelerometer's help (see estimate.approach); off: from positions and velocities alone.
+    inertial: bool = True
 
     # IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this.
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
+    # From the centre to the rim of a guard, the paper's vehicle: what slides along a wall when it turns.
+    reach_m: Positive = 0.2
     # Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated.
     velocity_noise_m_s: Positive = 0.04
+    # How long its errors last: those of optical flow and of a filter behind it change within a third of a second.
+    velocity_correlation_s: Positive = 0.3
+    # +-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g.
+    accelerometer_range_m_s2: Positive = 156.9
     position_noise_m: Positive = 0.03
     # White-jerk density: a go_to's 2 m/s^2 may come or go within any second, (2 m/s^2)^2 / 1 s. It leaves
     # 0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s.
@@ -99,14 +108,6 @@ class FlightConfig(Written):
     arrival_timeout_s: Positive = 15.0
 
 
-class OperatorConfig(Written):
-    """What a ground station is told; nothing of it is needed to fly."""
-
-    status_texts: bool = True
-    # Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none.
-    values_hz: Annotated[NotNegative, Field(le=50.0)] = 2.0
-
-
 class CompanionConfig(Written):
     """All settings of the companion."""
 
@@ -121,7 +122,6 @@ class CompanionConfig(Written):
     settled: SettledConfig = SettledConfig()
     link: LinkConfig = LinkConfig()
     flight: FlightConfig = FlightConfig()
-    operator: OperatorConfig = OperatorConfig()
 
     @field_validator("detector")
     @classmethod

@@ -68,14 +68,12 @@ def test_a_gap_in_the_stream_widens_what_may_have_been_contact():
     assert impacts[0].contact_free_until_boot_us == 380_000
 
 
-def test_the_peak_and_the_impulse_direction_are_followed_until_the_contact_is_quiet():
+def test_the_peak_is_followed_until_the_contact_is_quiet():
     impacts, states = run(averaged(402_900, 2.0, 4000, 4000, direction_deg=120.0))
     contact = [s for s in states if s.phase is Phase.CONTACT]
     assert states[-1].phase is Phase.ARMED
     first_m_s2 = math.hypot(*impacts[0].specific_force_frd_m_s2)
     assert contact[-1].peak_specific_force_m_s2 > 1.5 * first_m_s2
-    x, y, _ = contact[-1].force_sum_frd_m_s2
-    assert math.degrees(math.atan2(y, x)) == pytest.approx(120.0, abs=3.0)
 
 
 def hits(*times_us, level=10.0, length_us=20_000):

@@ -1,0 +1,124 @@
+"""v_c: the velocity just before a contact, from velocities with their real stamps and the accelerometer between them.
+
+The accelerometer's sum u (see `strapdown`) knows how the velocity changes, the vehicle's estimate where it is: the
+difference c = v - u is nearly constant, and what it drifts by is the accelerometer's bias. A Kalman filter (filterpy)
+follows c, its slope and the estimate's delay, state [c (3), slope (3), delay]:
+
+    v_k = c + u(t_k) - delay * a(t_k) + noise,      v_c = c + u(t_c)
+
+Only velocities from before the contact are used: after a stiff one PX4's estimate cannot be trusted.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from filterpy.kalman import KalmanFilter
+
+from companion.messages import LocalPosition, Vector3
+from companion.mission.config import EstimateConfig
+
+# Errors of a velocity estimate last for tenths of a second, and the accelerometer's bias is learnt in seconds: the
+# longer, the better, until the vehicle has turned its bias to another heading.
+BATCH_US = 5_000_000
+# Five positions at 50 Hz; at 2 m/s^2 the vehicle is 1 cm off a straight line in that time.
+POSITIONS_US = 100_000
+# Velocities closer together than this tell the same error again.
+SPACING_US = 100_000
+# What a calibrated accelerometer and a good attitude leave: 0.05 m/s^2 of bias and 3 mrad of g on each axis, the latter
+# coming and going within seconds; with some reserve.
+BIAS_M_S2 = 0.08
+BIAS_WALK_M_S2_PER_SQRT_S = 0.05
+# The sum's own noise: 0.25 m/s^2 in samples of 5 ms, each of which stands for 50 ms at the slowest useful rate.
+SUM_DENSITY_M2_S3 = 0.25**2 * 0.05
+# Mean squared misfit of a velocity against what is assumed of it: 0.1 for the simulated vehicle (errors that last
+# change little from one to the next), 1.0 for one with three times its noise. Beyond this, attitude or accelerometer
+# do not belong to the velocities.
+SURPRISE = 1.5
+# PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
+DELAY_S, DELAY_SPREAD_S = 0.01, 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityFix:
+    """One velocity of the estimate with the accelerometer's sum and mean at its stamp; local NED."""
+
+    time_boot_us: int
+    velocity_ned_m_s: Vector3
+    sum_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3
+
+
+def velocity_at(
+    fixes: Sequence[VelocityFix], contact_boot_us: int, sum_ned_m_s: Vector3, config: EstimateConfig
+) -> tuple[Vector3, float] | None:
+    """v_c at a contact where the sum is ``sum_ned_m_s``, and its standard deviation on an axis, m/s.
+
+    ``fixes`` are in the order of time and from before the contact, without a jump of the estimate between them. None
+    when there are none, or when accelerometer and velocities contradict each other.
+    """
+    batch = _thinned([fix for fix in fixes if contact_boot_us - BATCH_US <= fix.time_boot_us])
+    if not batch:
+        return None
+    kalman = _filter(batch[0], config)
+    time_us, surprise = batch[0].time_boot_us, 0.0
+    for fix in batch[1:]:
+        _predict(kalman, (fix.time_boot_us - time_us) * 1e-6)
+        _update(kalman, fix)
+        surprise += float(kalman.mahalanobis) ** 2
+        time_us = fix.time_boot_us
+    if surprise > SURPRISE * 3 * max(len(batch) - 1, 1):
+        return None
+    _predict(kalman, (contact_boot_us - time_us) * 1e-6)
+    n, e, d = (float(kalman.x[axis]) + sum_ned_m_s[axis] for axis in range(3))
+    return (n, e, d), float(np.sqrt(max(kalman.P[0, 0], kalman.P[1, 1], kalman.P[2, 2])))
+
+
+def position_at(samples: Sequence[LocalPosition], contact_boot_us: int, velocity_ned_m_s: Vector3) -> Vector3:
+    """x(t_c), local NED, m: the mean of the last positions before the contact, each carried on to it at v_c."""
+    recent = [s for s in samples if contact_boot_us - s.time_boot_us <= POSITIONS_US] or samples[-1:]
+    ahead_s = sum(contact_boot_us - s.time_boot_us for s in recent) * 1e-6 / len(recent)
+    n, e, d = (
+        sum(s.position_ned_m[axis] for s in recent) / len(recent) + ahead_s * velocity_ned_m_s[axis]
+        for axis in range(3)
+    )
+    return (n, e, d)
+
+
+def _thinned(fixes: Sequence[VelocityFix]) -> list[VelocityFix]:
+    """The newest, and before it what is far enough apart; oldest first."""
+    kept: list[VelocityFix] = []
+    for fix in reversed(fixes):
+        if not kept or kept[-1].time_boot_us - fix.time_boot_us >= SPACING_US:
+            kept.append(fix)
+    return kept[::-1]
+
+
+def _offset(fix: VelocityFix) -> npt.NDArray[np.float64]:
+    return np.subtract(fix.velocity_ned_m_s, fix.sum_ned_m_s)
+
+
+def _filter(first: VelocityFix, config: EstimateConfig) -> KalmanFilter:
+    kalman = KalmanFilter(dim_x=7, dim_z=3)
+    a = np.array(first.acceleration_ned_m_s2)
+    kalman.x = np.concatenate([_offset(first) + DELAY_S * a, np.zeros(3), [DELAY_S]])
+    # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
+    colour = max(1.0, 2.0 * config.velocity_correlation_s / (SPACING_US * 1e-6))
+    noise = config.velocity_noise_m_s**2
+    kalman.R = np.eye(3) * noise * colour
+    kalman.P = np.diag([noise * colour] * 3 + [BIAS_M_S2**2] * 3 + [DELAY_SPREAD_S**2])
+    return kalman
+
+
+def _predict(kalman: KalmanFilter, dt_s: float) -> None:
+    transition = np.eye(7)
+    transition[0, 3] = transition[1, 4] = transition[2, 5] = dt_s
+    walk = BIAS_WALK_M_S2_PER_SQRT_S**2 * dt_s
+    kalman.predict(F=transition, Q=np.diag([SUM_DENSITY_M2_S3 * dt_s] * 3 + [walk] * 3 + [0.0]))
+
+
+def _update(kalman: KalmanFilter, fix: VelocityFix) -> None:
+    measures = np.eye(3, 7)
+    measures[:, 6] = np.negative(fix.acceleration_ned_m_s2)
+    kalman.update(_offset(fix), H=measures)

@@ -1,0 +1,104 @@
+"""The contact's own force while it lasts: its impulse in NED, part by part, its peak, when it began."""
+
+import math
+from dataclasses import dataclass, field
+
+from companion.estimate.normal import Part
+from companion.estimate.rotation import body_to_ned, turned
+from companion.messages import ImuSample, Quaternion, Vector3
+
+# Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
+CONTIGUOUS = 1.5
+# The mean over a window of a pulse that reaches the range's end: one of a third of the window's length shows a third
+# of the range. Nothing less is certain not to have been clipped but by VIBRATION's counts.
+CLIPPED_SHARE = 1.0 / 3.0
+# A force that is over within this many samples was shorter than they can tell: its raw peak may well have been clipped.
+SHORT = 2
+
+
+@dataclass(slots=True)
+class Push:
+    """Changed only by `add`. Forces per unit mass, m/s^2; impulse per unit mass, m/s."""
+
+    free_frd_m_s2: Vector3
+    """What the accelerometer would show without the contact."""
+    attitude_wxyz: Quaternion
+    averaging_us: int
+    range_m_s2: float
+    started_boot_us: int
+    """Latest time at which there was no contact."""
+    time_boot_us: int = 0
+    rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
+    first_rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
+    impulse_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
+    unconfirmed_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
+    parts: list[Part] = field(default_factory=list)
+    """Of the impulse, as `normal` reads them."""
+    last_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
+    peak_m_s2: float = 0.0
+    samples: int = 0
+    clipped: bool = False
+    gap: bool = False
+    first_size_m_s2: float = 0.0
+    begun_boot_us: int | None = None
+
+    def add(self, sample: ImuSample, loud: bool) -> None:
+        """Take one sample of the contact; what comes after the last loud one does not belong to it."""
+        now_us, w = sample.time_boot_us, sample.angular_velocity_frd_rad_s
+        first = self.time_boot_us == 0
+        elapsed_us = now_us - (self.started_boot_us if first else self.time_boot_us)
+        if first:
+            self.first_rates_frd_rad_s = w
+        else:
+            p, q, r = self.rates_frd_rad_s
+            mean = (0.5 * (p + w[0]), 0.5 * (q + w[1]), 0.5 * (r + w[2]))
+            self.attitude_wxyz = turned(self.attitude_wxyz, mean, elapsed_us * 1e-6)
+        f, free = sample.specific_force_frd_m_s2, self.free_frd_m_s2
+        frd = (f[0] - free[0], f[1] - free[1], f[2] - free[2])
+        ned = body_to_ned(self.attitude_wxyz, frd)
+        contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
+        before = ned if contiguous or first else self.last_ned_m_s2
+        over_s = 0.5e-6 * (min(elapsed_us, self.averaging_us) if first else elapsed_us)
+        sums = self.unconfirmed_ned_m_s
+        self.unconfirmed_ned_m_s = (
+            sums[0] + over_s * (before[0] + ned[0]),
+            sums[1] + over_s * (before[1] + ned[1]),
+            sums[2] + over_s * (before[2] + ned[2]),
+        )
+        self.rates_frd_rad_s = w
+        if loud:
+            self._confirm(now_us, f, math.sqrt(frd[0] ** 2 + frd[1] ** 2 + frd[2] ** 2), contiguous)
+        self.last_ned_m_s2, self.time_boot_us = ned, now_us
+
+    def _confirm(self, now_us: int, f: Vector3, size_m_s2: float, contiguous: bool) -> None:
+        """The sample and all since the last loud one belong to the contact."""
+        total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
+        self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
+        yaw_rate_rad_s = body_to_ned(self.attitude_wxyz, self.rates_frd_rad_s)[2]
+        self.parts.append((more, yaw_rate_rad_s, total))
+        self.unconfirmed_ned_m_s = (0.0, 0.0, 0.0)
+        self.samples += 1
+        self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
+        self.gap = self.gap or not contiguous
+        self.clipped = self.clipped or max(abs(f[0]), abs(f[1]), abs(f[2])) >= CLIPPED_SHARE * self.range_m_s2
+        if self.samples == 1:
+            self.first_size_m_s2 = size_m_s2
+        elif self.samples == 2 and contiguous and size_m_s2 > 0.0:
+            # The first window held the force for the share that its mean has of the second's.
+            share = min(1.0, self.first_size_m_s2 / size_m_s2)
+            self.begun_boot_us = self.time_boot_us - round(share * self.averaging_us)
+
+    @property
+    def is_lower_bound(self) -> bool:
+        return self.clipped or self.gap or self.samples <= SHORT
+
+    def turn_rad_s(self) -> float:
+        """How much the contact has changed the rates by since its first sample."""
+        w, first = self.rates_frd_rad_s, self.first_rates_frd_rad_s
+        return math.sqrt((w[0] - first[0]) ** 2 + (w[1] - first[1]) ** 2 + (w[2] - first[2]) ** 2)
+
+
+def unit(vector: Vector3) -> Vector3:
+    """Direction; zero when there is none."""
+    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    return (vector[0] / length, vector[1] / length, vector[2] / length) if length > 1e-9 else (0.0, 0.0, 0.0)

@@ -1,0 +1,63 @@
+"""The accelerometer summed up: v' = R f + g, in the attitude told and turned on by the rates since."""
+
+from dataclasses import dataclass
+
+from companion.estimate.rotation import body_to_ned
+from companion.messages import Quaternion, Vector3
+
+GRAVITY_M_S2 = 9.80665
+LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+ZERO: Vector3 = (0.0, 0.0, 0.0)
+# Older than this an attitude says nothing of a vehicle that may turn at 3 rad/s.
+ATTITUDE_KEPT_S = 0.1
+# A longer silence leaves a hole in the sum: two samples of 20 Hz, the least rate of a detector that sees.
+LONGEST_GAP_US = 100_000
+
+
+@dataclass(slots=True)
+class Strapdown:
+    """Changed only by `attitude` and `imu`. Times: vehicle's boot clock; vectors local NED."""
+
+    attitude_wxyz: Quaternion = LEVEL
+    attitude_boot_us: int = 0
+    time_boot_us: int = 0
+    rates_frd_rad_s: Vector3 = ZERO
+    acceleration_ned_m_s2: Vector3 = ZERO
+    sum_ned_m_s: Vector3 = ZERO
+
+    def attitude(self, time_us: int, attitude_wxyz: Quaternion) -> None:
+        self.attitude_wxyz, self.attitude_boot_us = attitude_wxyz, time_us
+
+    def imu(self, time_us: int, f: Vector3, w: Vector3) -> bool:
+        """Add one sample (body FRD); False where a hole in the stream made the sum begin anew."""
+        elapsed_us = time_us - self.time_boot_us
+        behind_s = (time_us - self.attitude_boot_us) * 1e-6
+        if -ATTITUDE_KEPT_S < behind_s < ATTITUDE_KEPT_S:
+            # Turned on by its own rates since the attitude was told: f + dt w x f.
+            f_x, f_y, f_z = f
+            p, q, r = w
+            f = (
+                f_x + behind_s * (q * f_z - r * f_y),
+                f_y + behind_s * (r * f_x - p * f_z),
+                f_z + behind_s * (p * f_y - q * f_x),
+            )
+        a_n, a_e, a_d = body_to_ned(self.attitude_wxyz, f)
+        a_d += GRAVITY_M_S2
+        whole = 0 < elapsed_us < LONGEST_GAP_US
+        if whole:
+            b_n, b_e, b_d = self.acceleration_ned_m_s2
+            n, e, d = self.sum_ned_m_s
+            half_s = 0.5e-6 * elapsed_us
+            self.sum_ned_m_s = (n + half_s * (a_n + b_n), e + half_s * (a_e + b_e), d + half_s * (a_d + b_d))
+        self.acceleration_ned_m_s2 = (a_n, a_e, a_d)
+        self.rates_frd_rad_s = w
+        self.time_boot_us = time_us
+        return whole
+
+    def sum_at(self, time_us: int) -> Vector3 | None:
+        """The sum at a time near the newest sample; None where it is not near."""
+        ahead_us = time_us - self.time_boot_us
+        if not -LONGEST_GAP_US < ahead_us < LONGEST_GAP_US:
+            return None
+        s, a, ahead_s = self.sum_ned_m_s, self.acceleration_ned_m_s2, ahead_us * 1e-6
+        return (s[0] + ahead_s * a[0], s[1] + ahead_s * a[1], s[2] + ahead_s * a[2])
