@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: fly test check lint types results paper diagrams clean
+.PHONY: fly test check lint types results paper schema diagrams clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml --sim
@@ -33,6 +33,9 @@ $(READY): pyproject.toml requirements.txt
 
 paper: $(READY)
 	$(BIN)/rebound paper --seeds 50
+
+schema: $(READY)
+	$(BIN)/rebound check --schema > missions/schema.json
 
 diagrams: $(READY)
 	$(BIN)/python -m rebound_cli.diagrams docs/architecture.md

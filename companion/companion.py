@@ -44,7 +44,7 @@ class Companion:
         samples = [sample for _, sample in frames if sample is not None]
         outputs = advance(core, samples, now_us)
         self._address(core)
-        sent = tuple([self._encoder.encode(message) for message in outputs.messages])
+        sent = tuple([packet for message in outputs.messages for packet in self._encoder.packets(message)])
         return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
 
     def _begin(self, now_us: int) -> Core:

@@ -15,6 +15,7 @@ from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.machine import Machine
+from companion.flight.operator import status_text, values
 from companion.flight.states import FINAL_STATES, State
 from companion.link.identity import identify, is_autopilot
 from companion.link.streams import StreamMonitor
@@ -64,6 +65,7 @@ class Core:
     setpoint_due_us: int
     setpoint_interval_us: int
     stop_reason: str | None = None
+    values_due_us: int = 0
     last_setpoint_ned_m: Vector3 | None = None
     last_setpoint_us: int = 0
     limited_by: str = ""
@@ -99,6 +101,7 @@ def advance(core: Core, samples: Sequence[Sample], now_us: int) -> Outputs:
     follow_contact(core)
     stream_setpoint(core, moved, now_us)
     beat(core, now_us)
+    inform(core, now_us)
     return collect(core)
 
 
@@ -239,6 +242,21 @@ def beat(core: Core, now_us: int) -> None:
     core.heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
     active = core.machine.state not in FINAL_STATES and core.flight.armed_at_us is not None
     core.flight.outbox.append(OnboardHeartbeat(active))
+
+
+def inform(core: Core, now_us: int) -> None:
+    """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
+    flight, operator = core.flight, core.flight.mission.companion.operator
+    if flight.vehicle.identity is None:
+        return
+    hits = len(flight.collisions)
+    if operator.status_texts:
+        texts = [status_text(event, flight.mission.name, hits) for event in flight.events]
+        flight.outbox += [text for text in texts if text is not None]
+    if operator.values_hz and now_us >= core.values_due_us and not core.machine.finished:
+        core.values_due_us = now_us + round(1e6 / operator.values_hz)
+        latest = flight.collisions[-1] if flight.collisions else None
+        flight.outbox += values(core.machine.state, core.watch, latest, hits, now_us - core.started_at_us)
 
 
 def collect(core: Core) -> Outputs:

@@ -34,6 +34,15 @@ class LandedState(IntEnum):
     LANDING = 4
 
 
+class Severity(IntEnum):
+    """MAV_SEVERITY, as far as the companion has something to say."""
+
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+
+
 class MessageId(IntEnum):
     """MAVLink ids of the streams the companion asks for and of the messages it requests."""
 
@@ -243,4 +252,32 @@ class TimeSyncReply:
     companion_time_ns: int
 
 
-Outgoing: TypeAlias = SendCommand | PositionSetpoint | OnboardHeartbeat | TimeSyncReply
+@dataclass(frozen=True, slots=True)
+class StatusText:
+    """STATUSTEXT, in as many packets as its length needs."""
+
+    severity: Severity
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NamedValue:
+    """NAMED_VALUE_FLOAT: a number to plot; the name has at most ten characters."""
+
+    time_us: int
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class DebugVector:
+    """DEBUG_VECT: three numbers to plot; the name has at most ten characters."""
+
+    time_us: int
+    name: str
+    vector: Vector3
+
+
+Outgoing: TypeAlias = (
+    SendCommand | PositionSetpoint | OnboardHeartbeat | TimeSyncReply | StatusText | NamedValue | DebugVector
+)

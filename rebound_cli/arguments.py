@@ -2,6 +2,8 @@
 
 import argparse
 
+SIMULATED_AUTOPILOTS = ("builtin", "px4")
+
 
 def port(text: str) -> int:
     if not text.isdigit() or int(text) > 65_535:
@@ -47,3 +49,15 @@ def hours(text: str) -> float:
     if not 0 < value <= 10_000:
         raise argparse.ArgumentTypeError(f"{text!r} is not a time: give hours, such as 0.5")
     return value
+
+
+def add_world_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--airframe", metavar="NAME|FILE", help="foldable, rigid or an airframe file")
+    parser.add_argument("--seed", type=int, help="seed of every random number of the simulated vehicle")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="PATH=VALUE",
+        help="change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5",
+    )

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from companion.flight.states import markdown_table, mermaid_diagram
+from sim_vehicle.autopilot.failsafe_table import markdown_table as failsafe_table
 from sim_vehicle.autopilot.modes import mode_diagram
 
 
@@ -14,6 +15,7 @@ def with_diagrams(text: str) -> str:
         "flight diagram": f"```mermaid\n{mermaid_diagram()}```\n",
         "flight table": markdown_table(),
         "mode diagram": f"```mermaid\n{mode_diagram().rstrip()}\n```\n",
+        "failsafe table": failsafe_table(),
     }
     for name, content in contents.items():
         mark = re.compile(rf"(<!-- generated: {name} -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -9,14 +9,25 @@ from pathlib import Path
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
-from rebound_cli.arguments import count, host_and_port, hours, instance, port, speed
+from rebound_cli.arguments import (
+    SIMULATED_AUTOPILOTS,
+    add_world_options,
+    count,
+    host_and_port,
+    hours,
+    instance,
+    port,
+    speed,
+)
+from rebound_cli.check.arguments import add_check
+from rebound_cli.fly_arguments import add_fly
+from rebound_cli.plan.arguments import add_plan
 from rebound_cli.replay.arguments import add_replay
+from rebound_cli.tune.arguments import add_tune
 
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
-
-SIMULATED_AUTOPILOTS = ("builtin", "px4")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,47 +57,18 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    _add_fly(commands)
+    add_fly(commands)
+    add_check(commands)
+    add_plan(commands)
     _add_sim(commands)
     _add_results(commands)
     _add_paper(commands)
     _add_detectors(commands)
     add_replay(commands)
+    add_tune(commands)
     _add_airframe(commands)
     _add_identify(commands)
     return parser
-
-
-def _add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    fly = commands.add_parser("fly", help="fly a mission", description="Fly a mission from take-off to landing.")
-    fly.add_argument("mission", type=Path, metavar="MISSION", help="mission file, such as missions/wall.yaml")
-    how = fly.add_mutually_exclusive_group(required=True)
-    how.add_argument(
-        "--sim",
-        nargs="?",
-        const="builtin",
-        choices=SIMULATED_AUTOPILOTS,
-        metavar="px4",
-        help="start the simulated vehicle and fly it in real time over UDP; "
-        "px4: with your PX4 as its autopilot, see docs/px4.md",
-    )
-    how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")
-    how.add_argument(
-        "--connect",
-        metavar="URL",
-        help="a vehicle, e.g. udpin://0.0.0.0:14540 or serial:///dev/ttyAMA0:921600",
-    )
-    _add_world_options(fly)
-    fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
-    fly.add_argument(
-        "--instance", type=instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
-    )
-    fly.add_argument(
-        "--companion", type=Path, metavar="FILE", help="take the companion: part from this file, e.g. from rebound tune"
-    )
-    fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
-    fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
-    fly.set_defaults(run=_fly)
 
 
 def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -96,7 +78,7 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         description="A simulated PX4 quadrotor for any MAVLink client.",
     )
     sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
-    _add_world_options(sim)
+    add_world_options(sim)
     sim.add_argument(
         "--autopilot",
         choices=SIMULATED_AUTOPILOTS,
@@ -253,25 +235,7 @@ def _add_identify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
     identify.set_defaults(run=_identify)
 
 
-def _add_world_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--airframe", metavar="NAME|FILE", help="foldable, rigid or an airframe file")
-    parser.add_argument("--seed", type=int, help="seed of every random number of the simulated vehicle")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="PATH=VALUE",
-        help="change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5",
-    )
-
-
 # The commands' modules are imported when they run: `--help` and errors in arguments come at once.
-def _fly(options: argparse.Namespace) -> int:
-    from rebound_cli.fly import run_fly
-
-    return run_fly(options)
-
-
 def _sim(options: argparse.Namespace) -> int:
     from rebound_cli.sim import run_sim
 

@@ -1,7 +1,10 @@
-"""What the autopilot asks of the position controller."""
+"""What the autopilot asks of the control: a point of a trajectory, an attitude, or body rates."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 Axis3 = tuple[float | None, float | None, float | None]
 
 FREE: Axis3 = (None, None, None)
@@ -20,3 +23,24 @@ class TrajectorySetpoint:
     acceleration_ned_m_s2: Axis3 = FREE
     yaw_rad: float | None = None
     yaw_rate_rad_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSetpoint:
+    """An attitude (w, x, y, z; body to NED) with thrust; PX4's vehicle_attitude_setpoint."""
+
+    attitude_wxyz: Quaternion
+    thrust_fraction: float
+    """Of all four motors together, over their greatest."""
+    yaw_rate_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RatesSetpoint:
+    """Body rates with thrust; PX4's vehicle_rates_setpoint."""
+
+    rates_frd_rad_s: Vector3
+    thrust_fraction: float
+
+
+Setpoint: TypeAlias = TrajectorySetpoint | AttitudeSetpoint | RatesSetpoint

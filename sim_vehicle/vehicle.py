@@ -16,7 +16,7 @@ from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
-from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.slow_sensors import SlowSensors
 from sim_vehicle.truth import TruthRecorder
 
@@ -132,8 +132,8 @@ class SimulatedVehicle:
             self._tuned_at = self.parameters.changes
             self._plant.tune(position_gains(self.parameters))
 
-    def _fly(self, setpoint: TrajectorySetpoint | None) -> PlantOutput:
-        sample = self._plant.step(setpoint, self._autopilot.arming.armed)
+    def _fly(self, setpoint: Setpoint | None) -> PlantOutput:
+        sample = self._plant.step(setpoint, self._autopilot.motors_run)
         self._autopilot.observe(sample)
         self.time_boot_us = sample.time_boot_us
         return sample

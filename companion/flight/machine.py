@@ -91,7 +91,7 @@ class Machine:
         flight.outcome = "completed" if failure is None else "failed"
         flight.reason = failure or f"landed and disarmed{left}"
         text = f"done: landed and disarmed, {_hits(len(flight.collisions))}{left}"
-        flight.tell(now_us, "done", text, outcome=flight.outcome)
+        flight.tell(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
         return LetGo()
 
     def _aborted(self, move: Move, now_us: int) -> Activity:
@@ -100,7 +100,7 @@ class Machine:
         flight.reason = move.text
         expecting.close(flight, now_us)
         text = f"{flight.outcome}: {move.text}"
-        flight.tell(now_us, "aborted", text, outcome=flight.outcome, next_step=flight.step_index)
+        flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step_index)
         return HandOver(flight) if move.hand_over else LetGo()
 
 

@@ -33,7 +33,8 @@ class Recover:
             since_us = self._monitor.settled_since(sample)
             if since_us is not None:
                 record.settled_at_boot_us, record.is_over = since_us, True
-                flight.tell(now_us, "recovered", _recovered_text(record), settled_after_s=record.settled_after_s())
+                figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
+                flight.tell(now_us, "recovered", _recovered_text(record), **figures)
                 return afterwards(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._started_us > timeout_s * 1e6:

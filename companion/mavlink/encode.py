@@ -1,10 +1,12 @@
 """Typed commands to MAVLink 2 bytes. Sequence numbers, type masks and NaN exist only here."""
 
-from typing import Any
+from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.messages import (
+    DebugVector,
+    NamedValue,
     OnboardHeartbeat,
     Outgoing,
     PositionSetpoint,
@@ -13,6 +15,7 @@ from companion.messages import (
     SetArmed,
     SetMessageInterval,
     SetMode,
+    StatusText,
     TimeSyncReply,
     VehicleCommand,
 )
@@ -29,12 +32,18 @@ IGNORE_YAW_RATE = 0x800
 
 NAN = float("nan")
 
+# STATUSTEXT's field.
+TEXT_LENGTH = 50
+
+SinglePacket: TypeAlias = SendCommand | PositionSetpoint | OnboardHeartbeat | TimeSyncReply | NamedValue | DebugVector
+
 
 class Encoder:
     """Counts the packets it makes; otherwise without memory."""
 
     def __init__(self) -> None:
         self._mavlink = dialect.MAVLink(None, DEFAULT_SYSTEM_ID, COMPONENT_ID)
+        self._text_number = 0
         self._target = (DEFAULT_SYSTEM_ID, dialect.MAV_COMP_ID_AUTOPILOT1)
 
     def speak_to(self, system_id: int, component_id: int) -> None:
@@ -42,14 +51,36 @@ class Encoder:
         self._mavlink.srcSystem = system_id
         self._target = (system_id, component_id)
 
-    def encode(self, outgoing: Outgoing) -> bytes:
+    def packets(self, outgoing: Outgoing) -> list[bytes]:
+        """All that it takes; of most messages one."""
+        if isinstance(outgoing, StatusText):
+            return [self._pack(message) for message in self._chunks(outgoing)]
+        return [self.encode(outgoing)]
+
+    def encode(self, outgoing: SinglePacket) -> bytes:
         """One packet."""
-        message = self._message(outgoing)
+        return self._pack(self._message(outgoing))
+
+    def _pack(self, message: Any) -> bytes:
         packet = bytes(message.pack(self._mavlink))
         self._mavlink.seq = (self._mavlink.seq + 1) % 256
         return packet
 
-    def _message(self, outgoing: Outgoing) -> Any:
+    def _chunks(self, status: StatusText) -> list[Any]:
+        """A text that fits has no number; the parts of one that does not share theirs, never 0 (the message's spec)."""
+        text = status.text.encode()
+        parts = [text[start : start + TEXT_LENGTH] for start in range(0, len(text), TEXT_LENGTH)] or [b""]
+        number = 0
+        if len(parts) > 1:
+            self._text_number = number = self._text_number % 0xFFFF + 1
+            # the last part ends the text by being shorter than the field
+            parts += [b""] if len(parts[-1]) == TEXT_LENGTH else []
+        return [
+            dialect.MAVLink_statustext_message(int(status.severity), part, number, sequence)
+            for sequence, part in enumerate(parts)
+        ]
+
+    def _message(self, outgoing: SinglePacket) -> Any:
         match outgoing:
             case PositionSetpoint():
                 return self._setpoint(outgoing)
@@ -62,6 +93,10 @@ class Encoder:
                 return dialect.MAVLink_heartbeat_message(
                     dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, status, 3
                 )
+            case NamedValue(time_us, name, value):
+                return dialect.MAVLink_named_value_float_message(time_us // 1000 & 0xFFFFFFFF, name.encode(), value)
+            case DebugVector(time_us, name, vector):
+                return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case TimeSyncReply(vehicle_time_ns, companion_time_ns):
                 return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
 

@@ -108,6 +108,14 @@ class FlightConfig(Written):
     arrival_timeout_s: Positive = 15.0
 
 
+class OperatorConfig(Written):
+    """What a ground station is told; nothing of it is needed to fly."""
+
+    status_texts: bool = True
+    # Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none.
+    values_hz: Annotated[NotNegative, Field(le=50.0)] = 2.0
+
+
 class CompanionConfig(Written):
     """All settings of the companion."""
 
@@ -122,6 +130,7 @@ class CompanionConfig(Written):
     settled: SettledConfig = SettledConfig()
     link: LinkConfig = LinkConfig()
     flight: FlightConfig = FlightConfig()
+    operator: OperatorConfig = OperatorConfig()
 
     @field_validator("detector")
     @classmethod

@@ -1,5 +1,6 @@
 """The campaigns of the bench: how many cases of which family."""
 
+import math
 from pathlib import Path
 
 from rebound_cli.campaign.plan import Campaign
@@ -51,9 +52,15 @@ def hits_campaign(hits: int) -> Campaign:
 
 def flights_campaign(hours: float) -> Campaign:
     """At least so many hours of flight, airframes in turn."""
-    count = max(2, round(3600.0 * hours / FLIGHT_S))
+    count = max(2, math.ceil(3600.0 * hours / FLIGHT_S))
     cases = [
-        FlightCase("plain", seed, AIRFRAMES[seed % 2], _compared(seed), sweeps=seed % SWEEP_FLIGHTS_EVERY < 2)
+        FlightCase(
+            family="calm",
+            seed=seed,
+            airframe=AIRFRAMES[seed % 2],
+            detectors=_compared(seed),
+            sweeps=seed % SWEEP_FLIGHTS_EVERY < 2,
+        )
         for seed in range(count)
     ]
     return Campaign("flights", {"hours": hours}, cases, work_out_flight)

@@ -28,7 +28,6 @@ class FlightCase:
     seed: int
     airframe: str
     detectors: tuple[str, ...]
-    vibration_m_s2: float | None = None
     sweeps: bool = False
 
 
@@ -43,9 +42,6 @@ class Flown:
 def work_out_flight(case: FlightCase) -> dict[str, Any]:
     """Fly it, let every detector hear it at every rate, list what they report."""
     airframe = load_built_in(case.airframe)
-    if case.vibration_m_s2 is not None:
-        imu = airframe.imu.model_copy(update={"accelerometer_noise_m_s2": case.vibration_m_s2})
-        airframe = airframe.model_copy(update={"imu": imu})
     flown = fly_healthy(case, airframe)
     samples = flown.recording.samples
     result: dict[str, Any] = {

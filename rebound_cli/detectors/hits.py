@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from companion.detection.interface import Situation
 from companion.messages import LandedState
-from rebound_cli.detectors.cruise import Cruise
 from rebound_cli.detectors.recording import Recording
 from rebound_cli.detectors.scoring import score_hit
 from rebound_cli.detectors.watching import detector_names
 from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.cruise import Cruise
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float64]
 
 AIRFRAMES = ("foldable", "rigid")
 # What is hit and how; each as often as the others.
-APPROACHES = ("wall", "slanted wall", "leaning wall", "ceiling")
+APPROACHES = ("wall", "slanted wall", "leaning wall", "ceiling", "pole")
 SPEEDS_M_S = (0.5, 5.0)
 # Below the speeds that are asked for, to see where it ends.
 SLOW_SPEEDS_M_S = (0.3, 0.5)

@@ -21,10 +21,13 @@ class Recording:
 
     samples: list[PlantOutput] = field(default_factory=list)
     published: list[PlantOutput] = field(default_factory=list)
+    asked_attitudes: list[list[list[float]]] = field(default_factory=list)
+    """Rotation matrices that the position control asked for."""
     situations: list[Situation] = field(default_factory=list)
     contact_m_s2: list[float] = field(default_factory=list)
     """The obstacles' mean force on the vehicle over the interval, per unit mass. The ground's is not in it."""
-    _hit: Floats | None = None
+    _state: tuple[Floats, Floats] | None = None
+    """Views of the plant's state, taken once: looking a field up costs microseconds."""
     _impulse: tuple[float, Vector3] = (0.0, (0.0, 0.0, 0.0))
 
     def add(self, plant: Plant, sample: PlantOutput, situation: Situation, mass_kg: float) -> None:
@@ -33,17 +36,18 @@ class Recording:
         is_due = sample.time_boot_us - latest.time_boot_us >= POSITION_PERIOD_US
         self.samples.append(sample)
         self.published.append(sample if is_due else latest)
+        if self._state is None:
+            self._state = plant.state.hit, plant.state.attitude_setpoint
+        self.asked_attitudes.append(self._state[1].tolist())
         self.situations.append(situation)
-        self.contact_m_s2.append(self._contact_n_s(plant) / (mass_kg * 1e-6 * plant.interval_us))
+        self.contact_m_s2.append(self._contact_n_s(self._state[0]) / (mass_kg * 1e-6 * plant.interval_us))
 
-    def _contact_n_s(self, plant: Plant) -> float:
+    def _contact_n_s(self, hit: Floats) -> float:
         """Size of the impulse that the obstacles gave in the latest interval."""
-        if self._hit is None:
-            self._hit = plant.state.hit
-        started_us = float(self._hit[HIT_START_US])
+        started_us = float(hit[HIT_START_US])
         if started_us == 0.0:
             return 0.0
-        x, y, z = self._hit[HIT_IMPULSE].tolist()
+        x, y, z = hit[HIT_IMPULSE].tolist()
         before = self._impulse[1] if started_us == self._impulse[0] else (0.0, 0.0, 0.0)
         self._impulse = (started_us, (x, y, z))
         return math.dist((x, y, z), before)

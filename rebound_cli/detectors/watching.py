@@ -15,8 +15,20 @@ from rebound_cli.detectors.wire import BUILDERS, Heard
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 
-# The setting that a detector's sensitivity hangs on, as a multiple of its default.
+# What a detector's sensitivity hangs on is taken times these.
 SWEPT_FACTORS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+# Its settings; of detectors that are not here it is the first of their settings.
+SWEPT_FIELDS = {
+    "lateral": ("threshold_m_s2", "noise_factor"),
+    "fused": (
+        "side_threshold_m_s2",
+        "vertical_threshold_m_s2",
+        "noise_factor",
+        "velocity_step_m_s",
+        "velocity_step_turned_m_s",
+        "rate_step_rad_s",
+    ),
+}
 
 
 @dataclass(slots=True)
@@ -29,20 +41,19 @@ class Found:
 
 
 def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
-    """Default settings but for the detector's name, and its main threshold times `factor`."""
+    """Default settings but for the detector's name, and its thresholds times `factor`."""
     config = CompanionConfig(detector=detector)
     if factor == 1.0:
         return config
     own = getattr(config, detector)
-    field = swept_field(detector)
-    swept = type(own).model_validate({**own.model_dump(), field: factor * getattr(own, field)})
-    return config.model_copy(update={detector: swept})
+    changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
+    return config.model_copy(update={detector: type(own).model_validate({**own.model_dump(), **changes})})
 
 
-def swept_field(detector: str) -> str:
-    """Name of the setting that is swept: by convention the first of the detector's settings."""
+def swept_fields(detector: str) -> tuple[str, ...]:
+    """Names of the settings that are swept together."""
     fields: dict[str, object] = type(getattr(CompanionConfig(), detector)).model_fields
-    return next(iter(fields))
+    return SWEPT_FIELDS.get(detector, (next(iter(fields)),))
 
 
 def detector_names() -> tuple[str, ...]:

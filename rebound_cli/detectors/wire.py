@@ -24,6 +24,7 @@ from companion.messages import (
 from rebound_cli.detectors.recording import Recording
 from sim_vehicle.mavlink import vibration
 from sim_vehicle.mavlink.streams import KINDS, LateLoops, Stream, interval_from_request
+from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.mavlink.topics import Topic
 from sim_vehicle.physics.plant import PlantOutput
 
@@ -145,7 +146,8 @@ def _attitude_target(recording: Recording) -> Builder:
     rows = _as_floats([(s.thrust_fraction,) for s in samples])
 
     def build(index: int) -> Sample:
-        return AttitudeTarget(_milliseconds(samples[index]), rows[index][0])
+        ((w, x, y, z),) = _as_floats([quaternion_from_matrix(recording.asked_attitudes[index])])
+        return AttitudeTarget(_milliseconds(samples[index]), rows[index][0], (w, x, y, z))
 
     return build
 

@@ -39,6 +39,7 @@ def roc_figure(hits: Hits, cases: Sequence[FlightCase], flights: Mapping[int, En
                 middle = SWEPT_FACTORS.index(1.0)
                 axis.plot(x[middle], 100 * found[middle], "o", markersize=11, markerfacecolor="none", color="black")
             axis.set_xscale("log")
+            axis.set_ylim(-3, 103)
             finish(
                 axis,
                 f"{airframe}, {rate} Hz",

@@ -74,3 +74,11 @@ def clipped_at_us(imu: Topic) -> tuple[int, ...] | None:
     if flags is None:
         flags = imu.column("delta_velocity_clipping")
     return None if flags is None else tuple(imu.time_us[flags > 0].tolist())
+
+
+def averaging_us(imu: Topic) -> float | None:
+    """The interval of one mean; a driver that reads its sensor in blocks makes some of them longer."""
+    intervals = imu.column("accelerometer_integral_dt")
+    if intervals is None:
+        intervals = imu.column("delta_velocity_dt")
+    return None if intervals is None else float(np.percentile(intervals, 99))

@@ -12,7 +12,7 @@ import numpy as np
 
 from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
 from companion.messages import Attitude, AttitudeTarget, Heartbeat, LocalPosition, Odometry, Vector3, Vibration
-from rebound_cli.logs.inertial import clipped_at_us, imu_samples, inertial_topic
+from rebound_cli.logs.inertial import averaging_us, clipped_at_us, imu_samples, inertial_topic
 from rebound_cli.logs.landed import landed_states
 from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
 from rebound_cli.logs.modes import custom_mode
@@ -71,6 +71,7 @@ def read_ulog(path: Path) -> Log:
             losses=tuple(_losses(topics, imu)),
             hover_thrust_fraction=_hover_thrust(topics),
             clipped_at_us=clipped_at_us(imu),
+            averaging_us=averaging_us(imu),
         )
     )
 

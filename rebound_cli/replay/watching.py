@@ -16,13 +16,14 @@ from sim_vehicle.mavlink.streams import KINDS, Stream, interval_from_request
 _MOST_POLLS = 20
 
 
-def watch_log(log: Log, config: CompanionConfig) -> Findings:
-    """Everything heard, in its order."""
+def watch_log(log: Log, config: CompanionConfig, rate_hz: float | None = None) -> Findings:
+    """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded."""
+    heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
     circumstances, notebook = Circumstances(), Notebook()
     # A log begins with old news of every topic: until the first IMU sample nobody was on the watch.
-    start_us = last_us = next(item.at_us for item in log.heard if isinstance(item.sample, ImuSample))
+    start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, ImuSample))
     watch = start_watch(config, start_us)
-    for at_us, group in groupby(log.heard, key=lambda item: max(item.at_us, start_us)):
+    for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
         for poll_us in _polls(last_us, at_us):
             for notice in advance(watch, (), circumstances.situation, poll_us).notices:
                 notebook.tell(poll_us, notice.text)

@@ -13,6 +13,9 @@ class Reason(StrEnum):
     """Who armed or disarmed, in PX4's words."""
 
     COMMAND = "external command"
+    GESTURE = "stick gesture"
+    MISSION = "mission start"
+    FAILSAFE = "failsafe"
     LANDING = "landing"
     INACTION = "auto preflight disarming"
 

@@ -1,34 +1,32 @@
-"""The autopilot as a whole: who is in command, what is flown, when it arms and disarms."""
+"""The autopilot as a whole: what comes in, what is flown, what is shown."""
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot import commands, offboard
-from sim_vehicle.autopilot.arming import Arming, Reason
-from sim_vehicle.autopilot.battery import Battery
+from sim_vehicle.autopilot import commands, flight_commands
+from sim_vehicle.autopilot.commander import Commander, SystemStatus
 from sim_vehicle.autopilot.estimate import Estimate, Vector3, yaw_of
+from sim_vehicle.autopilot.flight_messages import (
+    AttitudeTarget,
+    FlightInput,
+    GlobalTarget,
+    RadioChannels,
+    StickInput,
+)
 from sim_vehicle.autopilot.land_detector import LandDetector
+from sim_vehicle.autopilot.manual import BY_STICKS, ManualFlight
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result, Severity, StatusText
-from sim_vehicle.autopilot.modes import ARMABLE, Conditions, Event, Mode, ModeState
+from sim_vehicle.autopilot.mission_store import MissionStore
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.autopilot.navigator import Navigator
+from sim_vehicle.autopilot.offboard_control import OffboardControl
 from sim_vehicle.autopilot.takeoff import Takeoff, wants_takeoff
-from sim_vehicle.autopilot.trajectory import ModeTrajectory
+from sim_vehicle.autopilot.target import Kind, View
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import TrajectorySetpoint
-
-# Modes in which PX4's navigator has a setpoint.
-AUTO_MODES = frozenset({Mode.MISSION, Mode.LOITER, Mode.RETURN, Mode.TAKEOFF, Mode.LAND})
+from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
 POSITION_PERIOD_US = 8_000
-
-
-class SystemStatus(IntEnum):
-    """MAV_STATE as PX4 uses it."""
-
-    NOT_READY = 0
-    STANDBY = 3
-    ACTIVE = 4
-    FAILSAFE = 5
 
 
 class LandedState(IntEnum):
@@ -41,28 +39,44 @@ class LandedState(IntEnum):
 
 
 class Autopilot:
-    """Commands and setpoints in; modes, a demand for the position control, texts and acks out."""
+    """Commands, setpoints and sticks in; modes, a demand for the control, texts and acks out."""
 
-    def __init__(self, hover_thrust_fraction: float, first: Estimate, parameters: Parameters) -> None:
+    def __init__(
+        self,
+        hover_thrust_fraction: float,
+        first: Estimate,
+        parameters: Parameters,
+        missions: MissionStore | None = None,
+    ) -> None:
+        """``missions`` is handed in by whoever keeps them over a reboot."""
         self.parameters = parameters
-        self.battery = Battery(parameters)
         self.origin = Origin()
-        self.home_set_us = first.time_boot_us
-        self.modes = ModeState()
-        self.arming = Arming(parameters)
-        self.signal = offboard.OffboardSignal()
+        self.missions = missions or MissionStore()
         self.detector = LandDetector(hover_thrust_fraction, parameters)
-        self.applied: TrajectorySetpoint | None = None
+        view = View(
+            first.time_boot_us,
+            first.position_ned_m,
+            first.velocity_ned_m_s,
+            yaw_of(first.attitude_wxyz),
+            home_ned_m=first.position_ned_m,
+            home_yaw_rad=yaw_of(first.attitude_wxyz),
+        )
+        self.navigator = Navigator(parameters, self.origin, self.missions, view)
+        self.commander = Commander(parameters, self.navigator, self.detector)
+        self.modes, self.arming = self.commander.modes, self.commander.arming
+        self.signal, self.battery = self.commander.signal, self.commander.battery
+        self._offboard = OffboardControl(self.signal, self.origin)
+        self.applied: Setpoint | None = None
         self.texts: list[StatusText] = []
+        self._manual = ManualFlight(parameters, hover_thrust_fraction)
         self._takeoff = Takeoff(parameters)
-        self._trajectory = ModeTrajectory(parameters)
         self._estimate = first
         self._now_us = first.time_boot_us
         self._demanded_us = first.time_boot_us
-        self._demand: TrajectorySetpoint | None = None
-        self._offboard_demand = offboard.STOP
+        self._demand: Setpoint | None = None
+        self._flown = self.modes.flown
+        self._sinks = False
         self._commands: list[Command] = []
-        self._set_home()
 
     # --- what comes in -----------------------------------------------------------------------------------
 
@@ -70,15 +84,29 @@ class Autopilot:
         """Queue a command: the commander gets to it in its next cycle."""
         self._commands.append(command)
 
-    def setpoint(self, target: PositionTarget) -> None:
+    def receive(self, message: FlightInput) -> None:
+        """Take a setpoint, sticks or a target to follow."""
+        if isinstance(message, PositionTarget | GlobalTarget):
+            self.setpoint(message)
+        elif isinstance(message, AttitudeTarget):
+            self._offboard.take_attitude(message, self._now_us, self.modes.flown is Mode.OFFBOARD)
+        elif isinstance(message, StickInput):
+            self.commander.sticks.heard(message, self._now_us)
+        elif isinstance(message, RadioChannels):
+            self.commander.sticks.heard_radio(message, self._now_us)
+        else:
+            self.navigator.follow(message)
+
+    def setpoint(self, target: PositionTarget | GlobalTarget) -> None:
         """Take an offboard setpoint, valid or not, whatever the mode; it only flies in OFFBOARD."""
-        refusal = offboard.refusal(target)
+        is_flown, attitude = self.modes.flown is Mode.OFFBOARD, self._estimate.attitude_wxyz
+        refusal = self._offboard.take_position(target, self._now_us, is_flown, attitude, self.home_ned_m)
         if refusal is not None:
             self.texts.append(refusal)
-            return
-        self.signal.heard(self._now_us)
-        if self.modes.mode is Mode.OFFBOARD:
-            self._offboard_demand = offboard.trajectory_setpoint(target, self._estimate.attitude_wxyz)
+
+    def ground_station_heard(self) -> None:
+        """A ground station's heartbeat came over some link."""
+        self.commander.ground_station.heard(self._now_us)
 
     def observe(self, estimate: Estimate) -> None:
         """Take what the sensors and the estimator say at the end of an interval."""
@@ -86,144 +114,148 @@ class Autopilot:
         self._now_us = estimate.time_boot_us
         self.battery.update(self._now_us, self.arming.armed, estimate.thrust_fraction)
 
-    # --- the commander's cycle ---------------------------------------------------------------------------
+    # --- commands ----------------------------------------------------------------------------------------
 
     def run_commander(self) -> list[CommandAck]:
-        """Commands, offboard's signal, arming: everything that can change mode or arming."""
-        self.signal.update(self._now_us)
-        if self.modes.mode is Mode.OFFBOARD and self.arming.armed and not self.signal.arrives:
-            self._change_mode(Event.SETPOINTS_LOST)
-            self._say(Severity.CRITICAL, "Failsafe activated")
-        elif self.modes.mode is Mode.OFFBOARD_LOST and self.signal.is_back:
-            self._change_mode(Event.SETPOINTS_BACK)
-        elif self.modes.mode is Mode.TAKEOFF and self._takeoff_is_over():
-            self._change_mode(Event.TAKEOFF_REACHED)
-        if self.arming.armed:
-            reason = self.arming.disarm_by_itself(self._now_us, self.detector.landed)
-            if reason is not None:
-                self._disarmed(reason)
-        if not self._commands:
-            return []
-        queue, self._commands = self._commands, []
-        return [ack for command in queue if (ack := self._execute(command)) is not None]
+        """Commands, failsafes, arming: everything that can change mode or arming."""
+        self._look()
+        self.commander.run(self._now_us, self._estimate.attitude_wxyz)
+        acks: list[CommandAck] = []
+        if self._commands:
+            queue, self._commands = self._commands, []
+            acks = [ack for command in queue if (ack := self._execute(command)) is not None]
+        if self.modes.flown is not self._flown:
+            self._notice_mode()
+        if self.commander.texts:
+            self.texts += self.commander.texts
+            self.commander.texts.clear()
+        return acks
 
     def _execute(self, command: Command) -> CommandAck | None:
         result = commands.execute(command, self)
         return None if result is None else commands.answer(command, result)
 
-    def _takeoff_is_over(self) -> bool:
-        return (
-            self.arming.armed
-            and not self.detector.landed
-            and self._trajectory.takeoff_is_reached(self._estimate.position_ned_m)
-        )
-
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
         """Change the mode as a command asks."""
-        if not self._change_mode(Event.REQUEST, mode):
-            return Result.TEMPORARILY_REJECTED
-        if says_so is not None:
-            self._say(Severity.INFO, says_so)
-        return Result.ACCEPTED
+        result = self.commander.request_mode(mode)
+        if result is Result.ACCEPTED and says_so is not None:
+            self.say(Severity.INFO, says_so)
+        return result
 
     def refuse_mode(self, why: str) -> Result:
         """Turn down a mode that does not exist."""
-        self._say(Severity.CRITICAL, why)
+        self.say(Severity.CRITICAL, why)
         return Result.TEMPORARILY_REJECTED
 
     def arm(self, forced: bool) -> Result:
         """Arm as a command asks."""
-        was_armed = self.arming.armed
-        result = self.arming.arm(self._now_us, self.checks_pass, forced)
-        if result is not Result.ACCEPTED:
-            self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
-        elif not was_armed:
-            self._say(Severity.INFO, f"Armed by {Reason.COMMAND}")
-            self._set_home()
-            self._enter(self.modes.mode)
-        return result
+        return self.commander.arm(forced)
 
     def disarm(self, forced: bool) -> Result:
         """Disarm as a command asks."""
-        was_armed = self.arming.armed
-        result = self.arming.disarm(self.detector.landed or self.detector.maybe_landed, forced)
-        if result is not Result.ACCEPTED:
-            self._say(Severity.CRITICAL, "Disarming denied: not landed")
-        elif was_armed:
-            self._disarmed(Reason.COMMAND)
-        return result
-
-    def _disarmed(self, reason: Reason) -> None:
-        self._say(Severity.INFO, f"Disarmed by {reason}")
-        self._change_mode(Event.DISARMED)
-
-    def _change_mode(self, event: Event, requested: Mode | None = None) -> bool:
-        previous = self.modes.mode
-        conditions = Conditions(self.arming.armed, self.signal.arrives)
-        if not self.modes.apply(event, conditions, requested):
-            return False
-        if self.modes.mode is not previous or event is Event.REQUEST:
-            self._enter(previous)
-        return True
-
-    def _enter(self, previous: Mode) -> None:
-        estimate = self._estimate
-        self._trajectory.enter(
-            self.modes.mode,
-            previous,
-            estimate.position_ned_m,
-            estimate.velocity_ned_m_s,
-            yaw_of(estimate.attitude_wxyz),
-        )
-        # Until the first setpoint arrives in OFFBOARD, the last demand goes on, or the vehicle stops.
-        if self.modes.mode is Mode.OFFBOARD and previous is not Mode.OFFBOARD:
-            self._offboard_demand = self._demand or offboard.STOP
-
-    def _set_home(self) -> None:
-        self.set_home_at(self._estimate.position_ned_m, yaw_of(self._estimate.attitude_wxyz))
+        return self.commander.disarm(forced)
 
     def set_home_here(self) -> Result:
         """DO_SET_HOME with the present position."""
-        self._set_home()
+        self.navigator.set_home_here()
         return Result.ACCEPTED
 
     def set_home_at(self, position_ned_m: Vector3, yaw_rad: float) -> None:
         """Where RETURN leads to from now on."""
-        self._trajectory.set_home(position_ned_m, yaw_rad)
-        self.home_set_us = self._now_us
+        self.navigator.set_home(position_ned_m, yaw_rad)
 
-    def _say(self, severity: Severity, text: str) -> None:
+    def say(self, severity: Severity, text: str) -> None:
+        """Tell the ground stations."""
         self.texts.append(StatusText(severity, text))
+
+    def _notice_mode(self) -> None:
+        previous, self._flown = self._flown, self.modes.flown
+        if self._flown is Mode.OFFBOARD:
+            self._offboard.begin(self._demand)
+        if self._flown in BY_STICKS and previous not in BY_STICKS:
+            self._manual.start(self.navigator.view)
 
     # --- what is flown -----------------------------------------------------------------------------------
 
-    def run_control(self) -> TrajectorySetpoint | None:
+    @property
+    def motors_run(self) -> bool:
+        """Armed, and the flight not terminated."""
+        return self.arming.armed and self.modes.flown is not Mode.TERMINATION
+
+    def run_control(self) -> Setpoint | None:
         """The demand for the coming interval, renewed every 8 ms; None lets the motors idle."""
         elapsed_us = self._now_us - self._demanded_us
         if elapsed_us < POSITION_PERIOD_US:
             return self.applied
         self._demanded_us = self._now_us
         self._detect_landing()
-        down_m = self._estimate.position_ned_m[2]
-        self._demand = self._demand_of_mode(1e-6 * elapsed_us)
-        self._takeoff.update(self._now_us, self.arming.armed, self.detector.landed, self._wants_takeoff(down_m))
-        self.applied = self._takeoff.allowed(self._demand, self._now_us, down_m, self.detector.ground_contact)
+        self.navigator.update()
+        texts = self.navigator.take_texts()
+        if texts:
+            self.texts += texts
+        self._run_mission_commands()
+        self._demand = demand = self._demand_of_mode(1e-6 * elapsed_us)
+        down_m, armed = self._estimate.position_ned_m[2], self.arming.armed
+        if demand is not None and not isinstance(demand, TrajectorySetpoint):
+            self._takeoff.skip(self._now_us, armed, self.detector.landed)
+            self.applied = demand if armed else None
+            return self.applied
+        self._takeoff.update(self._now_us, armed, self.detector.landed, self._wants_takeoff(down_m))
+        self.applied = self._takeoff.allowed(demand, self._now_us, down_m, self.detector.ground_contact)
         return self.applied
 
-    def _demand_of_mode(self, step_s: float) -> TrajectorySetpoint | None:
-        mode = self.modes.mode
+    def _look(self) -> None:
+        """Let the navigator see where the vehicle is."""
+        view, estimate = self.navigator.view, self._estimate
+        view.now_us, view.position_ned_m = estimate.time_boot_us, estimate.position_ned_m
+        view.velocity_ned_m_s, view.yaw_rad = estimate.velocity_ned_m_s, yaw_of(estimate.attitude_wxyz)
+        view.landed, view.armed = self.detector.landed, self.arming.armed
+
+    def _run_mission_commands(self) -> None:
+        queue = self.navigator.mission.commands
+        if not queue:
+            return
+        given, self.navigator.mission.commands = queue, []
+        for item in given:
+            commands.execute(flight_commands.from_mission(item), self)
+
+    def _demand_of_mode(self, step_s: float) -> Setpoint | None:
+        mode = self.modes.flown
         if mode is Mode.OFFBOARD:
-            return self._offboard_demand
-        if self.detector.landed and mode is not Mode.TAKEOFF:
+            return self._offboard.demand
+        if mode is Mode.TERMINATION:
             return None
-        return self._trajectory.demand(mode, self._estimate.position_ned_m, step_s)
+        if mode not in BY_STICKS:
+            self._sinks = False
+            return self.navigator.demand(step_s)
+        sticks = self.commander.sticks.sticks
+        if sticks is None:
+            return self._sink(step_s)
+        if self._sinks:
+            self._manual.start(self.navigator.view)
+            self._sinks = False
+        if not self.arming.armed:
+            self._manual.disarmed()
+        return self._manual.demand(mode, sticks, self.navigator.view, step_s)
+
+    def _sink(self, step_s: float) -> TrajectorySetpoint | None:
+        """A mode of sticks without sticks: PX4 comes down, whatever the mode is called."""
+        if not self._sinks:
+            self.navigator.sink_here()
+            self._sinks = True
+        return None if self.detector.landed else self.navigator.sink(step_s)
 
     def _wants_takeoff(self, down_m: float) -> bool:
-        mode = self.modes.mode
-        return mode is Mode.TAKEOFF or (mode is Mode.OFFBOARD and wants_takeoff(self._demand, down_m))
+        mode, sticks = self.modes.flown, self.commander.sticks.sticks
+        if mode is Mode.OFFBOARD:
+            return isinstance(self._demand, TrajectorySetpoint) and wants_takeoff(self._demand, down_m)
+        if mode in BY_STICKS:
+            return sticks is not None and self._manual.wants_takeoff(sticks)
+        return self.navigator.wants_takeoff
 
     def _detect_landing(self) -> None:
-        estimate, was_landed = self._estimate, self.detector.landed
+        estimate, was_landed, demand = self._estimate, self.detector.landed, self._demand
+        controls_climb = demand is None or isinstance(demand, TrajectorySetpoint)
         self.detector.update(
             self._now_us,
             self.arming.armed,
@@ -231,55 +263,55 @@ class Autopilot:
             estimate.angular_velocity_frd_rad_s,
             estimate.specific_force_frd_m_s2,
             estimate.thrust_fraction,
-            self._demand.velocity_ned_m_s[2] if self._demand is not None else None,
+            demand.velocity_ned_m_s[2] if isinstance(demand, TrajectorySetpoint) else None,
+            controls_climb,
         )
         if not self.arming.armed or was_landed == self.detector.landed:
             return
         if was_landed:
-            self._say(Severity.INFO, "Takeoff detected")
-            self._set_home()
+            self.say(Severity.INFO, "Takeoff detected")
+            self.navigator.set_home_here()
         else:
-            self._say(Severity.INFO, "Landing detected")
+            self.say(Severity.INFO, "Landing detected")
 
     # --- what is shown -----------------------------------------------------------------------------------
 
     @property
     def home_ned_m(self) -> Vector3:
         """HOME_POSITION, local NED."""
-        return self._trajectory.home_ned_m
+        return self.navigator.view.home_ned_m
 
     @property
     def home_yaw_rad(self) -> float:
         """Heading at home."""
-        return self._trajectory.home_yaw_rad
+        return self.navigator.view.home_yaw_rad
+
+    @property
+    def home_set_us(self) -> int:
+        """When home was set."""
+        return self.navigator.home_set_us
 
     @property
     def auto_target_ned_m(self) -> Vector3 | None:
         """Where a mode that flies by itself is going, local NED; None in all other modes and on the ground."""
-        is_auto = self.modes.shown in AUTO_MODES and not self.detector.landed
-        return self._trajectory.target_ned_m if is_auto else None
+        return None if self.detector.landed else self.navigator.shown_target_ned_m
 
     @property
     def checks_pass(self) -> bool:
         """Whether the vehicle could be armed in its present mode."""
-        mode = self.modes.mode
-        return mode in ARMABLE or (mode is Mode.OFFBOARD and self.signal.arrives)
+        return self.commander.checks_pass
 
     @property
     def system_status(self) -> SystemStatus:
         """HEARTBEAT.system_status."""
-        if self.arming.armed:
-            return SystemStatus.FAILSAFE if self.modes.in_failsafe else SystemStatus.ACTIVE
-        return SystemStatus.STANDBY if self.checks_pass else SystemStatus.NOT_READY
+        return self.commander.system_status
 
     @property
     def landed_state(self) -> LandedState:
         """EXTENDED_SYS_STATE.landed_state."""
         if self.detector.landed:
             return LandedState.ON_GROUND
-        mode = self.modes.mode
-        if mode is Mode.TAKEOFF:
+        phase = self.navigator.phase
+        if phase is Kind.TAKEOFF:
             return LandedState.TAKING_OFF
-        if mode is Mode.LAND or (mode is Mode.RETURN and self._trajectory.is_descending_to_land):
-            return LandedState.LANDING
-        return LandedState.IN_AIR
+        return LandedState.LANDING if phase is Kind.LAND else LandedState.IN_AIR

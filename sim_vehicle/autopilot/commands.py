@@ -7,14 +7,15 @@ MavlinkReceiver::handle_message_command_both and Commander::handle_command of PX
 
 import math
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
+from sim_vehicle.autopilot import flight_commands
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
 from sim_vehicle.autopilot.modes import AUTO_MAIN_MODE, CUSTOM_FLAG, Mode, mode_from_request
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21
-NAV_TAKEOFF = 22
+NAV_TAKEOFF = flight_commands.NAV_TAKEOFF
 DO_SET_MODE = 176
 COMPONENT_ARM_DISARM = 400
 GET_MESSAGE_INTERVAL = 510
@@ -136,10 +137,6 @@ def _arm_disarm(command: Command, flight: Flight) -> Result | None:
     return None
 
 
-def _take_off(command: Command, flight: Flight) -> Result:
-    return flight.request_mode(Mode.TAKEOFF)
-
-
 def _land(command: Command, flight: Flight) -> Result:
     return flight.request_mode(Mode.LAND, says_so="Landing at current position")
 
@@ -148,10 +145,10 @@ def _return(command: Command, flight: Flight) -> Result:
     return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
 
 
-_HANDLERS: dict[int, Callable[[Command, Flight], Result | None]] = {
+_HANDLERS: dict[int, Callable[[Command, Any], Result | None]] = {
+    **flight_commands.HANDLERS,
     DO_SET_MODE: _set_mode,
     COMPONENT_ARM_DISARM: _arm_disarm,
-    NAV_TAKEOFF: _take_off,
     NAV_LAND: _land,
     NAV_RETURN_TO_LAUNCH: _return,
 }

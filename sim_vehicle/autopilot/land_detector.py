@@ -78,8 +78,12 @@ class LandDetector:
         specific_force_frd_m_s2: Vector3,
         thrust_fraction: float,
         asked_down_m_s: float | None,
+        controls_climb: bool = True,
     ) -> None:
-        """Take one estimate; ``asked_down_m_s`` is the mode's own demand, None where it has none."""
+        """Take one estimate; ``asked_down_m_s`` is the mode's own demand, None where it has none.
+
+        ``controls_climb`` off: attitude or rates are asked for, so no descent can be; thrust alone must be low.
+        """
         if not armed:
             for stage in (self._contact, self._maybe, self._landed):
                 stage.update(True, now_us)
@@ -90,10 +94,12 @@ class LandDetector:
         descends = asked_down_m_s is not None and asked_down_m_s >= descent_m_s
         still = self._is_still(velocity_ned_m_s)
         self._free_fall.update(math.hypot(*specific_force_frd_m_s2) < FREE_FALL_M_S2, now_us)
-        gives_way = thrust_fraction <= self._thrust(LOW_THRUST_SHARE) and (descends or on_ground)
+        gives_way = thrust_fraction <= self._thrust(LOW_THRUST_SHARE)
+        gives_way = gives_way and (descends or on_ground or not controls_climb)
+        none = self._thrust(NO_THRUST_SHARE) if controls_climb else self._parameters["MPC_MANTHR_MIN"] + 0.01
         self._contact.update(gives_way and still, now_us)
         self._maybe.update(
-            thrust_fraction <= self._thrust(NO_THRUST_SHARE)
+            thrust_fraction <= none
             and self._contact.state
             and not self._free_fall.state
             and not self._rotates(angular_velocity_frd_rad_s),

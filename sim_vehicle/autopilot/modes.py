@@ -10,7 +10,7 @@ from enum import IntEnum, StrEnum
 
 
 class Mode(IntEnum):
-    """The modes by PX4's NAVIGATION_STATE numbers, and the one failsafe of this vehicle."""
+    """The modes of a multicopter by PX4's NAVIGATION_STATE numbers."""
 
     MANUAL = 0
     ALTCTL = 1
@@ -18,22 +18,80 @@ class Mode(IntEnum):
     MISSION = 3
     LOITER = 4
     RETURN = 5
+    POSITION_SLOW = 6
     ACRO = 10
+    DESCEND = 12
+    TERMINATION = 13
     OFFBOARD = 14
     STABILIZED = 15
     TAKEOFF = 17
     LAND = 18
-    OFFBOARD_LOST = 100
-    """Offboard is meant, but its setpoints have stopped: shown as POSCTL while the vehicle sinks."""
+    FOLLOW_TARGET = 19
+    PRECISION_LAND = 20
+    ORBIT = 21
+
+
+class Need(StrEnum):
+    """What a mode cannot do without."""
+
+    STICKS = "sticks"
+    SETPOINTS = "setpoints arrive"
+    MISSION = "valid mission"
+    LOCAL_POSITION = "local position"
+    GLOBAL_POSITION = "global position"
+    HOME = "home position"
+
+
+# mode_requirements.cpp; attitude and rates, which every mode needs, are always there.
+_PLACE = frozenset({Need.LOCAL_POSITION, Need.GLOBAL_POSITION})
+NEEDS: dict[Mode, frozenset[Need]] = {
+    Mode.MANUAL: frozenset({Need.STICKS}),
+    Mode.ALTCTL: frozenset({Need.STICKS}),
+    Mode.POSCTL: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
+    Mode.POSITION_SLOW: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
+    Mode.STABILIZED: frozenset({Need.STICKS}),
+    Mode.ACRO: frozenset({Need.STICKS}),
+    Mode.MISSION: _PLACE | {Need.MISSION},
+    Mode.LOITER: _PLACE,
+    Mode.RETURN: _PLACE | {Need.HOME},
+    Mode.TAKEOFF: frozenset({Need.LOCAL_POSITION}),
+    Mode.LAND: frozenset({Need.LOCAL_POSITION}),
+    Mode.PRECISION_LAND: frozenset({Need.LOCAL_POSITION}),
+    Mode.FOLLOW_TARGET: frozenset({Need.LOCAL_POSITION}),
+    Mode.ORBIT: frozenset({Need.LOCAL_POSITION}),
+    Mode.OFFBOARD: frozenset({Need.SETPOINTS}),
+    Mode.DESCEND: frozenset(),
+    Mode.TERMINATION: frozenset(),
+}
+
+# mode_req_prevent_arming: nobody can arm in these.
+NOT_ARMABLE = frozenset(
+    {
+        Mode.LAND,
+        Mode.RETURN,
+        Mode.DESCEND,
+        Mode.FOLLOW_TARGET,
+        Mode.PRECISION_LAND,
+        Mode.ORBIT,
+        Mode.TERMINATION,
+    }
+)
+# A vehicle that cannot be armed in its mode, or would take off again at once, goes back after disarming to
+# the mode before (UserModeIntention::change). Out of termination nothing leads.
+NOT_KEPT_AFTER_DISARMING = (NOT_ARMABLE - {Mode.TERMINATION}) | {Mode.TAKEOFF}
+
+
+def missing(mode: Mode, available: frozenset[Need]) -> frozenset[Need]:
+    """What ``mode`` needs and is not there."""
+    return NEEDS[mode] - available
 
 
 class Event(StrEnum):
-    """What can change the mode."""
+    """What can change the mode that is meant."""
 
     REQUEST = "requested"
     TAKEOFF_REACHED = "takeoff height reached"
-    SETPOINTS_LOST = "setpoints stopped"
-    SETPOINTS_BACK = "setpoints came back"
+    STICKS = "sticks moved"
     DISARMED = "disarmed"
 
 
@@ -41,9 +99,8 @@ class Guard(StrEnum):
     """Condition of a transition."""
 
     ALWAYS = ""
-    DISARMED = "disarmed"
     ARMED = "armed"
-    SETPOINTS = "disarmed, or setpoints arrive"
+    CAN_RUN = "disarmed, or it can run"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,39 +116,36 @@ class Transition:
     target: Mode | None
 
 
-def _request(target: Mode, guard: Guard) -> Transition:
+def _request(target: Mode, guard: Guard = Guard.CAN_RUN) -> Transition:
     return Transition(None, Event.REQUEST, guard, target)
 
 
-# Disarmed, PX4 lets every mode be chosen. Armed it wants what the mode needs: sticks for MANUAL,
-# ALTCTL, STABILIZED and ACRO and an uploaded mission for MISSION, which this vehicle never has;
-# setpoints for OFFBOARD. LAND may always be chosen, whatever it needs. POSCTL stands for a pilot
-# taking over with his sticks centred: it is accepted and holds the position.
+_FLOWN_WITHOUT_STICKS = tuple(mode for mode in Mode if Need.STICKS not in NEEDS[mode] and mode is not Mode.TERMINATION)
+
+# Disarmed, PX4 lets every mode be chosen; armed it wants what the mode needs. LAND may always be chosen. Nothing
+# leads out of TERMINATION: `ModeState` holds it. What a failsafe flies instead of the mode that is meant is
+# decided in `failsafe` and never changes what is meant, but for a pilot who takes over.
 TRANSITIONS: tuple[Transition, ...] = (
-    _request(Mode.MANUAL, Guard.DISARMED),
-    _request(Mode.ALTCTL, Guard.DISARMED),
-    _request(Mode.STABILIZED, Guard.DISARMED),
-    _request(Mode.ACRO, Guard.DISARMED),
-    _request(Mode.MISSION, Guard.DISARMED),
-    _request(Mode.POSCTL, Guard.ALWAYS),
-    _request(Mode.LOITER, Guard.ALWAYS),
-    _request(Mode.RETURN, Guard.ALWAYS),
-    _request(Mode.TAKEOFF, Guard.ALWAYS),
+    _request(Mode.MANUAL),
+    _request(Mode.ALTCTL),
+    _request(Mode.POSCTL),
+    _request(Mode.POSITION_SLOW),
+    _request(Mode.STABILIZED),
+    _request(Mode.ACRO),
+    _request(Mode.MISSION),
+    _request(Mode.LOITER),
+    _request(Mode.RETURN),
+    _request(Mode.TAKEOFF),
     _request(Mode.LAND, Guard.ALWAYS),
-    _request(Mode.OFFBOARD, Guard.SETPOINTS),
+    _request(Mode.PRECISION_LAND),
+    _request(Mode.FOLLOW_TARGET),
+    _request(Mode.ORBIT),
+    _request(Mode.OFFBOARD),
+    _request(Mode.TERMINATION, Guard.ALWAYS),
     Transition((Mode.TAKEOFF,), Event.TAKEOFF_REACHED, Guard.ARMED, Mode.LOITER),
-    Transition((Mode.OFFBOARD,), Event.SETPOINTS_LOST, Guard.ARMED, Mode.OFFBOARD_LOST),
-    Transition((Mode.OFFBOARD_LOST,), Event.SETPOINTS_BACK, Guard.ALWAYS, Mode.OFFBOARD),
-    Transition((Mode.OFFBOARD_LOST,), Event.DISARMED, Guard.ALWAYS, Mode.OFFBOARD),
-    Transition((Mode.TAKEOFF, Mode.RETURN, Mode.LAND), Event.DISARMED, Guard.ALWAYS, None),
+    Transition(_FLOWN_WITHOUT_STICKS, Event.STICKS, Guard.ARMED, Mode.POSCTL),
+    Transition(tuple(sorted(NOT_KEPT_AFTER_DISARMING)), Event.DISARMED, Guard.ALWAYS, None),
 )
-
-# A vehicle in these modes cannot be armed, or would take off again at once: after disarming, PX4
-# goes back to the mode before them (UserModeIntention::change).
-NOT_KEPT_AFTER_DISARMING = frozenset({Mode.TAKEOFF, Mode.RETURN, Mode.LAND})
-
-# prevent_arming, sticks or a mission required (mode_requirements.cpp). OFFBOARD needs its setpoints.
-ARMABLE = frozenset({Mode.LOITER, Mode.TAKEOFF})
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,17 +153,15 @@ class Conditions:
     """What the guards ask about."""
 
     armed: bool
-    setpoints_arrive: bool
+    available: frozenset[Need] = frozenset()
 
-    def hold(self, guard: Guard) -> bool:
+    def hold(self, guard: Guard, target: Mode | None) -> bool:
         """Whether a transition with this guard may happen."""
         if guard is Guard.ALWAYS:
             return True
-        if guard is Guard.DISARMED:
-            return not self.armed
         if guard is Guard.ARMED:
             return self.armed
-        return not self.armed or self.setpoints_arrive
+        return not self.armed or (target is not None and not missing(target, self.available))
 
 
 def find_transition(
@@ -119,7 +171,7 @@ def find_transition(
     for row in TRANSITIONS:
         if row.event is not event or (event is Event.REQUEST and row.target is not requested):
             continue
-        if (row.sources is None or mode in row.sources) and conditions.hold(row.guard):
+        if (row.sources is None or mode in row.sources) and conditions.hold(row.guard, row.target):
             return row
     return None
 
@@ -152,18 +204,27 @@ NUMBERS: dict[Mode, ModeNumbers] = {
     Mode.MANUAL: ModeNumbers(custom_mode(1), _STICKS, 0, "Manual"),
     Mode.ALTCTL: ModeNumbers(custom_mode(2), _STICKS, 4, "Altitude"),
     Mode.POSCTL: ModeNumbers(custom_mode(3), _STICKS, 1, "Position"),
+    Mode.ORBIT: ModeNumbers(custom_mode(3, 1), _AUTO, 2, "Orbit"),
+    Mode.POSITION_SLOW: ModeNumbers(custom_mode(3, 2), _STICKS, 0, "Position Slow"),
     Mode.TAKEOFF: ModeNumbers(custom_mode(4, 2), _AUTO, 8, "Takeoff"),
     Mode.LOITER: ModeNumbers(custom_mode(4, 3), _AUTO, 0, "Hold"),
     Mode.MISSION: ModeNumbers(custom_mode(4, 4), _AUTO, 6, "Mission"),
     Mode.RETURN: ModeNumbers(custom_mode(4, 5), _AUTO, 5, "Return"),
     Mode.LAND: ModeNumbers(custom_mode(4, 6), _AUTO, 7, "Land"),
+    Mode.FOLLOW_TARGET: ModeNumbers(custom_mode(4, 8), _AUTO, 0, "Follow Target"),
+    Mode.PRECISION_LAND: ModeNumbers(custom_mode(4, 9), _AUTO, 0, "Precision Landing"),
     Mode.ACRO: ModeNumbers(custom_mode(5), CUSTOM_FLAG | MANUAL_FLAG, 0, "Acro"),
     # Stabilised too as soon as a setpoint has said what is controlled: see `base_mode`.
     Mode.OFFBOARD: ModeNumbers(custom_mode(6), CUSTOM_FLAG, 0, "Offboard"),
     Mode.STABILIZED: ModeNumbers(custom_mode(7), _STICKS, 0, "Stabilized"),
+    Mode.TERMINATION: ModeNumbers(custom_mode(10), CUSTOM_FLAG, 0, "Termination"),
+    # Sinking without a position shows itself as landing.
+    Mode.DESCEND: ModeNumbers(custom_mode(4, 6), _AUTO, 0, "Descend"),
 }
 
-_MODE_OF_CUSTOM = {numbers.custom_mode: mode for mode, numbers in NUMBERS.items()}
+_NOT_BY_NUMBER = (Mode.DESCEND, Mode.TERMINATION, Mode.ORBIT)
+_MODE_OF_CUSTOM = {numbers.custom_mode: mode for mode, numbers in NUMBERS.items() if mode not in _NOT_BY_NUMBER}
+_POSITION_MAIN_MODE, _SLOW_SUB_MODE = 3, 2
 
 
 def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
@@ -177,10 +238,12 @@ def base_mode(mode: Mode, armed: bool, had_setpoint: bool) -> int:
 def mode_from_request(base: int, main: int, sub: int) -> Mode | None:
     """The mode that DO_SET_MODE's three parameters name; None for one this vehicle does not know.
 
-    As Commander.cpp: AUTO without a sub mode is MISSION, any sub mode of POSCTL is POSCTL, and
-    without the custom flag the base mode's own bits decide.
+    As Commander.cpp: AUTO without a sub mode is MISSION, POSCTL has a slow variant and takes every other sub mode
+    for itself, and without the custom flag the base mode's own bits decide.
     """
     if base & CUSTOM_FLAG:
+        if main == _POSITION_MAIN_MODE:
+            return Mode.POSITION_SLOW if sub == _SLOW_SUB_MODE else Mode.POSCTL
         if main == AUTO_MAIN_MODE:
             return _MODE_OF_CUSTOM.get(custom_mode(main, sub)) if sub > 0 else Mode.MISSION
         return _MODE_OF_CUSTOM.get(custom_mode(main))
@@ -194,45 +257,56 @@ def mode_from_request(base: int, main: int, sub: int) -> Mode | None:
 
 
 class ModeState:
-    """The mode that is meant and the mode that flies, moved only along the table."""
+    """The mode that is meant, moved only along the table, and the mode that flies."""
 
     def __init__(self) -> None:
         # PX4 boots a multicopter without sticks into Hold.
-        self.mode = Mode.LOITER
+        self.intended = Mode.LOITER
+        self.flown = Mode.LOITER
+        """What flies: ``intended``, or what a failsafe made of it."""
+        self.requested = False
+        """Whether a request was accepted since somebody last asked; the failsafes do."""
         self._after_disarming = Mode.LOITER
+
+    @property
+    def mode(self) -> Mode:
+        """What flies."""
+        return self.flown
 
     @property
     def shown(self) -> Mode:
         """As HEARTBEAT has it."""
-        return Mode.POSCTL if self.mode is Mode.OFFBOARD_LOST else self.mode
-
-    @property
-    def intended(self) -> Mode:
-        """As CURRENT_MODE.intended_custom_mode has it."""
-        return Mode.OFFBOARD if self.mode is Mode.OFFBOARD_LOST else self.mode
-
-    @property
-    def in_failsafe(self) -> bool:
-        """Whether the vehicle flies something else than what is meant."""
-        return self.mode is Mode.OFFBOARD_LOST
+        return self.flown
 
     def apply(self, event: Event, conditions: Conditions, requested: Mode | None = None) -> bool:
         """Take the event; False where the table has no row for it."""
-        row = find_transition(self.mode, event, conditions, requested)
+        if self.flown is Mode.TERMINATION:
+            return False
+        row = find_transition(self.intended, event, conditions, requested)
         if row is None:
             return False
-        self.mode = self._after_disarming if row.target is None else row.target
-        if self.intended not in NOT_KEPT_AFTER_DISARMING:
-            self._after_disarming = self.intended
+        self.requested = self.requested or event is Event.REQUEST
+        self.mean(self._after_disarming if row.target is None else row.target)
         return True
+
+    def mean(self, mode: Mode) -> None:
+        """Mean this mode from now on; the commander says what flies."""
+        self.intended = mode
+        if mode not in NOT_KEPT_AFTER_DISARMING:
+            self._after_disarming = mode
 
 
 def mode_diagram(rows: Iterable[Transition] = TRANSITIONS) -> str:
     """The table as a mermaid state diagram."""
-    lines = ["stateDiagram-v2", f"    [*] --> {ModeState().mode.name}"]
+    lines = ["stateDiagram-v2", f"    [*] --> {ModeState().intended.name}"]
     for row in rows:
         sources = [mode.name for mode in row.sources] if row.sources else ["ANY_MODE"]
         target = row.target.name if row.target is not None else "MODE_BEFORE"
-        guard = f" [{row.guard}]" if row.guard else ""
-        lines += [f"    {source} --> {target}: {row.event}{guard}" for source in sources]
+        lines += [f"    {source} --> {target}: {row.event}{_condition(row)}" for source in sources]
     return "\n".join(lines) + "\n"
+
+
+def _condition(row: Transition) -> str:
+    if row.guard is Guard.CAN_RUN and row.target is not None:
+        return f" [disarmed, or {', '.join(sorted(NEEDS[row.target]))}]"
+    return f" [{row.guard}]" if row.guard else ""

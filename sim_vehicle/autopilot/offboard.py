@@ -1,26 +1,29 @@
 """Offboard setpoints: which are valid, when their stream counts as alive, and what they ask for.
 
-Sources: MavlinkReceiver::handle_message_set_position_target_local_ned, commander's offboardCheck.cpp
-and PositionControl::_inputValid of PX4; the two delays are measured on it.
+Sources: PX4's MavlinkReceiver (its handlers of SET_POSITION_TARGET_LOCAL_NED, _GLOBAL_INT and SET_ATTITUDE_TARGET),
+commander's offboardCheck.cpp and PositionControl::_inputValid; the delays are measured.
 """
 
 import math
 
+from sim_vehicle.autopilot.flight_messages import AttitudeTarget, GlobalTarget
 from sim_vehicle.autopilot.messages import PositionTarget, Severity, StatusText
-from sim_vehicle.setpoint import FREE, Axis3, TrajectorySetpoint
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
+from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import FREE, AttitudeSetpoint, Axis3, Quaternion, RatesSetpoint, TrajectorySetpoint, Vector3
 
 FRAME_LOCAL_NED = 1
 FRAME_BODY_NED = 8
+FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT, FRAME_GLOBAL_TERRAIN_INT = 5, 6, 11
 
-# The mode changes 1.03 to 1.11 s after the last setpoint: COM_OF_LOSS_T = 1.0 s, the commander's
-# own cycle, and a check that runs only now and then. Here: at least 1.03 s, looked at every 76 ms.
-SETPOINTS_LOST_AFTER_US = 1_030_000
+# With COM_OF_LOSS_T = 1.0 s the mode changes 1.03 to 1.11 s after the last setpoint: the commander's
+# own cycle, and a check that runs only now and then. Here: 0.03 s later, looked at every 76 ms.
+NOTICED_AFTER_US = 30_000
 CHECK_PERIOD_US = 76_000
 # OFFBOARD can be chosen from the first setpoint on: it makes the commander check at once. Out of the
 # failsafe, setpoints that come back lead 0.09 s after the first of them.
 BACK_AFTER_US = 90_000
-
-Quaternion = tuple[float, float, float, float]
 
 STOP = TrajectorySetpoint(velocity_ned_m_s=(0.0, 0.0, 0.0))
 
@@ -28,7 +31,8 @@ STOP = TrajectorySetpoint(velocity_ned_m_s=(0.0, 0.0, 0.0))
 class OffboardSignal:
     """Whether setpoints arrive, judged as late as PX4 judges it."""
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
         self.arrives = False
         self.is_back = False
         """Whether it has arrived for long enough to end a failsafe."""
@@ -53,13 +57,13 @@ class OffboardSignal:
         if now_us < self._next_check_us:
             return
         self._next_check_us = now_us + CHECK_PERIOD_US
-        if now_us - self._last_us >= SETPOINTS_LOST_AFTER_US:
+        if now_us - self._last_us >= 1e6 * self._parameters["COM_OF_LOSS_T"] + NOTICED_AFTER_US:
             self.arrives = self.is_back = False
             self._last_us = None
 
 
 def refusal(target: PositionTarget) -> StatusText | None:
-    """Why PX4 refuses the setpoint, which then counts as none at all; None where it is valid."""
+    """Why PX4 refuses a local setpoint, which then counts as none at all; None where it is valid."""
     if target.frame not in (FRAME_LOCAL_NED, FRAME_BODY_NED):
         return _refused(f"coordinate frame {target.frame} unsupported")
     position, velocity, acceleration = _controlled(target)
@@ -81,8 +85,62 @@ def trajectory_setpoint(target: PositionTarget, attitude_wxyz: Quaternion) -> Tr
     return TrajectorySetpoint(position, velocity, acceleration, target.yaw_rad, target.yaw_rate_rad_s)
 
 
-def _refused(why: str) -> StatusText:
-    return StatusText(Severity.CRITICAL, f"SET_POSITION_TARGET_LOCAL_NED {why}")
+def local_target(target: GlobalTarget, origin: Origin, home_ned_m: Vector3) -> PositionTarget | StatusText | None:
+    """The same in local NED, or why it is refused; None where it counts as none without a word.
+
+    Between v1.15 and v1.17 PX4 takes the height above home for one below the sea in frame 6: `position[2] = home.alt -
+    alt - ref_alt`. This vehicle does what the frame means.
+    """
+    position: Axis3 = FREE
+    if target.place is not None:
+        if target.frame == FRAME_GLOBAL_TERRAIN_INT:
+            # There is no terrain that the vehicle would know.
+            return None
+        if target.frame not in (FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT):
+            return _refused(f"invalid coordinate frame {target.frame}", _GLOBAL)
+        north, east, down = origin.position_of(Place(*target.place))
+        position = (north, east, home_ned_m[2] - target.place[2] if target.frame == FRAME_GLOBAL_RELATIVE_INT else down)
+    if target.acceleration_m_s2 != FREE and target.is_force:
+        return _refused("force not supported", _GLOBAL)
+    if position == FREE and target.velocity_m_s == FREE and target.acceleration_m_s2 == FREE:
+        return None
+    return PositionTarget(
+        target_system=0,
+        target_component=0,
+        frame=FRAME_LOCAL_NED,
+        position_m=position,
+        velocity_m_s=target.velocity_m_s,
+        acceleration_m_s2=target.acceleration_m_s2,
+        yaw_rad=target.yaw_rad,
+        yaw_rate_rad_s=target.yaw_rate_rad_s,
+        is_force=False,
+    )
+
+
+def attitude_setpoint(target: AttitudeTarget) -> AttitudeSetpoint | RatesSetpoint | None:
+    """What a SET_ATTITUDE_TARGET asks for; None where neither attitude nor roll and pitch rates are given.
+
+    PX4 publishes both where both are given; the attitude control then makes rates of its own, so the attitude counts.
+    Without thrust the motors idle, as PX4's setpoint of zero has them.
+    """
+    thrust = min(max(target.thrust or 0.0, 0.0), 1.0)
+    roll, pitch, yaw = target.rates_frd_rad_s
+    if target.attitude_wxyz is not None:
+        length = math.hypot(*target.attitude_wxyz)
+        if not 0.0 < length < math.inf:
+            return None
+        w, x, y, z = (part / length for part in target.attitude_wxyz)
+        return AttitudeSetpoint((w, x, y, z), thrust, yaw or 0.0)
+    if roll is None or pitch is None:
+        return None
+    return RatesSetpoint((roll, pitch, yaw or 0.0), thrust)
+
+
+_LOCAL, _GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
+
+
+def _refused(why: str, message: str = _LOCAL) -> StatusText:
+    return StatusText(Severity.CRITICAL, f"{message} {why}")
 
 
 def _controlled(target: PositionTarget) -> tuple[Axis3, Axis3, Axis3]:

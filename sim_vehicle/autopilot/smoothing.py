@@ -1,4 +1,7 @@
-"""A setpoint that moves to its target within limits of speed and acceleration (no limit of jerk)."""
+"""A setpoint that moves to its target within limits of speed and acceleration (no limit of jerk).
+
+Source: PX4's lib/motion_planning (PositionSmoothing) and its parameters, which also limit the jerk.
+"""
 
 import math
 
@@ -8,15 +11,16 @@ Vector3 = tuple[float, float, float]
 
 # PX4 limits jerk too, and so brakes with about half of the greatest acceleration on average.
 BRAKE_SHARE = 0.5
+# Navigator::preproject_stop_point: the time in which the acceleration builds up.
+_BUILD_UP_S = 0.6
 
 
 def stop_point(position_ned_m: Vector3, velocity_ned_m_s: Vector3, parameters: Parameters) -> Vector3:
     """Where a vehicle that brakes now will stand, height kept (PX4's Navigator::preproject_stop_point)."""
     north, east, down = position_ned_m
     v_north, v_east, _ = velocity_ned_m_s
-    # d = v (v / 2a + t): t is the time in which the acceleration builds up.
-    seconds = math.hypot(v_north, v_east) / (2 * parameters["MPC_ACC_HOR"])
-    seconds += 0.6
+    # d = v (v / 2a + t)
+    seconds = math.hypot(v_north, v_east) / (2 * parameters["MPC_ACC_HOR"]) + _BUILD_UP_S
     return north + v_north * seconds, east + v_east * seconds, down
 
 
@@ -25,8 +29,6 @@ class Smoother:
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self.cruise_m_s: float | None = None
-        """Horizontal speed in place of MPC_XY_CRUISE, as DO_CHANGE_SPEED asks for."""
         self.position_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self.velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
         self.acceleration_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
@@ -37,21 +39,19 @@ class Smoother:
         self.velocity_ned_m_s = velocity_ned_m_s
         self.acceleration_ned_m_s2 = (0.0, 0.0, 0.0)
 
-    def advance(self, target_ned_m: Vector3, step_s: float) -> None:
+    def advance(self, target_ned_m: Vector3, step_s: float, cruise_m_s: float) -> None:
         """Move on towards the target by one step."""
         north, east, down = self.position_ned_m
         before = v_north, v_east, v_down = self.velocity_ned_m_s
         to_north, to_east = target_ned_m[0] - north, target_ned_m[1] - east
+        most_m_s2 = self._parameters["MPC_ACC_HOR"]
         distance = math.hypot(to_north, to_east)
-        parameters = self._parameters
-        acceleration = parameters["MPC_ACC_HOR"]
-        cruise = parameters["MPC_XY_CRUISE"] if self.cruise_m_s is None else self.cruise_m_s
-        speed = _braking_speed(distance, acceleration, cruise, step_s)
+        speed = _braking_speed(distance, most_m_s2, cruise_m_s, step_s)
         per_metre = speed / distance if distance > 0 else 0.0
         change_north, change_east = to_north * per_metre - v_north, to_east * per_metre - v_east
-        share = _share(math.hypot(change_north, change_east), acceleration * step_s)
+        share = _share(math.hypot(change_north, change_east), most_m_s2 * step_s)
         v_north, v_east = v_north + share * change_north, v_east + share * change_east
-        v_down = vertical_velocity(v_down, target_ned_m[2] - down, step_s, parameters)
+        v_down = self.vertical_velocity(v_down, target_ned_m[2] - down, step_s)
         self.velocity_ned_m_s = (v_north, v_east, v_down)
         self.acceleration_ned_m_s2 = (
             (v_north - before[0]) / step_s,
@@ -60,21 +60,27 @@ class Smoother:
         )
         self.position_ned_m = (north + v_north * step_s, east + v_east * step_s, down + v_down * step_s)
 
-
-def vertical_velocity(velocity_down_m_s: float, distance_down_m: float, step_s: float, parameters: Parameters) -> float:
-    """The next downward velocity of a setpoint ``distance_down_m`` away from its height."""
-    if distance_down_m < 0.0:
-        acceleration = parameters["MPC_ACC_UP_MAX"]
-        wanted = -_braking_speed(-distance_down_m, acceleration, parameters["MPC_Z_V_AUTO_UP"], step_s)
-    else:
-        acceleration = parameters["MPC_ACC_DOWN_MAX"]
-        wanted = _braking_speed(distance_down_m, acceleration, parameters["MPC_Z_V_AUTO_DN"], step_s)
-    return towards(velocity_down_m_s, wanted, acceleration * step_s)
+    def vertical_velocity(self, velocity_down_m_s: float, distance_down_m: float, step_s: float) -> float:
+        """The next downward velocity of a setpoint ``distance_down_m`` away from its height."""
+        parameters = self._parameters
+        if distance_down_m < 0.0:
+            most_m_s2 = parameters["MPC_ACC_UP_MAX"]
+            wanted = -_braking_speed(-distance_down_m, most_m_s2, parameters["MPC_Z_V_AUTO_UP"], step_s)
+        else:
+            most_m_s2 = parameters["MPC_ACC_DOWN_MAX"]
+            wanted = _braking_speed(distance_down_m, most_m_s2, parameters["MPC_Z_V_AUTO_DN"], step_s)
+        return towards(velocity_down_m_s, wanted, most_m_s2 * step_s)
 
 
 def towards(value: float, target: float, most: float) -> float:
     """``value`` moved to ``target`` by at most ``most``."""
     return min(max(target, value - most), value + most)
+
+
+def turned_towards(yaw_rad: float, target_rad: float, most_rad: float) -> float:
+    """``yaw_rad`` turned the short way by at most ``most_rad``."""
+    difference = math.remainder(target_rad - yaw_rad, 2 * math.pi)
+    return math.remainder(yaw_rad + towards(0.0, difference, most_rad), 2 * math.pi)
 
 
 def _braking_speed(distance_m: float, acceleration_m_s2: float, most_m_s: float, step_s: float) -> float:

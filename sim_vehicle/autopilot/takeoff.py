@@ -46,6 +46,12 @@ class Takeoff:
         elif self.state is TakeoffState.FLIGHT and landed:
             self.state = TakeoffState.READY
 
+    def skip(self, now_us: int, armed: bool, landed: bool) -> None:
+        """The same for a demand that leaves out the position control: no ramp holds it back."""
+        self.update(now_us, armed, landed, wants_takeoff=False)
+        if self.state in (TakeoffState.READY, TakeoffState.RAMP_UP) and not landed:
+            self.state = TakeoffState.FLIGHT
+
     def allowed(
         self, demand: TrajectorySetpoint | None, now_us: int, down_m: float, ground_contact: bool
     ) -> TrajectorySetpoint | None:

@@ -32,15 +32,38 @@ def attitude_control(state: State, constants: Constants, yaw_rate_rad_s: float, 
     rates = np.empty(3)
     for i in range(3):
         rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
-    p, q, r_z = rates[0], rates[1], rates[2]
-    x, y, z = times(state.inertia, p, q, r_z)
-    fx, fy, fz = times(state.inertia_rate, p, q, r_z)
-    carried = np.array([q * z - r_z * y + fx, r_z * x - p * z + fy, p * y - q * x + fz])
+    carried = _carried(state, rates)
     for i in range(3):
         asked_rate = product[2, i] * yaw_rate_rad_s
         state.moment_frd_n_m[i] = (
             -gains.k_r[i] * 0.5 * error[i] - gains.k_omega[i] * (rates[i] - asked_rate) + carried[i]
         )
+
+
+@njit
+def rate_control(state: State, constants: Constants, asked_frd_rad_s: Floats, gains: Gains) -> None:
+    """Set the moment of ``state`` for asked body rates: eq. 5 without its e_R."""
+    rates = np.empty(3)
+    for i in range(3):
+        rates[i] = state.body[10 + i] + constants.gyroscope_bias_frd_rad_s[i]
+    carried = _carried(state, rates)
+    for i in range(3):
+        state.moment_frd_n_m[i] = -gains.k_omega[i] * (rates[i] - asked_frd_rad_s[i]) + carried[i]
+
+
+@njit
+def _carried(state: State, rates: Floats) -> Floats:
+    """W x J W + J' W, what the body's own turning calls for."""
+    p, q, r_z = rates[0], rates[1], rates[2]
+    x, y, z = times(state.inertia, p, q, r_z)
+    fx, fy, fz = times(state.inertia_rate, p, q, r_z)
+    return np.array([q * z - r_z * y + fx, r_z * x - p * z + fy, p * y - q * x + fz])
+
+
+@njit
+def take_thrust(state: State, constants: Constants, thrust: float) -> None:
+    """The collective thrust f as it is asked for, a fraction of all that the motors have."""
+    state.collective_n = thrust * 4 * constants.motor_max_n
 
 
 @njit

@@ -19,7 +19,7 @@ from sim_vehicle.autopilot.messages import (
     SigningSetup,
     TimeSyncRequest,
 )
-from sim_vehicle.mavlink import parameter_reader
+from sim_vehicle.mavlink import flight_reader, mission_reader, parameter_reader
 from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
 from sim_vehicle.setpoint import Axis3
 
@@ -103,7 +103,7 @@ class Decoder:
             return None
         is_signed = packet[0] == _MARKER_V2 and bool(packet[2] & _SIGNED_FLAG)
         source = message.get_srcSystem(), message.get_srcComponent()
-        accepted = self._signing.accepts(packet, is_signed, source, message.id, self.signing_is_optional)
+        accepted = self._signing.accepts(packet, is_signed, source, message.get_msgId(), self.signing_is_optional)
         return message if accepted else None
 
     def _hear(self, packet: dialect.MAVLink_message, raw: bytes) -> None:
@@ -116,7 +116,7 @@ class Decoder:
             self.foreign.append(ForeignPacket(raw, *target))
 
     def _read(self, packet: dialect.MAVLink_message) -> object | None:
-        message_id: int = packet.id
+        message_id: int = packet.get_msgId()
         read = READERS.get(message_id)
         if read is None or (message_id in _ADDRESSED and not self._us.is_addressed(*_target(packet))):
             return None
@@ -237,6 +237,8 @@ READERS: dict[int, Reader] = {
     84: _position_target,
     111: _timesync,
     **parameter_reader.READERS,
+    **flight_reader.READERS,
+    **mission_reader.READERS,
 }
 
 # Commands may go to other components and still be answered, and who is pinged is the one thing that a PING says.

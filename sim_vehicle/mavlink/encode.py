@@ -13,7 +13,7 @@ from sim_vehicle.autopilot.estimate import Estimate
 from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import Axis3
+from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
 # pymavlink's messages carry no types; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
@@ -37,7 +37,7 @@ class Encoder:
     def packet(self, message: Message) -> bytes | None:
         """The message as a packet; None for one whose number MAVLink 1 has no room for."""
         link = self._link
-        if self.speaks_mavlink_1 and message.id > _GREATEST_MAVLINK_1_ID:
+        if self.speaks_mavlink_1 and message.get_msgId() > _GREATEST_MAVLINK_1_ID:
             return None
         packet: bytes = message.pack(link, force_mavlink1=self.speaks_mavlink_1)
         link.seq = (link.seq + 1) & 0xFF
@@ -179,7 +179,7 @@ def current_mode(state: Telemetry) -> Message:
 def position_target_local_ned(state: Telemetry) -> Message:
     """What the position control flies; all ignored while the motors idle or stand."""
     applied = state.autopilot.applied
-    if applied is None:
+    if not isinstance(applied, TrajectorySetpoint):
         return dialect.MAVLink_position_target_local_ned_message(
             boot_ms(state.published), dialect.MAV_FRAME_LOCAL_NED, 0xDFF, *([NAN] * 11)
         )

@@ -15,7 +15,7 @@ from sim_vehicle.mavlink.services import SERVICES
 from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams
-from sim_vehicle.mavlink.texts import TextLink
+from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
 
 # MAV_PROTO_VER: MAVLink 1 until somebody speaks MAVLink 2.
 _BEGINS_WITH_MAVLINK_1 = 1
@@ -138,6 +138,8 @@ class Link:
 
     def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
         self._texts.heard(heartbeat, self.now_us)
+        if heartbeat.type == GROUND_STATION_TYPE:
+            self._board.autopilot.ground_station_heard()
 
     def _answer_ping(self, request: PingRequest) -> None:
         self.send(encode.ping_answer(request))

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
 from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.setpoint import TrajectorySetpoint
 
 # What PX4's simulated receiver states (sensor_gps_sim).
 _HDOP_CENTI, _VDOP_CENTI, _SPEED_ACCURACY_MM_S = 70, 110, 400
@@ -130,9 +131,10 @@ def estimator_status(state: Telemetry) -> Message:
 def position_target_global_int(state: Telemetry) -> Message:
     """Where a mode that flies by itself is going; see `Topic.TARGET`."""
     target, applied = state.autopilot.auto_target_ned_m, state.autopilot.applied
+    flown = applied if isinstance(applied, TrajectorySetpoint) else None
     # A mode that has just ended leaves a message that was already due.
     place = state.origin.place_at(state.published.position_ned_m if target is None else target)
-    velocity = applied.velocity_ned_m_s if applied is not None else (None, None, None)
+    velocity = flown.velocity_ned_m_s if flown is not None else (None, None, None)
     return dialect.MAVLink_position_target_global_int_message(
         boot_ms(state.published),
         dialect.MAV_FRAME_GLOBAL_INT,
@@ -144,7 +146,7 @@ def position_target_global_int(state: Telemetry) -> Message:
         0.0,
         0.0,
         0.0,
-        (applied.yaw_rad or 0.0) if applied is not None else 0.0,
+        (flown.yaw_rad or 0.0) if flown is not None else 0.0,
         0.0,
     )
 

@@ -5,14 +5,30 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.control.attitude import ATTITUDE_LOOP_HZ, allocate_motors, attitude_control
+from sim_vehicle.control.attitude import (
+    ATTITUDE_LOOP_HZ,
+    allocate_motors,
+    attitude_control,
+    rate_control,
+    take_thrust,
+)
 from sim_vehicle.control.position import POSITION_LOOP_HZ, position_control
 from sim_vehicle.physics.contact import relax_arms, settle_arms
 from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import POINTS, Asked, Constants, Disturbance, Scratch, State
+from sim_vehicle.physics.layout import (
+    ASKED_ATTITUDE,
+    ASKED_RATES,
+    ASKED_TRAJECTORY,
+    POINTS,
+    Asked,
+    Constants,
+    Disturbance,
+    Scratch,
+    State,
+)
 from sim_vehicle.physics.proximity import find_close, find_near, wake_faces
 from sim_vehicle.physics.report import write_report
 from sim_vehicle.physics.rigid_body import runge_kutta_step
@@ -126,14 +142,26 @@ def advance_boxed(
 
 @njit
 def run_loops(state: State, asked: Asked, constants: Constants) -> None:
-    """Run whichever inner loop is due: position at 100 Hz, attitude at 150 Hz (paper, section V)."""
+    """Run whichever inner loop is due: position at 100 Hz, attitude at 150 Hz (paper, section V).
+
+    Asked for an attitude or rates, the loops above are left out and begin anew when they are next needed.
+    """
     time_us = state.time_us
-    if time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
+    if asked.level != ASKED_TRAJECTORY:
+        rest_loops(state)
+    elif time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
         state.position_loops = time_us * POSITION_LOOP_HZ // 1_000_000 + 1
         position_control(state, constants.mass_kg, asked, constants)
     if time_us * ATTITUDE_LOOP_HZ >= state.attitude_loops * 1_000_000:
         state.attitude_loops = time_us * ATTITUDE_LOOP_HZ // 1_000_000 + 1
-        attitude_control(state, constants, asked.yaw[2], constants)
+        if asked.level != ASKED_TRAJECTORY:
+            take_thrust(state, constants, asked.thrust)
+        if asked.level == ASKED_ATTITUDE:
+            state.attitude_setpoint[:, :] = asked.attitude
+        if asked.level == ASKED_RATES:
+            rate_control(state, constants, asked.rates_frd_rad_s, constants)
+        else:
+            attitude_control(state, constants, asked.yaw[2], constants)
         allocate_motors(state, constants, constants.motor_radius_m)
 
 

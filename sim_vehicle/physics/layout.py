@@ -108,12 +108,19 @@ class Constants(Gains, Contact):
     gyroscope_bias_frd_rad_s: Vector3
 
 
+ASKED_TRAJECTORY, ASKED_ATTITUDE, ASKED_RATES = range(3)
+
+
 class Asked:
     """A setpoint as the loops read it: rows position, velocity, acceleration, all NED and SI."""
 
     value: Matrix3
     given: Matrix3  # 1 where the axis is controlled, else 0
     yaw: Vector3  # angle (rad), 1 if it is given else 0, rate (rad/s)
+    level: int  # which loop is the first: ASKED_TRAJECTORY, ASKED_ATTITUDE or ASKED_RATES
+    attitude: Matrix3  # R_d, body to NED
+    rates_frd_rad_s: Vector3
+    thrust: float  # of all motors over their greatest
 
 
 class State:

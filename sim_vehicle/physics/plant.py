@@ -18,6 +18,9 @@ from sim_vehicle.physics.interval import (
     advance_boxed,
 )
 from sim_vehicle.physics.layout import (
+    ASKED_ATTITUDE,
+    ASKED_RATES,
+    ASKED_TRAJECTORY,
     POINTS,
     Asked,
     Scratch,
@@ -28,9 +31,10 @@ from sim_vehicle.physics.layout import (
 from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
+from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.physics.trim import trim
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import TrajectorySetpoint
+from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Vector3
 
@@ -91,7 +95,7 @@ class Plant:
         self._body = self.state.body
         self._report = np.zeros(REPORT_COLUMNS)
         self._asked = new_record(Asked)
-        self._taken: TrajectorySetpoint | None = None
+        self._taken: Setpoint | None = None
         # Views into the records, taken once: looking a field up in Python costs microseconds.
         self._asked_value, self._asked_given, self._asked_yaw = (
             self._asked.value,
@@ -136,7 +140,7 @@ class Plant:
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
 
-    def step(self, setpoint: TrajectorySetpoint | None, armed: bool) -> PlantOutput:
+    def step(self, setpoint: Setpoint | None, armed: bool) -> PlantOutput:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
         motors = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
         if setpoint is not None and setpoint is not self._taken:
@@ -194,13 +198,32 @@ class Plant:
         self._report[ESTIMATE] = estimate
         self._report[ACCELERATION] = acceleration
 
-    def _take_setpoint(self, setpoint: TrajectorySetpoint) -> None:
+    def _take_setpoint(self, setpoint: Setpoint) -> None:
         """Write the setpoint where the kernels read it."""
+        if isinstance(setpoint, TrajectorySetpoint):
+            self._take_trajectory(setpoint)
+        else:
+            self._take_thrust(setpoint)
+        self._taken = setpoint
+
+    def _take_thrust(self, setpoint: AttitudeSetpoint | RatesSetpoint) -> None:
+        asked = self._asked
+        asked.thrust = setpoint.thrust_fraction
+        if isinstance(setpoint, RatesSetpoint):
+            asked.level = ASKED_RATES
+            asked.rates_frd_rad_s[:] = setpoint.rates_frd_rad_s
+            return
+        asked.level = ASKED_ATTITUDE
+        matrix_from_quaternion(np.array([0.0] * 6 + [*setpoint.attitude_wxyz]), asked.attitude)
+        self._asked_yaw[:] = (0.0, 0.0, setpoint.yaw_rate_rad_s)
+
+    def _take_trajectory(self, setpoint: TrajectorySetpoint) -> None:
+        if self._asked.level != ASKED_TRAJECTORY:
+            self._asked.level = ASKED_TRAJECTORY
         rows = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
         self._asked_value[:] = [[0.0 if value is None else value for value in row] for row in rows]
         self._asked_given[:] = [[value is not None for value in row] for row in rows]
         self._asked_yaw[:] = (setpoint.yaw_rad or 0.0, setpoint.yaw_rad is not None, setpoint.yaw_rate_rad_s or 0.0)
-        self._taken = setpoint
 
     def _record_truth(self) -> None:
         self.truth.record(self._report[TRUTH])

@@ -57,6 +57,15 @@ def test_a_curve_is_slow_where_it_bends_and_fast_where_it_does_not():
     assert min(turn) < 0.8
 
 
+def test_a_curve_that_turns_back_on_itself_all_but_stops_there():
+    way = CurveProfile([(3.0, 4.0, -2.5), (1.0, 2.0, -2.0), (3.0, 4.0, -2.5)], 2.0, 2.0)
+    at_s = np.arange(0.0, way.duration_s, 0.005)
+    furthest = max((way.at(t) for t in at_s), key=lambda sample: math.dist(sample[0], (3.0, 4.0, -2.5)))
+    assert math.hypot(*furthest[1]) < 0.1
+    assert all(math.isfinite(sum(part)) for t in at_s for part in way.at(t))
+    assert tuple(way.at(1e9)[0]) == (3.0, 4.0, -2.5)
+
+
 def test_points_on_one_another_are_one_point():
     way = CurveProfile([(0.0, 0.0, -1.0), (0.0, 0.0, -1.0), (2.0, 0.0, -1.0)], 1.0, 1.0)
     assert way.distance_m == pytest.approx(2.0)

@@ -21,7 +21,7 @@ REST = np.array([0.0, 0.0, -9.81])
 def test_a_healthy_flight_goes_from_the_ground_to_the_ground_and_is_hard(monkeypatch):
     # Given a pilot with half a minute in the air
     monkeypatch.setattr(flights, "AIRBORNE_S", 30.0)
-    flown = fly_healthy(FlightCase("plain", 0, "foldable", ()), load_built_in("foldable"))
+    flown = fly_healthy(FlightCase("calm", 0, "foldable", ()), load_built_in("foldable"))
     samples, situations = flown.recording.samples, flown.recording.situations
     phases = np.array(flown.phases)
     # Then it begins and ends on the ground, motors off at the end, after a landing that was felt
@@ -42,7 +42,7 @@ def test_a_flip_goes_all_the_way_round_and_is_caught(monkeypatch):
     for manoeuvre in ("_dash", "_jump", "_stop", "_slalom", "_spin", "_hover"):
         monkeypatch.setattr(flights.Pilot, manoeuvre, flights.Pilot._flip)
     monkeypatch.setattr(flights, "AIRBORNE_S", 4.0)
-    flown = fly_healthy(FlightCase("plain", 3, "rigid", ()), load_built_in("rigid"))
+    flown = fly_healthy(FlightCase("calm", 3, "rigid", ()), load_built_in("rigid"))
     # Then the vehicle was upside down on the way, and upright soon after
     upright = [1 - 2 * (s.attitude_wxyz[1] ** 2 + s.attitude_wxyz[2] ** 2) for s in flown.recording.samples]
     phases = flown.phases

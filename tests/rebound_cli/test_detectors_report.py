@@ -78,7 +78,7 @@ def test_one_wild_velocity_misses_the_bar_and_six_wild_normals_in_a_hundred():
 
 
 def healthy(hours, *alarms):
-    cases = [FlightCase("plain", 0, "foldable", ("fused", "threshold"))]
+    cases = [FlightCase("calm", 0, "foldable", ("fused", "threshold"))]
     entry = {"alarms": list(alarms), "touches": 0, "blind": 0}
     noisy = {"alarms": [[1.0, "landing", "hit"]] * 3, "touches": 0, "blind": 0}
     rates = {rate: {"fused": entry, "threshold": noisy} for rate in ("50", "100", "246")}

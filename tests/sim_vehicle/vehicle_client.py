@@ -41,7 +41,9 @@ class Client:
         self._waiting += raw
 
     def command(self, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> None:
-        padded = [*params, *[0.0] * (7 - len(params))]
+        # A takeoff at place and height 0 would be one into the sea off Africa: not given is NaN.
+        unset = math.nan if number == TAKEOFF else 0.0
+        padded = [*params, *[unset] * (7 - len(params))]
         self.send(dialect.MAVLink_command_long_message(*target, number, 0, *padded))
 
     def setpoint(self, north: float, east: float, down: float) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import FREE, Axis3, TrajectorySetpoint
+from sim_vehicle.setpoint import FREE, AttitudeSetpoint, Axis3, RatesSetpoint, Setpoint, TrajectorySetpoint
 
 STEP_US = 4_000
 HOVER = 0.5
@@ -33,9 +33,17 @@ def attitude_of_yaw(yaw_rad: float) -> tuple[float, float, float, float]:
     return math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2)
 
 
-def moved(state: Estimate, setpoint: TrajectorySetpoint | None, armed: bool) -> Estimate:
+def moved(state: Estimate, setpoint: Setpoint | None, armed: bool) -> Estimate:
     step_s = 1e-6 * STEP_US
-    if setpoint is None:
+    if not armed:
+        setpoint = None
+    if isinstance(setpoint, AttitudeSetpoint | RatesSetpoint):
+        w, x, y, z = attitude = setpoint.attitude_wxyz if isinstance(setpoint, AttitudeSetpoint) else (1.0, 0, 0, 0)
+        thrust = setpoint.thrust_fraction
+        up = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+        accelerations = [9.81 * (axis == 2) - 9.81 * thrust / HOVER * up[axis] for axis in range(3)]
+        state = replace(state, attitude_wxyz=attitude)
+    elif setpoint is None:
         falls = 9.81 if state.position_ned_m[2] < 0.0 else 0.0
         accelerations = [0.0, 0.0, falls]
         thrust = 0.05 if armed else 0.0
@@ -47,7 +55,7 @@ def moved(state: Estimate, setpoint: TrajectorySetpoint | None, armed: bool) -> 
     if position[2] >= 0.0:
         position[2] = 0.0
         velocity = [0.0, 0.0, min(velocity[2], 0.0)]
-    yaw = setpoint.yaw_rad if setpoint is not None else None
+    yaw = setpoint.yaw_rad if isinstance(setpoint, TrajectorySetpoint) else None
     return replace(
         state,
         time_boot_us=state.time_boot_us + STEP_US,
@@ -70,9 +78,9 @@ def _acceleration(state: Estimate, setpoint: TrajectorySetpoint, axis: int) -> f
 class Flight:
     """An autopilot on the kinematic vehicle, in virtual time."""
 
-    def __init__(self, start: Estimate | None = None) -> None:
+    def __init__(self, start: Estimate | None = None, **parameters: float) -> None:
         self.state = start or Estimate()
-        self.parameters = Parameters()
+        self.parameters = Parameters(parameters)
         self.autopilot = Autopilot(HOVER, self.state, self.parameters)
         self.acks: list[CommandAck] = []
 
@@ -87,7 +95,7 @@ class Flight:
     def step(self) -> None:
         self.acks += self.autopilot.run_commander()
         setpoint = self.autopilot.run_control()
-        self.state = moved(self.state, setpoint, self.autopilot.arming.armed)
+        self.state = moved(self.state, setpoint, self.autopilot.motors_run)
         self.autopilot.observe(self.state)
 
     def fly(self, seconds: float, target: PositionTarget | None = None, rate_hz: float = 20.0) -> None:
@@ -107,12 +115,17 @@ class Flight:
             self.fly(0.004, target)
         return self.time_s - start_s
 
-    def ask(self, command: int, param1: float = 0.0, param2: float = 0.0, param3: float = 0.0) -> Result | None:
-        """Send a command; its answer, or None."""
+    def ask(self, command: int, *params: float) -> Result | None:
+        """Send a command, parameters that are not given as NaN; its answer, or None."""
         self.acks.clear()
-        self.autopilot.command(Command(255, 190, 1, 1, command, param1, param2, param3))
+        padded = (*params, *[math.nan] * (7 - len(params)))
+        self.autopilot.command(Command(255, 190, 1, 1, command, *padded))
         self.step()
         return self.acks[0].result if self.acks else None
+
+    def texts(self) -> list[str]:
+        """All that was said."""
+        return [text.text for text in self.autopilot.texts]
 
 
 def target(position: Axis3 = FREE, velocity: Axis3 = FREE, **others: object) -> PositionTarget:

@@ -3,6 +3,7 @@
 import pytest
 
 from sim_vehicle.autopilot.modes import (
+    NEEDS,
     NUMBERS,
     TRANSITIONS,
     Conditions,
@@ -10,6 +11,7 @@ from sim_vehicle.autopilot.modes import (
     Guard,
     Mode,
     ModeState,
+    Need,
     Transition,
     base_mode,
     find_transition,
@@ -17,10 +19,13 @@ from sim_vehicle.autopilot.modes import (
     mode_from_request,
 )
 
-ARMED_WITH, ARMED_WITHOUT = Conditions(True, True), Conditions(True, False)
-DISARMED = Conditions(False, False)
-FLOWN = {Mode.POSCTL, Mode.LOITER, Mode.RETURN, Mode.TAKEOFF, Mode.LAND}
-EVERY_MODE_THAT_CAN_BE_ASKED_FOR = [mode for mode in Mode if mode is not Mode.OFFBOARD_LOST]
+EVERYTHING = frozenset(Need)
+DISARMED = Conditions(False)
+ASKED_FOR = [row.target for row in TRANSITIONS if row.event is Event.REQUEST]
+
+
+def armed(*missing: Need) -> Conditions:
+    return Conditions(True, EVERYTHING - set(missing))
 
 
 def test_the_numbers_on_the_wire_are_those_measured():
@@ -36,6 +41,11 @@ def test_the_numbers_on_the_wire_are_those_measured():
         Mode.MISSION: (0x1D, 0x04040000),
         Mode.RETURN: (0x1D, 0x05040000),
         Mode.LAND: (0x1D, 0x06040000),
+        # And those of px4_custom_mode.h
+        Mode.ORBIT: (0x1D, 0x01030000),
+        Mode.FOLLOW_TARGET: (0x1D, 0x08040000),
+        Mode.DESCEND: (0x1D, 0x06040000),
+        Mode.TERMINATION: (0x01, 10 << 16),
     }
     for mode, (base, custom) in measured.items():
         assert base_mode(mode, armed=False, had_setpoint=False) == base, mode
@@ -48,79 +58,73 @@ def test_the_numbers_on_the_wire_are_those_measured():
     assert base_mode(Mode.OFFBOARD, armed=True, had_setpoint=True) == 0x91
 
 
-@pytest.mark.parametrize("mode", EVERY_MODE_THAT_CAN_BE_ASKED_FOR)
+@pytest.mark.parametrize("mode", ASKED_FOR)
 @pytest.mark.parametrize("before", [Mode.LOITER, Mode.OFFBOARD, Mode.MANUAL, Mode.LAND])
 def test_disarmed_every_mode_is_accepted(before, mode):
     row = find_transition(before, Event.REQUEST, DISARMED, mode)
     assert row is not None and row.target is mode
 
 
-@pytest.mark.parametrize("mode", EVERY_MODE_THAT_CAN_BE_ASKED_FOR)
-@pytest.mark.parametrize("before", [Mode.LOITER, Mode.OFFBOARD, Mode.OFFBOARD_LOST, Mode.TAKEOFF])
-def test_armed_only_what_can_fly_is_accepted(before, mode):
-    without = find_transition(before, Event.REQUEST, ARMED_WITHOUT, mode)
-    with_setpoints = find_transition(before, Event.REQUEST, ARMED_WITH, mode)
-    assert (without is not None) == (mode in FLOWN)
-    assert (with_setpoints is not None) == (mode in FLOWN | {Mode.OFFBOARD})
+@pytest.mark.parametrize("mode", ASKED_FOR)
+def test_armed_a_mode_is_accepted_that_has_what_it_needs(mode):
+    assert find_transition(Mode.LOITER, Event.REQUEST, armed(), mode) is not None
+    for need in NEEDS[mode]:
+        without = find_transition(Mode.LOITER, Event.REQUEST, armed(need), mode)
+        # LAND must always be there, be it without a position
+        assert (without is not None) == (mode is Mode.LAND), need
+
+
+def test_armed_without_sticks_setpoints_and_mission_only_these_can_fly():
+    bare = armed(Need.STICKS, Need.SETPOINTS, Need.MISSION)
+    flown = {mode for mode in ASKED_FOR if find_transition(Mode.LOITER, Event.REQUEST, bare, mode)}
+    assert flown == {
+        *(Mode.LOITER, Mode.RETURN, Mode.TAKEOFF, Mode.LAND, Mode.PRECISION_LAND, Mode.FOLLOW_TARGET, Mode.ORBIT),
+        Mode.TERMINATION,
+    }
 
 
 def test_takeoff_ends_in_hold():
-    assert find_transition(Mode.TAKEOFF, Event.TAKEOFF_REACHED, ARMED_WITHOUT).target is Mode.LOITER
-    assert find_transition(Mode.OFFBOARD, Event.TAKEOFF_REACHED, ARMED_WITH) is None
+    assert find_transition(Mode.TAKEOFF, Event.TAKEOFF_REACHED, armed()).target is Mode.LOITER
+    assert find_transition(Mode.OFFBOARD, Event.TAKEOFF_REACHED, armed()) is None
 
 
-def test_offboard_without_setpoints_is_a_failsafe_only_while_armed():
-    assert find_transition(Mode.OFFBOARD, Event.SETPOINTS_LOST, ARMED_WITHOUT).target is Mode.OFFBOARD_LOST
-    assert find_transition(Mode.OFFBOARD, Event.SETPOINTS_LOST, DISARMED) is None
-    assert find_transition(Mode.LOITER, Event.SETPOINTS_LOST, ARMED_WITHOUT) is None
+def test_sticks_take_over_from_every_mode_that_flies_without_them():
+    for mode in (Mode.OFFBOARD, Mode.MISSION, Mode.LOITER, Mode.LAND, Mode.RETURN):
+        assert find_transition(mode, Event.STICKS, armed()).target is Mode.POSCTL
+    assert find_transition(Mode.ALTCTL, Event.STICKS, armed()) is None
+    assert find_transition(Mode.TERMINATION, Event.STICKS, armed()) is None
 
 
-def test_setpoints_that_come_back_lead_into_offboard_again():
-    assert find_transition(Mode.OFFBOARD_LOST, Event.SETPOINTS_BACK, ARMED_WITH).target is Mode.OFFBOARD
-    assert find_transition(Mode.LOITER, Event.SETPOINTS_BACK, ARMED_WITH) is None
-
-
-@pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF])
-def test_after_disarming_the_mode_before_is_shown(ends_in):
+@pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF, Mode.ORBIT, Mode.FOLLOW_TARGET])
+def test_after_disarming_the_mode_before_is_meant(ends_in):
     # Given a flight in OFFBOARD that went on in a mode in which nobody can arm
     state = ModeState()
-    assert state.apply(Event.REQUEST, ARMED_WITH, Mode.OFFBOARD)
-    assert state.apply(Event.REQUEST, ARMED_WITH, ends_in)
+    assert state.apply(Event.REQUEST, armed(), Mode.OFFBOARD)
+    assert state.apply(Event.REQUEST, armed(), ends_in)
     # When the vehicle disarms
     assert state.apply(Event.DISARMED, DISARMED)
-    # Then OFFBOARD is shown again
-    assert state.shown is Mode.OFFBOARD
+    # Then OFFBOARD is meant again
+    assert state.intended is Mode.OFFBOARD
 
 
 def test_disarming_in_hold_changes_nothing():
     state = ModeState()
     assert not state.apply(Event.DISARMED, DISARMED)
-    assert state.shown is Mode.LOITER
+    assert state.intended is Mode.LOITER
 
 
-def test_in_the_failsafe_posctl_is_shown_and_offboard_is_meant():
+def test_nothing_leads_out_of_termination():
     state = ModeState()
-    state.apply(Event.REQUEST, ARMED_WITH, Mode.OFFBOARD)
-    state.apply(Event.SETPOINTS_LOST, ARMED_WITHOUT)
-    assert (state.shown, state.intended, state.in_failsafe) == (Mode.POSCTL, Mode.OFFBOARD, True)
-    # And after landing and disarming, OFFBOARD again
-    assert state.apply(Event.DISARMED, DISARMED)
-    assert (state.shown, state.in_failsafe) == (Mode.OFFBOARD, False)
-
-
-def test_a_pilots_request_ends_the_failsafe():
-    state = ModeState()
-    state.apply(Event.REQUEST, ARMED_WITH, Mode.OFFBOARD)
-    state.apply(Event.SETPOINTS_LOST, ARMED_WITHOUT)
-    assert state.apply(Event.REQUEST, ARMED_WITHOUT, Mode.LOITER)
-    assert (state.shown, state.intended, state.in_failsafe) == (Mode.LOITER, Mode.LOITER, False)
+    state.flown = Mode.TERMINATION
+    for mode in ASKED_FOR:
+        assert not state.apply(Event.REQUEST, DISARMED, mode)
+    assert not state.apply(Event.DISARMED, DISARMED)
 
 
 @pytest.mark.parametrize("row", TRANSITIONS, ids=lambda row: f"{row.event}-{row.target}")
 def test_every_row_can_happen_and_no_earlier_one_hides_it(row: Transition):
     source = row.sources[0] if row.sources else Mode.LOITER
-    conditions = {Guard.DISARMED: DISARMED}.get(row.guard, ARMED_WITH)
-    assert find_transition(source, row.event, conditions, row.target) is row
+    assert find_transition(source, row.event, armed(), row.target) is row
 
 
 def test_the_diagram_shows_every_row():
@@ -128,8 +132,9 @@ def test_the_diagram_shows_every_row():
     assert diagram.startswith("stateDiagram-v2\n    [*] --> LOITER\n")
     arrows = sum(len(row.sources or (None,)) for row in TRANSITIONS)
     assert diagram.count("-->") == 1 + arrows
-    assert "    OFFBOARD --> OFFBOARD_LOST: setpoints stopped [armed]\n" in diagram
+    assert "    ANY_MODE --> OFFBOARD: requested [disarmed, or setpoints arrive]\n" in diagram
     assert "    LAND --> MODE_BEFORE: disarmed\n" in diagram
+    assert Guard.CAN_RUN not in diagram
 
 
 @pytest.mark.parametrize(
@@ -138,6 +143,11 @@ def test_the_diagram_shows_every_row():
         (1, 6, 0, Mode.OFFBOARD),
         (1, 4, 0, Mode.MISSION),
         (1, 4, 6, Mode.LAND),
+        (1, 4, 8, Mode.FOLLOW_TARGET),
+        (1, 3, 0, Mode.POSCTL),
+        (1, 3, 1, Mode.POSCTL),
+        (1, 3, 2, Mode.POSITION_SLOW),
+        (1, 10, 0, None),
         (1, 4, 99, None),
         (1, 0, 0, None),
         (1, 77, 0, None),

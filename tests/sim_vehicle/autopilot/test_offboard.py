@@ -129,7 +129,7 @@ def test_lost_setpoints_change_the_mode_after_a_second(extra_steps):
 
 def test_lost_setpoints_sink_land_and_disarm_and_offboard_is_shown_again():
     flight = hovering()
-    flight.fly_until(lambda: flight.autopilot.modes.in_failsafe, 2.0)
+    flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, 2.0)
     flight.fly(1.5)
     assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)
     assert flight.autopilot.modes.shown is Mode.POSCTL
@@ -140,7 +140,7 @@ def test_lost_setpoints_sink_land_and_disarm_and_offboard_is_shown_again():
 
 def test_setpoints_that_come_back_put_it_into_offboard_again():
     flight = hovering()
-    flight.fly_until(lambda: flight.autopilot.modes.in_failsafe, 2.0)
+    flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, 2.0)
     flight.fly(0.5)
     waited_s = flight.fly_until(lambda: flight.autopilot.modes.shown is Mode.OFFBOARD, 0.5, UP_THERE)
     assert waited_s == pytest.approx(0.09, abs=0.01)
@@ -174,7 +174,7 @@ def test_too_slow_a_stream_flips_to_and_fro():
 def test_a_refused_frame_and_an_empty_mask_do_not_keep_it_alive():
     for useless in (target((0, 0, -3.0), frame=9), target()):
         flight = hovering()
-        flight.fly_until(lambda flight=flight: flight.autopilot.modes.in_failsafe, 2.0, useless)
+        flight.fly_until(lambda flight=flight: flight.autopilot.commander.failsafe.acts, 2.0, useless)
 
 
 def test_only_setpoints_received_in_offboard_are_flown():
@@ -192,8 +192,8 @@ def test_only_setpoints_received_in_offboard_are_flown():
 
 def test_a_pilots_change_is_not_undone_by_setpoints():
     flight = hovering()
-    assert flight.ask(DO_SET_MODE, 1, 3) is Result.ACCEPTED
+    assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
     flight.fly(3.0, target(position=(50.0, 0.0, -3.0)))
-    assert flight.autopilot.modes.shown is flight.autopilot.modes.intended is Mode.POSCTL
+    assert flight.autopilot.modes.shown is flight.autopilot.modes.intended is Mode.LOITER
     assert abs(flight.state.position_ned_m[0]) < 0.1
     assert flight.autopilot.system_status == 4

@@ -131,7 +131,7 @@ def height_after_takeoff(client: Client) -> float:
     client.command(TAKEOFF)
     client.command(ARM_DISARM, 1)
     client.run(14.0)
-    return -client.position()[2] - client.vehicle._plant._contact.foot_depth_m
+    return -client.position()[2] - client.vehicle._plant._constants.foot_depth_m
 
 
 def test_the_takeoff_height_is_obeyed():

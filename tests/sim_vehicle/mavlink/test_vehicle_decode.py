@@ -64,6 +64,8 @@ CASES = [
         target_message(1, 0xE3F, *NUMBERS),
         target(acceleration_m_s2=(7.0, 8.0, 9.0), is_force=True),
     ),
+    # a message whose fields include one called id
+    (dialect.MAVLink_statustext_message(6, b"said by a companion", 0, 0), None),
     (target_message(1, 0xFFF, *NUMBERS), target(is_force=True)),
     (target_message(1, 0xDFB, *NUMBERS), target(position_m=(None, None, -3.0))),
     (target_message(1, 0xDF8, NAN, math.inf, -3.0, *NUMBERS[3:]), target(position_m=(None, None, -3.0))),

@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.autopilot.failsafe_table import Action
 from sim_vehicle.autopilot.messages import (
     CommandAck,
     Identity,
@@ -161,8 +162,8 @@ def test_pitching_up_is_positive_and_right_wing_down_rolls_positive():
 
 def test_the_failsafe_looks_as_in_px4():
     state = telemetry()
-    state.autopilot.modes.mode = Mode.OFFBOARD_LOST
-    state.autopilot.arming.armed = True
+    state.autopilot.modes.intended, state.autopilot.modes.flown = Mode.OFFBOARD, Mode.POSCTL
+    state.autopilot.arming.armed, state.autopilot.commander.failsafe.action = True, Action.FALL_BACK_TO_POSITION
     message = read_back(encode.heartbeat(state))
     assert (message.custom_mode, message.system_status) == (0x00030000, 5)
     assert message.base_mode == 0x51 | 0x80

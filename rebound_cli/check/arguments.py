@@ -1,0 +1,38 @@
+"""The arguments of `rebound check`; what they run is imported when it runs."""
+
+import argparse
+from pathlib import Path
+
+
+def add_check(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    check = commands.add_parser(
+        "check",
+        help="check a mission file and show what would be flown",
+        description="Validates mission files, prints what would be flown and when, and draws it.",
+    )
+    check.add_argument("missions", type=Path, nargs="*", metavar="MISSION", help="mission files")
+    check.add_argument(
+        "--schema", action="store_true", help="print the JSON schema of mission files, for editors, and nothing else"
+    )
+    check.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="PATH=VALUE",
+        help="change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5",
+    )
+    check.add_argument(
+        "--out",
+        type=Path,
+        default=Path("runs/check"),
+        metavar="DIR",
+        help="folder of the pictures (default: runs/check)",
+    )
+    check.add_argument("--no-picture", action="store_true", help="draw nothing")
+    check.set_defaults(run=_check)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from rebound_cli.check.command import run_check
+
+    return run_check(options)

@@ -1,0 +1,96 @@
+"""A mission from above and from the side: the ways, the fence, and the simulated world's obstacles."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+
+from companion.mission.fence import Fence
+from companion.mission.model import Mission
+from rebound_cli.check.outline import footprint
+from rebound_cli.check.ways import Way
+from sim_vehicle.scene import Scene
+
+_WAY = "tab:orange"
+_FENCE = "tab:green"
+_OBSTACLE = "tab:brown"
+_MEETING = "tab:red"
+# A wait whose end nobody knows is drawn this long.
+_UNKNOWN_S = 5.0
+
+
+def draw_mission(path: Path, mission: Mission, scene: Scene, ways: Sequence[Way]) -> None:
+    figure = Figure(figsize=(13, 6.5), layout="constrained")
+    above, side = figure.subplots(1, 2)
+    _draw_from_above(above, mission, scene, ways)
+    _draw_heights(side, mission.fence, ways)
+    known = ways[-1].ends_s
+    lasts = "" if known is None else f", {known:.0f} s"
+    figure.suptitle(f"Mission '{mission.name}': {sum(way.length_m for way in ways):.0f} m{lasts} if nothing is hit")
+    figure.savefig(path, dpi=110)
+
+
+def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[Way]) -> None:
+    start = scene.start.position_ned_m
+    for number, (_, obstacle) in enumerate(scene.obstacles()):
+        corners = footprint(obstacle) - np.array(start[:2])
+        label = "obstacles (simulated)" if number == 0 else None
+        axis.add_patch(Polygon(corners[:, ::-1], facecolor=_OBSTACLE, edgecolor=_OBSTACLE, alpha=0.7, label=label))
+        axis.annotate(obstacle.name, corners.mean(axis=0)[::-1], fontsize=7, color=_OBSTACLE)
+    _draw_fence(axis, mission.fence)
+    for number, way in enumerate(ways):
+        points = way.points_ned_m
+        axis.plot(points[:, 1], points[:, 0], color=_WAY, linewidth=1.6, label="way" if number == 0 else None)
+        if way.length_m:
+            axis.annotate(way.leg.step.label.partition(" ")[0], points[-1, 1::-1], fontsize=8)
+        if way.meets:
+            axis.plot(*points[way.meets.index, 1::-1], "x", color=_MEETING)
+    axis.plot([0.0], [0.0], "^", color="black", label="arming position")
+    axis.set_title("From above; numbers are items")
+    axis.set_xlabel("east [m]")
+    axis.set_ylabel("north [m]")
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.grid(alpha=0.3)
+    axis.legend(loc="best", fontsize=8)
+
+
+def _draw_fence(axis: Any, fence: Fence) -> None:
+    style = {"fill": False, "edgecolor": _FENCE, "linestyle": "--", "linewidth": 1.2}
+    if fence.radius_m is not None:
+        axis.add_patch(Circle((0.0, 0.0), fence.radius_m, label="fence", **style))
+        axis.update_datalim([(-fence.radius_m, -fence.radius_m), (fence.radius_m, fence.radius_m)])
+    if fence.polygon_ne_m is not None:
+        corners = np.array(fence.polygon_ne_m)[:, ::-1]
+        axis.add_patch(Polygon(corners, closed=True, label="fence", **style))
+        axis.update_datalim(corners)
+
+
+def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
+    begins_s = 0.0
+    for way in ways:
+        lasts_s = _UNKNOWN_S if way.leg.lasts_s is None else way.leg.lasts_s
+        moving_s = 0.0 if way.leg.way is None else way.leg.way.duration_s
+        times = begins_s + way.fractions * moving_s
+        heights = -way.points_ned_m[:, 2]
+        axis.plot(times, heights, color=_WAY, linewidth=1.6)
+        resting_to = 0.0 if way.leg.step.name in ("land", "return") else heights[-1]
+        axis.plot([times[-1], begins_s + lasts_s], [heights[-1], resting_to], color=_WAY, linewidth=1.6)
+        if lasts_s:
+            axis.annotate(way.leg.step.label.partition(" ")[0], (begins_s + 0.5 * lasts_s, heights[-1]), fontsize=8)
+        if way.meets:
+            met_s, height_m = times[way.meets.index], heights[way.meets.index]
+            axis.plot([met_s], [height_m], "x", color=_MEETING)
+            axis.annotate(f"  {way.meets.name}", (met_s, height_m), fontsize=7, color=_MEETING, rotation=60)
+        begins_s += lasts_s
+    axis.axhline(fence.max_height_m, color=_FENCE, linestyle="--", linewidth=1.2, label="fence")
+    axis.axhline(fence.min_height_m, color=_FENCE, linestyle="--", linewidth=1.2)
+    axis.set_title("Height")
+    axis.set_xlabel("time after arming, when nothing is hit [s]")
+    axis.set_ylabel("height above the arming position [m]")
+    axis.set_ylim(bottom=min(0.0, math.floor(-max(float(way.points_ned_m[:, 2].max()) for way in ways))))
+    axis.grid(alpha=0.3)
+    axis.legend(loc="best", fontsize=8)

@@ -1,0 +1,1 @@
+"""`rebound plan`: missions from and for QGroundControl's .plan files."""

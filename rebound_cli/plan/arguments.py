@@ -1,0 +1,56 @@
+"""The arguments of `rebound plan`; what they run is imported when it runs."""
+
+import argparse
+from pathlib import Path
+
+
+def add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    plan = commands.add_parser(
+        "plan",
+        help="missions from and for QGroundControl",
+        description="Reads and writes QGroundControl's .plan files; see docs/missions.md.",
+    )
+    ways = plan.add_subparsers(required=True, metavar="import|export")
+    reading = ways.add_parser("import", help="a mission file from a .plan", description="Makes a mission of a .plan.")
+    reading.add_argument("plan", type=Path, metavar="PLAN", help="QGroundControl's file")
+    reading.add_argument("--name", help="name of the mission (default: the file's)")
+    _add_out(reading, "default: standard output")
+    reading.set_defaults(run=_import)
+    writing = ways.add_parser("export", help="a .plan from a mission file", description="Makes a .plan of a mission.")
+    writing.add_argument("mission", type=Path, metavar="MISSION")
+    writing.add_argument(
+        "--home",
+        type=_home,
+        required=True,
+        metavar="LAT,LON[,ALT]",
+        help="where the vehicle will be armed: degrees, and metres above sea level (default 0)",
+    )
+    _add_out(writing, "default: standard output")
+    writing.set_defaults(run=_export)
+
+
+def _add_out(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument("--out", type=Path, metavar="FILE", help=default)
+
+
+def _home(text: str) -> tuple[float, float, float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or abs(numbers[0]) > 90.0 or abs(numbers[1]) > 180.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LAT,LON or LAT,LON,ALT, such as 47.3977,8.5456,488")
+    latitude_deg, longitude_deg, *altitude_m = numbers
+    return latitude_deg, longitude_deg, altitude_m[0] if altitude_m else 0.0
+
+
+def _import(options: argparse.Namespace) -> int:
+    from rebound_cli.plan.command import run_import
+
+    return run_import(options)
+
+
+def _export(options: argparse.Namespace) -> int:
+    from rebound_cli.plan.command import run_export
+
+    return run_export(options)

@@ -1,0 +1,79 @@
+"""`rebound plan import` and `rebound plan export`: the file goes to standard output, the notes beside it."""
+
+import json
+import re
+import sys
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from companion.errors import ConfigurationError
+from rebound_cli.documents import parse_document
+from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.plan.reading import mission_of_plan
+from rebound_cli.plan.writing import plan_of_mission
+from sim_vehicle.hil.messages import Place
+
+
+def run_import(options: Namespace) -> int:
+    plan, name = _read_json(options.plan), options.name or _name_of(options.plan)
+    data, notes = mission_of_plan(plan, name)
+    text = mission_yaml(data, f"From {options.plan.name}, a plan of QGroundControl.")
+    # What is written can be flown: a plan that leaves its own fence is refused here and not at the field.
+    mission_from(parse_document(text, f"the mission from {options.plan}"))
+    _write(options.out, text, notes)
+    return 0
+
+
+def run_export(options: Namespace) -> int:
+    mission = mission_from(load_mission_document(options.mission, ()))
+    plan, notes = plan_of_mission(mission, Place(*options.home))
+    _write(options.out, json.dumps(plan, indent=4) + "\n", notes)
+    return 0
+
+
+def mission_yaml(data: dict[str, Any], comment: str) -> str:
+    """A mission file as a person would write it: an item a line."""
+    lines = [f"# {comment}"]
+    for key, value in data.items():
+        if key == "items":
+            lines += ["", "items:", *[f"  - {_flow(item)}" for item in value], ""]
+        else:
+            lines.append(f"{key}: {_flow(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _flow(value: Any) -> str:
+    text = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=1_000_000, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
+def _name_of(path: Path) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-") or "mission"
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigurationError(f"{path}: no such file.") from None
+    except OSError as error:
+        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}.") from error
+    except ValueError as error:
+        raise ConfigurationError(f"{path}: not JSON, so no plan of QGroundControl: {error}.") from error
+
+
+def _write(out: Path | None, text: str, notes: Sequence[str]) -> None:
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
+    if out is None:
+        print(text, end="")
+        return
+    try:
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{out}: cannot be written: {error.strerror}.") from error
+    print(f"written to {out}", file=sys.stderr)

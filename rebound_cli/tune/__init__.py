@@ -1,0 +1,1 @@
+"""`rebound tune`: from healthy flights to what a detector can see on this vehicle, and the settings to fly with."""

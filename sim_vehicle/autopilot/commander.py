@@ -1,0 +1,314 @@
+"""Who is in command: the mode that is meant and the one that flies, arming, and what the failsafes make of it.
+
+Source: PX4's commander/Commander.cpp.
+"""
+
+import math
+from enum import IntEnum
+from functools import cache
+
+from sim_vehicle.autopilot.arming import Arming, Reason
+from sim_vehicle.autopilot.battery import Battery
+from sim_vehicle.autopilot.battery import Warning as BatteryWarning
+from sim_vehicle.autopilot.estimate import Quaternion
+from sim_vehicle.autopilot.failsafe import Failsafe
+from sim_vehicle.autopilot.failsafe_table import Action, Situation
+from sim_vehicle.autopilot.land_detector import LandDetector
+from sim_vehicle.autopilot.links_heard import GroundStation
+from sim_vehicle.autopilot.manual_input import Gesture, ManualInput
+from sim_vehicle.autopilot.messages import Result, Severity, StatusText
+from sim_vehicle.autopilot.modes import NOT_ARMABLE, Conditions, Event, Mode, ModeState, Need, missing
+from sim_vehicle.autopilot.navigator import Navigator
+from sim_vehicle.autopilot.offboard import OffboardSignal
+from sim_vehicle.parameters.store import Parameters
+
+# How often the failsafes look when nothing calls for it: PX4's commander runs every 10 ms, its checks every 100.
+PERIOD_US = 20_000
+# COM_RC_OVERRIDE: in which modes moved sticks take over.
+_OVERRIDES_AUTO, _OVERRIDES_OFFBOARD = 1, 2
+# Commander::arm: sticks above these refuse a stick mode, with climb control and without.
+_CENTRE_THROTTLE, _LOW_THROTTLE = 0.2, -0.8
+
+
+class SystemStatus(IntEnum):
+    """MAV_STATE as PX4 uses it."""
+
+    NOT_READY = 0
+    STANDBY = 3
+    ACTIVE = 4
+    FAILSAFE = 5
+    TERMINATED = 8
+
+
+class Commander:
+    """Requests and the time in; the mode to fly, texts out."""
+
+    def __init__(self, parameters: Parameters, navigator: Navigator, detector: LandDetector) -> None:
+        self.modes = ModeState()
+        self.arming = Arming(parameters)
+        self.failsafe = Failsafe()
+        self.signal = OffboardSignal(parameters)
+        self.sticks = ManualInput(parameters)
+        self.ground_station = GroundStation(parameters)
+        self.battery = Battery(parameters)
+        self.has_global_position = True
+        self.texts: list[StatusText] = []
+        self._parameters = parameters
+        self._navigator = navigator
+        self._detector = detector
+        self._now_us = 0
+        self._judged_us = -PERIOD_US
+        self._battery_at_arming = BatteryWarning.NONE
+        self._sticks_lost_at_arming = True
+        self._ever_requested = False
+        self._tipped_since_us: int | None = None
+        self._taken_off_us: int | None = None
+
+    # --- requests --------------------------------------------------------------------------------------------
+
+    def request_mode(self, mode: Mode) -> Result:
+        """Change the mode as a command asks."""
+        self._ever_requested = True
+        if not self.modes.apply(Event.REQUEST, self._conditions, mode):
+            return Result.TEMPORARILY_REJECTED
+        self._judge()
+        return Result.ACCEPTED
+
+    def arm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
+        """Arm as a command or a gesture asks."""
+        was_armed = self.arming.armed
+        refusal = None if was_armed or forced else self._stick_refusal(reason)
+        if refusal is not None:
+            self._say(Severity.CRITICAL, f"Arming denied: {refusal}")
+            return Result.TEMPORARILY_REJECTED
+        result = self.arming.arm(self._now_us, self.checks_pass, forced)
+        if result is not Result.ACCEPTED:
+            self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+        elif not was_armed:
+            self._say(Severity.INFO, f"Armed by {reason}")
+            self._battery_at_arming = self.battery.warning
+            self._sticks_lost_at_arming = self.sticks.sticks is None
+            self._taken_off_us = None
+            self._navigator.view.armed = True
+            self._navigator.set_home_here()
+            self._navigator.enter(self.modes.flown)
+            self._judge()
+        return result
+
+    def _stick_refusal(self, reason: Reason) -> str | None:
+        """What is wrong with the throttle in a mode that sticks fly, or with the mode for a gesture."""
+        sticks, mode = self.sticks.sticks, self.modes.flown
+        if Need.STICKS not in _needs(mode):
+            return "switch to manual mode first" if reason is Reason.GESTURE else None
+        if sticks is None:
+            return None
+        if mode in _CLIMB_CONTROLLED:
+            return "throttle above center" if sticks.throttle > _CENTRE_THROTTLE else None
+        return "high throttle" if sticks.throttle > _LOW_THROTTLE else None
+
+    def disarm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
+        """Disarm as a command, a gesture or a failsafe asks."""
+        was_armed = self.arming.armed
+        result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced)
+        if result is not Result.ACCEPTED:
+            self._say(Severity.CRITICAL, "Disarming denied: not landed")
+        elif was_armed:
+            self._disarmed(reason)
+        return result
+
+    def _disarmed(self, reason: Reason) -> None:
+        self._say(Severity.INFO, f"Disarmed by {reason}")
+        self._navigator.view.armed = False
+        self._navigator.disarmed()
+        self.modes.apply(Event.DISARMED, self._conditions)
+        self._judge()
+
+    # --- the cycle -------------------------------------------------------------------------------------------
+
+    def run(self, now_us: int, attitude_wxyz: Quaternion) -> None:
+        """Everything that changes mode or arming by itself; call it at every step."""
+        self._now_us = now_us
+        heard = (self.signal.arrives, self.signal.is_back)
+        self.signal.update(now_us)
+        self.sticks.update(now_us)
+        self._obey_sticks()
+        if self.modes.flown is Mode.TAKEOFF and self._navigator.takeoff_is_over and not self._detector.landed:
+            self.modes.apply(Event.TAKEOFF_REACHED, self._conditions)
+            self._judge()
+        self._disarm_by_itself()
+        if now_us - self._judged_us >= PERIOD_US or heard != (self.signal.arrives, self.signal.is_back):
+            self._watch(attitude_wxyz)
+            self._judge()
+
+    def _obey_sticks(self) -> None:
+        if self.sticks.gesture is Gesture.ARM:
+            self.arm(False, Reason.GESTURE)
+        elif self.sticks.gesture is Gesture.DISARM:
+            self.disarm(False, Reason.GESTURE)
+        if self.sticks.sticks is None:
+            return
+        if not self.arming.armed:
+            if not self._ever_requested:
+                # As long as nobody has chosen a mode, sticks that arrive choose theirs.
+                self._ever_requested = True
+                self.modes.mean(Mode.POSCTL)
+            return
+        if not self.sticks.moving or self.failsafe.acts or not self._sticks_override:
+            return
+        if self.modes.apply(Event.STICKS, self._conditions):
+            self._say(Severity.INFO, "Pilot took over using sticks")
+            self._judge()
+
+    @property
+    def _sticks_override(self) -> bool:
+        mode, mask = self.modes.flown, int(self._parameters["COM_RC_OVERRIDE"])
+        if mode is Mode.OFFBOARD:
+            return bool(mask & _OVERRIDES_OFFBOARD)
+        return Need.STICKS not in _needs(mode) and bool(mask & _OVERRIDES_AUTO)
+
+    def _disarm_by_itself(self) -> None:
+        if not self.arming.armed:
+            return
+        landed = self._detector.landed
+        if not landed and self._taken_off_us is None:
+            self._taken_off_us = self._now_us
+        if landed and self.arming.taken_off and self._navigator.mission_is_in_progress:
+            return
+        reason = self.arming.disarm_by_itself(self._now_us, landed)
+        if reason is not None:
+            self._disarmed(reason)
+
+    def _watch(self, attitude_wxyz: Quaternion) -> None:
+        """The ground station, and whether the vehicle lies on its side (FailureDetector::updateAttitudeStatus)."""
+        self.texts += self.ground_station.update(self._now_us)
+        roll, pitch = _roll_pitch(attitude_wxyz)
+        most_roll, most_pitch = self._parameters["FD_FAIL_R"], self._parameters["FD_FAIL_P"]
+        tips = (0.0 < most_roll < abs(math.degrees(roll))) or (0.0 < most_pitch < abs(math.degrees(pitch)))
+        if not tips:
+            self._tipped_since_us = None
+        elif self._tipped_since_us is None:
+            self._tipped_since_us = self._now_us
+
+    def _judge(self) -> None:
+        """Let the failsafes say what flies."""
+        self._judged_us = self._now_us
+        decision = self.failsafe.update(self._now_us, self._situation(), self._parameters)
+        self.modes.requested = False
+        for text in decision.says:
+            self._say(Severity.CRITICAL, text)
+        if decision.intended is not self.modes.intended:
+            self.modes.mean(decision.intended)
+        if decision.action is Action.DISARM and self.arming.armed:
+            self.disarm(True, Reason.FAILSAFE)
+            return
+        if decision.flown is not self.modes.flown:
+            self.modes.flown = decision.flown
+            self._navigator.enter(decision.flown)
+
+    def _situation(self) -> Situation:
+        armed, progress = self.arming.armed, self._navigator.progress
+        tipped_us = 0 if self._tipped_since_us is None else self._now_us - self._tipped_since_us
+        back = self.signal.is_back if self.failsafe.acts else self.signal.arrives
+        return Situation(
+            armed=armed,
+            intended=self.modes.intended,
+            armed_for_us=self._now_us - self.arming.armed_at_us if armed else 0,
+            mode_requested=self.modes.requested,
+            sticks_moved=self.failsafe.acts and self.sticks.moving and self._sticks_override,
+            sticks_lost=self.sticks.sticks is None,
+            sticks_lost_at_arming=self._were_sticks_lost_at_arming(),
+            ground_station_lost=self.ground_station.lost,
+            offboard_lost=not back,
+            fence_breached=self._navigator.fence.breached,
+            battery=self.battery.warning,
+            battery_at_arming=self._battery_at_arming,
+            mission_finished=progress.finished,
+            flight_time_over=self._flight_time_is_over,
+            tipped_over=tipped_us > 1e6 * self._parameters["FD_FAIL_R_TTRI"],
+            cannot_run=_cannot_run(self._available, back),
+        )
+
+    def _were_sticks_lost_at_arming(self) -> bool:
+        """Whoever arms without sticks is not told that they are lost, until they have come once."""
+        if self.sticks.sticks is not None:
+            self._sticks_lost_at_arming = False
+        elif not self.arming.armed:
+            self._sticks_lost_at_arming = True
+        return self._sticks_lost_at_arming
+
+    @property
+    def _flight_time_is_over(self) -> bool:
+        most_s = self._parameters["COM_FLT_TIME_MAX"]
+        if most_s <= 0 or self._taken_off_us is None or not self.arming.armed:
+            return False
+        return self._now_us - self._taken_off_us > 1e6 * most_s
+
+    # --- what there is ---------------------------------------------------------------------------------------
+
+    @property
+    def _conditions(self) -> Conditions:
+        return Conditions(self.arming.armed, self._available)
+
+    @property
+    def _available(self) -> frozenset[Need]:
+        return _available(
+            self.has_global_position,
+            self.sticks.sticks is not None,
+            self.signal.arrives,
+            self._navigator.progress.valid,
+        )
+
+    @property
+    def checks_pass(self) -> bool:
+        """Whether the vehicle could be armed in its present mode."""
+        mode = self.modes.intended
+        if self._parameters["COM_ARM_MIS_REQ"] and not self._navigator.progress.valid:
+            return False
+        return mode not in NOT_ARMABLE and not missing(mode, self._available)
+
+    @property
+    def system_status(self) -> SystemStatus:
+        """HEARTBEAT.system_status."""
+        if self.modes.flown is Mode.TERMINATION:
+            return SystemStatus.TERMINATED
+        if self.arming.armed:
+            return SystemStatus.FAILSAFE if self.failsafe.acts else SystemStatus.ACTIVE
+        return SystemStatus.STANDBY if self.checks_pass else SystemStatus.NOT_READY
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self.texts.append(StatusText(severity, text))
+
+
+_CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL, Mode.POSITION_SLOW)
+
+
+def _needs(mode: Mode) -> frozenset[Need]:
+    return missing(mode, frozenset())
+
+
+@cache
+def _available(has_global: bool, has_sticks: bool, has_setpoints: bool, has_mission: bool) -> frozenset[Need]:
+    there = {
+        Need.LOCAL_POSITION: True,
+        Need.HOME: True,
+        Need.GLOBAL_POSITION: has_global,
+        Need.STICKS: has_sticks,
+        Need.SETPOINTS: has_setpoints,
+        Need.MISSION: has_mission,
+    }
+    return frozenset(need for need, is_there in there.items() if is_there)
+
+
+@cache
+def _cannot_run(available: frozenset[Need], has_setpoints: bool) -> frozenset[Mode]:
+    """As the failsafes count: lost sticks have a row of their own."""
+    there = (
+        available | {Need.STICKS, Need.SETPOINTS} if has_setpoints else (available | {Need.STICKS}) - {Need.SETPOINTS}
+    )
+    return frozenset(mode for mode in Mode if missing(mode, there))
+
+
+def _roll_pitch(attitude_wxyz: Quaternion) -> tuple[float, float]:
+    w, x, y, z = attitude_wxyz
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    return roll, math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))

@@ -1,0 +1,174 @@
+"""Commands that steer a flight: where to, how fast, round what, along which mission.
+
+Sources: PX4's Commander::handle_command, navigator_main.cpp and FlightModeManager::handleCommand.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+from sim_vehicle.autopilot.arming import Reason
+from sim_vehicle.autopilot.commander import Commander
+from sim_vehicle.autopilot.messages import Command, Result, Severity
+from sim_vehicle.autopilot.mission import MissionCommand
+from sim_vehicle.autopilot.mission_store import MissionStore
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.autopilot.navigator import Navigator
+from sim_vehicle.autopilot.target import Kind, Target, Vector3
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
+
+NAV_TAKEOFF = 22
+DO_ORBIT = 34
+DO_CHANGE_SPEED = 178
+DO_FLIGHTTERMINATION = 185
+DO_CHANGE_ALTITUDE = 186
+DO_REPOSITION = 192
+DO_SET_ROI_LOCATION, DO_SET_ROI_WPNEXT_OFFSET, DO_SET_ROI_NONE, DO_SET_ROI = 195, 196, 197, 201
+NAV_ROI = 80
+MISSION_START = 300
+
+_SWITCH_MODE = 1
+"""MAV_DO_REPOSITION_FLAGS_CHANGE_MODE: without it, or with any other flag, PX4 does not do it."""
+
+
+class SteeredFlight(Protocol):
+    """What these commands need of the autopilot."""
+
+    commander: Commander
+    navigator: Navigator
+    origin: Origin
+    missions: MissionStore
+
+    def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
+        """Change the mode."""
+
+    def say(self, severity: Severity, text: str) -> None:
+        """Tell the ground stations."""
+
+
+def from_mission(given: MissionCommand) -> Command:
+    """A mission item's command, as the vehicle sends it to itself."""
+    p1, p2, p3, p4, p5, p6, p7 = given.params
+    return Command(0, 0, 0, 0, given.command, p1, p2, p3, p4, p5, p6, p7)
+
+
+def _take_off(command: Command, flight: SteeredFlight) -> Result:
+    altitude_m = _given(command.param7)
+    down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
+    flight.navigator.take_off_to(_place(command, flight), down_m)
+    return flight.request_mode(Mode.TAKEOFF)
+
+
+def _reposition(command: Command, flight: SteeredFlight) -> Result:
+    if int(_given(command.param2) or 0) != _SWITCH_MODE:
+        return Result.UNSUPPORTED
+    if flight.commander.arming.armed:
+        _hold_at(_repositioned(command, flight), "Reposition", flight)
+    return flight.request_mode(Mode.LOITER)
+
+
+def _repositioned(command: Command, flight: SteeredFlight) -> Target:
+    """Where DO_REPOSITION leads: a place, another height over the same, another heading, or a stop."""
+    navigator = flight.navigator
+    place, yaw_rad, altitude_m = _place(command, flight), _given(command.param4), _given(command.param7)
+    down_m = navigator.view.position_ned_m[2] if altitude_m is None else flight.origin.place.altitude_m - altitude_m
+    if place is None:
+        stays = yaw_rad is not None or altitude_m is not None
+        place = navigator.held_place_ned_m if stays else navigator.stop_place_ned_m()
+    speed_m_s = _given(command.param1)
+    return Target(
+        Kind.HOLD, (place[0], place[1], down_m), yaw_rad, speed_m_s if speed_m_s and speed_m_s > 0.0 else None
+    )
+
+
+def _change_altitude(command: Command, flight: SteeredFlight) -> Result:
+    altitude_m = _given(command.param1)
+    if flight.commander.arming.armed:
+        navigator = flight.navigator
+        north, east, _ = navigator.held_place_ned_m
+        down_m = navigator.view.position_ned_m[2] if altitude_m is None else flight.origin.place.altitude_m - altitude_m
+        _hold_at(Target(Kind.HOLD, (north, east, down_m)), "Altitude change", flight)
+    return flight.request_mode(Mode.LOITER)
+
+
+def _hold_at(target: Target, what: str, flight: SteeredFlight) -> None:
+    if not flight.navigator.hold_at(target):
+        flight.say(Severity.CRITICAL, f"{what} is outside geofence")
+
+
+def _change_speed(command: Command, flight: SteeredFlight) -> Result:
+    speed_m_s = _given(command.param2)
+    flight.navigator.change_speed(speed_m_s if speed_m_s and speed_m_s > 0.0 else None)
+    return Result.ACCEPTED
+
+
+def _orbit(command: Command, flight: SteeredFlight) -> Result:
+    result = flight.request_mode(Mode.ORBIT)
+    if result is not Result.ACCEPTED:
+        flight.say(Severity.CRITICAL, "Orbit command rejected")
+        return result
+    place, altitude_m = _place(command, flight), _given(command.param7)
+    north, east = (None, None) if place is None else place[:2]
+    down_m = None if altitude_m is None else flight.origin.place.altitude_m - altitude_m
+    behaviour = _given(command.param3)
+    done = flight.navigator.change_orbit(
+        _given(command.param1),
+        _given(command.param2),
+        None if behaviour is None else round(behaviour),
+        (north, east, down_m),
+    )
+    if not done:
+        flight.say(Severity.CRITICAL, "Orbit radius limit exceeded")
+    return result
+
+
+def _start_mission(command: Command, flight: SteeredFlight) -> Result:
+    missions, first = flight.missions, _given(command.param1)
+    if not missions.progress.valid:
+        flight.say(Severity.CRITICAL, "Mission start denied! No valid mission")
+        return Result.DENIED
+    if first is None or not -1 <= first < len(missions.mission.items):
+        return Result.DENIED
+    if first >= 0:
+        missions.choose(int(first))
+    result = flight.request_mode(Mode.MISSION)
+    return flight.commander.arm(False, Reason.MISSION) if result is Result.ACCEPTED else result
+
+
+def _terminate(command: Command, flight: SteeredFlight) -> Result:
+    if not command.param1 > 0.5 or not flight.commander.arming.armed:
+        return Result.DENIED
+    return flight.request_mode(Mode.TERMINATION)
+
+
+def _look_at(command: Command, flight: SteeredFlight) -> Result:
+    """PX4 takes every region of interest; outside a mission this vehicle, like one without a gimbal, ignores it."""
+    return Result.ACCEPTED
+
+
+def _place(command: Command, flight: SteeredFlight) -> Vector3 | None:
+    latitude_deg, longitude_deg = _given(command.param5), _given(command.param6)
+    if latitude_deg is None or longitude_deg is None:
+        return None
+    return flight.origin.position_of(Place(latitude_deg, longitude_deg, flight.origin.place.altitude_m))
+
+
+def _given(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+HANDLERS: dict[int, Callable[[Command, SteeredFlight], Result | None]] = {
+    NAV_TAKEOFF: _take_off,
+    DO_ORBIT: _orbit,
+    DO_CHANGE_SPEED: _change_speed,
+    DO_FLIGHTTERMINATION: _terminate,
+    DO_CHANGE_ALTITUDE: _change_altitude,
+    DO_REPOSITION: _reposition,
+    DO_SET_ROI: _look_at,
+    DO_SET_ROI_LOCATION: _look_at,
+    DO_SET_ROI_WPNEXT_OFFSET: _look_at,
+    DO_SET_ROI_NONE: _look_at,
+    NAV_ROI: _look_at,
+    MISSION_START: _start_mission,
+}

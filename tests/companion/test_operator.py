@@ -1,0 +1,111 @@
+"""What a ground station hears: texts with numbers for hit, recovery and outcome, and the detector's state to plot."""
+
+import itertools
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.mavlink.encode import Encoder
+from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
+
+INTO_WALL = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
+    {"land": {}},
+]
+
+
+def decoded(packets) -> list:
+    parser = mav.MAVLink(None)
+    return parser.parse_buffer(b"".join(packets)) or []
+
+
+def sent(f: Flight, kind: str) -> list:
+    return [(t, message) for t, frame in f.sent for message in decoded([frame]) if message.get_type() == kind]
+
+
+@pytest.mark.parametrize("length", [0, 1, 49, 50, 51, 100, 137])
+def test_a_text_of_any_length_arrives_whole(length):
+    text = ("0123456789" * 20)[:length]
+    messages = decoded(Encoder().packets(StatusText(Severity.WARNING, text)))
+    assert "".join(message.text for message in messages) == text
+    assert [message.chunk_seq for message in messages] == list(range(len(messages)))
+    assert len({message.id for message in messages}) == 1 and (messages[0].id == 0) is (length <= 50)
+    if length > 50:
+        assert len(messages[-1].text) < 50, "only a shorter part ends the text"
+    assert {message.severity for message in messages} == {4}
+
+
+def test_two_long_texts_have_different_numbers():
+    encoder = Encoder()
+    first, second = (decoded(encoder.packets(StatusText(Severity.INFO, "x" * 60)))[0].id for _ in range(2))
+    assert 0 < first < second
+
+
+def test_numbers_and_vectors():
+    (value,) = decoded(Encoder().packets(NamedValue(1_500_000, "rb_thresh", 4.25)))
+    assert (value.name, value.value, value.time_boot_ms) == ("rb_thresh", 4.25, 1500)
+    (vector,) = decoded(Encoder().packets(DebugVector(1_500_000, "rb_v_c", (2.0, -1.0, 0.5))))
+    assert (vector.name, vector.x, vector.y, vector.z, vector.time_usec) == ("rb_v_c", 2.0, -1.0, 0.5, 1_500_000)
+
+
+def test_the_operator_reads_hit_recovery_and_outcome():
+    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f.run_to_end()
+    texts = [message.text for _, message in sent(f, "STATUSTEXT")]
+    hit, collision = next(text for text in texts if text.startswith("Hit")), f.companion.report().collisions[0]
+    assert hit.startswith(f"Hit 1: at {collision.impact_speed_m_s:.2f} m/s going north, ")
+    recovered = next(text for text in texts if text.startswith("Recovered"))
+    assert recovered.startswith(f"Recovered in {collision.settled_after_s:.2f} s, ") and recovered.endswith("too far")
+    assert texts[0] == "Mission test begins" and texts[-1] == "Mission test completed, hits: 1"
+    assert all(len(text) <= 50 for text in texts)
+
+
+def test_the_hits_text_leaves_with_the_recovery_setpoint():
+    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f.run_until(lambda: "detection" in f.kinds())
+    at_us = f.event("detection").time_us
+    assert [m.text[:5] for t, m in sent(f, "STATUSTEXT") if t == at_us] == ["Hit 1"]
+    kinds = [decoded([frame])[0].get_type() for t, frame in f.sent if t == at_us]
+    assert kinds.index("SET_POSITION_TARGET_LOCAL_NED") < kinds.index("STATUSTEXT"), "the setpoint first"
+
+
+def test_a_vehicle_hit_while_it_hovers_is_pushed():
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f.run_to("mission")
+    f.run_for(1.0)
+    f.vehicle.push_m_s2 = (0.0, -12.0)
+    f.step()
+    assert sent(f, "STATUSTEXT")[-1][1].text == "Hit 1: pushed west, 12 m/s2"
+
+
+def test_an_early_end_is_told_with_its_reason():
+    f = flight()
+    f.run_to("mission")
+    f.companion.stop("Ctrl-C")
+    f.run_to_end()
+    last = sent(f, "STATUSTEXT")[-1][1]
+    assert (last.text, last.severity) == ("Mission test aborted, hits: 0: Ctrl-C", 3)
+
+
+def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_the_end():
+    f = flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL)
+    f.run_to_end()
+    f.run_for(2.0)
+    phases = [(t, m.value) for t, m in sent(f, "NAMED_VALUE_FLOAT") if m.name == "rb_phase"]
+    gaps = [b - a for (a, _), (b, _) in itertools.pairwise(phases)]
+    assert min(gaps) >= 500_000 and max(gaps) <= 560_000
+    assert {value for _, value in phases} >= {0.0, 2.0}
+    hits = [m.value for _, m in sent(f, "NAMED_VALUE_FLOAT") if m.name == "rb_hits"]
+    assert hits == sorted(hits) and hits[-1] == 1.0
+    v_c = [m for _, m in sent(f, "DEBUG_VECT") if m.name == "rb_v_c"]
+    assert v_c[0].x == pytest.approx(2.0, abs=0.1)
+    assert phases[-1][0] <= f.companion.report().ended_at_us
+
+
+def test_both_can_be_switched_off():
+    f = flight(companion={"operator": {"status_texts": False, "values_hz": 0}})
+    f.run_to_end()
+    assert sent(f, "STATUSTEXT") == sent(f, "NAMED_VALUE_FLOAT") == []
+    assert f.now_us > EPOCH_US

@@ -1,0 +1,131 @@
+"""`rebound check`: what it says of a mission, what it draws, and the schema that editors use."""
+
+import json
+
+import jsonschema
+import matplotlib.image
+import numpy as np
+import pytest
+import yaml
+
+from companion.mission.model import ACTIONS
+from rebound_cli.check.outline import footprint
+from rebound_cli.check.schema import mission_schema
+from rebound_cli.check.ways import planned_ways
+from rebound_cli.documents import parse_document
+from rebound_cli.inputs import mission_from, world_from
+from sim_vehicle.scene import Scene
+from tests.rebound_cli.command import ROOT, WALL, run
+
+SCHEMA = ROOT / "missions" / "schema.json"
+MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))
+
+
+def planned(text: str):
+    document = parse_document(text, "t.yaml")
+    mission = mission_from(document)
+    return planned_ways(mission, world_from(document))
+
+
+def test_each_step_has_its_place_in_time():
+    ways = planned("""
+name: t
+items:
+  - takeoff: {height_m: 2}
+  - go_to: {position_ned_m: [4, 0, -2], speed_m_s: 2}
+  - hold: {duration_s: 5}
+  - wait_for: {file: go}
+  - land:
+""")
+    # up at 1 m/s and 1 m/s^2; then 4 m at 2 m/s and 2 m/s^2
+    assert [way.begins_s for way in ways] == [0.0, pytest.approx(3.0), pytest.approx(6.0), pytest.approx(11.0), None]
+    assert [way.length_m for way in ways] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
+    assert ways[-1].ends_s is None, "nobody knows how long the wait is"
+
+
+def test_what_stands_in_the_way_is_named_with_the_place():
+    ways = planned("""
+name: t
+items:
+  - takeoff: {height_m: 2}
+  - go_to: {position_ned_m: [6, 0, -2]}
+  - go_to: {position_ned_m: [6, 0, -5]}
+  - land:
+sim:
+  walls: [{name: far wall, point_ned_m: [4, 0, -2], normal_ned: [-1, 0, 0], width_m: 4, height_m: 2}]
+  poles: [{name: mast, point_ned_m: [6, 0, -4]}]
+""")
+    assert [way.meets.name if way.meets else None for way in ways] == [None, "far wall", "mast", "mast"]
+    # a reach before the wall
+    assert ways[1].points_ned_m[ways[1].meets.index][0] == pytest.approx(3.8, abs=0.15)
+
+
+def test_obstacles_seen_from_above():
+    scene = Scene.model_validate(
+        {
+            "walls": [{"point_ned_m": [4, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 4, "thickness_m": 0.2}],
+            "poles": [{"point_ned_m": [1, 2, 0], "radius_m": 0.5}],
+            "boxes": [{"centre_ned_m": [0, 0, -1], "size_m": [2, 1, 1], "yaw_deg": 90}],
+        }
+    )
+    corners = [footprint(obstacle) for _, obstacle in scene.obstacles()]
+    spans = [np.ptp(outline, axis=0) for outline in corners]
+    assert np.allclose(spans[0], [0.2, 4.0]) and np.allclose(spans[1], [1.0, 1.0]) and np.allclose(spans[2], [1.0, 2.0])
+    assert np.allclose(corners[1].mean(axis=0), [1.0, 2.0])
+
+
+def test_a_person_reads_what_would_be_flown(tmp_path):
+    result = run("check", WALL, "--out", tmp_path)
+    assert result.returncode == 0, result.stderr
+    for words in ("go to [7.00, 0.00, -1.50]", "7.0 m", "meets 'north wall'", "in all 15.5 m in 20 s", "Fence"):
+        assert words in result.stdout
+    picture = matplotlib.image.imread(tmp_path / "wall.png")
+    assert picture.shape[0] > 500 and picture.std() > 0.05
+
+
+def test_one_wrong_file_does_not_hide_another(tmp_path):
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text("name: wrong\nitems:\n  - takeoff: {height: 1}\n  - land:\n")
+    result = run("check", wrong, WALL, "--no-picture", "--set", "on_interrupt=land")
+    assert result.returncode == 1
+    assert f"{wrong}:3: items.0.takeoff.height: unknown key" in result.stderr and "Traceback" not in result.stderr
+    assert "hand the vehicle to land" in result.stdout
+    assert run("check").returncode == 1
+
+
+# --- the schema
+
+
+def test_the_schema_beside_the_missions_is_the_models():
+    assert json.loads(SCHEMA.read_text()) == mission_schema(), "run `make schema`"
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.stem)
+def test_every_shipped_mission_names_the_schema_and_keeps_to_it(path):
+    text = path.read_text()
+    assert text.startswith("# yaml-language-server: $schema=schema.json\n")
+    jsonschema.validate(yaml.safe_load(text), mission_schema())
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        {"go_to": {"position_ned_m": [1, 2], "speed_m_s": 1}},
+        {"go_to": {"position_ned_m": [1, 2, 3], "sped_m_s": 1}},
+        {"hold": {"duration_s": "long"}},
+        {"hold": {"duration_s": 1}, "land": {}},
+        {"on_collision": {"then": "hold"}},
+        {"repeat": {"times": 2, "items": [{"hold": {"duration_s": -1}}]}},
+    ],
+)
+def test_the_schema_refuses_what_the_model_refuses(item):
+    mission = {"name": "t", "items": [{"takeoff": {"height_m": 1}}, item, {"land": None}]}
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(mission, mission_schema())
+
+
+def test_the_schema_knows_all_actions_and_the_world():
+    schema = mission_schema()
+    item = schema["$defs"]["MissionItem"]["properties"]
+    assert set(ACTIONS) | {"on_collision", "timeout_s", "on_timeout"} == set(item)
+    assert {"walls", "wind_ned_m_s", "airframe"} <= set(schema["$defs"]["Scene"]["properties"])
