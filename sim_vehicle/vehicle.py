@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.autopilot.mission_store import MissionStore
 from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.signing import Signing
@@ -12,7 +13,7 @@ from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import Topics
 from sim_vehicle.mavlink.vibration import Vibration
-from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
+from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
@@ -22,6 +23,8 @@ from sim_vehicle.truth import TruthRecorder
 
 # A signature has one byte for the link.
 _LINK_NUMBERS = 256
+# PX4 answers, then waits 0.4 s before it resets itself; a flight controller then takes some seconds to be heard again.
+REBOOT_AFTER_US, BOOT_TAKES_US = 400_000, 2_000_000
 
 
 class SimulatedVehicle:
@@ -44,13 +47,23 @@ class SimulatedVehicle:
         Raises SceneError where a wall passes through the start position.
         """
         check_start_is_free(scene, airframe)
-        self._seed = seed
+        self._airframe, self._scene, self._seed, self._keeps_path = airframe, scene, seed, keeps_path
+        self._epoch_at_boot_us = epoch_at_boot_us
+        self._links: list[Link] = []
+        self._links_so_far = 0
+        self._companion_link: Link | None = None
         self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
-        self._tuned_at = self.parameters.changes
-        self._plant = Plant(airframe, scene, seed, keeps_path)
+        self._signing, self._missions = Signing(), MissionStore()
+        self._plant = Plant(with_parameters(airframe, self.parameters), scene, seed, keeps_path)
+        self._boot()
+
+    def _boot(self) -> None:
+        """Start the vehicle's software."""
+        airframe, parameters = self._airframe, self.parameters
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
-        self._autopilot = Autopilot(airframe.hover_fraction, first, self.parameters)
+        self._autopilot = Autopilot(airframe.hover_fraction, first, parameters, self._missions)
+        identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
         self._telemetry = Telemetry(
             sample=first,
             published=first,
@@ -61,20 +74,20 @@ class SimulatedVehicle:
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
             true_body=self._plant.state.body,
             attitude_setpoint=self._plant.state.attitude_setpoint,
-            epoch_at_boot_us=epoch_at_boot_us,
-            system=int(self.parameters["MAV_SYS_ID"]),
+            epoch_at_boot_us=self._epoch_at_boot_us,
+            system=identity.system,
         )
-        self._slow = SlowSensors(airframe, seed)
+        self._slow = SlowSensors(airframe, self._seed)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = first.time_boot_us
         self._topics = Topics(self._telemetry)
-        identity = Identity(int(self.parameters["MAV_SYS_ID"]), int(self.parameters["MAV_COMP_ID"]))
         self._board = Board(
-            identity, self._autopilot, self.parameters, self._telemetry, self._topics, Signing(), self.interval_us
+            identity, self._autopilot, parameters, self._telemetry, self._topics, self._signing, self.interval_us
         )
-        self._links: list[Link] = []
-        self._links_so_far = 0
-        self._companion_link: Link | None = None
+        for link in self._links:
+            link.boot(self._board)
+        self._tuned_at = 0
+        self._reboot_at_us: int | None = None
 
     @property
     def truth(self) -> TruthRecorder:
@@ -103,6 +116,18 @@ class SimulatedVehicle:
 
     def advance(self) -> None:
         """One interval: act on what the links have received, fly, leave what they are to send."""
+        if self._reboot_at_us is not None and self._is_rebooting(self._reboot_at_us):
+            return
+        self._communicate()
+        self._tune()
+        sample = self._fly(self._autopilot.run_control())
+        self._topics.count(new_position=self._publish(sample))
+        texts = tuple(self._autopilot.texts)
+        self._autopilot.texts.clear()
+        for link in self._links:
+            link.update(self.time_boot_us, texts)
+
+    def _communicate(self) -> None:
         # The commander runs beside the receivers: it answers in the interval after a command came.
         acks = self._autopilot.run_commander()
         links = self._links
@@ -113,16 +138,33 @@ class SimulatedVehicle:
                 for other in links:
                     if other is not link:
                         other.forward(foreign)
-        self._tune()
-        sample = self._fly(self._autopilot.run_control())
-        self._topics.count(new_position=self._publish(sample))
-        texts = tuple(self._autopilot.texts)
-        self._autopilot.texts.clear()
-        for link in self._links:
-            link.update(self.time_boot_us, texts)
+        if self._autopilot.ground.wants_reboot and self._reboot_at_us is None:
+            self._reboot_at_us = self.time_boot_us + REBOOT_AFTER_US
+
+    def _is_rebooting(self, reboot_at_us: int) -> bool:
+        """Whether nobody is there at the moment; the body goes on in any case, without motors.
+
+        The clock goes on, too, unlike a flight controller's: what is recorded of a flight has one time.
+        """
+        if self.time_boot_us < reboot_at_us:
+            return False
+        if self.time_boot_us < reboot_at_us + BOOT_TAKES_US:
+            self.time_boot_us = self._plant.step(None, armed=False).time_boot_us
+            for link in self._links:
+                link.discard()
+            return True
+        self.parameters.boot()
+        airframe = with_parameters(self._airframe, self.parameters)
+        if airframe.imu.integration_interval_us != self.interval_us:
+            plant = Plant(airframe, self._scene, self._seed, self._keeps_path)
+            plant.take_over(self._plant)
+            self._plant = plant
+        self._boot()
+        return True
 
     def _sense(self, telemetry: Telemetry) -> None:
         slow = self._slow
+        slow.gps_is_blocked = self._autopilot.ground.gps_is_off
         slow.update(self.time_boot_us, self._plant.state.body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss

@@ -12,6 +12,7 @@ from sim_vehicle.autopilot.flight_messages import (
     RadioChannels,
     StickInput,
 )
+from sim_vehicle.autopilot.ground import Ground
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.manual import BY_STICKS, ManualFlight
 from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result, Severity, StatusText
@@ -65,6 +66,7 @@ class Autopilot:
         self.commander = Commander(parameters, self.navigator, self.detector)
         self.modes, self.arming = self.commander.modes, self.commander.arming
         self.signal, self.battery = self.commander.signal, self.commander.battery
+        self.ground = Ground(parameters, self.origin, self.arming, self.battery, self.navigator)
         self._offboard = OffboardControl(self.signal, self.origin)
         self.applied: Setpoint | None = None
         self.texts: list[StatusText] = []
@@ -147,6 +149,10 @@ class Autopilot:
         self.say(Severity.CRITICAL, why)
         return Result.TEMPORARILY_REJECTED
 
+    def complain(self, why: str) -> None:
+        """Say what is wrong with a command."""
+        self.say(Severity.CRITICAL, why)
+
     def arm(self, forced: bool) -> Result:
         """Arm as a command asks."""
         return self.commander.arm(forced)
@@ -154,15 +160,6 @@ class Autopilot:
     def disarm(self, forced: bool) -> Result:
         """Disarm as a command asks."""
         return self.commander.disarm(forced)
-
-    def set_home_here(self) -> Result:
-        """DO_SET_HOME with the present position."""
-        self.navigator.set_home_here()
-        return Result.ACCEPTED
-
-    def set_home_at(self, position_ned_m: Vector3, yaw_rad: float) -> None:
-        """Where RETURN leads to from now on."""
-        self.navigator.set_home(position_ned_m, yaw_rad)
 
     def say(self, severity: Severity, text: str) -> None:
         """Tell the ground stations."""

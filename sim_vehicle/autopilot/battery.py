@@ -38,6 +38,8 @@ class Battery:
         self.current_a = IDLE_CURRENT_A
         self.consumed_mah = 0.0
         self.voltage_v = 0.0
+        self.is_forced_empty = False
+        """As INJECT_FAILURE can make it."""
         self.version = 0
         """Grows with every new sample."""
         self._sampled_us: int | None = None
@@ -69,6 +71,9 @@ class Battery:
         self.version += 1
 
     def _drain(self, seconds: float, armed: bool) -> None:
+        if self.is_forced_empty:
+            self.remaining = 0.0
+            return
         if not armed or not self._parameters["SIM_BAT_ENABLE"]:
             self.remaining = 1.0
             return

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from sim_vehicle.autopilot import flight_commands
+from sim_vehicle.autopilot import flight_commands, ground_commands
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
 from sim_vehicle.autopilot.modes import AUTO_MAIN_MODE, CUSTOM_FLAG, Mode, mode_from_request
 
@@ -21,11 +21,18 @@ COMPONENT_ARM_DISARM = 400
 GET_MESSAGE_INTERVAL = 510
 SET_MESSAGE_INTERVAL = 511
 REQUEST_MESSAGE = 512
+REQUEST_PROTOCOL_VERSION = 519
 REQUEST_AUTOPILOT_CAPABILITIES = 520
+ANY_COMPONENT = (REQUEST_PROTOCOL_VERSION, REQUEST_AUTOPILOT_CAPABILITIES)
+"""Answered whichever component they are for."""
 
 FORCE = 21196
 """Param 2 of COMPONENT_ARM_DISARM that skips all checks."""
-AUTOPILOT_VERSION_ID = 148
+# The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, PROTOCOL_VERSION, HOME_POSITION,
+# FLIGHT_INFORMATION, STORAGE_INFORMATION.
+REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, REQUEST_PROTOCOL_VERSION: 300, 410: 242, 528: 264, 525: 261}
+# Not a number as a whole one; and the whole number that means none, as a float.
+_NAN_AS_WHOLE, _NONE_AS_FLOAT = 0x7FF80000 / 1e7, (2_147_483_520.0, 2_147_483_648.0)
 MESSAGE_INTERVAL_ID = 244
 
 NO_ID = -1
@@ -54,6 +61,9 @@ class Flight(Protocol):
     def refuse_mode(self, why: str) -> Result:
         """Turn down a mode that this vehicle does not know."""
 
+    def complain(self, why: str) -> None:
+        """Say what is wrong with a command."""
+
     def arm(self, forced: bool) -> Result:
         """Arm."""
 
@@ -65,13 +75,15 @@ def is_for_us(command: Command, us: Identity) -> bool:
     """Whether PX4 takes the command: others are not answered, nor are its own echoes."""
     if (command.source_system, command.source_component) == us:
         return False
-    if command.command == REQUEST_AUTOPILOT_CAPABILITIES:
+    if command.command in ANY_COMPONENT:
         return command.target_system in (us.system, EVERY_ID)
     return us.is_addressed(command.target_system, command.target_component)
 
 
 def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bool]:
     """The receiver's part: its answer, if it has one, and whether the commander gets the command."""
+    if _is_misspelt(command):
+        return Result.DENIED, False
     if command.command == SET_MESSAGE_INTERVAL:
         return _set_interval(command, streams), False
     if command.command == GET_MESSAGE_INTERVAL:
@@ -79,11 +91,19 @@ def receive(command: Command, streams: StreamControl) -> tuple[Result | None, bo
         return Result.ACCEPTED, False
     if command.command == REQUEST_MESSAGE:
         return _request_message(command, streams), False
-    if command.command == REQUEST_AUTOPILOT_CAPABILITIES:
-        return _sent(streams.send_now(AUTOPILOT_VERSION_ID)), False
+    if command.command in REQUESTS:
+        return _sent(streams.send_now(REQUESTS[command.command])), False
     if command.command == DO_SET_MODE:
         return Result.ACCEPTED, True
     return None, True
+
+
+def _is_misspelt(command: Command) -> bool:
+    """Whether a place is given in the other kind of command's way to say that there is none."""
+    place = command.param5, command.param6
+    if command.frame is not None:
+        return place == (_NAN_AS_WHOLE, _NAN_AS_WHOLE)
+    return all(_NONE_AS_FLOAT[0] <= value <= _NONE_AS_FLOAT[1] for value in place)
 
 
 def answer(command: Command, result: Result) -> CommandAck:
@@ -130,11 +150,10 @@ def _set_mode(command: Command, flight: Flight) -> Result:
 
 def _arm_disarm(command: Command, flight: Flight) -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
-    if action == 1:
-        return flight.arm(forced)
-    if action == 0:
-        return flight.disarm(forced)
-    return None
+    if action not in (0, 1):
+        flight.complain(f"Unsupported ARM_DISARM param: {command.param1:.3f}")
+        return None
+    return flight.arm(forced) if action == 1 else flight.disarm(forced)
 
 
 def _land(command: Command, flight: Flight) -> Result:
@@ -151,6 +170,7 @@ _HANDLERS: dict[int, Callable[[Command, Any], Result | None]] = {
     COMPONENT_ARM_DISARM: _arm_disarm,
     NAV_LAND: _land,
     NAV_RETURN_TO_LAUNCH: _return,
+    **ground_commands.HANDLERS,
 }
 
 

@@ -17,6 +17,8 @@ from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams
 from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
 
+# Of a serial line's buffer, for the streams between the packets of a long answer.
+_RESERVED_BYTES = 1_000
 # MAV_PROTO_VER: MAVLink 1 until somebody speaks MAVLink 2.
 _BEGINS_WITH_MAVLINK_1 = 1
 
@@ -35,10 +37,16 @@ class Link:
 
     def __init__(self, options: LinkOptions, board: Board, number: int, seed: int) -> None:
         self.options = options
+        self._number = number
+        self._seed = seed
+        self._waiting = b""
+        self.boot(board)
+
+    def boot(self, board: Board) -> None:
+        """Begin as after switching on; nothing of the past is remembered."""
+        options, seed = self.options, self._seed
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
-        self._number = number
-        self._waiting = b""
         self._decoder = Decoder(board.identity, board.signing)
         self._encoder = Encoder(board.identity)
         self._signed_with: bytes | None = None
@@ -66,6 +74,10 @@ class Link:
         """The packets to send, in order."""
         return self._outbox.take()
 
+    def discard(self) -> None:
+        """Nobody is there to read what has arrived."""
+        self._waiting = b""
+
     # --- what services need ------------------------------------------------------------------------------
 
     def send(self, message: Message) -> None:
@@ -76,7 +88,8 @@ class Link:
         """How many packets of ``size`` bytes of a long answer may be sent now: at most ``serial`` on a serial line."""
         if self.options.line.baud is None:
             return fast
-        return next((count for count in range(serial, 0, -1) if self._outbox.has_room(count * size)), 0)
+        room = (count for count in range(serial, 0, -1) if self._outbox.has_room(count * size + _RESERVED_BYTES))
+        return next(room, 0)
 
     # --- what the vehicle's step calls, in this order ----------------------------------------------------
 
@@ -134,7 +147,7 @@ class Link:
         key = board.signing.key
         if key is not None or self._signed_with is not None:
             self._signed_with = key
-            encoder.sign(key, self._number, board.signing.next_stamp(board.telemetry.epoch_at_boot_us + self.now_us))
+            encoder.sign(key, self._number, board.signing.next_stamps(board.telemetry.epoch_at_boot_us + self.now_us))
 
     def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
         self._texts.heard(heartbeat, self.now_us)

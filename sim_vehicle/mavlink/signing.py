@@ -17,6 +17,8 @@ SETUP_SIGNING_ID = 256
 # Time stamps count ten microseconds since the first of January 2015; a new stream may be a minute behind.
 _UNIX_AT_2015_US = 1_420_070_400_000_000
 _MAY_LAG = 60 * 100_000
+# No link sends more in one interval.
+_MOST_PACKETS = 1000
 # Link number, time stamp and signature at the end of a packet.
 _BLOCK, _STAMP, _SIGNATURE = 13, slice(-12, -6), 6
 
@@ -47,9 +49,12 @@ class Signing:
         self._newest = time_stamp
         self._streams.clear()
 
-    def next_stamp(self, unix_us: int) -> int:
-        """The time stamp for a packet that is sent now: later than all before, from the clock where it is ahead."""
-        self._newest = max(self._newest + 1, (unix_us - _UNIX_AT_2015_US) // 10)
+    def next_stamps(self, unix_us: int) -> int:
+        """The first time stamp for the packets of one interval of one link: later than all before.
+
+        By the clock where that is ahead of all that was heard.
+        """
+        self._newest = max(self._newest + _MOST_PACKETS, (unix_us - _UNIX_AT_2015_US) // 10)
         return self._newest
 
     def accepts(self, packet: bytes, is_signed: bool, source: tuple[int, int], message_id: int, optional: bool) -> bool:

@@ -30,6 +30,20 @@ def defaults_from(airframe: Airframe) -> dict[str, float]:
     }
 
 
+def with_parameters(airframe: Airframe, parameters: Parameters) -> Airframe:
+    """``airframe`` with the inertial sensor that the parameters ask for, in whole raw samples.
+
+    IMU_GYRO_RATEMAX limits IMU_INTEG_RATE, as in PX4.
+    """
+    rate_hz = min(parameters["IMU_INTEG_RATE"], parameters["IMU_GYRO_RATEMAX"])
+    if rate_hz == defaults_from(airframe)["IMU_INTEG_RATE"]:
+        return airframe
+    raw_us = airframe.imu.raw_interval_us
+    interval_us = max(round(_MICROSECONDS / rate_hz / raw_us), 1) * raw_us
+    imu = airframe.imu.model_copy(update={"integration_interval_us": interval_us})
+    return airframe.model_copy(update={"imu": imu})
+
+
 def position_gains(parameters: Parameters) -> PositionGains:
     """What the parameters say now, for the position control."""
     p = parameters

@@ -126,6 +126,14 @@ class Plant:
         record.climb_max_m_s = gains.climb_max_m_s
         record.descent_max_m_s = gains.descent_max_m_s
 
+    def take_over(self, other: "Plant") -> None:
+        """Go on where ``other`` is, as the same body with other software or another inertial sensor."""
+        np.copyto(self._state_box, other._state_box)
+        self._behind[:] = other._behind
+        self.truth = other.truth
+        if self.onboard is not None:
+            self.onboard.start(self.state.body, self.state.time_us)
+
     def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Put the level vehicle somewhere in flight, for studies of single hits."""
         self.state.body[0:6] = [*position_ned_m, *velocity_ned_m_s]

@@ -5,6 +5,7 @@ import struct
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, TAKEOFF, Client
 
@@ -131,7 +132,7 @@ def height_after_takeoff(client: Client) -> float:
     client.command(TAKEOFF)
     client.command(ARM_DISARM, 1)
     client.run(14.0)
-    return -client.position()[2] - client.vehicle._plant._constants.foot_depth_m
+    return -client.position()[2] - load_built_in("foldable").geometry.foot_depth_m
 
 
 def test_the_takeoff_height_is_obeyed():

@@ -68,7 +68,10 @@ GROUND_HZ = {
 }
 
 
-def rates_hz(kind: LinkKind, seconds: float = 40.0) -> dict[str, float]:
+SECONDS = 20.0
+
+
+def rates_hz(kind: LinkKind, seconds: float = SECONDS) -> dict[str, float]:
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
     link, parser = vehicle.add_link(LinkOptions(kind)), dialect.MAVLink(None)
     counts: Counter[str] = Counter()
@@ -82,10 +85,10 @@ def rates_hz(kind: LinkKind, seconds: float = 40.0) -> dict[str, float]:
 def test_each_links_set_is_px4s_at_px4s_rates(kind, expected):
     measured = rates_hz(kind)
     # Sent once, when the origin is known
-    assert measured.pop("GPS_GLOBAL_ORIGIN") == pytest.approx(1 / 40)
+    assert measured.pop("GPS_GLOBAL_ORIGIN") == pytest.approx(1 / SECONDS)
     assert measured.keys() == expected.keys()
     for name, rate in expected.items():
-        assert measured[name] == pytest.approx(rate, rel=0.05), name
+        assert measured[name] == pytest.approx(rate, rel=0.05, abs=1 / SECONDS), name
 
 
 @pytest.fixture(scope="module")
@@ -163,20 +166,21 @@ def test_magnetometer_and_barometer_are_marked_when_they_are_new():
 
 def test_the_battery_sags_with_thrust_drains_in_flight_and_is_full_again_on_the_ground():
     client = Client()
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"SIM_BAT_DRAIN", 20.0, 9))
     client.run(3.0)
     at_rest = client.last("BATTERY_STATUS")
     client.command(TAKEOFF)
     client.command(ARM_DISARM, 1)
     client.run(6.0)
     flying = client.last("BATTERY_STATUS")
-    # A minute empties it (SIM_BAT_DRAIN), but not below half (SIM_BAT_MIN_PCT)
-    client.run(60.0)
+    # 20 s would empty it (SIM_BAT_DRAIN), but not below half (SIM_BAT_MIN_PCT)
+    client.run(10.0)
     late = client.last("BATTERY_STATUS")
     assert at_rest.battery_remaining == 100 and at_rest.charge_state == 1
     assert flying.current_battery > 1000 > at_rest.current_battery
     assert at_rest.voltages[0] - flying.voltages[0] > 200
-    assert late.battery_remaining == 50 and late.voltages[0] < flying.voltages[0] - 500
-    assert late.current_consumed > 100
+    assert late.battery_remaining == 50 and late.voltages[0] < flying.voltages[0] - 300
+    assert late.current_consumed > 30
     assert client.last("SYS_STATUS").battery_remaining == 50
 
 

@@ -1,0 +1,297 @@
+"""Several links at once, slow ones, MAVLink 1, pings, forwarding and signing; all in virtual time."""
+
+import hashlib
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.mavlink.line import Line
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+
+IMU, SET_INTERVAL = 105, 511
+KEY = bytes(range(32))
+
+
+class End:
+    """The other end of one link."""
+
+    def __init__(self, link: Link, system: int = 255, component: int = 190) -> None:
+        self.link = link
+        self.mav = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+        self.packets: list[bytes] = []
+
+    def send(self, message, v1: bool = False) -> bytes:
+        raw = message.pack(self.mav, force_mavlink1=v1)
+        self.mav.seq = (self.mav.seq + 1) % 256
+        self.link.push(raw)
+        return raw
+
+    def command(self, number: int, *params: float) -> bytes:
+        return self.send(dialect.MAVLink_command_long_message(1, 1, number, 0, *params, *[0.0] * (7 - len(params))))
+
+    def heartbeat(self, kind: int = 6) -> bytes:
+        return self.send(dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3))
+
+    @property
+    def messages(self) -> list:
+        parser = dialect.MAVLink(None)
+        return [parser.decode(bytearray(raw)) for raw in self.packets]
+
+    def all(self, kind: str) -> list:
+        return [message for message in self.messages if message.get_type() == kind]
+
+
+class Vehicle:
+    def __init__(self, *options: LinkOptions) -> None:
+        self.vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, epoch_at_boot_us=1_700_000_000_000_000)
+        self.ends = [End(self.vehicle.add_link(each)) for each in options]
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds * 250)):
+            self.vehicle.advance()
+            for end in self.ends:
+                end.packets += end.link.take()
+
+
+ONBOARD, GROUND = LinkOptions(LinkKind.ONBOARD), LinkOptions(LinkKind.GROUND)
+
+
+def imu_hz(baud: int, asked_hz: float | None) -> tuple[float, float]:
+    """Rate of HIGHRES_IMU and bytes a second on a serial line."""
+    vehicle = Vehicle(LinkOptions(LinkKind.ONBOARD, Line(baud)))
+    (end,) = vehicle.ends
+    if asked_hz is not None:
+        end.command(SET_INTERVAL, IMU, 1e6 / asked_hz)
+    vehicle.run(10.0)
+    assert end.link._buffer.lost == 0
+    return len(end.all("HIGHRES_IMU")) / 10, sum(map(len, end.packets)) / 10
+
+
+# The rates that PX4's own rule gives (docs/vehicle.md), by default and when asked for 200 Hz. The fastest line shows
+# the sample rate of 250 Hz, of which asking for 200 gives every second.
+@pytest.mark.parametrize(
+    ("baud", "by_default_hz", "asked_hz"),
+    [(57_600, 5, 15), (115_200, 11, 30), (460_800, 42, 120), (921_600, 50, 124)],
+)
+def test_a_serial_line_thins_the_streams_out_as_px4_does(baud, by_default_hz, asked_hz):
+    rate, load = imu_hz(baud, None)
+    assert rate == pytest.approx(by_default_hz, rel=0.15)
+    # Never more than the line carries, and on slow ones half of it, as PX4 plans
+    assert load < 0.57 * baud / 10
+    assert imu_hz(baud, 200)[0] == pytest.approx(asked_hz, rel=0.12)
+
+
+def test_a_long_list_over_a_slow_line_loses_nothing():
+    vehicle = Vehicle(LinkOptions(LinkKind.ONBOARD, Line(57_600)))
+    (end,) = vehicle.ends
+    end.send(dialect.MAVLink_param_request_list_message(1, 1))
+    vehicle.run(6.0)
+    values = end.all("PARAM_VALUE")
+    assert len(values) == values[0].param_count + 1
+    assert end.link._buffer.lost == 0
+
+
+def test_a_serial_line_begins_with_the_version():
+    vehicle = Vehicle(LinkOptions(LinkKind.ONBOARD, Line(921_600)))
+    vehicle.run(0.02)
+    assert vehicle.ends[0].messages[0].get_type() == "AUTOPILOT_VERSION"
+
+
+def test_each_link_has_its_own_streams_and_numbers():
+    vehicle = Vehicle(ONBOARD, ONBOARD)
+    first, second = vehicle.ends
+    first.command(SET_INTERVAL, IMU, 4_000)
+    second.command(SET_INTERVAL, IMU, -1)
+    vehicle.run(2.0)
+    assert len(first.all("HIGHRES_IMU")) > 480
+    assert second.all("HIGHRES_IMU") == []
+    for end in vehicle.ends:
+        assert all((b[4] - a[4]) % 256 == 1 for a, b in pairwise(end.packets))
+
+
+def test_answers_go_where_they_were_asked_for_and_texts_where_a_ground_station_is():
+    vehicle = Vehicle(ONBOARD, GROUND)
+    companion, station = vehicle.ends
+    companion.mav.srcSystem, companion.mav.srcComponent = 1, 191
+    companion.heartbeat(kind=18)
+    station.heartbeat()
+    vehicle.run(0.1)
+    companion.command(400, 1)
+    vehicle.run(0.5)
+    assert [ack.command for ack in companion.all("COMMAND_ACK")] == [400]
+    assert station.all("COMMAND_ACK") == []
+    assert [text.text for text in station.all("STATUSTEXT")] == ["Armed by external command\t"]
+    assert companion.all("STATUSTEXT") == []
+
+
+def test_a_changed_parameter_is_told_on_every_link():
+    vehicle = Vehicle(ONBOARD, GROUND)
+    vehicle.ends[0].send(dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 4.0, 9))
+    vehicle.run(0.1)
+    assert [len(end.all("PARAM_VALUE")) for end in vehicle.ends] == [2, 1]
+
+
+def test_a_link_that_ends_takes_nothing_with_it():
+    vehicle = Vehicle(ONBOARD, GROUND)
+    vehicle.vehicle.remove_link(vehicle.ends.pop(0).link)
+    vehicle.run(1.5)
+    assert vehicle.ends[0].all("HEARTBEAT")
+
+
+def test_what_is_meant_for_others_is_passed_on_between_links():
+    vehicle = Vehicle(ONBOARD, GROUND, LinkOptions(LinkKind.ONBOARD, forwards=False))
+    companion, station, deaf = vehicle.ends
+    companion.mav.srcSystem, companion.mav.srcComponent = 1, 191
+    for end in vehicle.ends:
+        end.heartbeat()
+    vehicle.run(0.05)
+    # When the ground station asks the companion, and then the vehicle
+    asked = station.send(dialect.MAVLink_command_long_message(1, 191, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    station.command(512, 148)
+    vehicle.run(0.05)
+    assert asked in companion.packets
+    assert [packet for packet in companion.packets if packet[7] == 76] == [asked]
+    assert asked not in deaf.packets
+
+
+def test_somebody_who_was_never_heard_gets_nothing_passed_on():
+    vehicle = Vehicle(ONBOARD, GROUND)
+    vehicle.ends[0].heartbeat()
+    vehicle.run(0.05)
+    asked = vehicle.ends[0].send(dialect.MAVLink_command_long_message(9, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    vehicle.run(0.05)
+    assert asked not in vehicle.ends[1].packets
+
+
+def test_a_ping_comes_back_to_its_sender():
+    vehicle = Vehicle(ONBOARD)
+    (end,) = vehicle.ends
+    end.send(dialect.MAVLink_ping_message(123, 77, 0, 0))
+    vehicle.run(0.02)
+    (ping,) = [message for message in end.all("PING") if message.seq == 77]
+    assert (ping.time_usec, ping.target_system, ping.target_component) == (123, 255, 190)
+
+
+def versions(end: End) -> Counter[int]:
+    return Counter(packet[0] for packet in end.packets)
+
+
+def test_mavlink_1_until_somebody_speaks_mavlink_2():
+    vehicle = Vehicle(ONBOARD)
+    (end,) = vehicle.ends
+    vehicle.vehicle.parameters.set("MAV_PROTO_VER", 1)
+    end.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), v1=True)
+    vehicle.run(2.0)
+    assert set(versions(end)) == {0xFE}
+    assert end.all("HEARTBEAT") and not end.all("ODOMETRY")
+    end.packets.clear()
+    end.heartbeat()
+    vehicle.run(2.0)
+    assert set(versions(end)) == {0xFD}
+
+
+def signed(end: End, time_stamp: int = 10**15, key: bytes = KEY) -> None:
+    end.mav.signing.secret_key, end.mav.signing.sign_outgoing = key, True
+    end.mav.signing.timestamp, end.mav.signing.link_id = time_stamp, 1
+
+
+@pytest.fixture
+def guarded() -> Vehicle:
+    """A vehicle that has a key."""
+    vehicle = Vehicle(ONBOARD, GROUND)
+    key_message = dialect.MAVLink_setup_signing_message(1, 1, KEY, 10**14)
+    vehicle.ends[0].send(key_message)
+    vehicle.run(0.02)
+    return vehicle
+
+
+def refused(vehicle: Vehicle):
+    return vehicle.vehicle._signing.refused
+
+
+def test_with_a_key_everything_sent_is_signed_with_it(guarded):
+    for end in guarded.ends:
+        end.packets.clear()
+    guarded.run(0.5)
+    stamps = []
+    for number, end in enumerate(guarded.ends):
+        assert end.packets
+        for raw in end.packets:
+            assert raw[2] & 1 and raw[-13] == number
+            assert hashlib.sha256(KEY + raw[:-6]).digest()[:6] == raw[-6:]
+        stamps.append([int.from_bytes(raw[-12:-6], "little") for raw in end.packets])
+    assert all(a < b for link in stamps for a, b in pairwise(link))
+
+
+def test_unsigned_wrongly_signed_and_replayed_packets_are_refused_and_counted(guarded):
+    end = guarded.ends[1]
+    end.command(400, 1)
+    guarded.run(0.05)
+    assert (refused(guarded).unsigned, end.all("COMMAND_ACK")) == (1, [])
+    signed(end, key=bytes(32))
+    end.command(400, 1)
+    guarded.run(0.05)
+    assert (refused(guarded).wrong, end.all("COMMAND_ACK")) == (1, [])
+    signed(end)
+    raw = end.command(400, 1)
+    guarded.run(0.05)
+    assert [ack.result for ack in end.all("COMMAND_ACK")] == [0]
+    # The same packet once more, on this link and on the other
+    for each in guarded.ends:
+        each.packets.clear()
+        each.link.push(raw)
+        guarded.run(0.05)
+        assert each.all("COMMAND_ACK") == []
+    assert refused(guarded).replayed == 2
+
+
+def test_a_forged_packet_from_the_future_does_not_lock_the_genuine_out(guarded):
+    end = guarded.ends[1]
+    signed(end)
+    end.command(400, 0)
+    signed(end, time_stamp=2**47, key=bytes(32))
+    end.command(400, 0)
+    signed(end, time_stamp=10**15 + 5)
+    end.command(400, 0)
+    guarded.run(0.05)
+    assert len(end.all("COMMAND_ACK")) == 2
+
+
+def test_a_new_sender_may_not_be_a_minute_late(guarded):
+    end = guarded.ends[1]
+    signed(end)
+    end.command(400, 0)
+    guarded.run(0.02)
+    end.mav.srcComponent = 77
+    signed(end, time_stamp=10**15 - 61 * 100_000)
+    end.command(400, 0)
+    guarded.run(0.02)
+    assert refused(guarded).replayed == 1
+
+
+def test_signing_may_be_left_to_the_sender(guarded):
+    guarded.vehicle.parameters.set("MAV_SIGN_CFG", 0)
+    guarded.ends[1].command(400, 0)
+    guarded.run(0.05)
+    assert len(guarded.ends[1].all("COMMAND_ACK")) == 1
+
+
+def test_a_key_is_taken_away_only_by_somebody_who_has_it(guarded):
+    end = guarded.ends[1]
+    no_key = dialect.MAVLink_setup_signing_message(1, 1, bytes(32), 0)
+    end.send(no_key)
+    guarded.run(0.02)
+    assert guarded.vehicle._signing.key == KEY
+    signed(end)
+    end.send(no_key)
+    guarded.run(0.02)
+    assert guarded.vehicle._signing.key is None
+    end.packets.clear()
+    guarded.run(0.2)
+    assert all(not raw[2] & 1 for raw in end.packets)

@@ -1,0 +1,226 @@
+"""Commands over the wire: PX4's answers, their order, and what they do to the vehicle."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, LAND, REQUEST_MESSAGE, SET_INTERVAL, SET_MODE, TAKEOFF, Client
+
+ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+NAN = math.nan
+SET_HOME, STORAGE, REBOOT, INJECT_FAILURE = 179, 245, 246, 420
+
+
+def results(client: Client, number: int, *params: float, target: tuple[int, int] = (1, 1)) -> list[int]:
+    client.forget()
+    client.command(number, *params, target=target)
+    client.run(0.02)
+    return client.results(number)
+
+
+def command_int(client: Client, number: int, x: int, y: int, z: float = 0.0, param1: float = 0.0) -> list[int]:
+    client.forget()
+    client.send(dialect.MAVLink_command_int_message(1, 1, 5, number, 0, 0, param1, 0, 0, NAN, x, y, z))
+    client.run(0.02)
+    return client.results(number)
+
+
+def texts(client: Client) -> list[str]:
+    return [message.text for message in client.all("STATUSTEXT")]
+
+
+@pytest.fixture
+def client() -> Client:
+    client = Client(system=255, component=190)
+    client.heartbeat(kind=6)
+    client.step()
+    return client
+
+
+# As a PX4 SITL answered on the ground, disarmed
+@pytest.mark.parametrize(
+    ("number", "params", "answers"),
+    [
+        (520, (1,), [ACCEPTED]),
+        (410, (), [ACCEPTED]),
+        (528, (1,), [ACCEPTED]),
+        (SET_INTERVAL, (26, 100_000), [ACCEPTED]),
+        (SET_INTERVAL, (27, 100_000), [FAILED]),
+        (510, (26,), [ACCEPTED]),
+        (REQUEST_MESSAGE, (27,), [DENIED]),
+        (REQUEST_MESSAGE, (395,), [DENIED]),
+        (REQUEST_MESSAGE, (65,), [DENIED]),
+        (SET_HOME, (1,), [ACCEPTED]),
+        (SET_HOME, (0, 0, 0, 0, 47.3977, 8.5456, 500), [ACCEPTED]),
+        (SET_HOME, (0, 0, 0, 0, NAN, 8.5456, 500), [DENIED]),
+        (STORAGE, (1,), [ACCEPTED]),
+        (REBOOT, (0,), [ACCEPTED]),
+        (REBOOT, (2,), [DENIED]),
+        (401, (1,), [ACCEPTED]),
+        (16, (), [UNSUPPORTED]),
+        (209, (1, 1), [UNSUPPORTED]),
+        (183, (1, 1500), [UNSUPPORTED]),
+        (2000, (), [UNSUPPORTED]),
+        (12345, (), [UNSUPPORTED]),
+        (203, (), []),
+        (205, (), []),
+        (530, (), []),
+        (2510, (), []),
+        (ARM_DISARM, (5,), []),
+        (ARM_DISARM, (0,), [ACCEPTED]),
+        (SET_MODE, (1, 4, 3), [ACCEPTED, ACCEPTED]),
+        (SET_MODE, (1, 9), [ACCEPTED, TEMPORARILY_REJECTED]),
+        (INJECT_FAILURE, (4, 1, 0), [ACCEPTED]),
+        (INJECT_FAILURE, (0, 1, 0), [UNSUPPORTED]),
+    ],
+)
+def test_answers_on_the_ground(client, number, params, answers):
+    assert results(client, number, *params) == answers
+
+
+@pytest.mark.parametrize(
+    ("number", "target", "answers"),
+    [
+        (ARM_DISARM, (0, 0), 1),
+        (ARM_DISARM, (1, 100), 0),
+        (ARM_DISARM, (7, 1), 0),
+        (520, (1, 100), 1),
+        (520, (7, 1), 0),
+    ],
+)
+def test_commands_for_others_are_not_answered(client, number, target, answers):
+    assert len(results(client, number, 0 if number == ARM_DISARM else 1, target=target)) == answers
+
+
+def test_the_answer_names_whoever_asked(client):
+    results(client, ARM_DISARM, 0)
+    ack = client.last("COMMAND_ACK")
+    assert (ack.target_system, ack.target_component) == (255, 190)
+
+
+def test_a_repeated_command_is_answered_again(client):
+    for confirmation in range(3):
+        client.forget()
+        client.send(dialect.MAVLink_command_long_message(1, 1, ARM_DISARM, confirmation, 1, 0, 0, 0, 0, 0, 0))
+        client.run(0.02)
+        assert client.results(ARM_DISARM) == [ACCEPTED]
+    assert client.armed() is False or client.vehicle._board.autopilot.arming.armed
+
+
+def test_set_mode_the_message_is_answered_once(client):
+    client.send(dialect.MAVLink_set_mode_message(1, 1, 0x06040000))
+    client.run(0.02)
+    assert client.results(SET_MODE) == [ACCEPTED]
+    client.run(1.0)
+    assert client.last("HEARTBEAT").custom_mode == 0x06040000
+
+
+def test_a_senseless_arming_parameter_is_named(client):
+    results(client, ARM_DISARM, 5)
+    client.heartbeat(kind=6)
+    client.run(0.3)
+    assert "Unsupported ARM_DISARM param: 5.000\t" in texts(client)
+
+
+def test_a_place_that_is_none_in_the_other_commands_way_is_denied(client):
+    assert command_int(client, SET_HOME, 0x7FF80000, 0x7FF80000) == [DENIED]
+    assert results(client, SET_HOME, 0, 0, 0, 0, 2**31 - 1, 2**31 - 1, 0) == [DENIED]
+
+
+def test_home_moves_where_a_command_int_says(client):
+    assert command_int(client, SET_HOME, 473_980_000, 85_460_000, 495.0) == [ACCEPTED]
+    client.forget()
+    client.command(410)
+    client.run(0.02)
+    home = client.last("HOME_POSITION")
+    assert (home.latitude, home.longitude, home.altitude) == (473_980_000, 85_460_000, 495_000)
+    assert home.z == pytest.approx(488.0 - 495.0)
+
+
+def test_home_may_be_fixed(client):
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"COM_HOME_EN", 0.0, 6))
+    # It counts after a reboot only
+    assert results(client, SET_HOME, 1) == [ACCEPTED]
+    client.vehicle.parameters.boot()
+    assert results(client, SET_HOME, 1) == [DENIED]
+
+
+def reboot(client: Client) -> None:
+    assert results(client, REBOOT, 1) == [ACCEPTED]
+    client.run(0.5)
+    client.forget()
+
+
+def test_a_reboot_is_silent_for_a_while_and_begins_anew(client):
+    client.command(SET_INTERVAL, 105, 4_000)
+    client.command(SET_MODE, 1, 1)
+    client.run(1.0)
+    reboot(client)
+    client.run(1.5)
+    assert client.received == []
+    client.run(2.0)
+    assert client.last("HEARTBEAT").custom_mode == 0x03040000
+    assert 50 < len(client.all("HIGHRES_IMU")) < 100
+
+
+def test_no_reboot_while_armed(client):
+    results(client, ARM_DISARM, 1)
+    assert results(client, REBOOT, 1) == [DENIED]
+    assert results(client, STORAGE, 2) == [TEMPORARILY_REJECTED]
+
+
+def test_parameters_outlive_a_reboot_and_some_count_only_then(client):
+    link = dialect.MAVLink(None, srcSystem=255, srcComponent=190)
+    for name, whole in (("MAV_SYS_ID", 42), ("IMU_INTEG_RATE", 400)):
+        message = dialect.MAVLink_param_set_message(1, 1, name.encode(), 0.0, 6)
+        client.send_raw(message._pack(link, message.crc_extra, _whole_set(name, whole)))
+    client.run(1.1)
+    assert client.last("HEARTBEAT").get_srcSystem() == 1
+    reboot(client)
+    client.run(4.0)
+    assert client.last("HEARTBEAT").get_srcSystem() == 42
+    assert client.vehicle.interval_us == 2_500
+    client.forget()
+    client.command(SET_INTERVAL, 105, 1_000, target=(42, 1))
+    begun_s = client.time_s
+    for _ in range(4_000):
+        client.step()
+    imu = client.all("HIGHRES_IMU")
+    assert len(imu) / (client.time_s - begun_s) == pytest.approx(395, abs=5)
+    assert imu[-1].zacc == pytest.approx(-9.8, abs=1.5)
+
+
+def _whole_set(name: str, whole: int) -> bytes:
+    return whole.to_bytes(4, "little", signed=True) + bytes([1, 1]) + name.encode().ljust(16, b"\0") + bytes([6])
+
+
+def test_defaults_come_back_by_command(client):
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 9.0, 9))
+    client.run(0.05)
+    assert results(client, STORAGE, 2) == [ACCEPTED]
+    assert client.vehicle.parameters["MIS_TAKEOFF_ALT"] == 2.5
+
+
+def test_a_lost_gps_shows_and_comes_back(client):
+    results(client, INJECT_FAILURE, 4, 1, 0)
+    client.run(1.0)
+    assert client.last("GPS_RAW_INT").fix_type == 0
+    assert not client.last("SYS_STATUS").onboard_control_sensors_health & 0x20
+    results(client, INJECT_FAILURE, 4, 0, 0)
+    client.run(1.0)
+    assert client.last("GPS_RAW_INT").fix_type == 3
+
+
+def test_failures_are_refused_where_they_are_switched_off(client):
+    client.send(dialect.MAVLink_param_set_message(1, 1, b"SYS_FAILURE_EN", 0.0, 6))
+    assert results(client, INJECT_FAILURE, 4, 1, 0) == [DENIED]
+
+
+def test_takeoff_disarm_in_the_air_and_land(client):
+    results(client, TAKEOFF, NAN, 0, 0, NAN, NAN, NAN, NAN)
+    assert results(client, ARM_DISARM, 1) == [ACCEPTED]
+    client.run(8.0)
+    assert results(client, ARM_DISARM, 0) == [TEMPORARILY_REJECTED]
+    assert results(client, LAND) == [ACCEPTED]
+    client.run_until(lambda: not client.armed(), 20.0)
