@@ -118,6 +118,9 @@ class FlightContext:
         config = self.mission.companion.flight
         self.pace = Pace(config.cruise_speed_m_s, config.cruise_acceleration_m_s2)
         self.steps = self.steps or program(self.mission)
+        last = self.steps[-1].action
+        if isinstance(last, ReturnItem):
+            self.returning_as = last
 
     @property
     def step(self) -> Step:

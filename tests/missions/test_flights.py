@@ -7,7 +7,7 @@ from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.truth_match import match_contacts
-from tests.missions.test_missions import CONTACT_REACH_M, load
+from tests.missions.test_missions import CONTACT_REACH_M, NAMES, WITHOUT_OBSTACLES, load
 
 
 @pytest.fixture(scope="module")
@@ -26,23 +26,28 @@ def fly(tmp_path_factory):
     return flight_of
 
 
-@pytest.mark.parametrize("name", ["corner", "oblique", "paper", "wall"])
-def test_each_wall_is_hit_seen_and_left_behind(fly, name):
+@pytest.mark.parametrize("name", NAMES)
+def test_each_mission_ends_as_its_file_says(fly, name):
     flown = fly(name)
     assert flown.report.outcome == "completed", flown.report.reason
+    assert [wish.text for wish in flown.report.expectations if not wish.met] == []
     matches = match_contacts(flown.report.collisions, flown.truth.hits, 0.5)
     assert (matches.false_detections, matches.missed_contacts) == (0, 0)
-    assert len(flown.report.collisions) >= 1
+    assert (len(flown.truth.hits) == 0) is (name in WITHOUT_OBSTACLES)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in WITHOUT_OBSTACLES])
+def test_each_recovery_leads_away_from_what_was_hit(fly, name):
+    flown = fly(name)
     # the recovery setpoint leads away from the wall that was hit
     collision, hit = flown.report.collisions[0], flown.truth.hits[0]
     away = np.subtract(collision.recovery_setpoint_ned_m, hit.contact_position_ned_m)
-    assert away @ np.array(hit.normal_ned) > 0.3
+    assert away @ np.array(hit.normal_ned) > (0.3 if name != "hover" else -0.05)
 
 
 def test_the_square_hits_nothing_and_detects_nothing(fly):
     flown = fly("square")
-    assert flown.report.outcome == "completed", flown.report.reason
-    assert flown.report.collisions == () and flown.truth.hits == []
+    assert flown.report.collisions == ()
     # all four corners were passed within the acceptance radius of 0.2 m and the landing is at the start
     path = flown.truth.series["position_ned_m"]
     for north_m, east_m in ((4, 0), (4, 4), (0, 4), (0, 0)):
@@ -52,7 +57,7 @@ def test_the_square_hits_nothing_and_detects_nothing(fly):
 
 
 def test_the_wall_missions_come_home(fly):
-    for name in ("wall", "corner", "oblique"):
+    for name in ("wall", "corner", "oblique", "knock", "corridor", "patrol", "home", "windy", "acceptance"):
         assert np.hypot(*fly(name).truth.series["position_ned_m"][-1, :2]) < 0.5
 
 
@@ -80,3 +85,67 @@ def test_the_papers_scenario_is_met(fly):
     assert until_contact_s == pytest.approx(0.2, abs=0.02)
     assert hit.impact_velocity_ned_m_s[0] == pytest.approx(1.4, abs=0.08)
     assert hit.contact_position_ned_m[2] == pytest.approx(-4.0, abs=0.2)
+
+
+def heights_m(flown):
+    return -flown.truth.series["position_ned_m"][:, 2]
+
+
+def test_the_slalom_is_swept_through_without_stopping(fly):
+    flown = fly("path")
+    path, speed = flown.truth.series["position_ned_m"], np.linalg.norm(flown.truth.series["velocity_ned_m_s"], axis=1)
+    for point in ([2, 1.5, -2], [4, -1.5, -2], [6, 1.5, -2.5], [6, -2.5, -3]):
+        distance_m = np.linalg.norm(path - point, axis=1)
+        assert distance_m.min() < 0.4
+        assert speed[distance_m.argmin()] > 0.5
+
+
+def test_the_orbit_keeps_its_distance_and_turns_both_ways(fly):
+    series = fly("orbit").truth.series
+    offset = series["position_ned_m"][:, :2] - np.array([4.0, 0.0])
+    distance_m = np.hypot(*offset.T)
+    # until the way home leads across the middle
+    on_circle = (np.abs(distance_m - 2.5) < 0.35) & (np.arange(len(distance_m)) < np.argmax(distance_m < 1.5))
+    angle = np.unwrap(np.arctan2(offset[:, 1], offset[:, 0])[on_circle])
+    # from the south clockwise all round, and half way back
+    assert angle.max() - angle[0] == pytest.approx(2 * np.pi, abs=0.4)
+    assert angle.max() - angle[-1] == pytest.approx(np.pi, abs=0.6)
+
+
+def test_the_door_is_tried_three_times_each_slower(fly):
+    flown = fly("knock")
+    speeds = [hit.impact_speed_m_s for hit in flown.report.collisions]
+    assert len(speeds) == 3 and speeds == sorted(speeds, reverse=True)
+    assert speeds[2] < 0.65 * speeds[0]
+    assert flown.report.reason.endswith("not flown from item 2 on")
+
+
+def test_the_corridor_is_left_by_both_walls(fly):
+    first, second = fly("corridor").report.collisions
+    assert first.normal_ned[1] < -0.9 and second.normal_ned[1] > 0.9
+
+
+def test_where_the_wall_was_touched_is_where_it_stands(fly):
+    """Two touches 2 m apart give the wall's angle, 10 degrees."""
+    first, second = (np.array(hit.position_ned_m) for hit in fly("touch").report.collisions)
+    north_m, east_m, _ = second - first
+    assert np.degrees(np.arctan2(north_m, east_m)) == pytest.approx(10.0, abs=3.0)
+
+
+def test_the_way_home_leads_above_what_was_hit(fly):
+    flown = fly("home")
+    after = flown.truth.series["time_boot_us"] > flown.truth.hits[0].contact_at_boot_us
+    assert heights_m(flown)[after].max() == pytest.approx(3.0, abs=0.3)
+    assert heights_m(flown)[~after].max() < 1.8
+
+
+def test_the_rooms_fence_holds_the_vehicle_inside(fly):
+    path = fly("room").truth.series["position_ned_m"]
+    assert path[:, 0].min() > -1.9 and path[:, 0].max() < 4.1
+    assert path[:, 1].min() > -2.3 and path[:, 1].max() < 2.7
+
+
+def test_the_cart_pushes_the_hovering_vehicle_out_of_its_way(fly):
+    hit = fly("hover").truth.hits[0]
+    assert np.linalg.norm(hit.impact_velocity_ned_m_s) < 0.3
+    assert fly("hover").truth.series["position_ned_m"][-1, 0] > 0.3
