@@ -15,6 +15,8 @@ from rebound_cli.logs.log import LogError
 
 Floats = npt.NDArray[np.float64]
 
+# Every ULog message begins with its size and its type.
+_HEADER_SIZE = 3
 # vehicle_status.arming_state, the same number since 2015.
 ARMED = 2
 
@@ -28,7 +30,8 @@ class Topic:
 
     def column(self, name: str) -> Floats | None:
         values = self.fields.get(name)
-        return None if values is None else values.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # damage can make a signalling NaN
+            return None if values is None else values.astype(np.float64)
 
     def vector(self, *names: str) -> Floats | None:
         """Fields side by side, one row a sample; None when one of them is missing."""
@@ -50,14 +53,20 @@ class Topics:
     def __init__(self, path: Path, names: Sequence[str]) -> None:
         log = _read(path, names)
         self._topics = {
-            (data.name, data.multi_id): _topic(data.data) for data in log.data_list if len(data.data["timestamp"])
+            (data.name, data.multi_id): _topic(data.data)
+            for data in log.data_list
+            if len(data.data.get("timestamp", ()))
         }
         self.is_damaged = bool(log.file_corruption)
         self.lost_s = sum(dropout.duration for dropout in log.dropouts) * 1e-3
-        self.parameters: Mapping[str, float] = log.initial_parameters
+        self.parameters = {
+            name: float(value) for name, value in log.initial_parameters.items() if isinstance(value, int | float)
+        }
         self.hardware = str(log.msg_info_dict.get("ver_hw", ""))
         release = log.msg_info_dict.get("ver_sw_release")
-        self.version = None if release is None else (release >> 24 & 0xFF, release >> 16 & 0xFF, release >> 8 & 0xFF)
+        self.version = None
+        if isinstance(release, int):
+            self.version = (release >> 24 & 0xFF, release >> 16 & 0xFF, release >> 8 & 0xFF)
         # Instants that topics share; a log's own start may lie hours of waiting before its data.
         self.started_us = int(log.start_timestamp)
 
@@ -72,11 +81,27 @@ class Topics:
         return next((topic for name in names if (topic := self.get(name)) is not None), None)
 
 
+class _Content(io.BytesIO):
+    """A file in memory. Where its end cuts a message of the head, pyulog would go back and read it again for ever."""
+
+    _message_at = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size == _HEADER_SIZE:
+            self._message_at = self.tell()
+        return super().read(size)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        if whence == io.SEEK_CUR and self.tell() + offset < self._message_at:
+            raise EOFError("it is cut short")
+        return super().seek(offset, whence)
+
+
 def _read(path: Path, names: Sequence[str]) -> ULog:
     try:
         # It prints its warnings; what they say is asked for below.
         with contextlib.redirect_stdout(io.StringIO()):
-            return ULog(str(path), list(names))
+            return ULog(_Content(path.read_bytes()), list(names))
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # damaged files make it raise whatever the bytes led to

@@ -41,6 +41,8 @@ _COSTS = {
 }
 # A topic that begins this much later than the IMU samples was not there when something may have happened.
 _LATE_US = 1_000_000
+# No battery lasts so long: a time stamp further from the middle of the log is damage.
+_LONGEST_US = 24 * 3600 * 1_000_000
 # Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
 _SLOW_HZ = 15.0
 
@@ -59,7 +61,8 @@ def read_ulog(path: Path) -> Log:
         if topic is not None:
             heard.extend(convert(topic))
     heard.extend(landed_states(topics))
-    heard.sort(key=lambda item: item.at_us)
+    middle_us = int(np.median(imu.time_us))
+    heard = sorted((item for item in heard if abs(item.at_us - middle_us) < _LONGEST_US), key=lambda item: item.at_us)
     version = "" if topics.version is None else " " + ".".join(map(str, topics.version))
     hardware = f" on {topics.hardware}" if topics.hardware else ""
     return checked(

@@ -64,7 +64,7 @@ def test_another_setting_is_another_flight(flight):
     mission = yaml.safe_load(resolved.read_text())
     mission["companion"]["lateral"]["threshold_m_s2"] = 40.0
     resolved.write_text(yaml.safe_dump(mission))
-    assert "'lateral' on the watch" in reproduce(read_recording(flight)).first_difference
+    assert reproduce(read_recording(flight)).first_difference is not None
 
 
 def test_a_changed_packet_is_found(flight):

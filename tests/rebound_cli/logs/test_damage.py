@@ -1,0 +1,85 @@
+"""Whatever bytes a log holds, it is read, or refused in one sentence."""
+
+import struct
+
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from companion.mission.config import CompanionConfig
+from rebound_cli.logs.log import LogError
+from rebound_cli.logs.reader import read_log
+from rebound_cli.replay.watching import watch_log
+from tests.rebound_cli.logs.test_telemetry import Writer
+from tests.rebound_cli.logs.ulog_file import every, message, sensor_combined, ulog
+
+ULOG = ulog(
+    {
+        "sensor_combined": sensor_combined(every(5000, 0, 200_000)),
+        "vehicle_attitude": ([("float[4]", "q")], [(1000, (1.0, 0.0, 0.0, 0.0))]),
+        "vehicle_status": ([("uint8_t", "nav_state"), ("uint8_t", "arming_state")], [(0, 14, 2)]),
+        "vehicle_land_detected": ([("bool", "landed")], [(0, True), (50_000, False)]),
+    },
+    parameters=[("MPC_THR_HOVER", 0.5)],
+)
+
+
+def telemetry():
+    log = Writer()
+    log.heartbeat()
+    for _ in range(40):
+        log.imu()
+    return log.content
+
+
+TELEMETRY = telemetry()
+
+changes = st.lists(st.tuples(st.floats(0.0, 1.0, exclude_max=True), st.binary(min_size=1, max_size=8)), max_size=8)
+cuts = st.floats(0.0, 1.0)
+
+
+def damaged(content, spots, kept):
+    damaged = bytearray(content)
+    for place, patch in spots:
+        start = int(place * len(damaged))
+        damaged[start : start + len(patch)] = patch
+    return bytes(damaged[: round(kept * len(damaged))])
+
+
+def read_or_refused(path, content):
+    path.write_bytes(content)
+    try:
+        log = read_log(path)
+    except LogError as error:
+        assert str(path) in str(error) and "\n" not in str(error) and str(error).endswith(".")
+    else:
+        watch_log(log, CompanionConfig())
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes, cuts)
+@example([], 1.0)
+def test_a_damaged_px4_log(tmp_path, spots, kept):
+    read_or_refused(tmp_path / "log.ulg", damaged(ULOG, spots, kept))
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(changes, cuts)
+@example([], 1.0)
+def test_a_damaged_telemetry_log(tmp_path, spots, kept):
+    read_or_refused(tmp_path / "log.tlog", damaged(TELEMETRY, spots, kept))
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=300), st.sampled_from(["log.ulg", "log.tlog"]))
+def test_bytes_from_anywhere(tmp_path, content, name):
+    read_or_refused(tmp_path / name, content)
+
+
+def test_a_head_that_ends_in_a_damaged_message(tmp_path):
+    # Given a message of no type that is said to be longer than what is left of the file, by just so much that its
+    # reader, going back over it, meets the beginning of an earlier message, and so for ever
+    note = message("I", bytes([14]) + b"char[900] text" + bytes(900))
+    head = ULOG[:59] + 13 * note
+    size = len(head) + 1 - 59 - len(note)
+    assert size > 10_000
+    read_or_refused(tmp_path / "log.ulg", head + struct.pack("<HB", size, 0))
