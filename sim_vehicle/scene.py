@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.errors import SceneError
+from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.obstacles import BoxSpec, Finite, Part, Point, PoleSpec, WallSpec
 from sim_vehicle.world import Obstacle, Vector3, Wall, World, build_world
 
@@ -33,6 +34,14 @@ class Scene(Part):
     walls: tuple[WallSpec, ...] = ()
     poles: tuple[PoleSpec, ...] = ()
     boxes: tuple[BoxSpec, ...] = ()
+    faults: tuple[Fault, ...] = ()
+
+    @model_validator(mode="after")
+    def _faults_fit(self) -> "Scene":
+        problem = overlapping(self.faults)
+        if problem is not None:
+            raise ValueError(problem)
+        return self
 
     def walls_built(self) -> tuple[Wall, ...]:
         """The walls as values, in the file's order."""

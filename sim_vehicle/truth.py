@@ -1,6 +1,7 @@
 """What really happened: every hit and the path, recorded beside the simulation and never sent by it."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -70,12 +71,25 @@ class Hit:
         return sum(v * n for v, n in zip(self.rebound_velocity_ned_m_s, self.normal_ned, strict=True))
 
 
+@dataclass(frozen=True, slots=True)
+class FaultSpan:
+    """A fault that a mission asked for, and when it acted."""
+
+    kind: str
+    began_at_boot_us: int
+    ended_at_boot_us: int | None
+    """None while it acts."""
+    details: dict[str, Any]
+    """As the mission file has it."""
+
+
 @dataclass(slots=True)
 class TruthRecorder:
     """Grows with the flight; ``keeps_path`` off leaves only the hits, for flights without an end."""
 
     keeps_path: bool = True
     hits: list[Hit] = field(default_factory=list)
+    faults: list[FaultSpan] = field(default_factory=list)
     _rows: Floats = field(default_factory=lambda: np.empty((_FIRST_ROWS, _ROW)))
     _used: int = 0
 

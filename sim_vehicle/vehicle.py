@@ -7,6 +7,7 @@ from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.autopilot.mission_store import MissionStore
 from sim_vehicle.mavlink.board import Board
+from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.stream_rates import LinkKind
@@ -96,7 +97,11 @@ class SimulatedVehicle:
 
     def add_link(self, options: LinkOptions) -> Link:
         """One more connection, from now on."""
-        link = Link(options, self._board, self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far)
+        number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
+        if needs_faulty_link(self._scene.faults):
+            link: Link = FaultyLink(options, self._board, number, seed, self._scene.faults)
+        else:
+            link = Link(options, self._board, number, seed)
         self._links_so_far += 1
         self._links.append(link)
         return link
@@ -163,8 +168,10 @@ class SimulatedVehicle:
         return True
 
     def _sense(self, telemetry: Telemetry) -> None:
-        slow = self._slow
+        slow, faults = self._slow, self._plant.faults
         slow.gps_is_blocked = self._autopilot.ground.gps_is_off
+        if faults is not None and faults.is_lost("gps", self.time_boot_us / 1e6):
+            slow.gps_is_blocked = True
         slow.update(self.time_boot_us, self._plant.state.body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss

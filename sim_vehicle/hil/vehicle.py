@@ -72,7 +72,8 @@ class HilVehicle:
         velocity_ned_m_s: Vector3 = (vx, vy, vz)
         attitude_wxyz: Quadruple = (qw, qx, qy, qz)
         messages: list[ToPx4] = []
-        if self._is_due(GPS_PERIOD_US):
+        faults = self._plant.faults
+        if self._is_due(GPS_PERIOD_US) and not (faults is not None and faults.is_lost("gps", now_us / 1e6)):
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))

@@ -8,6 +8,7 @@ import numpy as np
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
 from sim_vehicle.estimator.onboard import OnboardEstimator
+from sim_vehicle.faults.plan import Faults, with_losses
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import (
     FINE_STEPS,
@@ -74,6 +75,7 @@ class Plant:
         keeps_path: bool = True,
         fine_steps: int = FINE_STEPS,
     ) -> None:
+        airframe = with_losses(airframe, scene.faults)
         self._rng = np.random.default_rng(seed)
         self._world = scene.world()
         # What a camera or a beam sees: poles and edges are too thin.
@@ -113,6 +115,11 @@ class Plant:
         self._scratch_box = boxed(new_record(Scratch))
         self.interval_us = airframe.imu.integration_interval_us
         self.truth = TruthRecorder(keeps_path)
+        self.faults: Faults | None = None
+        if scene.faults:
+            self.faults = Faults(scene.faults, airframe, scene.wind_ned_m_s, seed)
+            self.truth.faults = self.faults.spans
+            self.faults.begin(self.state)
 
     def tune(self, gains: PositionGains) -> None:
         """Change the gains and limits of the position control."""
@@ -130,7 +137,8 @@ class Plant:
         """Go on where ``other`` is, as the same body with other software or another inertial sensor."""
         np.copyto(self._state_box, other._state_box)
         self._behind[:] = other._behind
-        self.truth = other.truth
+        self.truth, self.faults = other.truth, other.faults
+        np.copyto(self._disturbance_box, other._disturbance_box)
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
 
@@ -164,6 +172,8 @@ class Plant:
     def _advance(self, motors: int) -> PlantOutput:
         if self._world.movers:
             self._move_obstacles()
+        if self.faults is not None:
+            self.faults.before(self.state, self.disturbance)
         advance_boxed(
             self._state_box,
             self._asked_box,
@@ -203,8 +213,14 @@ class Plant:
         clipped = int(clip_x), int(clip_y), int(clip_z)
         estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
         onboard.update(int(time_us), (fx, fy, fz), (p, q, r), clipped, flies, self._body, estimate, acceleration)
+        if self.faults is not None:
+            estimate[0:6] += self.disturbance.estimate_jump
         self._report[ESTIMATE] = estimate
         self._report[ACCELERATION] = acceleration
+
+    def _reset_counter(self) -> int:
+        own = 0 if self.onboard is None else self.onboard.reset_counter
+        return own if self.faults is None else own + self.faults.reset_counter
 
     def _take_setpoint(self, setpoint: Setpoint) -> None:
         """Write the setpoint where the kernels read it."""
@@ -255,5 +271,5 @@ class Plant:
             attitude_wxyz=(qw, qx, qy, qz),
             thrust_fraction=(m1 + m2 + m3 + m4) / 4,
             motor_fractions=(m1, m2, m3, m4),
-            reset_counter=self.onboard.reset_counter if self.onboard is not None else 0,
+            reset_counter=self._reset_counter(),
         )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.truth import Hit, TruthRecorder
+from sim_vehicle.truth import FaultSpan, Hit, TruthRecorder
 
 Floats = npt.NDArray[np.float64]
 
@@ -16,16 +16,23 @@ Floats = npt.NDArray[np.float64]
 def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int) -> None:
     """Write hits and path as `.npz`; ``epoch_at_boot_us`` is the wall clock at the vehicle's boot time 0."""
     hits = json.dumps([asdict(hit) for hit in truth.hits])
-    arrays: dict[str, Any] = {**truth.series(), "hits": hits, "epoch_at_boot_us": epoch_at_boot_us}
+    faults = json.dumps([asdict(fault) for fault in truth.faults])
+    arrays: dict[str, Any] = {**truth.series(), "hits": hits, "faults": faults, "epoch_at_boot_us": epoch_at_boot_us}
     np.savez_compressed(path, **arrays)
 
 
 def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
     """Hits, path and the wall clock (microseconds) at the vehicle's boot time 0."""
     with np.load(path) as stored:
-        series = {name: stored[name] for name in stored.files if name not in ("hits", "epoch_at_boot_us")}
+        series = {name: stored[name] for name in stored.files if name not in ("hits", "faults", "epoch_at_boot_us")}
         hits = [Hit(**_as_tuples(fields)) for fields in json.loads(str(stored["hits"]))]
         return hits, series, int(stored["epoch_at_boot_us"])
+
+
+def load_faults(path: Path) -> list[FaultSpan]:
+    """The faults that acted, in the order in which they began."""
+    with np.load(path) as stored:
+        return [FaultSpan(**fields) for fields in json.loads(str(stored["faults"]))] if "faults" in stored else []
 
 
 def _as_tuples(fields: dict[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,82 @@
+"""Faults of the vehicle's body: motors, supply, load, and hands."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sim_vehicle.faults.spec import BatterySag, FreeFall, HandCatch, MotorFailure, PayloadDrop, Push
+from sim_vehicle.faults.wind import risen
+from sim_vehicle.physics.layout import Disturbance, State
+
+
+class Motors:
+    """What each motor gives of what it is commanded."""
+
+    def __init__(self, faults: Sequence[MotorFailure | FreeFall | BatterySag]) -> None:
+        self._faults = faults
+
+    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+        shares = [1.0] * 4
+        for fault in self._faults:
+            start_s, end_s = fault.window_s
+            if time_s < start_s:
+                continue
+            if isinstance(fault, BatterySag):
+                # A propeller's speed goes with voltage, its thrust with the square of its speed.
+                fallen = min((time_s - start_s) / (end_s - start_s), 1.0)
+                voltage_share = 1.0 - fallen * (1.0 - fault.voltage_share)
+                shares = [share * voltage_share**2 for share in shares]
+            elif time_s < end_s and isinstance(fault, MotorFailure):
+                shares[fault.motor] *= fault.thrust_share
+            elif time_s < end_s:
+                shares = [0.0] * 4
+        disturbance.motor_share[:] = shares
+
+
+class Load:
+    """What the vehicle still carries."""
+
+    def __init__(self, drops: Sequence[PayloadDrop]) -> None:
+        self._drops = drops
+
+    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+        disturbance.carried_kg = sum(drop.mass_kg for drop in self._drops if time_s < drop.window_s[0])
+
+
+class Pushes:
+    """Forces on a point of the body, one at a time."""
+
+    def __init__(self, pushes: Sequence[Push]) -> None:
+        self._pushes = pushes
+
+    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+        disturbance.pushes = 0
+        for push in self._pushes:
+            start_s, end_s = push.window_s
+            if start_s <= time_s < end_s:
+                share = risen(time_s, start_s, end_s, push.rise_s) if push.rise_s > 0.0 else 1.0
+                disturbance.pushes = 1
+                disturbance.push_ned_n[:] = share * np.array(push.force_ned_n)
+                disturbance.push_point_frd_m[:] = push.point_frd_m
+
+
+class Hands:
+    """Hands that take hold of the vehicle where it is."""
+
+    def __init__(self, catches: Sequence[HandCatch]) -> None:
+        self._catches = catches
+        self._held: HandCatch | None = None
+
+    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+        held = None
+        for catch in self._catches:
+            start_s, end_s = catch.window_s
+            if start_s <= time_s < end_s:
+                held = catch
+        if held is not None and held is not self._held:
+            disturbance.hold_point_ned_m[:] = state.body[0:3]
+            disturbance.hold_stiffness_n_m = held.stiffness_n_m
+            disturbance.hold_damping_n_s_m = held.damping_n_s_m
+            disturbance.hold_turn_damping_n_m_s = held.turn_damping_n_m_s
+        disturbance.holds = int(held is not None)
+        self._held = held

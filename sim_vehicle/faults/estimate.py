@@ -1,0 +1,96 @@
+"""Faults of the vehicle's estimate: it jumps, it misses what clipping hid, it drifts without its sensors."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.faults.spec import AidingLoss, EstimatorAfterClipping, EstimatorReset
+from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.rotation import matrix_from_quaternion
+
+Floats = npt.NDArray[np.float64]
+
+
+class Estimate:
+    """How far the estimate is off (position m, velocity m/s, NED), and how often it has said that it jumped."""
+
+    def __init__(
+        self,
+        faults: Sequence[EstimatorReset | EstimatorAfterClipping | AidingLoss],
+        drifts: bool,
+        step_s: float,
+        rng: np.random.Generator,
+    ) -> None:
+        """``drifts``: nothing else models what the loss of a sensor does."""
+        self._resets = [fault for fault in faults if isinstance(fault, EstimatorReset)]
+        self._clippings = [fault for fault in faults if isinstance(fault, EstimatorAfterClipping)]
+        self._losses = [fault for fault in faults if isinstance(fault, AidingLoss)] if drifts else []
+        self._step_s = step_s
+        self._rng = rng
+        self._pending = sorted(self._resets, key=lambda fault: fault.window_s)
+        self._lost_before: set[int] = set()
+        self._due_s: list[float] = []
+        self._kick_m_s = 0.0
+        self._settles_s = 1.0
+        self._rotation = np.empty((3, 3))
+        self._shift, self._velocity, self._drift = np.zeros(3), np.zeros(3), np.zeros(6)
+        self.reset_counter = 0
+
+    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+        self._velocity *= np.exp(-self._step_s / self._settles_s)
+        self._jump(time_s)
+        self._miss(time_s, state)
+        self._stray(time_s)
+        disturbance.estimate_jump[0:3] = self._shift + self._drift[0:3]
+        disturbance.estimate_jump[3:6] = self._velocity + self._drift[3:6]
+
+    def _jump(self, time_s: float) -> None:
+        while self._pending and self._pending[0].window_s[0] <= time_s:
+            reset = self._pending.pop(0)
+            self._shift += reset.position_jump_ned_m
+            self._velocity += reset.velocity_jump_ned_m_s
+            self._settles_s = reset.settles_s
+            self.reset_counter += 1
+
+    def _miss(self, time_s: float, state: State) -> None:
+        """Velocity that clipping has hidden is missing at once; resets follow, each leaving an error of its own."""
+        for fault in self._clippings:
+            start_s, end_s = fault.window_s
+            hidden = np.array(state.clipped_off_m_s)
+            if not start_s <= time_s < end_s or float(np.linalg.norm(hidden)) < fault.least_hidden_m_s:
+                continue
+            matrix_from_quaternion(state.body, self._rotation)
+            self._velocity -= self._rotation @ hidden
+            self._settles_s, self._kick_m_s = fault.settles_s, fault.kick_m_s
+            if not self._due_s:
+                self._due_s = [time_s + fault.over_s * (n + 1) / fault.resets for n in range(fault.resets)]
+        while self._due_s and self._due_s[0] <= time_s:
+            self._due_s.pop(0)
+            self._velocity = self._kick_m_s * self._rng.standard_normal(3)
+            self._shift += self._step_s * self._velocity
+            self.reset_counter += 1
+
+    def _stray(self, time_s: float) -> None:
+        """Random walk of the velocity while a sensor is lost; when it is back the estimate jumps back to the truth."""
+        for number, fault in enumerate(self._losses):
+            start_s, end_s = fault.window_s
+            if start_s <= time_s < end_s:
+                self._lost_before.add(number)
+                axes = _STRAYING.get(fault.sensor, slice(0, 0))
+                walk = fault.drift_m_s2 * np.sqrt(self._step_s) * self._rng.standard_normal(3)
+                self._drift[3:6][axes] += walk[axes]
+                self._drift[0:3][axes] += self._step_s * self._drift[3:6][axes]
+            elif number in self._lost_before:
+                self._lost_before.discard(number)
+                self._drift[:] = 0.0
+                self.reset_counter += 1
+
+
+# Which axes of velocity and position nobody watches any more.
+_STRAYING = {
+    "optical_flow": slice(0, 2),
+    "gps": slice(0, 2),
+    "motion_capture": slice(0, 3),
+    "range_finder": slice(2, 3),
+}

@@ -1,0 +1,272 @@
+"""The entries of `sim.faults`: what goes wrong, how much, and when by the vehicle's boot clock."""
+
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from sim_vehicle.obstacles import Finite, NotNegative, Part, Point
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Motor = Annotated[int, Field(ge=0, le=3)]
+
+FOREVER_S = 1e9
+
+
+class Timed(Part):
+    """When a fault acts: from a moment on, or between two."""
+
+    at_s: NotNegative | None = None
+    between_s: tuple[NotNegative, NotNegative] | None = None
+
+    @model_validator(mode="after")
+    def _has_one_time(self) -> Self:
+        if (self.at_s is None) == (self.between_s is None):
+            raise ValueError("give at_s (from then on) or between_s: [from, until], and not both")
+        if self.between_s is not None and self.between_s[1] <= self.between_s[0]:
+            raise ValueError(f"between_s: [{self.between_s[0]:g}, {self.between_s[1]:g}] ends before it begins")
+        return self
+
+    @property
+    def window_s(self) -> tuple[float, float]:
+        """From when until when."""
+        return self.between_s or (self.at_s or 0.0, FOREVER_S)
+
+
+class During(Timed):
+    """A fault that has to end: `between_s` only."""
+
+    @model_validator(mode="after")
+    def _ends(self) -> Self:
+        if self.between_s is None:
+            raise ValueError("give between_s: [from, until]")
+        return self
+
+
+class Moment(Timed):
+    """A fault that happens once: `at_s` only."""
+
+    @model_validator(mode="after")
+    def _happens(self) -> Self:
+        if self.at_s is None:
+            raise ValueError("give at_s, the moment when it happens")
+        return self
+
+
+class Gust(During):
+    """Extra wind that rises, stays and falls as half a cosine (the discrete gust of MIL-F-8785C)."""
+
+    kind: Literal["gust"]
+    velocity_ned_m_s: Point
+    rise_s: Positive = 0.5
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        start_s, end_s = self.window_s
+        if 2 * self.rise_s > end_s - start_s:
+            raise ValueError(f"a gust of {end_s - start_s:g} s has no room to rise and fall in {self.rise_s:g} s each")
+        return self
+
+
+class Turbulence(Timed):
+    """Continuous gusts near the ground: Dryden's spectra with MIL-F-8785C's low-altitude lengths and strengths."""
+
+    kind: Literal["turbulence"]
+    wind_20ft_m_s: NotNegative
+    """Wind speed at 20 ft: 7.7 m/s (15 knots) is light turbulence there, 15.4 moderate, 23.1 severe."""
+
+
+class MotorFailure(Timed):
+    """A motor gives less than it is commanded: a broken propeller, a failing speed controller."""
+
+    kind: Literal["motor_failure"]
+    motor: Motor
+    """PX4's order: 0 front right, 1 rear left, 2 front left, 3 rear right."""
+    thrust_share: Share = 0.0
+
+
+class FreeFall(Timed):
+    """All motors stop."""
+
+    kind: Literal["free_fall"]
+
+
+class BatterySag(During):
+    """The supply falls in a straight line and stays low; thrust goes with its square."""
+
+    kind: Literal["battery_sag"]
+    voltage_share: Annotated[float, Field(gt=0, le=1)]
+
+
+class PayloadDrop(Moment):
+    """A load at the centre of mass, of which the control knows nothing, until it is let go."""
+
+    kind: Literal["payload_drop"]
+    mass_kg: Positive
+
+
+class Vibration(Timed):
+    """Rotors that are not balanced, as the raw samples of the inertial sensor see them."""
+
+    kind: Literal["vibration"]
+    accelerometer_rms_m_s2: NotNegative
+    """On each axis at hover thrust; goes with thrust."""
+    gyroscope_rms_rad_s: NotNegative = 0.0
+    motor: Motor | None = None
+    """The rotor that is bent; without it all four share it."""
+    motor_hz: Annotated[float, Field(gt=0, le=1000)] = 180.0
+    """Turns a second at hover thrust; goes with its root. A 6-inch propeller that lifts 280 g turns about so fast."""
+
+
+class Push(During):
+    """A steady force on a point of the body: a hand, a rope, a downdraught."""
+
+    kind: Literal["push"]
+    force_ned_n: Point
+    point_frd_m: Point = (0.0, 0.0, 0.0)
+    rise_s: NotNegative = 0.05
+    """To full force and back, as half a cosine."""
+
+
+class HandCatch(During):
+    """A hand takes hold where the vehicle is and keeps it there until it lets go."""
+
+    kind: Literal["hand_catch"]
+    stiffness_n_m: Positive = 200.0
+    """Of an arm that holds still: 100 to 400 N/m (Mussa-Ivaldi, Hogan and Bizzi, 1985)."""
+    damping_n_s_m: NotNegative = 30.0
+    """Near critical for a vehicle of 1 kg, as arms are."""
+    turn_damping_n_m_s: NotNegative = 0.1
+
+
+class ImuBias(Timed):
+    """The inertial sensor's zero moves."""
+
+    kind: Literal["imu_bias"]
+    accelerometer_frd_m_s2: Point = (0.0, 0.0, 0.0)
+    gyroscope_frd_rad_s: Point = (0.0, 0.0, 0.0)
+
+
+class ImuStuck(Timed):
+    """One raw axis shows the same value all the time: the one it showed last, or a given one."""
+
+    kind: Literal["imu_stuck"]
+    axis: Literal["accelerometer_x", "accelerometer_y", "accelerometer_z", "gyroscope_x", "gyroscope_y", "gyroscope_z"]
+    value: Finite | None = None
+    """m/s2 or rad/s."""
+
+
+class EstimatorReset(Moment):
+    """The estimate jumps and says so: the reset counter goes up."""
+
+    kind: Literal["estimator_reset"]
+    position_jump_ned_m: Point = (0.0, 0.0, 0.0)
+    """Stays: the vehicle flies on in a frame that has moved."""
+    velocity_jump_ned_m_s: Point = (0.0, 0.0, 0.0)
+    settles_s: Positive = 1.0
+    """Time constant with which the velocity finds back to the truth."""
+
+
+class EstimatorAfterClipping(Timed):
+    """What clipping hides of a hit is missing in the estimated velocity, which then resets again and again.
+
+    PX4 after a hit of 108 m/s2 changed its primary estimator four times in 36 ms (a log of v1.12 on an FMU v5).
+    """
+
+    kind: Literal["estimator_after_clipping"]
+    resets: Annotated[int, Field(ge=0, le=20)] = 4
+    over_s: Positive = 0.036
+    kick_m_s: NotNegative = 0.3
+    """Standard deviation, per axis, of what each reset leaves instead of the error before."""
+    settles_s: Positive = 0.5
+    least_hidden_m_s: NotNegative = 0.02
+    """Less than this hidden in an interval disturbs nobody: a propeller that clips now and then."""
+
+
+class AidingLoss(Timed):
+    """A sensor that aids the estimate is lost; without a filter of its own the vehicle drifts until it is back."""
+
+    kind: Literal["aiding_loss"]
+    sensor: Literal["optical_flow", "range_finder", "compass", "motion_capture", "gps"]
+    drift_m_s2: NotNegative = 0.1
+    """Velocity gone astray per root second, for an estimate of kind markov; half a degree of tilt is 0.09 m/s2."""
+
+
+class WireFault(Timed):
+    """What happens to packets between the vehicle and whoever listens; shares are chances per packet."""
+
+    kind: Literal["wire"]
+    direction: Literal["to_companion", "to_vehicle", "both"] = "both"
+    messages: tuple[int | str, ...] = ()
+    """Names or numbers of the messages that are hit; none named means all."""
+    loss: Share = 0.0
+    """1 cuts the link."""
+    burst_packets: Annotated[float, Field(ge=1)] = 1.0
+    """Mean length of a run of lost packets (Gilbert's two-state channel)."""
+    delay_s: NotNegative = 0.0
+    jitter_s: NotNegative = 0.0
+    """Up to so much more, evenly; the order stays."""
+    reorder: Share = 0.0
+    """Share of packets that are overtaken."""
+    reorder_by_s: Positive = 0.02
+    duplicate: Share = 0.0
+    corrupt: Share = 0.0
+    """Share of packets of which one byte is changed."""
+
+    @model_validator(mode="after")
+    def _does_something(self) -> Self:
+        if not any((self.loss, self.delay_s, self.jitter_s, self.reorder, self.duplicate, self.corrupt)):
+            raise ValueError("give at least one of loss, delay_s, jitter_s, reorder, duplicate and corrupt")
+        if self.loss == 1.0 and self.burst_packets > 1.0:
+            raise ValueError("loss: 1 loses every packet; leave burst_packets out")
+        return self
+
+
+class ImuDropout(Timed):
+    """The inertial sensor's samples do not come: HIGHRES_IMU, SCALED_IMU and RAW_IMU are not sent."""
+
+    kind: Literal["imu_dropout"]
+
+
+class ClockJump(Moment):
+    """All time stamps of the vehicle jump, and its answers to TIMESYNC with them."""
+
+    kind: Literal["clock_jump"]
+    jump_s: Finite
+    """4294960 at 0 s puts the 32-bit milliseconds 7 s before their end."""
+
+
+Fault = Annotated[
+    Gust
+    | Turbulence
+    | MotorFailure
+    | FreeFall
+    | BatterySag
+    | PayloadDrop
+    | Vibration
+    | Push
+    | HandCatch
+    | ImuBias
+    | ImuStuck
+    | ImuDropout
+    | EstimatorReset
+    | EstimatorAfterClipping
+    | AidingLoss
+    | WireFault
+    | ClockJump,
+    Field(discriminator="kind"),
+]
+
+# Only one of these can act at a time: the body has one place for it.
+_ALONE: dict[str, type[object]] = {"push": Push, "hand_catch": HandCatch}
+
+
+def overlapping(faults: tuple[Fault, ...]) -> str | None:
+    """What is wrong with two faults that would act at once and cannot; None if nothing is."""
+    for name, kind in _ALONE.items():
+        windows = sorted(fault.window_s for fault in faults if isinstance(fault, kind))
+        for (_, end_s), (start_s, _) in pairwise(windows):
+            if start_s < end_s:
+                return f"two faults of kind {name} act at {start_s:g} s; let one end before the next begins"
+    return None

@@ -1,0 +1,131 @@
+"""A wire that loses, delays, reorders, doubles and damages packets: pure, seeded, for any carrier of frames."""
+
+import heapq
+import random
+from collections.abc import Callable, Iterable, Sequence
+
+from sim_vehicle.faults.spec import WireFault
+
+_MAVLINK_1, _MAVLINK_2 = 0xFE, 0xFD
+# Header and checksum around the payload, and what a signature adds.
+_AROUND_1, _AROUND_2, _SIGNATURE, _SIGNED = 8, 12, 13, 0x01
+
+
+def split(data: bytes) -> list[bytes]:
+    """The frames in bytes that begin with one, by their stated lengths; what is none stays together as it came."""
+    frames, start = [], 0
+    while start < len(data):
+        size = _size(data, start)
+        if size is None or start + size > len(data):
+            frames.append(data[start:])
+            break
+        frames.append(data[start : start + size])
+        start += size
+    return frames
+
+
+def _size(data: bytes, start: int) -> int | None:
+    if start + 3 > len(data):
+        return None
+    if data[start] == _MAVLINK_1:
+        return _AROUND_1 + data[start + 1]
+    if data[start] == _MAVLINK_2:
+        return _AROUND_2 + data[start + 1] + (_SIGNATURE if data[start + 2] & _SIGNED else 0)
+    return None
+
+
+def message_number(frame: bytes) -> int | None:
+    """The message's number; None for bytes that are no frame."""
+    if len(frame) >= _AROUND_2 and frame[0] == _MAVLINK_2:
+        return int.from_bytes(frame[7:10], "little")
+    return frame[5] if len(frame) >= _AROUND_1 and frame[0] == _MAVLINK_1 else None
+
+
+class Wire:
+    """One direction of a link. The same frames at the same times meet the same fate for the same seed."""
+
+    def __init__(self, faults: Iterable[WireFault], seed: int, number_of: Callable[[str], int] | None = None) -> None:
+        """``number_of`` turns a message's name into its number; needed only where faults name messages."""
+        self._stretches = [_Stretch(fault, random.Random(seed + 7919 * i), number_of) for i, fault in enumerate(faults)]
+        self._held: list[tuple[int, int, bytes]] = []
+        self._count = 0
+        self.lost = 0
+
+    def carry(self, frames: Sequence[bytes], now_us: int) -> tuple[bytes, ...]:
+        """Put frames in at a time; take out all that have arrived by then, in the order of their arrival."""
+        time_s = now_us / 1e6
+        acting = [stretch for stretch in self._stretches if stretch.start_s <= time_s < stretch.end_s]
+        if not acting and not self._held:
+            return tuple(frames)
+        for frame in frames:
+            self._put(frame, now_us, acting)
+        arrived = []
+        while self._held and self._held[0][0] <= now_us:
+            arrived.append(heapq.heappop(self._held)[2])
+        return tuple(arrived)
+
+    def _put(self, frame: bytes, now_us: int, acting: "list[_Stretch]") -> None:
+        copies = [(now_us, frame)]
+        for stretch in acting:
+            if stretch.hits(frame):
+                copies = [fate for due_us, copy in copies for fate in stretch.fates(copy, due_us)]
+        self.lost += not copies
+        for due_us, copy in copies:
+            # Numbered, so that what arrives together keeps its order.
+            heapq.heappush(self._held, (due_us, self._count, copy))
+            self._count += 1
+
+
+class _Stretch:
+    """One fault and its chances."""
+
+    def __init__(self, fault: WireFault, rng: random.Random, number_of: Callable[[str], int] | None) -> None:
+        self.start_s, self.end_s = fault.window_s
+        self._fault = fault
+        self._rng = rng
+        self._numbers = {_number(message, number_of) for message in fault.messages}
+        self._in_burst = False
+        self._last_due_us = 0
+
+    def hits(self, frame: bytes) -> bool:
+        """Whether the fault is about such messages."""
+        return not self._numbers or message_number(frame) in self._numbers
+
+    def fates(self, frame: bytes, due_us: int) -> list[tuple[int, bytes]]:
+        """When which copies of a frame arrive."""
+        fault, chance = self._fault, self._rng.random
+        if self._is_lost():
+            return []
+        due_us += round(1e6 * (fault.delay_s + fault.jitter_s * chance()))
+        if fault.reorder and chance() < fault.reorder:
+            due_us += round(1e6 * fault.reorder_by_s)
+        else:
+            due_us = self._last_due_us = max(due_us, self._last_due_us)
+        if fault.corrupt and chance() < fault.corrupt:
+            frame = self._damaged(frame)
+        return [(due_us, frame)] * (2 if fault.duplicate and chance() < fault.duplicate else 1)
+
+    def _is_lost(self) -> bool:
+        """Gilbert's channel: while it is bad everything is lost; how often it turns makes share and run length."""
+        fault, chance = self._fault, self._rng.random()
+        if fault.loss in (0.0, 1.0):
+            return fault.loss == 1.0
+        if fault.burst_packets == 1.0:
+            return chance < fault.loss
+        if self._in_burst:
+            self._in_burst = chance >= 1.0 / fault.burst_packets
+        else:
+            self._in_burst = chance < fault.loss / (1.0 - fault.loss) / fault.burst_packets
+        return self._in_burst
+
+    def _damaged(self, frame: bytes) -> bytes:
+        place = self._rng.randrange(len(frame))
+        return frame[:place] + bytes([frame[place] ^ self._rng.randrange(1, 256)]) + frame[place + 1 :]
+
+
+def _number(message: int | str, number_of: Callable[[str], int] | None) -> int:
+    if isinstance(message, int):
+        return message
+    if number_of is None:
+        raise ValueError(f"message {message!r} has a name, and nobody here knows its number")
+    return number_of(message)

@@ -1,0 +1,62 @@
+"""A link over a wire on which a mission asks for faults."""
+
+from collections.abc import Sequence
+
+from sim_vehicle.faults.spec import ClockJump, Fault, ImuDropout, WireFault
+from sim_vehicle.faults.wire import Wire, split
+from sim_vehicle.mavlink.board import Board
+from sim_vehicle.mavlink.decode import ForeignPacket
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.restamp import Restamper, message_number
+
+# HIGHRES_IMU, SCALED_IMU, RAW_IMU and the second and third sensor's SCALED_IMU2 and 3.
+_INERTIAL = (105, 26, 27, 116, 129)
+# So that the two directions do not share their luck.
+_INBOUND_SEED = 0x1B
+
+
+class FaultyLink(Link):
+    """The same link; between it and whoever is at the other end lies the wire."""
+
+    def __init__(self, options: LinkOptions, board: Board, number: int, seed: int, faults: Sequence[Fault]) -> None:
+        super().__init__(options, board, number, seed)
+        out, into = _wire_faults(faults, "to_companion"), _wire_faults(faults, "to_vehicle")
+        self._outbound = Wire(out, seed, message_number)
+        self._inbound = Wire(into, seed ^ _INBOUND_SEED, message_number)
+        self._jumps = [fault for fault in faults if isinstance(fault, ClockJump)]
+        self._restamper = Restamper()
+        self._arriving = b""
+
+    def push(self, data: bytes) -> None:
+        """Bytes have been sent; they arrive when the wire lets them."""
+        self._arriving += data
+
+    def receive(self, collects_foreign: bool = False) -> list[ForeignPacket]:
+        """Act on what has arrived."""
+        frames, self._arriving = split(self._arriving), b""
+        super().push(b"".join(self._inbound.carry(frames, self.now_us)))
+        return super().receive(collects_foreign)
+
+    def take(self) -> tuple[bytes, ...]:
+        """The packets that arrive at the other end now, in order."""
+        packets = super().take()
+        offset_us = round(1e6 * sum(jump.jump_s for jump in self._jumps if jump.window_s[0] <= self.now_us / 1e6))
+        if offset_us:
+            packets = tuple(self._restamper.restamp(packet, offset_us) for packet in packets)
+        return self._outbound.carry(packets, self.now_us)
+
+
+def needs_faulty_link(faults: Sequence[Fault]) -> bool:
+    """Whether any of the faults is one of the wire."""
+    return any(isinstance(fault, WireFault | ImuDropout | ClockJump) for fault in faults)
+
+
+def _wire_faults(faults: Sequence[Fault], direction: str) -> list[WireFault]:
+    found = [fault for fault in faults if isinstance(fault, WireFault) and fault.direction in (direction, "both")]
+    if direction == "to_companion":
+        found += [
+            WireFault(kind="wire", between_s=fault.window_s, loss=1.0, messages=_INERTIAL)
+            for fault in faults
+            if isinstance(fault, ImuDropout)
+        ]
+    return found

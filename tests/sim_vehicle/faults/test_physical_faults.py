@@ -1,0 +1,305 @@
+"""Each fault does to the vehicle what its figures say, when it says, and nothing before or after."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.cruise import Cruise
+from sim_vehicle.faults.wind import Dryden, risen, strengths_and_lengths
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.scene import Scene
+from tests.sim_vehicle.physics.throwing import quiet
+
+FOLDABLE = load_built_in("foldable")
+QUIET = quiet(FOLDABLE)
+HOVER = (0.0, 0.0, -20.0)
+
+
+def hover(*faults: dict[str, Any], airframe: Airframe = QUIET, seed: int = 1) -> Cruise:
+    return Cruise(airframe, Scene.model_validate({"faults": faults}), HOVER, (0.0, 0.0, 0.0), seed=seed)
+
+
+def fly(cruise: Cruise, seconds: float) -> list[Any]:
+    return [cruise.step() for _ in range(round(seconds / 0.004))]
+
+
+def velocity(cruise: Cruise) -> np.ndarray:
+    return np.array(cruise.plant.state.body[3:6])
+
+
+# --- air -------------------------------------------------------------------------------------------------
+
+
+def test_a_gust_rises_stays_and_falls_with_the_integral_of_its_shape() -> None:
+    """Two half cosines make one rise: amplitude times (length - rise)."""
+    times = np.arange(0.0, 5.0, 0.001)
+    shape = np.array([risen(time_s, 1.0, 4.0, 0.5) for time_s in times])
+    assert shape.sum() * 0.001 == pytest.approx(3.0 - 0.5, abs=1e-3)
+    assert shape[times < 1.0].max() == 0.0 and shape[times > 4.0].max() == 0.0
+    assert risen(1.25, 1.0, 4.0, 0.5) == pytest.approx(0.5)
+    assert (shape[(times > 1.5) & (times < 3.5)] == 1.0).all()
+
+
+def test_a_gust_pushes_by_the_drag_of_its_air() -> None:
+    """Without control: m dv = c V (length - rise), as long as the vehicle is slow against the gust."""
+    airframe = quiet(FOLDABLE, drag_n_s_m=0.05)
+    scene = Scene.model_validate(
+        {"faults": [{"kind": "gust", "between_s": [0.1, 0.5], "velocity_ned_m_s": [0, 6, 0], "rise_s": 0.1}]}
+    )
+    plant = Plant(airframe, scene, seed=1)
+    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
+    for _ in range(150):
+        plant.step(None, armed=False)
+    assert plant.state.body[4] == pytest.approx(0.05 * 6 * 0.3 / airframe.mass_kg, rel=0.02)
+    assert plant.disturbance.wind_ned_m_s == pytest.approx([0, 0, 0])
+
+
+def test_turbulence_has_the_strength_and_the_memory_that_the_model_asks_for() -> None:
+    level_m_s, vertical_m_s, level_m, vertical_m = strengths_and_lengths(6.1, 15.4)
+    assert vertical_m_s == pytest.approx(1.54) and vertical_m == pytest.approx(6.1)
+    # 20 ft: 0.177 + 0.01646 = 0.19346, to the power of 0.4 0.518, of 1.2 0.1393
+    assert level_m_s == pytest.approx(1.54 / 0.518, rel=0.01)
+    assert level_m == pytest.approx(6.1 / 0.1393, rel=0.01)
+    dryden = Dryden(15.4, (1.0, 0.0, 0.0), 0.02, np.random.default_rng(5))
+    air = np.array([dryden.next(6.1, 15.0) for _ in range(150_000)])
+    assert air.std(axis=0) == pytest.approx([level_m_s, level_m_s, vertical_m_s], rel=0.06)
+    # Along the wind a first-order process: after L / V its correlation is 1 / e.
+    lag = round(level_m / 15.0 / 0.02)
+    assert np.corrcoef(air[:-lag, 0], air[lag:, 0])[0, 1] == pytest.approx(math.exp(-1), abs=0.08)
+
+
+# --- motors, supply, load ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("motor", "roll", "pitch"), [(0, 1, -1), (1, -1, 1), (2, -1, -1), (3, 1, 1)])
+def test_a_dead_motor_lets_its_corner_fall(motor: int, roll: int, pitch: int) -> None:
+    """Front right gone: the right side and the nose go down, roll positive, pitch negative."""
+    cruise = hover({"kind": "motor_failure", "motor": motor, "at_s": 0.1})
+    fly(cruise, 0.1)
+    assert np.abs(cruise.plant.state.body[10:13]).max() < 1e-3
+    fly(cruise, 0.048)
+    p, q = cruise.plant.state.body[10:12]
+    assert math.copysign(1, p) == roll and math.copysign(1, q) == pitch
+    assert abs(p) > 1.0 and abs(q) > 1.0
+
+
+def test_a_failing_motor_gives_its_share() -> None:
+    cruise = hover({"kind": "motor_failure", "motor": 2, "thrust_share": 0.9, "between_s": [0.0, 9.0]})
+    fly(cruise, 3.0)
+    given = cruise.plant.state.motor_thrust_n / cruise.plant.state.motor_command_n
+    assert given == pytest.approx([1, 1, 0.9, 1], abs=0.01)
+
+
+def test_free_fall_is_felt_as_nothing_at_all() -> None:
+    cruise = hover({"kind": "free_fall", "between_s": [0.2, 0.6]})
+    outputs = fly(cruise, 0.6)
+    # Motors run down in 20 ms; then there is no specific force.
+    assert np.abs([output.specific_force_frd_m_s2 for output in outputs[-50:]]).max() < 0.2
+    assert velocity(cruise)[2] == pytest.approx(9.81 * 0.38, rel=0.02)
+
+
+def test_a_battery_that_sags_takes_thrust_with_the_square_of_its_voltage() -> None:
+    cruise = hover({"kind": "battery_sag", "between_s": [0.0, 2.0], "voltage_share": 0.9})
+    fly(cruise, 4.0)
+    given = cruise.plant.state.motor_thrust_n / cruise.plant.state.motor_command_n
+    assert given == pytest.approx([0.81] * 4, abs=0.005)
+    # The control makes up for it with more throttle.
+    assert float(np.sum(cruise.plant.state.motor_thrust_n)) == pytest.approx(QUIET.mass_kg * 9.81, rel=0.01)
+
+
+def test_a_payload_that_drops_lets_the_vehicle_jump_by_its_weight() -> None:
+    cruise = hover({"kind": "payload_drop", "at_s": 3.0, "mass_kg": 0.1})
+    before = fly(cruise, 3.0)[-1].specific_force_frd_m_s2[2]
+    held_n = -before * (QUIET.mass_kg + 0.1)
+    assert held_n == pytest.approx((QUIET.mass_kg + 0.1) * 9.81, rel=0.01)
+    first = fly(cruise, 0.004)[-1].specific_force_frd_m_s2[2]
+    assert first == pytest.approx(-held_n / QUIET.mass_kg, rel=0.01)
+
+
+# --- hands -------------------------------------------------------------------------------------------------
+
+
+def test_a_push_gives_its_impulse_and_no_moment_through_the_centre() -> None:
+    scene = Scene.model_validate(
+        {"faults": [{"kind": "push", "between_s": [0.1, 0.5], "force_ned_n": [2, 0, 0], "rise_s": 0.1}]}
+    )
+    plant = Plant(QUIET, scene, seed=1)
+    plant.place((0.0, 0.0, -50.0), (0.0, 0.0, 0.0))
+    for _ in range(200):
+        plant.step(None, armed=False)
+    assert plant.state.body[3] == pytest.approx(2 * 0.3 / QUIET.mass_kg, rel=0.01)
+    assert np.abs(plant.state.body[10:13]).max() == 0.0
+
+
+def test_a_push_on_the_nose_turns_it() -> None:
+    """To the right on the nose: about down, positive."""
+    push = {"kind": "push", "between_s": [0.1, 0.2], "force_ned_n": [0, 1, 0], "point_frd_m": [0.2, 0, 0]}
+    cruise = hover(push)
+    fly(cruise, 0.2)
+    assert cruise.plant.state.body[12] > 0.5
+
+
+def test_a_hand_stops_the_vehicle_softly_and_lets_go() -> None:
+    scene = Scene.model_validate({"faults": [{"kind": "hand_catch", "between_s": [0.5, 2.0]}]})
+    cruise = Cruise(QUIET, scene, HOVER, (1.5, 0.0, 0.0))
+    outputs = fly(cruise, 1.5)
+    assert np.linalg.norm(velocity(cruise)) < 0.3
+    assert cruise.plant.state.body[0] == pytest.approx(0.75, abs=0.2)
+    forces = np.array([output.specific_force_frd_m_s2 for output in outputs])
+    # Soft: 30 N s/m at 1.5 m/s on 1.1 kg are 40 m/s2, felt at the first touch.
+    assert 20 < np.abs(forces[:, 0]).max() < 45
+
+
+# --- inertial sensor ---------------------------------------------------------------------------------------
+
+
+def raw_rms(cruise: Cruise) -> np.ndarray:
+    """Of the vibration on the six raw axes, looked at raw sample by raw sample."""
+    from sim_vehicle.physics.imu import shake
+
+    plant, shaken, rows = cruise.plant, np.zeros(6), []
+    for _ in range(8000):
+        shake(plant.state, 125e-6, plant._constants, plant.disturbance, shaken)
+        rows.append(shaken.copy())
+    return np.sqrt((np.array(rows) ** 2).mean(axis=0))
+
+
+@pytest.mark.parametrize("motor", [None, 1])
+def test_vibration_has_the_strength_that_was_asked_for_at_hover(motor: int | None) -> None:
+    asked = {"kind": "vibration", "at_s": 0, "accelerometer_rms_m_s2": 20, "gyroscope_rms_rad_s": 0.5, "motor": motor}
+    cruise = hover(asked)
+    fly(cruise, 0.1)
+    # Four rotors that turn at nearly the same speed beat; their powers add up in the long run.
+    spread = 0.05 if motor is not None else 0.75
+    assert raw_rms(cruise) == pytest.approx([20, 20, 20, 0.5, 0.5, 0.5], rel=spread)
+
+
+def test_vibration_beyond_the_range_clips_raw_samples_and_is_counted() -> None:
+    """A sine of 200 m/s2 RMS is beyond 156.9 for arccos(0.555) / 90 deg of the time: 62.5 %."""
+    cruise = hover({"kind": "vibration", "at_s": 0.5, "accelerometer_rms_m_s2": 200, "motor": 0})
+    assert max(fly(cruise, 0.5)[-1].clipping_counts) == 0
+    counts = fly(cruise, 1.0)[-1].clipping_counts
+    assert counts[0] / 8000 == pytest.approx(math.acos(156.9 / (200 * math.sqrt(2))) * 2 / math.pi, abs=0.05)
+
+
+def test_vibration_goes_with_thrust_and_ends_with_its_time() -> None:
+    cruise = hover({"kind": "vibration", "between_s": [0.1, 0.3], "accelerometer_rms_m_s2": 40})
+    forces = np.array([output.specific_force_frd_m_s2 for output in fly(cruise, 0.5)])
+    assert forces[30:70, 0].std() > 2.0
+    assert forces[80:, 0].std() < 0.2
+
+
+def test_a_bias_and_a_stuck_axis_show_in_the_mean_sample() -> None:
+    cruise = hover(
+        {"kind": "imu_bias", "between_s": [0.1, 0.2], "accelerometer_frd_m_s2": [0.5, 0, 0],
+         "gyroscope_frd_rad_s": [0, 0, 0.1]},
+        {"kind": "imu_stuck", "at_s": 0.3, "axis": "accelerometer_z"},
+        {"kind": "imu_stuck", "at_s": 0.3, "axis": "gyroscope_y", "value": 2.0},
+        {"kind": "free_fall", "at_s": 0.3},
+    )  # fmt: skip
+    outputs = fly(cruise, 0.5)
+    forces = np.array([output.specific_force_frd_m_s2 for output in outputs])
+    rates = np.array([output.angular_velocity_frd_rad_s for output in outputs])
+    assert forces[26:48, 0] == pytest.approx(0.5, abs=0.01) and forces[:24, 0] == pytest.approx(0.0, abs=0.01)
+    assert rates[26:48, 2] == pytest.approx(0.1, abs=0.01)
+    assert forces[76:, 2] == pytest.approx(forces[74, 2], abs=1e-9)
+    assert rates[76:, 1] == pytest.approx(2.0, abs=1e-9)
+
+
+# --- estimate ----------------------------------------------------------------------------------------------
+
+
+def test_a_reset_jumps_says_so_and_the_velocity_finds_back() -> None:
+    cruise = hover(
+        {"kind": "estimator_reset", "at_s": 0.2, "position_jump_ned_m": [0.5, 0, 0],
+         "velocity_jump_ned_m_s": [0, 0.4, 0], "settles_s": 0.1}
+    )  # fmt: skip
+    outputs = fly(cruise, 0.24)
+    assert {output.reset_counter for output in outputs[:49]} == {0} and outputs[-1].reset_counter == 1
+    assert outputs[51].position_ned_m[0] - outputs[48].position_ned_m[0] == pytest.approx(0.5, abs=0.01)
+    assert outputs[50].velocity_ned_m_s[1] == pytest.approx(0.4, abs=0.03)
+    late = fly(cruise, 0.8)[-1]
+    assert late.velocity_ned_m_s[1] - cruise.plant.state.body[4] == pytest.approx(0.0, abs=0.03)
+
+
+@pytest.mark.parametrize(("name", "disturbed"), [("rigid", True), ("foldable", False)])
+def test_after_a_clipped_hit_the_estimated_velocity_is_wrong_and_resets(name: str, disturbed: bool) -> None:
+    """The rigid vehicle's hit at 2 m/s hides most of its 3.8 m/s from the sensor; the foldable's at 1 m/s nothing."""
+    scene = Scene.model_validate(
+        {"walls": [{"point_ned_m": [1, 0, -20], "normal_ned": [-1, 0, 0]}],
+         "faults": [{"kind": "estimator_after_clipping", "at_s": 0}]}
+    )  # fmt: skip
+    speed_m_s = 2.0 if disturbed else 1.0
+    cruise = Cruise(quiet(load_built_in(name)), scene, HOVER, (speed_m_s, 0.0, 0.0))
+    while not cruise.plant.truth.hits:
+        output = cruise.step()
+    errors = []
+    for _ in range(12):
+        output = cruise.step()
+        errors.append(np.linalg.norm(np.array(output.velocity_ned_m_s) - velocity(cruise)))
+    assert output.reset_counter == (4 if disturbed else 0)
+    assert bool(max(errors) > 0.2) is disturbed
+
+
+def test_an_estimate_without_its_sensor_drifts_and_jumps_back() -> None:
+    cruise = hover({"kind": "aiding_loss", "sensor": "optical_flow", "between_s": [0.5, 3.0], "drift_m_s2": 0.3})
+    outputs = fly(cruise, 3.0)
+    off_m = np.linalg.norm(np.array(outputs[-1].position_ned_m[:2]) - cruise.plant.state.body[:2])
+    assert off_m > 0.05 and outputs[-1].reset_counter == 0
+    back = fly(cruise, 0.004)[-1]
+    assert back.reset_counter == 1
+    assert np.linalg.norm(np.array(back.position_ned_m[:2]) - cruise.plant.state.body[:2]) < 0.03
+
+
+# --- all of them -------------------------------------------------------------------------------------------
+
+
+def test_truth_says_what_acted_and_when() -> None:
+    cruise = hover(
+        {"kind": "push", "between_s": [0.1, 0.3], "force_ned_n": [1, 0, 0]},
+        {"kind": "payload_drop", "at_s": 0.2, "mass_kg": 0.05},
+        {"kind": "vibration", "at_s": 0.0, "accelerometer_rms_m_s2": 1},
+    )
+    fly(cruise, 0.5)
+    spans = {span.kind: (span.began_at_boot_us, span.ended_at_boot_us) for span in cruise.plant.truth.faults}
+    assert spans == {"vibration": (0, None), "push": (100_000, 300_000), "payload_drop": (200_000, 200_000)}
+
+
+def test_faults_repeat_for_a_seed_and_leave_the_rest_of_the_noise_alone() -> None:
+    def path(*faults: dict[str, Any], seed: int = 3) -> np.ndarray:
+        cruise = hover(*faults, airframe=FOLDABLE, seed=seed)
+        fly(cruise, 0.5)
+        return cruise.plant.truth.series()["position_ned_m"]
+
+    turbulence = {"kind": "turbulence", "wind_20ft_m_s": 10, "at_s": 0.0}
+    assert (path(turbulence) == path(turbulence)).all()
+    assert (path(turbulence) != path(turbulence, seed=4)).any()
+    assert (path({"kind": "imu_bias", "at_s": 0.1}) == path()).all()
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ({"kind": "gust", "at_s": 1, "velocity_ned_m_s": [1, 0, 0]}, "give between_s"),
+        ({"kind": "gust", "between_s": [1, 1.5], "velocity_ned_m_s": [1, 0, 0]}, "no room to rise"),
+        ({"kind": "free_fall"}, "give at_s"),
+        ({"kind": "free_fall", "at_s": 1, "between_s": [1, 2]}, "not both"),
+        ({"kind": "push", "between_s": [2, 1], "force_ned_n": [1, 0, 0]}, "ends before it begins"),
+        ({"kind": "motor_failure", "motor": 4, "at_s": 0}, "less than or equal to 3"),
+        ({"kind": "wire", "at_s": 0}, "at least one of loss"),
+        ({"kind": "unlucky", "at_s": 0}, "does not match any of the expected tags"),
+    ],
+)
+def test_faults_that_make_no_sense_are_refused(fault: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        Scene.model_validate({"faults": [fault]})
+
+
+def test_two_hands_at_once_are_refused() -> None:
+    catches = [{"kind": "hand_catch", "between_s": [1, 3]}, {"kind": "hand_catch", "between_s": [2, 4]}]
+    with pytest.raises(ValidationError, match="hand_catch act at 2 s"):
+        Scene.model_validate({"faults": catches})

@@ -1,0 +1,166 @@
+"""A faulty wire loses, delays, turns and damages as asked, in order, and the same way for the same seed."""
+
+import random
+from typing import Any
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.faults.spec import WireFault
+from sim_vehicle.faults.wire import Wire, message_number, split
+from sim_vehicle.mavlink.restamp import Restamper
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+
+STEP_US = 4000
+
+
+def frame(number: int, message: int = 105) -> bytes:
+    return bytes([0xFD, 2, 0, 0, number & 0xFF, 1, 1, message, 0, 0]) + number.to_bytes(2, "little") + b"\0\0"
+
+
+def number_in(raw: bytes) -> int:
+    return int.from_bytes(raw[10:12], "little")
+
+
+def carried(seed: int = 1, count: int = 20_000, **fault: Any) -> tuple[list[tuple[int, bytes]], Wire]:
+    """One frame every 4 ms; (time, frame) as they arrive."""
+    wire = Wire([WireFault.model_validate({"kind": "wire", "at_s": 0, **fault})], seed)
+    arrived = []
+    for step in range(count + 500):
+        frames = [frame(step)] if step < count else []
+        arrived += [(step * STEP_US, raw) for raw in wire.carry(frames, step * STEP_US)]
+    return arrived, wire
+
+
+def delays_s(arrived: list[tuple[int, bytes]]) -> np.ndarray:
+    return np.array([time_us / 1e6 - number_in(raw) * STEP_US / 1e6 for time_us, raw in arrived])
+
+
+@pytest.mark.parametrize("burst_packets", [1.0, 8.0])
+def test_as_many_are_lost_as_asked_in_runs_as_long_as_asked(burst_packets: float) -> None:
+    arrived, wire = carried(loss=0.2, burst_packets=burst_packets)
+    there = np.zeros(20_000, bool)
+    there[[number_in(raw) for _, raw in arrived]] = True
+    assert 1 - there.mean() == pytest.approx(0.2, abs=0.025)
+    assert wire.lost == (~there).sum()
+    starts = (~there[1:] & there[:-1]).sum()
+    # Chance alone makes runs of 1 / (1 - 0.2).
+    assert (~there).sum() / starts == pytest.approx(max(burst_packets, 1.25), rel=0.1)
+
+
+def test_a_cut_lets_nothing_through_and_ends() -> None:
+    wire = Wire([WireFault(kind="wire", between_s=(1.0, 2.0), loss=1.0)], 1)
+    arrived = [number_in(raw) for step in range(750) for raw in wire.carry([frame(step)], step * STEP_US)]
+    assert arrived == [*range(250), *range(500, 750)]
+
+
+def test_delay_and_jitter_are_those_asked_and_keep_the_order() -> None:
+    arrived, _ = carried(delay_s=0.03, jitter_s=0.05)
+    delays, numbers = delays_s(arrived), [number_in(raw) for _, raw in arrived]
+    assert numbers == sorted(numbers) and len(numbers) == 20_000
+    assert delays.min() >= 0.03
+    # What is overtaken waits for the one before it: never more than the longest, and one step to be noticed.
+    assert delays.max() <= 0.08 + 0.004 and delays.mean() > 0.055
+
+
+def test_the_share_that_is_overtaken_is_the_one_asked() -> None:
+    arrived, _ = carried(reorder=0.1, reorder_by_s=0.02)
+    assert (delays_s(arrived) > 0).mean() == pytest.approx(0.1, abs=0.01)
+    numbers = [number_in(raw) for _, raw in arrived]
+    assert sorted(numbers) == list(range(20_000)) and numbers != sorted(numbers)
+
+
+def test_doubles_and_damage_come_as_often_as_asked() -> None:
+    arrived, _ = carried(duplicate=0.05, corrupt=0.1)
+    assert len(arrived) == pytest.approx(21_000, abs=150)
+    good = {frame(number) for number in range(20_000)}
+    assert sum(raw not in good for _, raw in arrived) / len(arrived) == pytest.approx(0.1, abs=0.015)
+    assert all(len(raw) == 14 for _, raw in arrived)
+
+
+def test_only_the_named_messages_are_hit() -> None:
+    wire = Wire([WireFault(kind="wire", at_s=0, loss=1.0, messages=("HIGHRES_IMU", 30))], 1, {"HIGHRES_IMU": 105}.get)
+    kept = wire.carry([frame(1, 105), frame(2, 30), frame(3, 32)], 0)
+    assert [message_number(raw) for raw in kept] == [32]
+
+
+def test_the_same_seed_means_the_same_fate() -> None:
+    fault = {"loss": 0.1, "jitter_s": 0.02, "reorder": 0.1, "corrupt": 0.1, "duplicate": 0.1}
+    assert carried(seed=4, count=500, **fault)[0] == carried(seed=4, count=500, **fault)[0]
+    assert carried(seed=4, count=500, **fault)[0] != carried(seed=5, count=500, **fault)[0]
+
+
+def test_without_faults_at_the_moment_frames_go_straight_through() -> None:
+    wire = Wire([WireFault(kind="wire", at_s=9, loss=1.0)], 1)
+    frames = [frame(1), frame(2)]
+    assert wire.carry(frames, 0) == tuple(frames)
+
+
+def test_bytes_are_split_where_frames_begin() -> None:
+    link, chance = dialect.MAVLink(None, 1, 1), random.Random(1)
+    messages = [dialect.MAVLink_heartbeat_message(2, 12, 0, chance.randrange(9999), 4, 3) for _ in range(20)]
+    frames = [message.pack(link, force_mavlink1=chance.random() < 0.5) for message in messages]
+    assert split(b"".join(frames)) == frames
+    assert split(b"".join(frames) + b"\x01\x02") == [*frames, b"\x01\x02"]
+    assert split(b"".join(frames)[:-1])[-1] == frames[-1][:-1]
+
+
+# --- on a vehicle ------------------------------------------------------------------------------------------
+
+
+def flown(*faults: dict[str, Any], seconds: float = 3.0) -> list[Any]:
+    """What a listener decodes of a standing vehicle."""
+    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene.model_validate({"faults": faults}), seed=1)
+    parser, heard = dialect.MAVLink(None), []
+    parser.robust_parsing = True
+    for _ in range(round(seconds / 0.004)):
+        for packet in vehicle.step(b""):
+            heard += [(vehicle.time_boot_us, message) for message in parser.parse_buffer(packet) or []]
+    return heard
+
+
+def stamps(heard: list[Any], name: str, field: str) -> np.ndarray:
+    return np.array([getattr(message, field) for _, message in heard if message.get_type() == name])
+
+
+def test_an_imu_that_drops_out_leaves_a_gap_in_its_message_alone() -> None:
+    heard = flown({"kind": "imu_dropout", "between_s": [1.0, 2.0]})
+    assert np.diff(stamps(heard, "HIGHRES_IMU", "time_usec")).max() == pytest.approx(1_010_000, abs=20_000)
+    assert np.diff(stamps(heard, "ATTITUDE", "time_boot_ms")).max() < 30
+
+
+def test_a_clock_that_jumps_shows_in_every_stamp_and_wraps_where_it_is_narrow() -> None:
+    heard = flown({"kind": "clock_jump", "at_s": 1.0, "jump_s": 4294966.296 - 1.0})
+    wide, narrow = stamps(heard, "HIGHRES_IMU", "time_usec"), stamps(heard, "ATTITUDE", "time_boot_ms")
+    assert np.diff(wide).max() == pytest.approx(4294965.3e6, abs=0.05e6)
+    # One second after the jump the milliseconds are at their end and begin anew.
+    assert narrow.max() > 2**32 - 30 and narrow[-1] < 1100
+    assert wide[-1] > 2**32 * 1000
+
+
+def test_commands_to_the_vehicle_are_lost_too() -> None:
+    link = dialect.MAVLink(None, 255, 190)
+    request = dialect.MAVLink_timesync_message(0, 12345).pack(link)
+
+    def answers(*faults: dict[str, Any]) -> int:
+        vehicle = SimulatedVehicle(load_built_in("foldable"), Scene.model_validate({"faults": faults}), seed=1)
+        parser = dialect.MAVLink(None)
+        got = [parser.decode(bytearray(raw)) for _ in range(200) for raw in vehicle.step(request)]
+        return sum(message.get_type() == "TIMESYNC" and message.ts1 == 12345 for message in got)
+
+    assert answers() == 200
+    assert answers({"kind": "wire", "direction": "to_vehicle", "at_s": 0, "loss": 0.5}) == pytest.approx(100, abs=25)
+
+
+def test_what_has_no_stamp_of_the_vehicles_is_left_alone() -> None:
+    link = dialect.MAVLink(None, 1, 1)
+    heartbeat = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3).pack(link)
+    answer = dialect.MAVLink_ping_message(777, 1, 255, 190).pack(link)
+    restamper = Restamper()
+    assert restamper.restamp(heartbeat, 10**6) == heartbeat
+    assert restamper.restamp(answer, 10**6) == answer
+    assert restamper.restamp(b"\xfd\x01", 10**6) == b"\xfd\x01"
+    assert restamper.restamp(heartbeat[:-1] + b"\x00", 10**6) == heartbeat[:-1] + b"\x00"
