@@ -218,6 +218,7 @@ class Autopilot:
 
     def _demand_of_mode(self, step_s: float) -> Setpoint | None:
         mode = self.modes.flown
+        self._manual.spin_up(self.arming.armed, step_s)
         if mode is Mode.OFFBOARD:
             return self._offboard.demand
         if mode is Mode.TERMINATION:
@@ -231,8 +232,6 @@ class Autopilot:
         if self._sinks:
             self._manual.start(self.navigator.view)
             self._sinks = False
-        if not self.arming.armed:
-            self._manual.disarmed()
         return self._manual.demand(mode, sticks, self.navigator.view, step_s)
 
     def _sink(self, step_s: float) -> TrajectorySetpoint | None:

@@ -7,6 +7,7 @@ import math
 from enum import IntEnum
 from functools import cache
 
+from sim_vehicle.autopilot import preflight
 from sim_vehicle.autopilot.arming import Arming, Reason
 from sim_vehicle.autopilot.battery import Battery
 from sim_vehicle.autopilot.battery import Warning as BatteryWarning
@@ -83,6 +84,7 @@ class Commander:
             return Result.TEMPORARILY_REJECTED
         result = self.arming.arm(self._now_us, self.checks_pass, forced)
         if result is not Result.ACCEPTED:
+            self.texts += [problem for problem in self._problems if problem.text]
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
         elif not was_armed:
             self._say(Severity.INFO, f"Armed by {reason}")
@@ -262,9 +264,11 @@ class Commander:
     def checks_pass(self) -> bool:
         """Whether the vehicle could be armed in its present mode."""
         mode = self.modes.intended
-        if self._parameters["COM_ARM_MIS_REQ"] and not self._navigator.progress.valid:
-            return False
-        return mode not in NOT_ARMABLE and not missing(mode, self._available)
+        return mode not in NOT_ARMABLE and not missing(mode, self._available) and not self._problems
+
+    @property
+    def _problems(self) -> list[StatusText]:
+        return preflight.problems(self._parameters, self.ground_station, self.battery, self._navigator)
 
     @property
     def system_status(self) -> SystemStatus:

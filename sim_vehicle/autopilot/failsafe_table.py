@@ -51,7 +51,6 @@ class Trigger(StrEnum):
 
     STICKS_LOST = "manual control lost"
     GROUND_STATION_LOST = "ground station lost"
-    MISSION_FAILED = "mission cannot be flown"
     MISSION_OUT_OF_REACH = "mission finished, no link left"
     FLIGHT_TIME = "flight time over"
     FENCE = "geofence breached"
@@ -90,7 +89,6 @@ class Situation:
     fence_breached: bool = False
     battery: BatteryWarning = BatteryWarning.NONE
     battery_at_arming: BatteryWarning = BatteryWarning.NONE
-    mission_failed: bool = False
     mission_finished: bool = False
     flight_time_over: bool = False
     tipped_over: bool = False
@@ -200,12 +198,6 @@ def _is_taking_off(now: Situation, parameters: Parameters) -> bool:
 ROWS: tuple[Row, ...] = (
     Row(Trigger.STICKS_LOST, _sticks_lost, "NAV_RCL_ACT", _LINK_LOSS),
     Row(Trigger.GROUND_STATION_LOST, _ground_station_lost, "NAV_DLL_ACT", _LINK_LOSS),
-    Row(
-        Trigger.MISSION_FAILED,
-        lambda now, parameters: now.mission_failed and now.intended is Mode.MISSION,
-        None,
-        {0: Response(Action.RETURN)},
-    ),
     Row(Trigger.MISSION_OUT_OF_REACH, _out_of_reach, None, {0: Response(Action.RETURN)}),
     Row(Trigger.FLIGHT_TIME, lambda now, parameters: now.flight_time_over, None, {0: Response(Action.RETURN)}),
     Row(Trigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),

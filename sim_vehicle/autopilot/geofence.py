@@ -56,6 +56,8 @@ class Geofence:
         self._shapes: tuple[Shape, ...] = ()
         self._checked_us: int | None = None
         self.breached = False
+        self.breach_text = ""
+        """What PX4 says about it when somebody tries to arm."""
         self.texts: list[StatusText] = []
 
     def load(self, items: Sequence[MissionItem], view: View) -> None:
@@ -78,18 +80,23 @@ class Geofence:
         if self._checked_us is not None and view.now_us - self._checked_us < CHECK_PERIOD_US:
             return
         self._checked_us = view.now_us
-        outside = not self.allows(view.position_ned_m, view.home_ned_m)
-        self.breached = outside or (self.breached and holds_after_breach)
+        outside = self._breach(view.position_ned_m, view.home_ned_m)
+        self.breach_text = outside or self.breach_text
+        self.breached = outside is not None or (self.breached and holds_after_breach)
 
     def allows(self, position_ned_m: Vector3, home_ned_m: Vector3) -> bool:
         """Whether a place is inside everything: distance, height and shapes."""
+        return self._breach(position_ned_m, home_ned_m) is None
+
+    def _breach(self, position_ned_m: Vector3, home_ned_m: Vector3) -> str | None:
         north, east, down = position_ned_m
         most_away_m, most_high_m = self._parameters["GF_MAX_HOR_DIST"], self._parameters["GF_MAX_VER_DIST"]
         if most_away_m > 0.0 and math.hypot(north - home_ned_m[0], east - home_ned_m[1]) >= most_away_m:
-            return False
+            return "Geofence: exceeding maximum distance to Home"
         if most_high_m > 0.0 and home_ned_m[2] - down >= most_high_m:
-            return False
-        return all(shape.allows(north, east) for shape in self._shapes)
+            return "Geofence: exceeding maximum altitude above Home"
+        inside = all(shape.allows(north, east) for shape in self._shapes)
+        return None if inside else "Geofence: approaching or outside geofence"
 
     @property
     def _acts(self) -> bool:

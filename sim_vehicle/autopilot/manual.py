@@ -45,7 +45,7 @@ class ManualFlight:
         self._climb_m_s = 0.0
         self._down_m: float | None = None
         self._yaw_rad: float | None = None
-        self._most_throttle = 0.0
+        self._armed_s = 0.0
 
     def start(self, view: View) -> None:
         """Begin where the vehicle is."""
@@ -53,9 +53,9 @@ class ManualFlight:
         self._velocity_m_s, self._acceleration_m_s2, self._boost = (north, east), (0.0, 0.0), 1.0
         self._climb_m_s, self._place_m, self._down_m, self._yaw_rad = down, None, None, None
 
-    def disarmed(self) -> None:
-        """The throttle's limit begins anew."""
-        self._most_throttle = 0.0
+    def spin_up(self, armed: bool, step_s: float) -> None:
+        """The throttle's upper limit grows once the motors are up to speed, whatever the mode."""
+        self._armed_s = self._armed_s + step_s if armed else 0.0
 
     def wants_takeoff(self, sticks: StickInput) -> bool:
         """Whether a vehicle on the ground should leave it."""
@@ -68,7 +68,7 @@ class ManualFlight:
         yaw_rate = self._expo(sticks.yaw) * math.radians(self._parameters["MPC_MAN_Y_MAX"])
         yaw_rad = self._locked_yaw(yaw_rate, view)
         if mode not in BY_ALTITUDE:
-            return self._stabilised(sticks, yaw_rad, yaw_rate, view, step_s)
+            return self._stabilised(sticks, yaw_rad, yaw_rate, view)
         down, v_down = self._height(sticks, view, step_s)
         if mode is Mode.ALTCTL:
             a_north, a_east = self._tilt(sticks, view)
@@ -153,9 +153,7 @@ class ManualFlight:
 
     # --- by attitude and by rates ------------------------------------------------------------------------------
 
-    def _stabilised(
-        self, sticks: StickInput, yaw_rad: float | None, yaw_rate: float, view: View, step_s: float
-    ) -> AttitudeSetpoint:
+    def _stabilised(self, sticks: StickInput, yaw_rad: float | None, yaw_rate: float, view: View) -> AttitudeSetpoint:
         most_rad = math.radians(self._parameters["MPC_MAN_TILT_MAX"])
         roll, pitch = sticks.roll * most_rad, -sticks.pitch * most_rad
         tilt = math.hypot(roll, pitch)
@@ -166,12 +164,13 @@ class ManualFlight:
         half_yaw = (yaw_rad if yaw_rad is not None else view.yaw_rad) / 2
         c, s = math.cos(half_yaw), math.sin(half_yaw)
         attitude = (c * lean[0], c * lean[1] - s * lean[2], c * lean[2] + s * lean[1], s * lean[0])
-        return AttitudeSetpoint(attitude, self._throttle(sticks.throttle, view, step_s), yaw_rate)
+        return AttitudeSetpoint(attitude, self._throttle(sticks.throttle, view), yaw_rate)
 
-    def _throttle(self, stick: float, view: View, step_s: float) -> float:
+    def _throttle(self, stick: float, view: View) -> float:
         """MPC_THR_CURVE: 1 leaves the stick as it is, everything else puts hovering in its middle."""
         parameters = self._parameters
-        self._most_throttle = min(1.0, self._most_throttle + _THROTTLE_RISE_PER_S * step_s)
+        rises_s = max(0.0, self._armed_s - parameters["COM_SPOOLUP_TIME"])
+        allowed = min(1.0, _THROTTLE_RISE_PER_S * rises_s)
         least = 0.0 if view.landed else parameters["MPC_MANTHR_MIN"]
         most = parameters["MPC_THR_MAX"]
         if parameters["MPC_THR_CURVE"] == 1:
@@ -180,7 +179,7 @@ class ManualFlight:
             thrust = self._hover_thrust + stick * (self._hover_thrust - least)
         else:
             thrust = self._hover_thrust + stick * (most - self._hover_thrust)
-        return min(thrust, self._most_throttle)
+        return min(thrust, allowed)
 
     def _acro(self, sticks: StickInput) -> RatesSetpoint:
         roll, pitch, yaw = (

@@ -35,6 +35,7 @@ class Severity(IntEnum):
     """MAV_SEVERITY of the texts that are sent."""
 
     CRITICAL = 2
+    WARNING = 4
     INFO = 6
 
 

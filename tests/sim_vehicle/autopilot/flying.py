@@ -1,0 +1,73 @@
+"""Flights of the kinematic vehicle that tests begin with, and what they measure places by."""
+
+import math
+
+from sim_vehicle.autopilot import mission_items as kinds
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE, NAV_TAKEOFF
+from sim_vehicle.autopilot.flight_messages import StickInput
+from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.mission_messages import MissionItem, MissionType
+from sim_vehicle.autopilot.mission_store import Plan
+from sim_vehicle.autopilot.modes import NUMBERS, Mode
+from sim_vehicle.geography import Origin
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight
+
+ORIGIN = Origin()
+LINK = 2
+
+
+def hovering(height_m: float = 5.0, **parameters: float) -> Flight:
+    """In hold, taken off to that height."""
+    flight = Flight(None, MIS_TAKEOFF_ALT=height_m, **parameters)
+    assert flight.ask(NAV_TAKEOFF) is Result.ACCEPTED
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.LOITER, 30.0)
+    flight.fly(3.0)
+    flight.autopilot.texts.clear()
+    return flight
+
+
+def set_mode(flight: Flight, mode: Mode) -> Result | None:
+    """DO_SET_MODE."""
+    custom = NUMBERS[mode].custom_mode
+    return flight.ask(DO_SET_MODE, 1, custom >> 16 & 0xFF, custom >> 24)
+
+
+def place(north_m: float, east_m: float) -> tuple[float, float]:
+    """Latitude and longitude of a local place."""
+    there = ORIGIN.place_at((north_m, east_m, 0.0))
+    return there.latitude_deg, there.longitude_deg
+
+
+def item(
+    command: int,
+    north_m: float = 0.0,
+    east_m: float = 0.0,
+    up_m: float = 5.0,
+    params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, math.nan),
+    autocontinue: int = 1,
+) -> MissionItem:
+    """An item with a place, its height above home."""
+    return MissionItem(kinds.FRAME_GLOBAL_RELATIVE_INT, command, autocontinue, (*params, *place(north_m, east_m), up_m))
+
+
+def action(command: int, *params: float) -> MissionItem:
+    """An item without a place."""
+    padded = (*params, *[0.0] * (7 - len(params)))
+    return MissionItem(kinds.FRAME_MISSION, command, 1, padded)
+
+
+def upload(flight: Flight, *items: MissionItem, kind: MissionType = MissionType.MISSION) -> None:
+    """Store a list as a link would."""
+    flight.autopilot.missions.replace(kind, Plan(tuple(items), hash(items) & 0xFFFFFFFF))
+    flight.fly(0.06)
+
+
+def sticks(
+    flight: Flight, seconds: float, roll: float = 0, pitch: float = 0, throttle: float = 0, yaw: float = 0
+) -> None:
+    """Hold the sticks, sent at 50 Hz."""
+    for number in range(round(seconds * 250)):
+        if number % 5 == 0:
+            flight.autopilot.receive(StickInput(roll, pitch, throttle, yaw, LINK))
+        flight.step()

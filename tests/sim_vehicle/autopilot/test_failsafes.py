@@ -1,0 +1,340 @@
+"""Every failsafe with every value of its parameter: what flies, when, how the pilot ends it, how it ends by itself."""
+
+import pytest
+
+from sim_vehicle.autopilot.battery import Warning as BatteryWarning
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.failsafe import MODE_OF, Failsafe
+from sim_vehicle.autopilot.failsafe_table import (
+    OFFBOARD_LOSS,
+    ROWS,
+    Action,
+    Situation,
+    Trigger,
+    markdown_table,
+    responses_now,
+)
+from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
+from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.parameters.store import Parameters
+from tests.sim_vehicle.autopilot.flying import hovering, set_mode, sticks
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target
+
+SECOND = 1_000_000
+UP = target(position=(0.0, 0.0, -5.0))
+FLYING = {"armed": True, "armed_for_us": 60 * SECOND, "sticks_lost_at_arming": False}
+
+
+def situation(**fields: object) -> Situation:
+    return Situation(**{"intended": Mode.LOITER, **FLYING, **fields})  # type: ignore[arg-type]
+
+
+def in_offboard(**parameters: float) -> Flight:
+    flight = hovering(5.0, **parameters)
+    flight.fly(0.2, UP)
+    assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED
+    flight.fly(0.5, UP)
+    flight.autopilot.setpoint(UP)
+    return flight
+
+
+def with_ground_station(**parameters: float) -> Flight:
+    """In hold, its ground station heard for the last time just now."""
+    flight = hovering(5.0, **{**parameters, "NAV_DLL_ACT": 0})
+    flight.autopilot.ground_station_heard()
+    flight.fly(0.1)
+    flight.parameters.set("NAV_DLL_ACT", parameters["NAV_DLL_ACT"])
+    return flight
+
+
+def with_sticks(**parameters: float) -> Flight:
+    flight = Flight(None, MIS_TAKEOFF_ALT=5.0, COM_RC_IN_MODE=1, COM_RC_OVERRIDE=0, **parameters)
+    flight.autopilot.ground_station_heard()
+    sticks(flight, 0.2, throttle=-1)
+    set_mode(flight, Mode.TAKEOFF)
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    sticks(flight, 12.0)
+    assert flight.autopilot.modes.flown is Mode.LOITER
+    return flight
+
+
+def until_it_acts(flight: Flight, at_most_s: float) -> float:
+    return flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, at_most_s)
+
+
+def flown(flight: Flight) -> Mode:
+    return flight.autopilot.modes.flown
+
+
+# --- the table ---------------------------------------------------------------------------------------------------
+
+CONDITIONS = {
+    Trigger.STICKS_LOST: {"sticks_lost": True},
+    Trigger.GROUND_STATION_LOST: {"ground_station_lost": True},
+    Trigger.MISSION_OUT_OF_REACH: {"mission_finished": True, "intended": Mode.MISSION},
+    Trigger.FLIGHT_TIME: {"flight_time_over": True},
+    Trigger.FENCE: {"fence_breached": True},
+    Trigger.BATTERY_LOW: {"battery": BatteryWarning.LOW},
+    Trigger.BATTERY_CRITICAL: {"battery": BatteryWarning.CRITICAL},
+    Trigger.BATTERY_EMERGENCY: {"battery": BatteryWarning.EMERGENCY},
+    Trigger.ATTITUDE_AT_TAKEOFF: {"tipped_over": True, "armed_for_us": 2 * SECOND},
+    Trigger.ATTITUDE: {"tipped_over": True},
+}
+# What PX4's parameters mean, written down once more: failsafe.cpp and commander_params.yaml.
+EXPECTED = {
+    (Trigger.STICKS_LOST, "NAV_RCL_ACT"): {1: "HOLD", 2: "RETURN", 3: "LAND", 5: "TERMINATE", 6: "DISARM"},
+    (Trigger.GROUND_STATION_LOST, "NAV_DLL_ACT"): {
+        0: None,
+        1: "HOLD",
+        2: "RETURN",
+        3: "LAND",
+        5: "TERMINATE",
+        6: "DISARM",
+    },
+    (Trigger.FENCE, "GF_ACTION"): {0: None, 1: "WARN", 2: "HOLD", 3: "RETURN", 4: "TERMINATE", 5: "LAND"},
+    (Trigger.BATTERY_LOW, "COM_LOW_BAT_ACT"): {0: "WARN", 2: "WARN", 3: "WARN"},
+    (Trigger.BATTERY_CRITICAL, "COM_LOW_BAT_ACT"): {0: "WARN", 1: "RETURN", 2: "LAND", 3: "RETURN"},
+    (Trigger.BATTERY_EMERGENCY, "COM_LOW_BAT_ACT"): {0: "WARN", 1: "RETURN", 2: "LAND", 3: "LAND"},
+    (Trigger.ATTITUDE, "CBRK_FLIGHTTERM"): {121212: "WARN", 0: "TERMINATE"},
+    (Trigger.ATTITUDE_AT_TAKEOFF, "CBRK_FLIGHTTERM"): {121212: "DISARM", 0: "DISARM"},
+    (Trigger.MISSION_OUT_OF_REACH, "NAV_DLL_ACT"): {0: "RETURN", 2: None},
+    (Trigger.FLIGHT_TIME, "NAV_DLL_ACT"): {0: "RETURN"},
+}
+CELLS = [(*key, value, action) for key, row in EXPECTED.items() for value, action in row.items()]
+
+
+@pytest.mark.parametrize(("trigger", "parameter", "value", "action"), CELLS)
+def test_every_value_of_every_parameter(trigger, parameter, value, action):
+    in_mode = 4 if trigger is Trigger.MISSION_OUT_OF_REACH else 1
+    parameters = Parameters({"COM_RC_IN_MODE": in_mode, parameter: value})
+    now = {"sticks_lost": False, "ground_station_lost": False, **CONDITIONS[trigger]}
+    if trigger is Trigger.MISSION_OUT_OF_REACH:
+        now["ground_station_lost"] = True
+    found = dict(responses_now(situation(**now), parameters))
+    assert (found[trigger].action if trigger in found else None) == (Action[action] if action else None)
+
+
+def test_every_row_is_tested_and_documented():
+    assert {row.trigger for row in ROWS} == set(CONDITIONS)
+    table = markdown_table()
+    assert all(f"| {row.trigger} |" in table for row in ROWS)
+
+
+@pytest.mark.parametrize(("mode", "mask"), [(Mode.MISSION, 1), (Mode.LOITER, 2), (Mode.TAKEOFF, 2), (Mode.OFFBOARD, 4)])
+def test_a_lost_link_can_be_excepted_in_a_mode(mode, mask):
+    lost = situation(intended=mode, sticks_lost=True, ground_station_lost=True)
+    for excepted in (0, mask, 7 - mask):
+        parameters = Parameters({"COM_RCL_EXCEPT": excepted, "COM_DLL_EXCEPT": excepted, "NAV_DLL_ACT": 2})
+        found = {trigger for trigger, _ in responses_now(lost, parameters)}
+        assert (Trigger.STICKS_LOST in found) == (Trigger.GROUND_STATION_LOST in found) == (excepted != mask)
+
+
+def test_of_two_failsafes_the_later_in_the_order_wins():
+    # Given a breached fence, which holds, and a battery that has to land
+    parameters = Parameters({"COM_FAIL_ACT_T": 0.0})
+    now = situation(sticks_lost=False, fence_breached=True, battery=BatteryWarning.EMERGENCY)
+    assert Failsafe().update(0, now, parameters).action is Action.LAND
+    assert Action.HOLD < Action.RETURN < Action.LAND < Action.DESCEND < Action.DISARM < Action.TERMINATE
+
+
+@pytest.mark.parametrize(
+    ("missing", "action"),
+    [
+        ({Mode.LOITER}, Action.RETURN),
+        ({Mode.LOITER, Mode.RETURN}, Action.LAND),
+        ({Mode.LOITER, Mode.RETURN, Mode.LAND}, Action.DESCEND),
+    ],
+)
+def test_an_action_that_cannot_be_flown_gives_way_to_the_next(missing, action):
+    now = situation(
+        intended=Mode.OFFBOARD,
+        sticks_lost=False,
+        fence_breached=True,
+        offboard_lost=False,
+        cannot_run=frozenset(missing),
+    )
+    assert Failsafe().update(0, now, Parameters()).action is action
+
+
+def test_a_vehicle_that_lands_or_returns_begins_no_return():
+    for mode in (Mode.LAND, Mode.RETURN):
+        now = situation(intended=mode, sticks_lost=False, flight_time_over=True)
+        assert Failsafe().update(0, now, Parameters({"COM_FAIL_ACT_T": 0.0})).action is Action.WARN
+
+
+def test_a_delay_that_flickers_runs_down_at_last():
+    # Given a trigger that is there for 2 s and away for 1 s, and a delay of 5 s
+    failsafe, parameters, now_us = Failsafe(), Parameters({"COM_FAIL_ACT_T": 5.0}), 0
+    actions = []
+    for step in range(1200):
+        lost = step % 150 < 100
+        now = situation(sticks_lost=False, flight_time_over=lost)
+        actions.append(failsafe.update(now_us, now, parameters).action)
+        now_us += 20_000
+    assert actions[0] is Action.HOLD
+    assert Action.RETURN in actions
+
+
+# --- flown ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", OFFBOARD_LOSS)
+def test_lost_setpoints_do_what_com_obl_rc_act_says(value):
+    flight = in_offboard(COM_OBL_RC_ACT=value)
+    action, _ = OFFBOARD_LOSS[value]
+    if action is Action.DISARM:
+        assert flight.fly_until(lambda: not flight.autopilot.arming.armed, 2.0) == pytest.approx(1.07, abs=0.05)
+        assert "Disarmed by failsafe" in flight.texts()
+        return
+    assert until_it_acts(flight, 2.0) == pytest.approx(1.07, abs=0.05)
+    assert flown(flight) is MODE_OF[action]
+    assert flight.autopilot.modes.intended is Mode.OFFBOARD
+    assert flight.texts()[-1] == "Failsafe activated"
+
+
+@pytest.mark.parametrize("after_s", [0.3, 1.0, 4.0])
+def test_the_time_without_setpoints_can_be_set(after_s):
+    flight = in_offboard(COM_OF_LOSS_T=after_s)
+    assert until_it_acts(flight, 10.0) == pytest.approx(after_s + 0.07, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("value", "mode"), [(0, None), (1, Mode.LOITER), (2, Mode.RETURN), (3, Mode.LAND), (5, Mode.TERMINATION)]
+)
+def test_a_lost_ground_station(value, mode):
+    flight = with_ground_station(NAV_DLL_ACT=value, COM_DL_LOSS_T=5.0)
+    flight.fly(7.3)
+    assert not flight.autopilot.commander.failsafe.acts
+    if mode is None:
+        flight.fly(3.0)
+        assert flown(flight) is Mode.LOITER
+        return
+    # COM_DL_LOSS_T counts from when the link calls it gone, 2.5 s after its last heartbeat
+    until_it_acts(flight, 0.5)
+    assert "Connection to ground station lost" in flight.texts()
+    # And most actions wait for COM_FAIL_ACT_T in hold
+    if mode in (Mode.RETURN, Mode.LAND):
+        assert "Failsafe activated: entering Hold for 5 seconds" in flight.texts()
+        assert flown(flight) is Mode.LOITER
+        flight.fly(5.1)
+    assert flown(flight) is mode
+
+
+def test_a_ground_station_that_comes_back_does_not_end_the_return_but_a_mode_does():
+    flight = with_ground_station(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0, COM_FAIL_ACT_T=0.0)
+    flight.fly(8.0)
+    assert flown(flight) is Mode.RETURN
+    flight.autopilot.ground_station_heard()
+    flight.fly(1.0)
+    assert "GCS connection regained" in flight.texts()
+    assert flown(flight) is Mode.RETURN
+    assert set_mode(flight, Mode.LOITER) is Result.ACCEPTED
+    flight.fly(0.1)
+    assert (flown(flight), flight.autopilot.system_status) == (Mode.LOITER, 4)
+
+
+@pytest.mark.parametrize(("value", "mode"), [(1, Mode.LOITER), (2, Mode.RETURN), (3, Mode.LAND), (5, Mode.TERMINATION)])
+def test_lost_sticks(value, mode):
+    flight = with_sticks(NAV_RCL_ACT=value, COM_FAIL_ACT_T=0.0)
+    assert until_it_acts(flight, 2.0) == pytest.approx(0.5, abs=0.05)
+    assert flown(flight) is mode
+
+
+def test_whoever_arms_without_sticks_does_not_lose_them():
+    flight = hovering(5.0, NAV_RCL_ACT=2)
+    flight.fly(3.0)
+    assert flown(flight) is Mode.LOITER
+
+
+@pytest.mark.parametrize(
+    ("act", "remaining", "mode"),
+    [
+        (3, 0.14, Mode.LOITER),
+        (3, 0.065, Mode.RETURN),
+        (3, 0.04, Mode.LAND),
+        (2, 0.065, Mode.LAND),
+        (0, 0.04, Mode.LOITER),
+    ],
+)
+def test_a_battery_that_runs_down(act, remaining, mode):
+    flight = hovering(5.0, COM_LOW_BAT_ACT=act, COM_FAIL_ACT_T=0.0, SIM_BAT_MIN_PCT=0)
+    flight.autopilot.battery.remaining = remaining
+    flight.fly(0.2)
+    assert flown(flight) is mode
+
+
+def test_a_battery_that_was_low_when_armed_only_warns():
+    failsafe = situation(sticks_lost=False, battery=BatteryWarning.LOW, battery_at_arming=BatteryWarning.CRITICAL)
+    assert [response.action for _, response in responses_now(failsafe, Parameters())] == [Action.WARN]
+    known = situation(sticks_lost=False, battery=BatteryWarning.CRITICAL, battery_at_arming=BatteryWarning.CRITICAL)
+    assert [response.action for _, response in responses_now(known, Parameters())] == [Action.WARN]
+
+
+def test_a_flight_that_lasts_too_long_returns():
+    flight = hovering(5.0, COM_FLT_TIME_MAX=20, COM_FAIL_ACT_T=0.0)
+    until_it_acts(flight, 25.0)
+    assert flown(flight) is Mode.RETURN
+
+
+def test_a_mode_chosen_in_the_delay_takes_over_at_once():
+    flight = with_ground_station(NAV_DLL_ACT=2, COM_DL_LOSS_T=5.0)
+    flight.fly(8.5)
+    assert flown(flight) is Mode.LOITER and flight.autopilot.system_status == 5
+    assert set_mode(flight, Mode.LAND) is Result.ACCEPTED
+    flight.fly(6.0)
+    assert (flown(flight), flight.autopilot.system_status) == (Mode.LAND, 4)
+
+
+def test_sticks_take_over_from_a_failsafe():
+    flight = with_sticks(NAV_DLL_ACT=2, COM_DL_LOSS_T=10.0, COM_FAIL_ACT_T=1.0)
+    flight.parameters.set("COM_RC_OVERRIDE", 1)
+    sticks(flight, 3.0)
+    assert flown(flight) is Mode.RETURN
+    sticks(flight, 0.3, pitch=1.0)
+    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.POSCTL, Mode.POSCTL)
+    assert flight.autopilot.system_status == 4
+
+
+@pytest.mark.parametrize(("mask", "mode", "taken"), [(1, Mode.LOITER, True), (0, Mode.LOITER, False)])
+def test_sticks_take_over_where_com_rc_override_lets_them(mask, mode, taken):
+    flight = with_sticks()
+    flight.parameters.set("COM_RC_OVERRIDE", mask)
+    sticks(flight, 0.3, roll=1.0)
+    assert (flown(flight) is Mode.POSCTL) == taken
+    assert ("Pilot took over using sticks" in flight.texts()) == taken
+
+
+def test_terminated_is_for_good():
+    flight = hovering(5.0)
+    assert flight.ask(DO_FLIGHTTERMINATION, 0) is Result.DENIED
+    assert flight.ask(DO_FLIGHTTERMINATION, 1) is Result.ACCEPTED
+    assert flight.autopilot.system_status == 8
+    assert not flight.autopilot.motors_run
+    flight.fly(2.0)
+    assert flight.height_m == 0.0
+    assert set_mode(flight, Mode.LOITER) is Result.TEMPORARILY_REJECTED
+    flight.ask(COMPONENT_ARM_DISARM, 0, 21196)
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
+
+
+def test_on_the_ground_and_disarmed_there_is_nothing_to_terminate():
+    assert Flight().ask(DO_FLIGHTTERMINATION, 1) is Result.DENIED
+
+
+def test_killed_in_the_air_it_falls():
+    flight = hovering(5.0)
+    assert flight.ask(COMPONENT_ARM_DISARM, 0) is Result.TEMPORARILY_REJECTED
+    assert flight.ask(COMPONENT_ARM_DISARM, 0, 21196) is Result.ACCEPTED
+    flight.fly(2.0)
+    assert flight.height_m == 0.0
+
+
+def test_without_a_global_position_a_hold_becomes_a_landing():
+    flight = hovering(5.0)
+    flight.autopilot.commander.has_global_position = False
+    flight.fly(0.1)
+    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.LAND, Mode.LOITER)
+    flight.autopilot.commander.has_global_position = True
+    flight.fly(0.1)
+    assert flown(flight) is Mode.LOITER

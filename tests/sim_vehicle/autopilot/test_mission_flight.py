@@ -1,0 +1,264 @@
+"""Missions flown by the kinematic vehicle: items, jumps, pause, resume, changes in flight, what is refused."""
+
+import math
+from itertools import pairwise
+
+import pytest
+
+from sim_vehicle.autopilot import mission_items as kinds
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
+from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.mission_messages import MissionItem
+from sim_vehicle.autopilot.modes import Mode
+from tests.sim_vehicle.autopilot.flying import action, hovering, item, set_mode, upload
+from tests.sim_vehicle.autopilot.kinematic_plant import Flight
+
+TAKEOFF, NORTH, EAST = item(kinds.TAKEOFF), item(kinds.WAYPOINT, 20.0), item(kinds.WAYPOINT, 20.0, 20.0)
+LAND_AT_HOME = item(kinds.LAND, 0.0, 0.0, 0.0)
+
+
+def begun(*items: MissionItem) -> Flight:
+    """On the ground with that mission, started."""
+    flight = Flight()
+    upload(flight, *items)
+    assert flight.autopilot.missions.progress.valid, flight.texts()
+    assert flight.ask(MISSION_START, 0) is Result.ACCEPTED
+    assert flight.autopilot.modes.flown is Mode.MISSION and flight.autopilot.arming.armed
+    return flight
+
+
+def reached(flight: Flight, number: int, at_most_s: float = 60.0) -> float:
+    return flight.fly_until(lambda: flight.autopilot.missions.progress.reached >= number, at_most_s)
+
+
+def north_east(flight: Flight) -> tuple[float, float]:
+    return flight.state.position_ned_m[:2]
+
+
+def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
+    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
+    for number, there in ((0, (0.0, 0.0)), (1, (20.0, 0.0)), (2, (20.0, 20.0))):
+        reached(flight, number)
+        # A place counts as reached within NAV_ACC_RAD, 2 m
+        assert math.dist(north_east(flight), there) < 2.1
+    flight.fly_until(lambda: not flight.autopilot.arming.armed, 60.0)
+    assert math.dist(north_east(flight), (0.0, 0.0)) < 0.2
+    assert flight.autopilot.missions.progress.finished
+    said = flight.texts()
+    for text in ("Executing Mission", "Takeoff detected", "Mission finished, landed", "Disarmed by landing"):
+        assert text in said
+    assert said.index("Mission finished, landed") < said.index("Disarmed by landing")
+
+
+def test_items_are_passed_in_their_order_and_the_current_one_is_shown():
+    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
+    seen = []
+    while flight.autopilot.arming.armed:
+        flight.step()
+        if not seen or seen[-1] != flight.autopilot.missions.current:
+            seen.append(flight.autopilot.missions.current)
+    assert seen == [0, 1, 2, 3]
+
+
+def test_without_a_landing_it_holds_at_the_last_place():
+    flight = begun(TAKEOFF, NORTH)
+    flight.fly_until(lambda: flight.autopilot.missions.progress.finished, 60.0)
+    assert "Mission finished, loitering" in flight.texts()
+    flight.fly(10.0)
+    assert math.dist(north_east(flight), (20.0, 0.0)) < 0.1
+    assert flight.autopilot.modes.flown is Mode.MISSION
+
+
+def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
+    # Given a hover at 5 m and a first place at 15 m
+    flight = hovering(5.0)
+    upload(flight, item(kinds.WAYPOINT, 30.0, up_m=15.0))
+    assert set_mode(flight, Mode.MISSION) is Result.ACCEPTED
+    while flight.height_m < 14.0:
+        flight.step()
+        assert north_east(flight)[0] < 0.5
+    assert "Climb to 15.0 meters above home" in flight.texts()
+    reached(flight, 0)
+    assert north_east(flight)[0] > 27.0
+
+
+def test_time_to_stay_is_stayed():
+    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(4.0, 0.0, 0.0, math.nan)), LAND_AT_HOME)
+    flight.fly_until(lambda: math.dist(north_east(flight), (10.0, 0.0)) < 2.0, 60.0)
+    assert reached(flight, 1) == pytest.approx(4.0, abs=0.15)
+
+
+def test_loiter_time_and_delay_take_their_time():
+    flight = begun(TAKEOFF, item(kinds.LOITER_TIME, params=(3.0, 0.0, 0.0, math.nan)), action(kinds.DELAY, 2.0), NORTH)
+    reached(flight, 0)
+    assert reached(flight, 1) == pytest.approx(3.0, abs=0.15)
+    assert reached(flight, 2) == pytest.approx(2.0, abs=0.15)
+
+
+def test_a_heading_is_reached_before_the_item_is_over():
+    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(0.0, 0.0, 0.0, 90.0)), NORTH)
+    reached(flight, 1)
+    assert math.degrees(yaw_of(flight.state.attitude_wxyz)) == pytest.approx(90.0, abs=12.0)
+
+
+def test_without_a_heading_the_nose_points_to_where_it_flies():
+    flight = begun(TAKEOFF, NORTH, EAST)
+    reached(flight, 1)
+    flight.fly(3.0)
+    assert math.degrees(yaw_of(flight.state.attitude_wxyz)) == pytest.approx(90.0, abs=12.0)
+
+
+def test_a_tighter_acceptance_radius_counts():
+    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, params=(0.0, 0.3, 0.0, math.nan)), NORTH)
+    reached(flight, 1)
+    assert math.dist(north_east(flight), (10.0, 0.0)) < 0.35
+
+
+def test_speed_is_changed_for_what_follows():
+    flight = begun(TAKEOFF, action(kinds.DO_CHANGE_SPEED, 1, 2.0, -1), item(kinds.WAYPOINT, 30.0))
+    reached(flight, 1)
+    flight.fly(5.0)
+    assert flight.state.velocity_ned_m_s[0] == pytest.approx(2.0, abs=0.1)
+    # And by command at once
+    flight.ask(DO_CHANGE_SPEED, 1, 4.0, -1)
+    flight.fly(2.0)
+    assert flight.state.velocity_ned_m_s[0] == pytest.approx(4.0, abs=0.1)
+
+
+def test_a_jump_repeats_as_often_as_it_says_then_goes_on():
+    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 8.0), item(kinds.WAYPOINT), action(kinds.DO_JUMP, 1, 2), LAND_AT_HOME)
+    visits = []
+    while flight.autopilot.arming.armed:
+        flight.step()
+        if not visits or visits[-1] != flight.autopilot.missions.current:
+            visits.append(flight.autopilot.missions.current)
+    assert visits == [0, 1, 2, 1, 2, 1, 2, 4]
+
+
+def test_return_as_an_item_returns():
+    flight = begun(TAKEOFF, NORTH, action(kinds.RETURN_TO_LAUNCH))
+    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.RETURN, 60.0)
+    assert "Returning to launch" in flight.texts()
+
+
+def test_an_item_without_autocontinue_is_stayed_at():
+    flight = begun(TAKEOFF, item(kinds.WAYPOINT, 10.0, autocontinue=0), NORTH)
+    reached(flight, 1)
+    flight.fly(10.0)
+    assert flight.autopilot.missions.current == 1
+    assert math.dist(north_east(flight), (10.0, 0.0)) < 0.1
+
+
+def test_a_gate_is_flown_through_and_a_region_of_interest_looked_at():
+    gate = MissionItem(6, kinds.CONDITION_GATE, 1, item(kinds.WAYPOINT, 10.0).params)
+    looks = MissionItem(6, kinds.DO_SET_ROI_LOCATION, 1, item(kinds.WAYPOINT, 0.0, 40.0).params)
+    flight = begun(TAKEOFF, gate, looks, item(kinds.WAYPOINT, 30.0))
+    reached(flight, 1)
+    assert north_east(flight)[0] >= 10.0
+    flight.fly(3.0)
+    bearing = math.atan2(40.0 - north_east(flight)[1], -north_east(flight)[0])
+    assert yaw_of(flight.state.attitude_wxyz) == pytest.approx(bearing, abs=0.15)
+
+
+def test_pause_holds_and_resume_goes_on_with_the_same_item():
+    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
+    reached(flight, 1)
+    flight.fly(1.0)
+    assert set_mode(flight, Mode.LOITER) is Result.ACCEPTED
+    flight.fly(8.0)
+    assert math.hypot(*flight.state.velocity_ned_m_s) < 0.05
+    assert flight.autopilot.missions.current == 2
+    assert set_mode(flight, Mode.MISSION) is Result.ACCEPTED
+    reached(flight, 2)
+    assert math.dist(north_east(flight), (20.0, 20.0)) < 2.1
+
+
+def test_another_current_item_is_flown_at_once():
+    flight = begun(TAKEOFF, NORTH, EAST, LAND_AT_HOME)
+    reached(flight, 0)
+    assert flight.autopilot.missions.choose(2)
+    reached(flight, 2)
+    assert math.dist(north_east(flight), (20.0, 20.0)) < 2.1
+
+
+def test_another_mission_in_flight_is_flown_instead():
+    flight = begun(TAKEOFF, NORTH, EAST)
+    reached(flight, 1)
+    upload(flight, item(kinds.WAYPOINT, -10.0), item(kinds.WAYPOINT, -10.0, -10.0))
+    flight.autopilot.missions.choose(0)
+    reached(flight, 1)
+    assert math.dist(north_east(flight), (-10.0, -10.0)) < 2.1
+
+
+def test_a_mission_cleared_in_flight_is_a_failsafe():
+    # A mode that has lost what it needs cannot run: PX4 returns
+    flight = begun(TAKEOFF, NORTH, EAST)
+    reached(flight, 1)
+    upload(flight)
+    flight.fly(0.1)
+    assert "No valid mission available, loitering" in flight.texts()
+    assert (flight.autopilot.modes.flown, flight.autopilot.modes.intended) == (Mode.RETURN, Mode.MISSION)
+    assert flight.autopilot.system_status == 5
+
+
+def test_flown_again_after_landing_it_begins_with_the_first_item():
+    flight = begun(TAKEOFF, NORTH, LAND_AT_HOME)
+    flight.fly_until(lambda: not flight.autopilot.arming.armed, 90.0)
+    flight.fly(1.0)
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    assert flight.autopilot.missions.current == 0
+    reached(flight, 1)
+
+
+@pytest.mark.parametrize(
+    ("items", "text"),
+    [
+        ([LAND_AT_HOME, NORTH], "Mission rejected: starts with landing"),
+        ([NORTH, TAKEOFF], "Mission rejected: takeoff not first waypoint item"),
+        ([item(kinds.TAKEOFF, up_m=-1.0)], "Mission rejected: Takeoff altitude below home altitude!"),
+        ([TAKEOFF, action(kinds.CONDITION_DELAY, 1.0)], "Mission rejected: item 2: unsupported cmd: 112"),
+        ([TAKEOFF, item(kinds.VTOL_LAND)], "Mission rejected: Item 1 does not fit vehicle type"),
+    ],
+)
+def test_missions_that_cannot_be_flown_are_stored_but_not_started(items, text):
+    flight = Flight()
+    upload(flight, *items)
+    assert text in flight.texts()
+    assert flight.ask(MISSION_START, 0) is Result.DENIED
+    assert "Mission start denied! No valid mission" in flight.texts()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "items", "valid"),
+    [
+        (0, [NORTH], True),
+        (1, [NORTH], False),
+        (1, [TAKEOFF], True),
+        (2, [TAKEOFF], False),
+        (3, [TAKEOFF, NORTH], False),
+        (3, [TAKEOFF, LAND_AT_HOME], True),
+        (4, [NORTH], True),
+        (4, [TAKEOFF, NORTH], False),
+    ],
+)
+def test_takeoff_and_landing_can_be_demanded(wanted, items, valid):
+    flight = Flight(None, MIS_TKO_LAND_REQ=wanted)
+    upload(flight, *items)
+    assert flight.autopilot.missions.progress.valid is valid
+
+
+def test_a_first_place_far_away_is_only_a_warning():
+    flight = Flight(None, MIS_DIST_1WP=100.0)
+    upload(flight, item(kinds.WAYPOINT, 150.5))
+    assert flight.texts() == ["First waypoint far away from home: 150m. Correct mission loaded?"]
+    assert flight.autopilot.missions.progress.valid
+
+
+def test_the_order_of_visits_is_the_order_of_the_list():
+    corners = [(10.0 * n, 5.0 * (n % 2)) for n in range(1, 6)]
+    flight = begun(TAKEOFF, *[item(kinds.WAYPOINT, north, east) for north, east in corners])
+    flight.fly_until(lambda: flight.autopilot.missions.progress.finished, 90.0)
+    assert all(a[0] < b[0] for a, b in pairwise(corners))
+    assert math.dist(north_east(flight), corners[-1]) < 2.1

@@ -1,0 +1,188 @@
+"""Offboard by attitude, by rates and by geographic places."""
+
+import math
+
+import pytest
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.autopilot import offboard
+from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
+from sim_vehicle.autopilot.flight_messages import AttitudeTarget, GlobalTarget
+from sim_vehicle.autopilot.messages import Result, StatusText
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.scene import Scene
+from sim_vehicle.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
+from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, place, set_mode
+from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Flight
+
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+NO_RATES = (None, None, None)
+HOME_M = ORIGIN.place.altitude_m
+
+
+def leaning(roll_deg: float) -> tuple[float, float, float, float]:
+    half = math.radians(roll_deg) / 2
+    return math.cos(half), math.sin(half), 0.0, 0.0
+
+
+def global_target(frame: int, north: float, east: float, altitude_m: float, **others: object) -> GlobalTarget:
+    fields: dict[str, object] = {
+        "frame": frame,
+        "place": (*place(north, east), altitude_m),
+        "velocity_m_s": FREE,
+        "acceleration_m_s2": FREE,
+        "yaw_rad": None,
+        "yaw_rate_rad_s": None,
+        "is_force": False,
+    }
+    return GlobalTarget(**{**fields, **others})  # type: ignore[arg-type]
+
+
+def stream(flight: Flight, message: object, seconds: float) -> None:
+    for number in range(round(seconds * 250)):
+        if number % 12 == 0:
+            flight.autopilot.receive(message)
+        flight.step()
+
+
+# --- what they mean ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "flown"),
+    [
+        (AttitudeTarget(LEVEL, NO_RATES, 0.5), AttitudeSetpoint(LEVEL, 0.5)),
+        (AttitudeTarget((2.0, 0.0, 0.0, 0.0), (None, None, 0.3), 0.5), AttitudeSetpoint(LEVEL, 0.5, 0.3)),
+        # Both given: the attitude's own rates count
+        (AttitudeTarget(LEVEL, (1.0, 2.0, 3.0), 0.5), AttitudeSetpoint(LEVEL, 0.5, 3.0)),
+        (AttitudeTarget(None, (1.0, 2.0, None), 0.5), RatesSetpoint((1.0, 2.0, 0.0), 0.5)),
+        (AttitudeTarget(None, (1.0, None, 3.0), 0.5), None),
+        (AttitudeTarget(None, NO_RATES, 0.5), None),
+        (AttitudeTarget((0.0, 0.0, 0.0, 0.0), NO_RATES, 0.5), None),
+        (AttitudeTarget(LEVEL, NO_RATES, None), AttitudeSetpoint(LEVEL, 0.0)),
+        (AttitudeTarget(LEVEL, NO_RATES, 7.0), AttitudeSetpoint(LEVEL, 1.0)),
+    ],
+)
+def test_what_an_attitude_target_asks_for(message, flown):
+    assert offboard.attitude_setpoint(message) == flown
+
+
+@pytest.mark.parametrize(("frame", "altitude_m", "down_m"), [(5, HOME_M + 4.0, -4.0), (6, 4.0, -6.0)])
+def test_global_places_become_local_ones(frame, altitude_m, down_m):
+    # Given a home 2 m above the local origin
+    local = offboard.local_target(global_target(frame, 10.0, -5.0, altitude_m), ORIGIN, (0.0, 0.0, -2.0))
+    assert local.position_m == pytest.approx((10.0, -5.0, down_m), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("message", "answer"),
+    [
+        (global_target(11, 0, 0, 4.0), None),
+        (global_target(1, 0, 0, 4.0), "SET_POSITION_TARGET_GLOBAL_INT invalid coordinate frame 1"),
+        (
+            global_target(5, 0, 0, 4.0, acceleration_m_s2=(0, 0, 1.0), is_force=True),
+            "SET_POSITION_TARGET_GLOBAL_INT force not supported",
+        ),
+        # Nothing at all asked for: PX4 is silent, and it counts as none
+        (global_target(5, 0, 0, 4.0, place=None), None),
+    ],
+)
+def test_which_global_setpoints_are_refused(message, answer):
+    local = offboard.local_target(message, ORIGIN, (0.0, 0.0, 0.0))
+    assert (local.text if isinstance(local, StatusText) else local) == answer
+
+
+# --- flown -------------------------------------------------------------------------------------------------------
+
+
+def test_global_setpoints_are_flown():
+    flight = hovering(5.0)
+    there = global_target(6, 8.0, 0.0, 7.0)
+    stream(flight, there, 0.2)
+    assert set_mode(flight, Mode.OFFBOARD) is Result.ACCEPTED
+    stream(flight, there, 8.0)
+    assert flight.state.position_ned_m == pytest.approx((8.0, 0.0, -7.0), abs=0.1)
+
+
+def test_an_attitude_alone_arms_and_takes_off_without_the_ramp():
+    flight = Flight()
+    up = AttitudeTarget(LEVEL, NO_RATES, 1.2 * HOVER)
+    stream(flight, up, 0.2)
+    set_mode(flight, Mode.OFFBOARD)
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    stream(flight, up, 1.0)
+    assert flight.height_m == pytest.approx(0.5 * 0.2 * 9.81, abs=0.1)
+    assert not flight.autopilot.detector.landed
+
+
+def test_from_an_attitude_to_a_position_no_ramp_holds_it_back():
+    flight = Flight()
+    up = AttitudeTarget(LEVEL, NO_RATES, 1.1 * HOVER)
+    stream(flight, up, 0.2)
+    set_mode(flight, Mode.OFFBOARD)
+    flight.ask(COMPONENT_ARM_DISARM, 1)
+    stream(flight, up, 2.0)
+    lowest = flight.height_m
+    set_mode(flight, Mode.LOITER)
+    flight.fly(3.0)
+    assert flight.height_m > lowest - 0.3
+
+
+def test_attitude_setpoints_that_stop_are_lost_offboard():
+    flight = hovering(5.0)
+    level = AttitudeTarget(LEVEL, NO_RATES, HOVER)
+    stream(flight, level, 0.2)
+    set_mode(flight, Mode.OFFBOARD)
+    stream(flight, level, 0.5)
+    assert isinstance(flight.autopilot.applied, AttitudeSetpoint)
+    flight.fly(1.2)
+    assert flight.autopilot.modes.flown is Mode.POSCTL
+    assert isinstance(flight.autopilot.applied, TrajectorySetpoint)
+
+
+def test_low_thrust_by_attitude_is_a_landing_without_a_commanded_descent():
+    flight = hovering(2.5)
+    stream(flight, AttitudeTarget(LEVEL, NO_RATES, HOVER), 0.2)
+    set_mode(flight, Mode.OFFBOARD)
+    stream(flight, AttitudeTarget(LEVEL, NO_RATES, 0.9 * HOVER), 4.0)
+    assert flight.height_m == 0.0
+    stream(flight, AttitudeTarget(LEVEL, NO_RATES, 0.0), 4.0)
+    assert "Disarmed by landing" in flight.texts()
+
+
+# --- by the real loops ---------------------------------------------------------------------------------------------
+
+
+def thrown_up() -> tuple[Plant, float]:
+    airframe = load_built_in("foldable")
+    plant = Plant(airframe, Scene(), seed=1)
+    plant.place((0.0, 0.0, -20.0), (0.0, 0.0, 0.0))
+    for _ in range(100):
+        plant.step(TrajectorySetpoint((0.0, 0.0, -20.0)), armed=True)
+    return plant, airframe.hover_fraction
+
+
+def test_the_loops_lean_as_asked_and_accelerate_as_leaning_does():
+    plant, hover = thrown_up()
+    asked = AttitudeSetpoint(leaning(15.0), hover / math.cos(math.radians(15.0)))
+    for _ in range(250):
+        output = plant.step(asked, armed=True)
+    assert math.degrees(2 * math.asin(output.attitude_wxyz[1])) == pytest.approx(15.0, abs=1.0)
+    # Right wing down flies to the right, g tan 15 deg less what the first quarter of a second misses
+    assert output.velocity_ned_m_s[1] == pytest.approx(9.81 * math.tan(math.radians(15.0)) * 0.8, abs=0.35)
+    assert output.velocity_ned_m_s[2] == pytest.approx(0.0, abs=0.35)
+
+
+def test_the_loops_turn_at_the_rates_asked_for():
+    plant, hover = thrown_up()
+    for _ in range(60):
+        output = plant.step(RatesSetpoint((0.8, -0.4, 0.5), hover), armed=True)
+    assert output.angular_velocity_frd_rad_s == pytest.approx((0.8, -0.4, 0.5), abs=0.12)
+
+
+def test_thrust_is_a_share_of_all_that_there_is():
+    plant, hover = thrown_up()
+    for _ in range(100):
+        output = plant.step(AttitudeSetpoint(LEVEL, 0.9 * hover), armed=True)
+    assert output.thrust_fraction == pytest.approx(0.9 * hover, abs=0.005)
