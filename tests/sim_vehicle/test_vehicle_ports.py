@@ -1,0 +1,175 @@
+"""The vehicle's ports: TCP, a UDP server, serial lines over a pseudo-terminal, addresses, several vehicles."""
+
+import os
+import pty
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.errors import LinkAddressError, PortInUse
+from sim_vehicle.scene import Scene
+from sim_vehicle.shell.addresses import open_port, px4_ports
+from sim_vehicle.shell.port import Port
+from sim_vehicle.shell.realtime import serve
+from sim_vehicle.vehicle import SimulatedVehicle
+
+TIMEOUT_S = 5.0
+
+
+def new_vehicle(system: int = 1) -> SimulatedVehicle:
+    return SimulatedVehicle(load_built_in("foldable"), Scene(), 1, parameters={"MAV_SYS_ID": system})
+
+
+@contextmanager
+def served(vehicle: SimulatedVehicle, *ports: Port) -> Iterator[None]:
+    stop = threading.Event()
+    thread = threading.Thread(target=serve, args=(vehicle, ports), kwargs={"stop": stop.is_set})
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(TIMEOUT_S)
+        assert not thread.is_alive()
+
+
+class Reader:
+    """Takes a stream of bytes apart."""
+
+    def __init__(self) -> None:
+        self._parser = dialect.MAVLink(None)
+        self._parser.robust_parsing = True
+        self.messages: list = []
+
+    def push(self, data: bytes) -> None:
+        self.messages += self._parser.parse_buffer(data) or []
+
+    def kinds(self) -> set[str]:
+        return {message.get_type() for message in self.messages}
+
+
+def client(system: int = 255) -> dialect.MAVLink:
+    return dialect.MAVLink(None, srcSystem=system, srcComponent=190)
+
+
+REQUEST = dialect.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0)
+
+
+def read_socket(connection: socket.socket, wanted: set[str]) -> Reader:
+    reader, until_s = Reader(), time.monotonic() + TIMEOUT_S
+    connection.settimeout(TIMEOUT_S)
+    while not wanted <= reader.kinds():
+        assert time.monotonic() < until_s, f"only {reader.kinds()}"
+        reader.push(connection.recv(65_536))
+    return reader
+
+
+def test_several_clients_on_tcp_each_with_answers_of_its_own():
+    vehicle = new_vehicle()
+    port = open_port(vehicle, "tcpin://127.0.0.1:0")
+    address = ("127.0.0.1", port.local_port)
+    with served(vehicle, port), socket.create_connection(address) as first:
+        with socket.create_connection(address) as second:
+            first.sendall(REQUEST.pack(client()))
+            read_socket(first, {"AUTOPILOT_VERSION", "COMMAND_ACK", "HEARTBEAT"})
+            assert "AUTOPILOT_VERSION" not in read_socket(second, {"HEARTBEAT", "ATTITUDE"}).kinds()
+        # One hangs up, the other goes on
+        read_socket(first, {"ATTITUDE"})
+    assert len(vehicle._links) <= 2
+
+
+def test_a_client_that_hangs_up_leaves_no_link_behind():
+    vehicle = new_vehicle()
+    port = open_port(vehicle, "tcpin://127.0.0.1:0")
+    with served(vehicle, port):
+        with socket.create_connection(("127.0.0.1", port.local_port)) as connection:
+            read_socket(connection, {"ATTITUDE"})
+        until_s = time.monotonic() + TIMEOUT_S
+        while vehicle._links:
+            assert time.monotonic() < until_s
+            time.sleep(0.01)
+
+
+def test_a_udp_server_answers_each_client_at_its_address():
+    vehicle = new_vehicle()
+    port = open_port(vehicle, "udpin://127.0.0.1:0?set=onboard")
+    with (
+        served(vehicle, port),
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second,
+    ):
+        for connection in (first, second):
+            connection.connect(("127.0.0.1", port.local_port))
+            connection.send(client().heartbeat_encode(6, 8, 0, 0, 0).pack(client()))
+        first.send(REQUEST.pack(client()))
+        read_socket(first, {"AUTOPILOT_VERSION", "HIGHRES_IMU"})
+        assert "AUTOPILOT_VERSION" not in read_socket(second, {"HIGHRES_IMU", "HEARTBEAT"}).kinds()
+
+
+def test_a_serial_line_over_a_pseudo_terminal_carries_no_more_than_its_speed():
+    vehicle = new_vehicle()
+    ours, theirs = pty.openpty()
+    port = open_port(vehicle, f"serial://{os.ttyname(theirs)}:57600")
+    reader, count = Reader(), 0
+    with served(vehicle, port):
+        os.set_blocking(ours, False)
+        os.write(ours, REQUEST.pack(client()))
+        begun_s = time.monotonic()
+        while time.monotonic() - begun_s < 2.0:
+            try:
+                data = os.read(ours, 65_536)
+            except BlockingIOError:
+                time.sleep(0.005)
+                continue
+            count += len(data)
+            reader.push(data)
+    os.close(ours)
+    os.close(theirs)
+    assert {"HEARTBEAT", "AUTOPILOT_VERSION", "COMMAND_ACK", "HIGHRES_IMU"} <= reader.kinds()
+    assert all(message.get_type() != "BAD_DATA" for message in reader.messages)
+    # Ten bits for each byte; a busy machine gives less
+    assert count < 1.2 * 2.0 * 5_760
+    imu_hz = sum(message.get_type() == "HIGHRES_IMU" for message in reader.messages) / 2.0
+    assert imu_hz < 9
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("nonsense", "is not an address"),
+        ("tcpin://127.0.0.1", "is not an address"),
+        ("carrier://pigeon:7", "unknown scheme 'carrier'"),
+        ("udpin://0.0.0.0:14551?set=satellite", "unknown set of streams"),
+    ],
+)
+def test_a_wrong_address_is_one_sentence(address, words):
+    with pytest.raises(LinkAddressError, match=words):
+        open_port(new_vehicle(), address)
+
+
+def test_a_serial_port_that_is_not_there_is_one_sentence():
+    with pytest.raises(PortInUse, match="Serial port /dev/none cannot be opened"):
+        open_port(new_vehicle(), "serial:///dev/none:57600")
+
+
+def test_two_vehicles_beside_one_another():
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second,
+    ):
+        for connection in (first, second):
+            connection.bind(("127.0.0.1", 0))
+        one, two = new_vehicle(1), new_vehicle(2)
+        with (
+            served(one, *px4_ports(one, 0, 0, first.getsockname())),
+            served(two, *px4_ports(two, 1, 0, second.getsockname())),
+        ):
+            for number, connection in ((1, first), (2, second)):
+                reader = read_socket(connection, {"HEARTBEAT", "ATTITUDE"})
+                assert {message.get_srcSystem() for message in reader.messages} == {number}
