@@ -283,6 +283,11 @@ class Autopilot:
         return self.navigator.view.home_yaw_rad
 
     @property
+    def radio_channels(self) -> RadioChannels | None:
+        """What a radio last said, if there ever was one."""
+        return self.commander.sticks.channels
+
+    @property
     def home_set_us(self) -> int:
         """When home was set."""
         return self.navigator.home_set_us

@@ -2,6 +2,7 @@
 
 from enum import IntEnum
 
+from sim_vehicle.autopilot.flight_messages import RadioChannels
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Air, HilGps
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -29,10 +30,11 @@ class Topic(IntEnum):
     TARGET = 11
     """New with every position, while a mode flies somewhere by itself."""
     MAGNETIC_FIELD = 12
+    RADIO = 13
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.TARGET)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.TARGET, Topic.RADIO)
 
 
 class Topics:
@@ -46,6 +48,7 @@ class Topics:
         self._fix: HilGps | None = None
         self._battery = 0
         self._air: Air | None = None
+        self._channels: RadioChannels | None = None
         self._field = state.magnetic_field_frd_gauss
         self._status: tuple[int, bool, int] | None = None
         self._status_us = state.sample.time_boot_us
@@ -59,6 +62,10 @@ class Topics:
         if new_position:
             versions[2] += 1
             self._count_target()
+        channels = state.autopilot.radio_channels
+        if channels is not self._channels:
+            self._channels = channels
+            versions[13] += 1
         if state.air is not self._air:
             self._air = state.air
             versions[8] += 1

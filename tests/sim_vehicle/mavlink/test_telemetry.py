@@ -207,3 +207,16 @@ def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
     degrees = 100.0 / (111_194.93 * math.cos(math.radians(47.397742)))
     assert place.longitude_deg - 8.545594 == pytest.approx(degrees, rel=1e-5)
     assert place.altitude_m == 500.0
+
+
+def test_radio_channels_show_once_somebody_sends_them():
+    client = Client()
+    client.run(1.0)
+    assert client.all("RC_CHANNELS") == []
+    pulses = (1500, 1500, 1200, 1500, *[0] * 14)
+    for _ in range(20):
+        client.send(dialect.MAVLink_rc_channels_override_message(1, 1, *pulses))
+        client.run(0.05)
+    channels = client.last("RC_CHANNELS")
+    assert (channels.chancount, channels.chan3_raw, channels.chan5_raw) == (4, 1200, 0xFFFF)
+    assert len(client.all("RC_CHANNELS")) == pytest.approx(20, abs=2)
