@@ -170,8 +170,9 @@ class SimulatedVehicle:
     def _sense(self, telemetry: Telemetry) -> None:
         slow, faults = self._slow, self._plant.faults
         slow.gps_is_blocked = self._autopilot.ground.gps_is_off
-        if faults is not None and faults.is_lost("gps", self.time_boot_us / 1e6):
-            slow.gps_is_blocked = True
+        if faults is not None:
+            slow.gps_is_blocked |= faults.is_lost("gps", self.time_boot_us / 1e6)
+            self._autopilot.battery.supply_share = faults.voltage_share
         slow.update(self.time_boot_us, self._plant.state.body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss

@@ -42,6 +42,8 @@ class Battery:
         """As INJECT_FAILURE can make it."""
         self.version = 0
         """Grows with every new sample."""
+        self.supply_share = 1.0
+        """Voltage over what charge and current explain, where a fault has it sag."""
         self._sampled_us: int | None = None
         self._update_voltage()
 
@@ -85,4 +87,5 @@ class Battery:
         empty, full = parameters["BAT1_V_EMPTY"], parameters["BAT1_V_CHARGED"]
         resistance = parameters["BAT1_R_INTERNAL"]
         sag = self.current_a * (resistance if resistance >= 0 else CELL_RESISTANCE_OHM)
-        self.voltage_v = max(parameters["BAT1_N_CELLS"], 1) * (empty + self.remaining * (full - empty) - sag)
+        cell_v = empty + self.remaining * (full - empty) - sag
+        self.voltage_v = self.supply_share * max(parameters["BAT1_N_CELLS"], 1) * cell_v

@@ -14,9 +14,10 @@ class Motors:
 
     def __init__(self, faults: Sequence[MotorFailure | FreeFall | BatterySag]) -> None:
         self._faults = faults
+        self.voltage_share = 1.0
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
-        shares = [1.0] * 4
+        shares, self.voltage_share = [1.0] * 4, 1.0
         for fault in self._faults:
             start_s, end_s = fault.window_s
             if time_s < start_s:
@@ -25,6 +26,7 @@ class Motors:
                 # A propeller's speed goes with voltage, its thrust with the square of its speed.
                 fallen = min((time_s - start_s) / (end_s - start_s), 1.0)
                 voltage_share = 1.0 - fallen * (1.0 - fault.voltage_share)
+                self.voltage_share *= voltage_share
                 shares = [share * voltage_share**2 for share in shares]
             elif time_s < end_s and isinstance(fault, MotorFailure):
                 shares[fault.motor] *= fault.thrust_share

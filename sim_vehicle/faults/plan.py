@@ -63,10 +63,11 @@ class Faults:
         estimate = [
             fault for fault in faults if isinstance(fault, EstimatorReset | EstimatorAfterClipping | AidingLoss)
         ]
+        self._motors = Motors(motors)
         self._estimate = Estimate(estimate, airframe.estimate.kind == "markov", step_s, rng)
         groups: tuple[tuple[Sequence[Fault], Act], ...] = (
             (winds, Air(winds, wind_ned_m_s, step_s, rng)),
-            (motors, Motors(motors)),
+            (motors, self._motors),
             (drops, Load(drops)),
             (pushes, Pushes(pushes)),
             (catches, Hands(catches)),
@@ -83,6 +84,11 @@ class Faults:
     def reset_counter(self) -> int:
         """How often faults have made the estimate jump."""
         return self._estimate.reset_counter
+
+    @property
+    def voltage_share(self) -> float:
+        """What is left of the supply's voltage."""
+        return self._motors.voltage_share
 
     def begin(self, state: State) -> None:
         """Write what is different from the start on."""

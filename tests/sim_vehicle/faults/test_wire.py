@@ -141,6 +141,12 @@ def test_a_clock_that_jumps_shows_in_every_stamp_and_wraps_where_it_is_narrow() 
     assert wide[-1] > 2**32 * 1000
 
 
+def test_a_battery_that_sags_shows_its_voltage() -> None:
+    heard = flown({"kind": "battery_sag", "between_s": [0.5, 1.0], "voltage_share": 0.8}, seconds=4.0)
+    millivolts = stamps(heard, "SYS_STATUS", "voltage_battery")
+    assert millivolts[-1] / millivolts[0] == pytest.approx(0.8, abs=0.01)
+
+
 def test_commands_to_the_vehicle_are_lost_too() -> None:
     link = dialect.MAVLink(None, 255, 190)
     request = dialect.MAVLink_timesync_message(0, 12345).pack(link)
