@@ -14,9 +14,11 @@ from companion.shell.clock import Clock
 from companion.shell.connection import Connection, UdpInConnection, open_connection
 from rebound_cli import run_folder
 from rebound_cli.console import Console, console_for, summary_text, timeline
+from rebound_cli.documents import Override, apply_override
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
+from rebound_cli.resume import resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.truth_match import FlightTruth
@@ -45,6 +47,11 @@ def run_fly(options: Namespace) -> int:
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     document = load_mission_document(options.mission, options.set, options.airframe, options.seed, options.companion)
     mission = mission_from(document)
+    if options.resume is not None:
+        apply_override(
+            document, Override(f"--resume {options.resume}", ("resume",), resume_of(options.resume, mission))
+        )
+        mission = mission_from(document)
     world = world_from(document) if is_simulated else None
     console = console_for(options.json)
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.

@@ -33,6 +33,12 @@ def add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
     fly.add_argument(
         "--companion", type=Path, metavar="FILE", help="take the companion: part from this file, e.g. from rebound tune"
     )
+    fly.add_argument(
+        "--resume",
+        type=Path,
+        metavar="RUN",
+        help="go on with the mission where the flight in this folder was interrupted",
+    )
     fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
     fly.set_defaults(run=_fly)

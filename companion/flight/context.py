@@ -14,8 +14,9 @@ from companion.link.vehicle import Vehicle
 from companion.messages import CommandAck, LocalPosition, Outgoing, Vector3
 from companion.mission.expectations import ExpectItem
 from companion.mission.items import ReturnItem
+from companion.mission.itinerary import steps_to_fly
 from companion.mission.model import Mission
-from companion.mission.program import Step, program
+from companion.mission.program import Step
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -117,7 +118,7 @@ class FlightContext:
     def __post_init__(self) -> None:
         config = self.mission.companion.flight
         self.pace = Pace(config.cruise_speed_m_s, config.cruise_acceleration_m_s2)
-        self.steps = self.steps or program(self.mission)
+        self.steps = self.steps or steps_to_fly(self.mission)
         last = self.steps[-1].action
         if isinstance(last, ReturnItem):
             self.returning_as = last

@@ -100,7 +100,7 @@ class Machine:
         flight.reason = move.text
         expecting.close(flight, now_us)
         text = f"{flight.outcome}: {move.text}"
-        flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step_index)
+        flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index)
         return HandOver(flight) if move.hand_over else LetGo()
 
 

@@ -152,6 +152,14 @@ def _item_lines(number: str, item: MissionItem, lead: str = "") -> list[str]:
     return [f"{lead:<10} {number} {describe_item(item.action)}" + (f" ({modifiers})" if modifiers else "")]
 
 
+def _resume_lines(flight: FlightContext) -> list[str]:
+    resume = flight.mission.resume
+    if resume is None:
+        return []
+    label = next(step.label for step in reversed(flight.steps) if step.index == resume.at_step)
+    return [f"Resumes    at item {label}, in the first flight's coordinates unless the vehicle was restarted since"]
+
+
 def plan_text(flight: FlightContext) -> str:
     """What will happen, for a person to agree to."""
     mission = flight.mission
@@ -162,6 +170,7 @@ def plan_text(flight: FlightContext) -> str:
         f"Vehicle    {flight.vehicle.autopilot_text()}, "
         + (f"{identity.vehicle_type}, system {identity.system_id}" if identity else "not connected"),
         f"Checks     disarmed, on the ground, streams: {rates}",
+        *_resume_lines(flight),
         *mission_lines(mission),
         "Pilot      any mode change or disarm by the pilot ends the flight; the companion does not come back",
     ]

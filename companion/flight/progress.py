@@ -59,7 +59,7 @@ class FlyItems:
         again = "" if flight.tally.pace_factor == 1.0 else f", at {flight.tally.pace_factor:.0%} of the speed"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
-        flight.tell(now_us, "item", text, number=number, name=step.name, step=flight.step_index)
+        flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
         if isinstance(self._action, ExpectItem):
             expecting.begin(flight, step.label, self._action, now_us)
 

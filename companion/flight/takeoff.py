@@ -15,6 +15,12 @@ from companion.px4_mode import OFFBOARD
 ORIGIN_MEAN_US = 1_000_000
 
 
+# How far a vehicle's boot clock may go wrong and still be the same: SITL's may run 1 % off (measured), and the wall's
+# clock may be set by a second or two.
+BOOT_CLOCK_DRIFT = 0.02
+BOOT_CLOCK_SLACK_US = 3_000_000
+
+
 class Step(Enum):
     LEAD = "streaming setpoints"
     MODE = "switching to OFFBOARD"
@@ -80,12 +86,16 @@ class TakeOff:
             return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
         self._step = Step.CLIMB
         self._started_us = flight.armed_at_us = now_us
-        self._ground_ned_m = flight.origin_ned_m = mean_position(flight)
+        self._ground_ned_m = mean_position(flight)
+        latest = flight.vehicle.history.latest()
+        assert latest is not None, "a flight begins only with positions arriving"
+        flight.origin_ned_m = origin_of(flight, self._ground_ned_m, latest.time_boot_us, now_us)
         limits = flight.mission.companion.flight
-        top = flight.local_ned_m((0.0, 0.0, -self._item.height_m))
+        n, e, d = self._ground_ned_m
+        top = (n, e, d - self._item.height_m)
         self._profile = LineProfile(self._ground_ned_m, top, limits.takeoff_speed_m_s, limits.takeoff_acceleration_m_s2)
         text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
-        flight.tell(now_us, "armed", text, origin_ned_m=self._ground_ned_m)
+        flight.tell(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
 
     def _climb(self, flight: FlightContext, now_us: int) -> Move | None:
@@ -102,6 +112,22 @@ class TakeOff:
         if flying_s > limits.arrival_timeout_s:
             return Move(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)
         return None
+
+
+def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us: int) -> Vector3:
+    """The zero of mission coordinates: where the vehicle stands, or where the flight that is resumed was armed.
+
+    The latter only where the vehicle's boot clock has gone on since then, so that its local frame is still the same.
+    """
+    resume = flight.mission.resume
+    if resume is None:
+        return ground_ned_m
+    passed_us = now_us - resume.armed_at_us
+    drift_us = abs(boot_us - resume.armed_boot_us - passed_us)
+    same_frame = passed_us > 0 and drift_us <= BOOT_CLOCK_DRIFT * passed_us + BOOT_CLOCK_SLACK_US
+    which = "the first flight's arming position" if same_frame else "this arming position: the vehicle was restarted"
+    flight.tell(now_us, "resume", f"coordinates count from {which}")
+    return resume.origin_ned_m if same_frame else ground_ned_m
 
 
 def mean_position(flight: FlightContext) -> Vector3:

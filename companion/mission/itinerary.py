@@ -2,15 +2,24 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.flight.course import Pace, climb, way_home, way_of
 from companion.flight.trajectory import Chain, LineProfile, Trajectory
 from companion.messages import Vector3
 from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
-from companion.mission.items import HoldItem, LandItem, ReturnItem, SetSpeedItem, SetYawItem, TakeoffItem, WaitForItem
-from companion.mission.model import Mission
+from companion.mission.items import (
+    GoToItem,
+    HoldItem,
+    LandItem,
+    ReturnItem,
+    SetSpeedItem,
+    SetYawItem,
+    TakeoffItem,
+    WaitForItem,
+)
+from companion.mission.model import Mission, MissionItem
 from companion.mission.program import Step, program
 
 # Setpoints this far apart in time are looked at for the fence: 4 cm at 2 m/s, as they are sent.
@@ -40,6 +49,24 @@ class Leg:
 def itinerary(mission: Mission) -> tuple[Leg, ...]:
     """The mission when nothing is hit."""
     return tuple(_legs(mission))
+
+
+def steps_to_fly(mission: Mission) -> tuple[Step, ...]:
+    """The program, or what of it an interrupted flight has left: up, to where its step begins, and on from there.
+
+    Raises ValueError for a step that there is not.
+    """
+    steps = program(mission)
+    if mission.resume is None:
+        return steps
+    at = mission.resume.at_step
+    if at >= len(steps):
+        raise ValueError(f"resume.at_step: the mission has {len(steps)} steps, counted from 0; there is no {at}")
+    begin = itinerary(mission)[at]
+    there = GoToItem(position_ned_m=begin.start_ned_m)
+    back = Step(at, begin.step.label, MissionItem(go_to=there), there)
+    paces = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, SetSpeedItem)]
+    return (steps[0], *paces[-1:], back, *steps[at:])
 
 
 def _legs(mission: Mission) -> Iterator[Leg]:
@@ -83,7 +110,8 @@ def _landing_s(place: Vector3) -> float:
 
 
 def first_complaint(mission: Mission) -> str | None:
-    """What is wrong with the first way that leaves the fence, or None."""
+    """What is wrong with the first way that leaves the fence, or None. Raises ValueError, too."""
+    steps_to_fly(mission)
     seen: set[tuple[int, Vector3]] = set()
     for leg in _legs(mission):
         # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.

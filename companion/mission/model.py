@@ -22,7 +22,7 @@ from companion.mission.items import (
     VelocityItem,
     WaitForItem,
 )
-from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, OnTimeout
+from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, OnTimeout, Resume
 from companion.recovery.interface import RecoveryConfig
 from companion.recovery.registry import RECOVERY_LAWS, check_known_law
 from companion.written import Positive, Written, with_bare_keys
@@ -113,6 +113,7 @@ class Mission(Written):
     abort_when: AbortWhen = AbortWhen()
     on_interrupt: Handover = "hold"
     companion: CompanionConfig = CompanionConfig()
+    resume: Resume | None = None
     sim: dict[str, object] | None = None
 
     @field_validator("recovery")

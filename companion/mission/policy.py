@@ -4,7 +4,7 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from companion.written import NotNegative, Positive, Written
+from companion.written import NotNegative, PositionNed, Positive, Written
 
 Handover: TypeAlias = Literal["hold", "land"]
 OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
@@ -45,3 +45,16 @@ class Limits(Written):
     # PX4 answers a setpoint that lies d ahead with MPC_XY_P * d = 0.95/s * d: 5 m are 4.75 m/s. Recoveries ask for
     # up to 3 m; a setpoint further off than this is an estimate that jumped or a mistake.
     max_step_m: Annotated[Positive, Field(ge=0.5)] = 5.0
+
+
+class Resume(Written):
+    """Where an interrupted flight of this mission is taken up again; `rebound fly --resume RUN` writes it.
+
+    The first flight's arming position is the zero of the coordinates for as long as the vehicle has not been
+    restarted, which its boot clock tells.
+    """
+
+    at_step: Annotated[int, Field(strict=True, ge=1)]  # with the repeats written out, counted from 0
+    origin_ned_m: PositionNed
+    armed_at_us: Annotated[int, Field(strict=True, ge=0)]
+    armed_boot_us: Annotated[int, Field(strict=True, ge=0)]

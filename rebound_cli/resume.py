@@ -1,0 +1,57 @@
+"""`rebound fly MISSION --resume RUN`: from the folder of an interrupted flight, where to take it up again."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from companion.errors import ConfigurationError
+from companion.mission.model import Mission
+from rebound_cli.documents import load_document
+from rebound_cli.inputs import mission_from
+from rebound_cli.run_folder import EVENTS_NAME, RESOLVED_NAME
+
+
+class ResumeError(ConfigurationError):
+    """There is nothing to go on with, or it is not this mission's."""
+
+
+def resume_of(run: Path, mission: Mission) -> dict[str, Any]:
+    """The mission's `resume:` part. Works for flights that ended early, and for those whose process was killed."""
+    flown = mission_from(load_document(run / RESOLVED_NAME))
+    if flown.items != mission.items:
+        raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
+    events = _events(run / EVENTS_NAME)
+    armed = _last(events, "armed")
+    item, end = _last(events, "item"), _last(events, "aborted")
+    if _last(events, "done") is not None:
+        raise ResumeError(f"{run} was flown to its end: there is nothing to resume.")
+    if armed is None or item is None:
+        raise ResumeError(f"{run} ended before its first item: fly it from the start.")
+    at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
+    return {
+        "at_step": max(1, at_step),
+        "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
+        "armed_at_us": armed["time_us"],
+        "armed_boot_us": armed["data"]["time_boot_us"],
+    }
+
+
+def _events(path: Path) -> Sequence[dict[str, Any]]:
+    """A killed process may leave its last line unfinished: that one is left out."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise ResumeError(f"{path}: cannot be read: {error.strerror}.") from error
+    events = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            events.append(json.loads(line))
+        except ValueError as error:
+            if number < len(lines):
+                raise ResumeError(f"{path}:{number}: not an event; the file is damaged.") from error
+    return events
+
+
+def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:
+    return next((event for event in reversed(events) if event["kind"] == kind), None)

@@ -1,0 +1,45 @@
+"""`rebound fly MISSION --resume RUN`: a flight cut short and flown on, and runs that cannot be gone on with."""
+
+import json
+
+import yaml
+
+from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.main import main
+from rebound_cli.resume import resume_of
+from rebound_cli.run_folder import EVENTS_NAME
+from tests.rebound_cli.command import QUICK, SQUARE, events_of
+
+
+def fly(*arguments):
+    return main(["fly", str(SQUARE), "--lockstep", *map(str, arguments)])
+
+
+def steps(folder):
+    return [event["data"]["step"] for event in events_of(folder) if event["kind"] == "item"]
+
+
+def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
+    # Given the square, ended by its own time limit on its third side
+    first, second = tmp_path / "first", tmp_path / "second"
+    limit = ("--set", "abort_when.flight_time_above_s=14", *QUICK)
+    assert fly(*limit, "--out", first) == 1
+    assert "flight time above 14 s" in capsys.readouterr().out
+    assert steps(first) == [1, 2, 3]
+    # When it is resumed
+    code = fly(*QUICK, "--resume", first, "--out", second)
+    # Then it begins where the third side does, and ends as the mission says
+    assert code == 0
+    assert steps(second) == [3, 3, 4, 5, 6]
+    resume = yaml.safe_load((second / "resolved.yaml").read_text())["resume"]
+    assert resume["at_step"] == 3
+    assert json.loads((second / "summary.json").read_text())["outcome"] == "completed"
+    # and neither another mission nor a flight that is over can be resumed
+    assert fly("--resume", second) == 1 and "nothing to resume" in capsys.readouterr().err
+    assert fly("--set", "items.1.go_to.speed_m_s=1", "--resume", first) == 1
+    assert "its items are others" in capsys.readouterr().err
+    # A process that was killed leaves no word of an end, and perhaps half a line
+    events = (first / EVENTS_NAME).read_text().splitlines(keepends=True)
+    cut = [line for line in events if '"aborted"' not in line and '"mode"' not in line]
+    (first / EVENTS_NAME).write_text("".join(cut) + cut[-1][:20])
+    assert resume_of(first, mission_from(load_mission_document(SQUARE, QUICK[1:])))["at_step"] == 3
