@@ -6,6 +6,7 @@ from pathlib import Path
 from rebound_cli.campaign.plan import Campaign
 from rebound_cli.detectors.flights import AIRBORNE_S, FlightCase, work_out_flight
 from rebound_cli.detectors.hits import AIRFRAMES, HitCase, draw_case, work_out_hit
+from rebound_cli.detectors.mishaps import FAMILIES
 from rebound_cli.detectors.recorded import (
     SCALES,
     STRIKE_LOG,
@@ -53,9 +54,10 @@ def hits_campaign(hits: int) -> Campaign:
 def flights_campaign(hours: float) -> Campaign:
     """At least so many hours of flight, airframes in turn."""
     count = max(2, math.ceil(3600.0 * hours / FLIGHT_S))
+    families = list(FAMILIES)
     cases = [
         FlightCase(
-            family="calm",
+            family=families[seed // 2 % len(families)],
             seed=seed,
             airframe=AIRFRAMES[seed % 2],
             detectors=_compared(seed),

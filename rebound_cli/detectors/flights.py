@@ -7,15 +7,20 @@ from typing import Any
 import numpy as np
 
 from companion.detection.interface import Situation
+from rebound_cli.detectors.hits import built_in
+from rebound_cli.detectors.mishaps import FAMILIES
 from rebound_cli.detectors.pilot import Asked, Pilot, as_known
 from rebound_cli.detectors.recording import Recording
 from rebound_cli.detectors.watching import ASKED_HZ, SWEPT_FACTORS, configuration, streams_asked_hz, watch_all
 from rebound_cli.detectors.wire import Wire
-from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.scene import Scene
 
 SWEPT_RATE = 246
+# A vehicle this low that was not asked to be is about to hit the ground, which would be a collision.
+LOST_BELOW_M = 1.0
+NEAR_GROUND = frozenset({"ground", "takeoff", "climb", "descend", "landing", "landed"})
 # Between take-off and landing.
 AIRBORNE_S = 100.0
 
@@ -41,7 +46,7 @@ class Flown:
 
 def work_out_flight(case: FlightCase) -> dict[str, Any]:
     """Fly it, let every detector hear it at every rate, list what they report."""
-    airframe = load_built_in(case.airframe)
+    airframe = built_in(case.airframe)
     flown = fly_healthy(case, airframe)
     samples = flown.recording.samples
     result: dict[str, Any] = {
@@ -82,7 +87,8 @@ def _told(time_boot_us: int, phase: str, kind: Any) -> Sequence[Any]:
 def fly_healthy(case: FlightCase, airframe: Airframe) -> Flown:
     """From the ground to the ground; a flight that its fault ends is recorded up to there."""
     rng = np.random.default_rng([case.seed, 2])
-    scene = Scene.model_validate({})
+    mishaps = FAMILIES[case.family](np.random.default_rng([case.seed, 4]))
+    scene = Scene.model_validate({"faults": mishaps.faults})
     plant = Plant(airframe, scene, case.seed, keeps_path=False)
     pilot = Pilot(plant, airframe, rng, AIRBORNE_S)
     flown = Flown(Recording(), [])
@@ -91,6 +97,9 @@ def fly_healthy(case: FlightCase, airframe: Airframe) -> Flown:
         output = plant.step(asked.setpoint, asked.armed) if asked.driven is None else plant.drive(asked.driven)
         flown.recording.add(plant, output, _situation(asked, ground_m - output.position_ned_m[2]), airframe.mass_kg)
         flown.phases.append(asked.phase)
+        is_lost = asked.phase not in NEAR_GROUND and ground_m - plant.state.body[2] < LOST_BELOW_M
+        if is_lost or (mishaps.ends_s is not None and output.time_boot_us > 1e6 * mishaps.ends_s):
+            break
     return flown
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,7 @@ def work_out_hit(case: HitCase) -> dict[str, Any]:
 
 
 def airframe_of(case: HitCase) -> Airframe:
-    airframe = load_built_in(case.airframe)
+    airframe = built_in(case.airframe)
     if case.vibration_m_s2 is not None:
         imu = airframe.imu.model_copy(update={"accelerometer_noise_m_s2": case.vibration_m_s2})
         airframe = airframe.model_copy(update={"imu": imu})
@@ -102,6 +103,12 @@ def airframe_of(case: HitCase) -> Airframe:
         estimate = airframe.estimate.model_copy(update={"velocity_noise_m_s": case.velocity_noise_m_s})
         airframe = airframe.model_copy(update={"estimate": estimate})
     return airframe
+
+
+@lru_cache
+def built_in(name: str) -> Airframe:
+    """Reading an airframe's file takes longer than flying a hit with it."""
+    return load_built_in(name)
 
 
 def fly_hit(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:

@@ -4,6 +4,7 @@ The link's own rule decides what is sent when; numbers have the width of their M
 against the whole wire, bytes included.
 """
 
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -83,6 +84,7 @@ class Wire:
 
 
 Builder = Callable[[int], Sample]
+FOUR_FLOATS = struct.Struct("<4f")
 
 
 def _as_floats(rows: Sequence[Sequence[float]]) -> list[list[float]]:
@@ -146,7 +148,8 @@ def _attitude_target(recording: Recording) -> Builder:
     rows = _as_floats([(s.thrust_fraction,) for s in samples])
 
     def build(index: int) -> Sample:
-        ((w, x, y, z),) = _as_floats([quaternion_from_matrix(recording.asked_attitudes[index])])
+        asked = quaternion_from_matrix(recording.asked_attitudes[index])
+        w, x, y, z = FOUR_FLOATS.unpack(FOUR_FLOATS.pack(*asked))
         return AttitudeTarget(_milliseconds(samples[index]), rows[index][0], (w, x, y, z))
 
     return build

@@ -71,7 +71,7 @@ def test_one_two_or_a_schedulers_workers_give_the_same_bytes(tmp_path):
     for who in ("1", "2", "scheduler"):
         # When one process works it out, or two, or the workers of a scheduler that was there before
         command = [sys.executable, "-c", SCRIPT, who, str(tmp_path / who)]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True, timeout=120)
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True, timeout=300)
         texts.append(done.stdout)
     # Then the results are the same to the byte, with the failures among them
     assert texts[0] == texts[1] == texts[2]
