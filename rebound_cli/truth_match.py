@@ -31,14 +31,16 @@ class FlightTruth:
     def past_setpoint_and_below(self, hit: "Hit", setpoint_ned_m: Vector3, until_boot_us: float) -> tuple[float, float]:
         """Furthest distance past the setpoint along the wall's normal and greatest loss of height, in metres.
 
-        Looked at from the contact until `until_boot_us`; the setpoint is in the world's NED.
+        Looked at from the contact until `until_boot_us`. The setpoint is in the vehicle's own frame, which dead
+        reckoning lets drift; its place in the world is where that frame was at the contact.
         """
         time_us = self.series["time_boot_us"]
         during = (time_us >= hit.contact_at_boot_us) & (time_us <= until_boot_us)
         position_ned_m = self.series["position_ned_m"][during]
         if len(position_ned_m) == 0:
             return 0.0, 0.0
-        past_m = (position_ned_m - np.array(setpoint_ned_m)) @ np.array(hit.normal_ned)
+        place_ned_m = np.array(setpoint_ned_m) - np.array(hit.frame_offset_ned_m)
+        past_m = (position_ned_m - place_ned_m) @ np.array(hit.normal_ned)
         lost_m = position_ned_m[:, 2] - hit.contact_position_ned_m[2]
         return max(float(past_m.max()), 0.0), max(float(lost_m.max()), 0.0)
 

@@ -12,6 +12,7 @@ from sim_vehicle.physics.layout import (
     HIT_EXIT_VELOCITY,
     HIT_FACE,
     HIT_FOLD_M,
+    HIT_FRAME_OFFSET,
     HIT_IMPULSE,
     HIT_LAST_US,
     HIT_NORMAL,
@@ -59,6 +60,8 @@ class Hit:
     """On the surface, where it was touched first and hardest."""
     surface_velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     """Of the obstacle at the first touch."""
+    frame_offset_ned_m: Vector3 = (0.0, 0.0, 0.0)
+    """What the vehicle believed its position to be, less what it was, at the first touch; without its delay."""
 
     @property
     def contact_duration_s(self) -> float:
@@ -121,6 +124,7 @@ class TruthRecorder:
                 kind=world.kinds[int(row[HIT_FACE])],
                 contact_point_ned_m=_vector(row[HIT_POINT]),
                 surface_velocity_ned_m_s=_vector(row[HIT_SURFACE_VELOCITY]),
+                frame_offset_ned_m=_vector(row[HIT_FRAME_OFFSET]),
             )
         )
 

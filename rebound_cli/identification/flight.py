@@ -24,7 +24,7 @@ _AFTER_S = 0.15
 _SPEED_SIGMA_M_S = 0.03
 # Two numbers are fitted: with one sample more than that they are at least checked.
 _FEWEST_SAMPLES = 3
-# A sample this near to the usual +-16 g (156.9) has clipped raw samples in it and shows too little.
+# A sample this near to the usual +-16 g (156.9) has clipped raw samples in it and shows too little: no spring makes it.
 _CLIPPED_M_S2 = 140.0
 # A push that rises again to this share over its first decay has met the stop of the arms.
 _STOP_RISE = 1.3
@@ -123,8 +123,6 @@ def _push(log: FlightLog, touch: int, direction: Floats, speed_m_s: float) -> tu
         middle_s += interval_s
         depth += middle_speed * interval_s
         speed -= value * interval_s
-    if push.max() > _CLIPPED_M_S2:
-        return None, None
     before_stop = _before_stop(push[1:])
     if before_stop < _FEWEST_SAMPLES:
         return None, None
@@ -137,5 +135,5 @@ def _push(log: FlightLog, touch: int, direction: Floats, speed_m_s: float) -> tu
 def _before_stop(push: Floats) -> int:
     """Samples before the push rises again after it has begun to decay: there the arms met their stop."""
     lowest = np.minimum.accumulate(push)
-    rising = np.flatnonzero(push > _STOP_RISE * lowest + _RELEASE_M_S2)
+    rising = np.flatnonzero((push > _STOP_RISE * lowest + _RELEASE_M_S2) | (push > _CLIPPED_M_S2))
     return int(rising[0]) - 1 if len(rising) else len(push)

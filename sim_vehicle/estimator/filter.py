@@ -44,10 +44,23 @@ FIRST_VELOCITY_M_S = 0.01
 FLOW_NAME, RANGE_NAME, HEADING_NAME, CAPTURE_NAME, REST_NAME = "flow", "range", "heading", "capture", "rest"
 
 
+class ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
+    """filterpy's filter over an error that is put into the nominal state as soon as it is known."""
+
+    def predict_x(self, u: float = 0) -> None:
+        """The error expected before a measurement is zero."""
+
+
 class NavigationFilter:
     """State and covariance at the time of the last inertial sample used."""
 
-    def __init__(self, airframe: Airframe, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float) -> None:
+    def __init__(
+        self,
+        airframe: Airframe,
+        position_ned_m: Vector3,
+        velocity_ned_m_s: Vector3,
+        attitude_wxyz: tuple[float, float, float, float],
+    ) -> None:
         imu, tuning = airframe.imu, airframe.estimator
         self._step_s = step_s = 1e-6 * imu.integration_interval_us
         self._noise = np.array(
@@ -62,8 +75,8 @@ class NavigationFilter:
         self.nominal = np.zeros(NOMINAL_ROWS)
         self.nominal[POSITION : POSITION + 3] = position_ned_m
         self.nominal[VELOCITY : VELOCITY + 3] = velocity_ned_m_s
-        self.nominal[QUATERNION : QUATERNION + 4] = [np.cos(yaw_rad / 2), 0.0, 0.0, np.sin(yaw_rad / 2)]
-        self._ekf = ekf = ExtendedKalmanFilter(ERROR_ROWS, 1)
+        self.nominal[QUATERNION : QUATERNION + 4] = attitude_wxyz
+        self._ekf = ekf = ErrorFilter(ERROR_ROWS, 1)
         ekf.x = np.zeros(ERROR_ROWS)
         ekf.Q = np.zeros((ERROR_ROWS, ERROR_ROWS))
         first = np.zeros(ERROR_ROWS)

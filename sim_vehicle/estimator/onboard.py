@@ -19,7 +19,7 @@ from sim_vehicle.estimator.samples import (
     RangeSample,
     Sample,
 )
-from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, FlowSensor, RangeSensor, true_yaw
+from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, FlowSensor, RangeSensor
 from sim_vehicle.estimator.strapdown import (
     CLIPPED,
     D_ATTITUDE,
@@ -27,14 +27,12 @@ from sim_vehicle.estimator.strapdown import (
     D_VELOCITY,
     FORCE,
     NOMINAL_ROWS,
-    RATES,
     SAMPLE_COLUMNS,
     predict_now,
 )
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
 from sim_vehicle.physics.rotation import matrix_from_quaternion
-from sim_vehicle.world import Vector3
 
 Floats = npt.NDArray[np.float64]
 
@@ -66,6 +64,7 @@ class OnboardEstimator:
         self._rotation = np.empty((3, 3))
         self._share = 1 - math.exp(-self._step_s / SLOPE_TIME_CONSTANT_S)
         self._now = np.zeros(NOMINAL_ROWS + 3)
+        self._clipped = np.zeros(3)
         self.flow: FlowSample | None = None
         self.range: RangeSample | None = None
         self.reset_counter = 0
@@ -73,16 +72,17 @@ class OnboardEstimator:
         self.start(body, 0)
 
     def start(self, body: Floats, time_us: int) -> None:
-        """Begin anew, at a place and speed that are known and with the heading that the sensors show."""
+        """Begin anew, at a place, speed and tilt that are known and with the heading that the sensors show."""
         sensors, tuning = self._airframe.sensors, self._airframe.estimator
         heads_by = sensors.motion_capture if self._has_cameras else sensors.compass
-        yaw_rad = true_yaw(body) + heads_by.noise_rad * self._seed_yaw_noise
-        x, y, z, vx, vy, vz = body[0:6].tolist()
-        self.filter = NavigationFilter(self._airframe, (x, y, z), (vx, vy, vz), yaw_rad)
+        half_rad = heads_by.noise_rad * self._seed_yaw_noise / 2
+        cos, sin = math.cos(half_rad), math.sin(half_rad)
+        px, py, pz, vx, vy, vz, w, x, y, z = body[0:10].tolist()
+        attitude_wxyz = (cos * w - sin * z, cos * x - sin * y, cos * y + sin * x, cos * z + sin * w)
+        self.filter = NavigationFilter(self._airframe, (px, py, pz), (vx, vy, vz), attitude_wxyz)
         self._samples = np.zeros((self._slots, SAMPLE_COLUMNS))
         self._samples[:, FORCE + 2] = -GRAVITY_M_S2
         self._head = 0
-        self._clipped = (0, 0, 0)
         self._waiting: deque[Sample] = deque()
         self._velocity_clock = ResetClock(tuning.reset_after_s, time_us)
         self._height_clock = ResetClock(tuning.reset_after_s, time_us)
@@ -91,9 +91,7 @@ class OnboardEstimator:
     def update(
         self,
         time_us: int,
-        specific_force_frd_m_s2: Vector3,
-        angular_velocity_frd_rad_s: Vector3,
-        clipping_counts: tuple[int, int, int],
+        sensed: Floats,
         flies: bool,
         body: Floats,
         estimate: Floats,
@@ -101,15 +99,15 @@ class OnboardEstimator:
     ) -> None:
         """Take one inertial sample; renew ``estimate`` (position, velocity, attitude) and the acceleration.
 
-        ``body``, the truth, goes no further than the sensors.
+        ``sensed`` (SAMPLE_COLUMNS,): the sample, with the clipped raw samples counted since boot. ``body``, the
+        truth, goes no further than the sensors.
         """
         self._sense(time_us, body)
         head = self._head = (self._head + 1) % self._slots
-        before, self._clipped = self._clipped, clipping_counts
         row = self._samples[head]
-        row[FORCE : FORCE + 3] = specific_force_frd_m_s2
-        row[RATES : RATES + 3] = angular_velocity_frd_rad_s
-        row[CLIPPED : CLIPPED + 3] = [now - then for now, then in zip(clipping_counts, before, strict=True)]
+        row[:] = sensed
+        row[CLIPPED:] -= self._clipped
+        self._clipped[:] = sensed[CLIPPED:]
         oldest = (head + 1) % self._slots
         self.filter.predict(self._samples[oldest])
         horizon_us = time_us - (self._slots - 1) * self._interval_us

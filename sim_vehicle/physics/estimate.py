@@ -65,6 +65,8 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturb
         errors.error[i] = errors.keep[i] * errors.error[i] + errors.drive[i] * noise[i]
     for i in range(6):
         state.estimate[i] = delayed[i] + errors.error[i] + disturbance.estimate_jump[i]
+    for i in range(3):
+        state.frame_offset_ned_m[i] = errors.error[i] + disturbance.estimate_jump[i]
     turn(state.body, errors.error[6], errors.error[7], errors.error[8], state.estimate)
 
 

@@ -12,6 +12,7 @@ from sim_vehicle.physics.layout import (
     HIT_EXIT_VELOCITY,
     HIT_FACE,
     HIT_FOLD_M,
+    HIT_FRAME_OFFSET,
     HIT_IMPULSE,
     HIT_LAST_US,
     HIT_NORMAL,
@@ -73,6 +74,7 @@ def note_contact(
         hit[HIT_NORMAL], hit[HIT_POINT] = scratch.normal, scratch.where
         hit[HIT_SURFACE_VELOCITY] = faces[hardest, FACE_VELOCITY : FACE_VELOCITY + 3]
         hit[HIT_IMPULSE] = 0.0
+        hit[HIT_FRAME_OFFSET] = state.frame_offset_ned_m
         hit[HIT_ENERGY_BEFORE_J] = moving_energy(state, mass_kg)
     hit[HIT_LAST_US] = now_us
     hit[HIT_PEAK_N] = max(hit[HIT_PEAK_N], total_n)

@@ -139,6 +139,7 @@ class State:
     inertia: Vector4  # J at these folds: xx, yy, zz, xy
     inertia_rate: Vector4
     estimate: Annotated[Floats, (10,)]  # position NED, velocity NED, attitude: what the vehicle itself knows
+    frame_offset_ned_m: Vector3  # how far off the vehicle believes itself, its estimate's delay apart
     acceleration_ned_m_s2: Vector3  # low-passed slope of the estimated velocity
     velocity_integral: Vector3  # of eq. 6, m/s2
     yaw_setpoint_rad: float
@@ -153,8 +154,8 @@ class State:
     clipped_off_m_s: Vector3  # velocity that clipping has hidden in this interval, body FRD
     rotor_phase: Vector4  # rad, of the vibration
     peak_force_n: float  # in this interval
-    hit: Annotated[Floats, (29,)]  # the hit in progress
-    finished_hits: Annotated[Floats, (2, 29)]  # ended in this interval; it is too short for a third
+    hit: Annotated[Floats, (32,)]  # the hit in progress
+    finished_hits: Annotated[Floats, (2, 32)]  # ended in this interval; it is too short for a third
     finished_count: int
 
 
@@ -188,6 +189,7 @@ HIT_ACTIVE, HIT_FACE, HIT_START_US, HIT_LAST_US, HIT_PEAK_N, HIT_FOLD_M = range(
 HIT_POSITION, HIT_VELOCITY, HIT_NORMAL, HIT_EXIT_VELOCITY = slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 18)
 HIT_IMPULSE, HIT_ENERGY_BEFORE_J, HIT_ENERGY_AFTER_J = slice(18, 21), 21, 22
 HIT_POINT, HIT_SURFACE_VELOCITY = slice(23, 26), slice(26, 29)
+HIT_FRAME_OFFSET = slice(29, 32)
 
 # Contacts closer together than this are one hit: a bounce inside the springs, not a second approach.
 SAME_HIT_US = 20_000

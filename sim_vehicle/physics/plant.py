@@ -93,6 +93,7 @@ class Plant:
         if airframe.estimate.kind == "ekf":
             self.onboard = OnboardEstimator(airframe, self._flat_faces, self.state.body, seed)
         self._estimate = self.state.estimate
+        self._frame_offset_ned_m = self.state.frame_offset_ned_m
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
         self._body = self.state.body
         self._report = np.zeros(REPORT_COLUMNS)
@@ -192,7 +193,7 @@ class Plant:
             self._report,
         )
         self._record_truth()
-        if self.onboard is not None:
+        if self.onboard is not None and motors != MOTORS_DRIVEN:
             self._estimate_state(self.onboard, motors == MOTORS_FLYING)
         return self._output()
 
@@ -208,13 +209,11 @@ class Plant:
 
     def _estimate_state(self, onboard: OnboardEstimator, flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
-        time_us, *_ = row = self._report.tolist()
-        fx, fy, fz, p, q, r, clip_x, clip_y, clip_z = row[SENSED]
-        clipped = int(clip_x), int(clip_y), int(clip_z)
         estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
-        onboard.update(int(time_us), (fx, fy, fz), (p, q, r), clipped, flies, self._body, estimate, acceleration)
+        onboard.update(int(self._report[0]), self._report[SENSED], flies, self._body, estimate, acceleration)
         if self.faults is not None:
             estimate[0:6] += self.disturbance.estimate_jump
+        np.subtract(estimate[:3], self._body[:3], out=self._frame_offset_ned_m)
         self._report[ESTIMATE] = estimate
         self._report[ACCELERATION] = acceleration
 

@@ -1,5 +1,7 @@
 """Detections beside contacts, by the definitions of docs/summary.md."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -123,6 +125,15 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     assert entry["truth"]["rebound_speed_m_s"] == pytest.approx(0.3)
     assert entry["detected_at_s"] == pytest.approx(9.0045)
     assert (summary["duration_s"], summary["realtime_factor"]) == (25.0, 50.0)
+
+
+def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():
+    # Given the same path, of a vehicle that believed itself 0.3 m further north than it was when it touched
+    path = path_of([(10.0, 3.8, -1.5), (11.0, 3.0, -1.5), (12.0, 2.46, -1.5)])
+    drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, FlightTruth([drifted], path, EPOCH_US)), FACTS)
+    # Then its setpoint of 2.8 m was at 2.5 m, and it went 4 cm past that
+    assert summary["collisions"][0]["truth"]["overshoot_m"] == pytest.approx(0.04)
 
 
 def test_the_summary_has_exactly_the_documented_keys():

@@ -50,9 +50,12 @@ def test_every_built_in_airframe_loads_and_is_named_as_its_file() -> None:
         assert load_built_in(name).name == name
 
 
-def test_the_rigid_vehicle_differs_in_its_arms_alone() -> None:
+def test_the_rigid_vehicle_differs_in_its_arms_and_in_how_hard_a_hit_its_filter_expects_alone() -> None:
     foldable, rigid = load_built_in("foldable").model_dump(), load_built_in("rigid").model_dump()
-    assert {key for key in foldable if foldable[key] != rigid[key]} == {"name", "description", "arms"}
+    assert {key for key in foldable if foldable[key] != rigid[key]} == {"name", "description", "arms", "estimator"}
+    assert {key for key in foldable["estimator"] if foldable["estimator"][key] != rigid["estimator"][key]} == {
+        "clipped_excess_m_s2"
+    }
 
 
 def test_the_papers_lengths() -> None:

@@ -17,6 +17,7 @@ from sim_vehicle.physics.layout import (
 from sim_vehicle.physics.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
+from tests.sim_vehicle.estimator.flying import filtered
 from tests.sim_vehicle.physics.throwing import quiet
 
 NONE = (None, None, None)
@@ -149,7 +150,7 @@ def test_the_mean_has_the_stated_noise() -> None:
 
 
 def test_the_estimate_is_late_and_as_noisy_as_stated() -> None:
-    airframe = load_built_in("foldable")
+    airframe = filtered(changes={"estimate": {"kind": "markov"}})
     plant = hovering(airframe, seed=5)
     start = len(plant.truth.series()["time_boot_us"])
     outputs = flown(plant, at(0, 0, -2), 60)

@@ -31,6 +31,7 @@ def quiet(airframe: Airframe, **changes: object) -> Airframe:
     for key in ("accelerometer_noise_m_s2", "accelerometer_bias_m_s2", "gyroscope_noise_rad_s"):
         data["imu"][key] = 0.0
     data["imu"]["gyroscope_bias_rad_s"] = 0.0
+    data["estimate"]["kind"] = "markov"
     for key in ("position_noise_m", "velocity_noise_m_s", "attitude_noise_rad"):
         data["estimate"][key] = 0.0
     for path, value in changes.items():
