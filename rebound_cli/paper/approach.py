@@ -9,7 +9,9 @@ from rebound_cli.paper.flights import DETECTOR, GAMMA_S, LAW
 ACCELERATION_M_S2 = 2.0
 # After the acceleration, until drag and tilt are in balance: the integral of eq. 6 takes that long to find it.
 CRUISE_S = 3.0
-HEIGHT_M = 2.0
+# The paper flew half a metre up. A hit at 5 m/s leans the vehicle so far that it loses up to 0.9 m; the errors of
+# optical flow grow with the height, so no higher than that asks for.
+HEIGHT_M = 1.5
 # The mission's target is so far behind the wall that braking for it has not begun: a second of flight.
 BEHIND_S = 1.0
 # The wall is wider than any flight bounces along it.

@@ -18,7 +18,7 @@ from rebound_cli.paper import (
     simulation_experiment,
 )
 from rebound_cli.paper.flights import Flight, Result, fly
-from rebound_cli.paper.study import Findings, Study
+from rebound_cli.paper.study import Findings, Study, concluded
 from rebound_cli.paper.table import Row, rows_text
 from rebound_cli.progress import with_progress
 
@@ -43,7 +43,7 @@ def run_paper(options: Namespace) -> int:
     results = _fly_all([flight for flights in planned for flight in flights], options.jobs)
     findings, first = [], 0
     for study, flights in zip(STUDIES, planned, strict=True):
-        findings.append(study.conclude(results[first : first + len(flights)]))
+        findings.append(concluded(study, results[first : first + len(flights)]))
         first += len(flights)
     write(options.out, findings, options.seeds)
     rows = [row for found in findings for row in found.rows]
@@ -98,11 +98,12 @@ def results_text(findings: Sequence[Findings], seeds: int) -> str:
     differing = [row for row in rows if row.is_judged and not row.agrees]
     option = "" if seeds == DEFAULT_SEEDS else f" --seeds {seeds}"
     parts = [
-        f"Written by `rebound paper{option}` (version {__version__}). Detector `lateral`, law `paper`, γ = 0.5.\n",
+        f"Written by `rebound paper{option}` (version {__version__}). Detector `lateral`, law `paper`, γ = 0.5; the "
+        "vehicle knows itself by flow, range and its own Kalman filter ([estimator.md](estimator.md)).\n",
         f"{sum(row.is_judged for row in rows)} rows have a verdict; {len(differing)} differ, each with its reason in "
         "the remark or in its study below.\n",
     ]
-    parts += [f"### Table: {found.title}\n\n{rows_text(found.rows)}" for found in findings]
+    parts += [f"### Table: {found.title}\n\n{found.sampling}\n\n{rows_text(found.rows)}" for found in findings]
     parts += [f"## {found.title}\n\n{found.text}" for found in findings]
     return "\n" + "\n".join(parts) + "\n"
 

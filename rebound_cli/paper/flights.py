@@ -24,11 +24,15 @@ from sim_vehicle.truth import Hit
 Floats = npt.NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 
-# What the paper used, whatever the defaults become.
+# What the paper used, whatever the defaults become: its law and gain, a detector on the inertial sensor alone, and a
+# vehicle that knows itself by flow, range and an extended Kalman filter (section V).
 DETECTOR, LAW, GAMMA_S = "lateral", "paper", 0.5
+ESTIMATE = {"kind": "ekf"}
 
 # What is kept of a flight that is to be drawn, around its first contact.
 TRACK_BEFORE_S, TRACK_AFTER_S = 2.0, 8.0
+# Of an arm that is on its way: an arm that rests on its hysteresis is there to the last bit.
+LEAST_FOLD_M = 1e-6
 # The hit turns the vehicle, the attitude loop turns it back: all of that is over within a second.
 LEAN_LOOKED_AT_S = 1.0
 
@@ -55,12 +59,25 @@ class Contact:
     latency_s: float | None
     impact_speed_estimate_m_s: float | None
     setpoint_ned_m: Vector3 | None
+    """In the vehicle's own frame, like the next."""
     position_estimate_ned_m: Vector3 | None
     overshoot_m: float | None
+    """By the truth, which places the setpoint where the vehicle's own frame was at the first touch."""
+    overshoot_by_estimate_m: float | None
+    fold_before_m: float
+    """Greatest fold of any arm just before the first touch, beyond the hysteresis: not yet back from a hit before."""
 
     @property
     def impact_speed_m_s(self) -> float:
         return float(np.linalg.norm(self.hit.impact_velocity_ned_m_s))
+
+    @property
+    def setpoint_in_world_ned_m(self) -> Vector3 | None:
+        """Where the setpoint lay at the first touch, for what is measured from the truth."""
+        if self.setpoint_ned_m is None:
+            return None
+        x, y, z = np.subtract(self.setpoint_ned_m, self.hit.frame_offset_ned_m).tolist()
+        return x, y, z
 
     @property
     def is_detected(self) -> bool:
@@ -70,6 +87,14 @@ class Contact:
     def is_approach(self) -> bool:
         """Whether the centre moved towards the wall at the first touch; a swinging guard touches while it leaves."""
         return float(np.dot(self.hit.impact_velocity_ned_m_s, self.hit.normal_ned)) < 0.0
+
+    @property
+    def is_end_of_the_one_before(self) -> bool:
+        """Whether another guard swings in while the vehicle leaves and its arms still unfold.
+
+        The paper's collision is over when l <= delta l after its peak (section IV), not when the force is.
+        """
+        return self.fold_before_m > 0.0 and not self.is_approach
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +127,7 @@ class Result:
     is_completed: bool
     contacts: tuple[Contact, ...]
     recontacts: int
+    """Touches after the first, before the vehicle had recovered, 20 ms or more after the last ended."""
     false_detections: int
     imu_received_hz: float
     integration_interval_us: int
@@ -114,20 +140,25 @@ class Result:
         return self.contacts[0]
 
     @property
-    def came_back(self) -> bool:
-        """Whether a second hit was one: the vehicle moved towards the wall again before it had recovered."""
-        return self.recontacts > 0 and any(contact.is_approach for contact in self.contacts[1:])
+    def second_hits(self) -> int:
+        """Of `recontacts`, those that are not the end of the collision before."""
+        return self.recontacts - sum(contact.is_end_of_the_one_before for contact in self.contacts[1:])
 
     @property
     def overshoots_m(self) -> list[float]:
         return [contact.overshoot_m for contact in self.contacts if contact.overshoot_m is not None]
+
+    @property
+    def overshoots_by_estimate_m(self) -> list[float]:
+        past_m = (contact.overshoot_by_estimate_m for contact in self.contacts)
+        return [each_m for each_m in past_m if each_m is not None]
 
 
 def fly(flight: Flight) -> Result:
     """Fly it in lockstep, all MAVLink bytes and the log on."""
     mission = Mission.model_validate(dict(flight.mission))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
-    airframe = Airframe.model_validate(with_base({"based_on": flight.airframe, **flight.changes}))
+    airframe = Airframe.model_validate(with_base({"based_on": flight.airframe, "estimate": ESTIMATE, **flight.changes}))
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:
@@ -142,7 +173,7 @@ def fly(flight: Flight) -> Result:
     return Result(
         flight=flight,
         is_completed=flown.report.outcome == "completed",
-        contacts=_contacts(flown, flown.truth, log, interval_us, settled_duration_s),
+        contacts=_contacts(flown, flown.truth, log, airframe, settled_duration_s),
         recontacts=matches.recontacts,
         false_detections=matches.false_detections,
         imu_received_hz=flown.report.stream_rates_hz["HIGHRES_IMU"],
@@ -153,7 +184,7 @@ def fly(flight: Flight) -> Result:
 
 
 def _contacts(
-    flown: Flown, truth: FlightTruth, log: FlightLog, interval_us: int, settled_duration_s: float
+    flown: Flown, truth: FlightTruth, log: FlightLog, airframe: Airframe, settled_duration_s: float
 ) -> tuple[Contact, ...]:
     collisions = flown.report.collisions
     matches = match_contacts(collisions, truth.hits, settled_duration_s)
@@ -167,15 +198,23 @@ def _contacts(
         contacts.append(
             Contact(
                 hit=hit,
-                share_received=share_received(log.imu_time_boot_us, interval_us, hit),
+                share_received=share_received(log.imu_time_boot_us, airframe.imu.integration_interval_us, hit),
                 latency_s=None if seen is None else 1e-3 * seen["detection_latency_ms"],
                 impact_speed_estimate_m_s=None if collision is None else collision.impact_speed_m_s,
                 setpoint_ned_m=None if collision is None else collision.recovery_setpoint_ned_m,
                 position_estimate_ned_m=None if collision is None else collision.position_ned_m,
                 overshoot_m=None if seen is None else seen["overshoot_m"],
+                overshoot_by_estimate_m=None if collision is None else collision.overshoot_m,
+                fold_before_m=_fold_before_m(truth, hit, airframe.arms.hysteresis_m),
             )
         )
     return tuple(contacts)
+
+
+def _fold_before_m(truth: FlightTruth, hit: Hit, hysteresis_m: float) -> float:
+    before = int(np.searchsorted(truth.series["time_boot_us"], hit.contact_at_boot_us)) - 1
+    beyond_m = float(truth.series["arm_fold_m"][before].max()) - hysteresis_m
+    return beyond_m if beyond_m > LEAST_FOLD_M else 0.0
 
 
 def share_received(sample_times_boot_us: Floats, interval_us: int, hit: Hit) -> float:
@@ -198,6 +237,8 @@ def _greatest_lean_rad(truth: FlightTruth) -> float:
 def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Track:
     report, hit = flown.report, truth.hits[0]
     into_wall = -np.array(hit.normal_ned)
+    # What the vehicle was told lies in its own frame, and is drawn where that was at the first touch.
+    offset = np.array(hit.frame_offset_ned_m)
     origin = np.array(report.origin_ned_m or (0.0, 0.0, 0.0))
     wall = next(wall for wall in scene.walls_built() if wall.name == hit.obstacle)
     zero_us = hit.contact_at_boot_us
@@ -219,10 +260,12 @@ def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Tr
         speed_m_s=truth.series["velocity_ned_m_s"][kept] @ into_wall,
         fold_m=truth.series["arm_fold_m"][kept],
         setpoint_at_s=setpoint_at_s[asked],
-        setpoint_m=(log.setpoint_ned_m[asked] - origin) @ into_wall,
+        setpoint_m=(log.setpoint_ned_m[asked] - offset - origin) @ into_wall,
         touch_m=place_m(hit.contact_position_ned_m),
         wall_m=place_m(wall.point_ned_m),
         contacts_s=tuple(1e-6 * (each.contact_at_boot_us - zero_us) for each in truth.hits),
         detections_s=tuple(1e-6 * (each.sample_time_boot_us - zero_us) for each in report.collisions),
-        targets_m=tuple(place_m(each.recovery_setpoint_ned_m) for each in report.collisions),
+        targets_m=tuple(
+            place_m(each.recovery_setpoint_ned_m) - float(offset @ into_wall) for each in report.collisions
+        ),
     )

@@ -51,9 +51,10 @@ def _rows(result: Result, track: Track) -> tuple[Row, ...]:
     # x = 0 is crossed by the guards: from there to the touch they travel to the wall's 0.3 m.
     guard_m = track.place_m + (track.wall_m - track.touch_m)
     crossing = int(np.flatnonzero((guard_m < 0.0) & (track.time_s < 0.0))[-1])
-    if contact.setpoint_ned_m is None:
+    setpoint_ned_m = contact.setpoint_in_world_ned_m
+    if setpoint_ned_m is None:
         raise AssertionError("the sample scenario's hit was not detected")
-    before_m, setpoint_m = contact.hit.contact_position_ned_m[0], contact.setpoint_ned_m[0]
+    before_m, setpoint_m = contact.hit.contact_position_ned_m[0], setpoint_ned_m[0]
     back_m = float(before_m - setpoint_m)
     forward_m = float(track.place_m[(track.time_s >= 0.0) & (track.time_s < 0.3)].max() - track.touch_m)
     speed_m_s = contact.impact_speed_m_s

@@ -1,7 +1,7 @@
 """What every study is: flights to fly, and what follows from their results."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from matplotlib.figure import Figure
@@ -12,12 +12,13 @@ from rebound_cli.paper.table import Row
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """`text` is Markdown; pictures by the name of their file."""
+    """`text` is Markdown; pictures by the name of their file; `sampling` stands beside the table of the rows."""
 
     title: str
     rows: tuple[Row, ...]
     text: str
     pictures: Mapping[str, Figure] = field(default_factory=dict)
+    sampling: str = ""
 
 
 class Study(Protocol):
@@ -29,6 +30,12 @@ class Study(Protocol):
     def flights(self, seeds: int) -> list[Flight]: ...
 
     def conclude(self, results: Sequence[Result]) -> Findings: ...
+
+
+def concluded(study: Study, results: Sequence[Result]) -> Findings:
+    """The study's findings, with how the inertial sensor was received in its flights."""
+    sampling = sampling_text(results) if results else "Single hits of the simulated body: no telemetry in it."
+    return replace(study.conclude(results), sampling=sampling)
 
 
 def sampling_text(results: Sequence[Result]) -> str:

@@ -188,8 +188,7 @@ class Scratch:
 HIT_ACTIVE, HIT_FACE, HIT_START_US, HIT_LAST_US, HIT_PEAK_N, HIT_FOLD_M = range(6)
 HIT_POSITION, HIT_VELOCITY, HIT_NORMAL, HIT_EXIT_VELOCITY = slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 18)
 HIT_IMPULSE, HIT_ENERGY_BEFORE_J, HIT_ENERGY_AFTER_J = slice(18, 21), 21, 22
-HIT_POINT, HIT_SURFACE_VELOCITY = slice(23, 26), slice(26, 29)
-HIT_FRAME_OFFSET = slice(29, 32)
+HIT_POINT, HIT_SURFACE_VELOCITY, HIT_FRAME_OFFSET = slice(23, 26), slice(26, 29), slice(29, 32)
 
 # Contacts closer together than this are one hit: a bounce inside the springs, not a second approach.
 SAME_HIT_US = 20_000

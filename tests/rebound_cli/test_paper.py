@@ -159,9 +159,9 @@ def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
     claim = "setpoint by eq. 3, back from x(t_c)"
     contact = sample.first
     x, y, z = contact.hit.contact_position_ned_m
-    back_m = x - contact.setpoint_ned_m[0]
+    back_m, off_m = x - contact.setpoint_in_world_ned_m[0], contact.hit.frame_offset_ned_m[0]
     for wrong_m in (-back_m, 2 * back_m, back_m / 2):
-        moved: Contact = dataclasses.replace(contact, setpoint_ned_m=(x - wrong_m, y, z))
+        moved: Contact = dataclasses.replace(contact, setpoint_ned_m=(x - wrong_m + off_m, y, z))
         rows = sample_scenario.conclude([dataclasses.replace(sample, contacts=(moved,))]).rows
         assert [row.claim for row in rows if not row.agrees] == [claim]
 
@@ -187,7 +187,18 @@ def test_a_vehicle_that_hits_again_or_overshoots_makes_the_directions_red(sample
     past = dataclasses.replace(sample.first, overshoot_m=0.2)
     bad = [dataclasses.replace(result, recontacts=1, contacts=(past, past)) for result in good]
     assert not any(row.agrees for row in directions.conclude(bad).rows)
-    assert all(result.came_back for result in bad)
+
+
+def test_a_guard_that_swings_in_while_the_arms_unfold_ends_the_same_collision(sample):
+    # Given a second touch while an arm is folded by 12 mm and the centre moves away
+    leaving = dataclasses.replace(sample.first.hit, impact_velocity_ned_m_s=(-0.05, 0.0, 0.0))
+    touch = dataclasses.replace(sample.first, hit=leaving, fold_before_m=0.012)
+    result = dataclasses.replace(sample, recontacts=1, contacts=(sample.first, touch))
+    # Then it is no second hit; with the arms out, or with the centre moving in, it is one
+    assert result.second_hits == 0
+    arriving = dataclasses.replace(touch, hit=sample.first.hit)
+    for other in (dataclasses.replace(touch, fold_before_m=0.0), arriving):
+        assert dataclasses.replace(result, contacts=(sample.first, other)).second_hits == 1
 
 
 def test_a_lost_hit_is_told_from_one_that_was_seen(sample):
