@@ -187,8 +187,13 @@ def test_vibration_beyond_the_range_clips_raw_samples_and_is_counted() -> None:
 
 
 def test_vibration_goes_with_thrust_and_ends_with_its_time() -> None:
-    cruise = hover({"kind": "vibration", "between_s": [0.1, 0.3], "accelerometer_rms_m_s2": 40})
-    forces = np.array([output.specific_force_frd_m_s2 for output in fly(cruise, 0.5)])
+    cruise = hover(
+        {"kind": "vibration", "between_s": [0.1, 0.3], "accelerometer_rms_m_s2": 40, "gyroscope_rms_rad_s": 1}
+    )
+    outputs = fly(cruise, 0.5)
+    forces = np.array([output.specific_force_frd_m_s2 for output in outputs])
+    rates = np.array([output.angular_velocity_frd_rad_s for output in outputs])
+    assert rates[30:70, 0].std() > 0.05 and rates[80:, 0].std() < 0.01
     assert forces[30:70, 0].std() > 2.0
     assert forces[80:, 0].std() < 0.2
 

@@ -161,6 +161,8 @@ def test_from_rim_to_face_nothing_jumps() -> None:
         for offset_m in np.arange(-0.02, 0.14, 0.01)
     ]
     assert np.abs(np.diff(speeds, 2)).max() < 0.1
+    # Beyond the rim the face alone pushes: the same hit wherever it is.
+    assert np.ptp(speeds[-8:]) < 0.01
     assert speeds[-1] < -0.1
 
 
