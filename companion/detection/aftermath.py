@@ -33,6 +33,7 @@ class Aftermath:
 
     strapdown: Strapdown = field(default_factory=Strapdown)
     previous_imu_us: int = 0
+    newest_rate_step_rad_s: float = 0.0
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
@@ -48,12 +49,12 @@ class Aftermath:
         p_0, q_0, r_0 = strapdown.rates_frd_rad_s
         if strapdown.imu(time_us, f, w):
             p, q, r = w[0] - p_0, w[1] - q_0, w[2] - r_0
-            step2 = p * p + q * q + r * r
-            kept = self.rate_step_rad_s
-            if step2 > kept * kept or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
-                self.rate_step_rad_s = math.sqrt(step2)
+            step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
+            if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
+                self.rate_step_rad_s = step
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         else:
+            self.newest_rate_step_rad_s = 0.0
             self.forget()
         self.previous_imu_us = before_us
 

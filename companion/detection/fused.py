@@ -62,6 +62,10 @@ class FusedConfig(Written):
     # Thrust that turns at 1 rad/s changes the acceleration by 0.6 m/s^2 in 60 ms; the estimate's 20 ms of delay make
     # 0.012 m/s of that. Turning about the thrust itself changes nothing.
     velocity_per_rate_m: NotNegative = 0.01
+    # A jolt: rates that step from one sample to the next by more than motors can, 200 rad/s^2 at full moment. With half
+    # of a force threshold, on z against the mean, it is a contact that grazes; alone it is no hit.
+    jolt_rad_s: Positive = 0.4
+    jolt_rad_s2: Positive = 200.0
     # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
     rearm_quiet_s: Positive = 0.04
     # Longer loud than this is no contact but a new way to shake, and is learnt.
@@ -73,6 +77,8 @@ class FusedConfig(Written):
     soft_wait_s: Positive = 0.02
 
 
+# A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
+SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
 # 11 m/s^2 in one sample, nothing in the next): the next one must show it, too.
 CLEAR = 1.6
@@ -147,7 +153,8 @@ class FusedDetector:
         if side < s.threshold_m_s2 and off is None and s.phase is Phase.ARMED:
             # Nearly every sample ends here.
             room = self._vertical_threshold(s)
-            if -s.thrust.most_m_s2(now_us) - room < f_z < room:
+            jolted = s.aftermath.newest_rate_step_rad_s > self._config.jolt_rad_s and self._is_jolt(s, side, f_z)
+            if -s.thrust.most_m_s2(now_us) - room < f_z < room and not jolted:
                 s.held_since_boot_us = None
                 self._learn(s, f, before_us)
                 return None
@@ -158,12 +165,21 @@ class FusedDetector:
         room = self._vertical_threshold(s)
         below, above = f_z - room, -f_z - s.thrust.most_m_s2(now_us) - room
         threshold = s.threshold_m_s2 + self._drag_room(s, turning)
-        if side < threshold and below < 0.0 and above < 0.0:
+        jolted = s.phase is Phase.ARMED and self._is_jolt(s, side, f_z)
+        if side < threshold and below < 0.0 and above < 0.0 and not jolted:
             self._quiet(s, f, before_us)
             return None
         force = (x, y, f_z - s.thrust.expected_m_s2(now_us, s.floor.z))
         size = math.sqrt(x * x + y * y + force[2] * force[2])
-        return self._loud(s, sample, situation, force, size, max(side / threshold, 1.0 + max(below, above) / room))
+        ratio = CLEAR if jolted else max(side / threshold, 1.0 + max(below, above) / room)
+        return self._loud(s, sample, situation, force, size, ratio)
+
+    def _is_jolt(self, s: FusedState, side_m_s2: float, f_z: float) -> bool:
+        """Turned by more than motors can, and pushed."""
+        elapsed_s = (s.aftermath.strapdown.time_boot_us - s.aftermath.previous_imu_us) * 1e-6
+        if s.aftermath.newest_rate_step_rad_s < self._config.jolt_rad_s + self._config.jolt_rad_s2 * elapsed_s:
+            return False
+        return side_m_s2 > 0.5 * s.threshold_m_s2 or abs(f_z - s.floor.z) > self._vertical_threshold(s)
 
     def _vertical_threshold(self, s: FusedState) -> float:
         return max(self._config.vertical_threshold_m_s2, self._config.noise_factor * s.floor.vertical_m_s2)
@@ -224,7 +240,7 @@ class FusedDetector:
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, confidence, kind)
 
     def _may_be_the_sensors(self, s: FusedState, ratio: float) -> bool:
-        return ratio < CLEAR and s.threshold_m_s2 > self._config.side_threshold_m_s2
+        return ratio < CLEAR and s.threshold_m_s2 > SHAKING * self._config.side_threshold_m_s2
 
     def _held_us(self, s: FusedState, free_until_us: int) -> int:
         """How long the present doubtful force has been looked at."""

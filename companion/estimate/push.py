@@ -9,6 +9,9 @@ from companion.messages import ImuSample, Quaternion, Vector3
 
 # Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
 CONTIGUOUS = 1.5
+# What comes after this long without a push is another part of the vehicle, turned round by the first: the guard on the
+# other side, the hub. Its direction is no longer that of the hit.
+QUIET_US = 20_000
 # The mean over a window of a pulse that reaches the range's end: one of a third of the window's length shows a third
 # of the range. Nothing less is certain not to have been clipped but by VIBRATION's counts.
 CLIPPED_SHARE = 1.0 / 3.0
@@ -37,6 +40,8 @@ class Push:
     last_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
     peak_m_s2: float = 0.0
     samples: int = 0
+    loud_boot_us: int = 0
+    closed: bool = False
     clipped: bool = False
     gap: bool = False
     first_size_m_s2: float = 0.0
@@ -46,6 +51,10 @@ class Push:
         """Take one sample of the contact; what comes after the last loud one does not belong to it."""
         now_us, w = sample.time_boot_us, sample.angular_velocity_frd_rad_s
         first = self.time_boot_us == 0
+        if not first and now_us - self.loud_boot_us > max(QUIET_US, 2 * self.averaging_us):
+            self.closed = True
+        if self.closed:
+            return
         elapsed_us = now_us - (self.started_boot_us if first else self.time_boot_us)
         if first:
             self.first_rates_frd_rad_s = w
@@ -74,10 +83,10 @@ class Push:
         """The sample and all since the last loud one belong to the contact."""
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
-        yaw_rate_rad_s = body_to_ned(self.attitude_wxyz, self.rates_frd_rad_s)[2]
-        self.parts.append((more, yaw_rate_rad_s, total))
+        self.parts.append((more, body_to_ned(self.attitude_wxyz, self.rates_frd_rad_s), total))
         self.unconfirmed_ned_m_s = (0.0, 0.0, 0.0)
         self.samples += 1
+        self.loud_boot_us = now_us
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
         self.gap = self.gap or not contiguous
         self.clipped = self.clipped or max(abs(f[0]), abs(f[1]), abs(f[2])) >= CLIPPED_SHARE * self.range_m_s2

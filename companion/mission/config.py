@@ -5,9 +5,14 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from companion.detection.fused import FusedConfig
+from companion.detection.fuzzy import FuzzyConfig
+from companion.detection.hybrid import HybridConfig
 from companion.detection.lateral import LateralConfig
+from companion.detection.momentum import MomentumConfig
 from companion.detection.registry import DETECTORS, check_known_detector
 from companion.detection.sight import SightConfig
+from companion.detection.threshold import ThresholdConfig
+from companion.detection.tracking import TrackingConfig
 from companion.written import NotNegative, Positive, Written
 
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
@@ -123,7 +128,12 @@ class CompanionConfig(Written):
     # Ground handling, landing gear and ground effect are below this height above the arming position.
     min_detection_height_m: NotNegative = 0.5
     fused: FusedConfig = FusedConfig()
+    fuzzy: FuzzyConfig = FuzzyConfig()
+    hybrid: HybridConfig = HybridConfig()
     lateral: LateralConfig = LateralConfig()
+    momentum: MomentumConfig = MomentumConfig()
+    threshold: ThresholdConfig = ThresholdConfig()
+    tracking: TrackingConfig = TrackingConfig()
     sight: SightConfig = SightConfig()
     streams: StreamsConfig = StreamsConfig()
     estimate: EstimateConfig = EstimateConfig()

@@ -51,6 +51,9 @@ def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
     assert velocity_at([], CONTACT_US, (0.0, 0.0, 0.0), CONFIG) is None
 
 
+STILL = (0.0, 0.0, 0.0)
+
+
 def slide(friction, tangent_m_s, yaw_rate=0.0, samples=10):
     """A wall to the north (normal south) that pushes ten times; the vehicle slides east, then is turned."""
     parts, total = [], (0.0, 0.0, 0.0)
@@ -59,7 +62,7 @@ def slide(friction, tangent_m_s, yaw_rate=0.0, samples=10):
         # Tangent east, seen from the wall: the contact point goes with v and with the turning.
         sliding = east_m_s + 0.2 * yaw_rate * k / samples
         push = (-0.2, -0.2 * friction * max(-1.0, min(1.0, sliding / 0.02)), 0.0)
-        parts.append((push, yaw_rate * k / samples, total))
+        parts.append((push, (0.0, 0.0, yaw_rate * k / samples), total))
         total = (total[0] + push[0], total[1] + push[1], 0.0)
     return parts
 
@@ -83,8 +86,21 @@ def test_friction_that_changes_sides_as_the_vehicle_turns_gives_itself_away():
     assert abs(off_deg(normal_of(parts, (1.5, 0.6, 0.0), 0.2))) < 4.0
 
 
+def test_a_leaning_walls_normal_is_found_where_the_vehicle_slides_up_it():
+    """The wall leans over by 40 degrees; friction of 0.3 holds the vehicle that slides up along it."""
+    c, s = math.cos(math.radians(40.0)), math.sin(math.radians(40.0))
+    parts, total = [], STILL
+    for _ in range(10):
+        push = (-0.1 * (c + 0.3 * s), 0.0, 0.1 * (s - 0.3 * c))
+        # Up the wall is (-s, 0, -c) from the vehicle's north; it goes north and is turned up by the wall.
+        parts.append((push, STILL, total))
+        total = tuple(a + b for a, b in zip(total, push, strict=True))
+    n, _, d = normal_of(parts, (1.5, 0.0, 0.0), 0.2)
+    assert abs(math.degrees(math.atan2(d, -n)) - 40.0) < 13.0
+
+
 def test_a_ceilings_normal_is_the_pushs_direction_and_no_push_has_none():
-    assert normal_of([((0.0, 0.1, 2.0), 0.0, (0.0, 0.0, 0.0))], (0.0, 0.0, -1.0), 0.2)[2] > 0.99
+    assert normal_of([((0.0, 0.1, 2.0), STILL, STILL)], (0.0, 0.0, -1.0), 0.2)[2] > 0.99
     assert normal_of([], (0.0, 0.0, 0.0), 0.2) == (0.0, 0.0, 0.0)
 
 

@@ -1,0 +1,40 @@
+"""One contact, one impact: the phases of a detector that has a loudness and a threshold, whatever they are made of."""
+
+from companion.detection.interface import DetectorState, Impact, Phase
+from companion.messages import Vector3
+
+# A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
+REARM_US = 40_000
+
+
+def judge(
+    state: DetectorState,
+    time_us: int,
+    free_until_us: int,
+    force_frd_m_s2: Vector3,
+    size_m_s2: float,
+    is_loud: bool,
+    off_reason: str | None,
+) -> Impact | None:
+    """Move the state's phase by one sample; the impact if it is the first loud one of a contact."""
+    before, state.last_sample_boot_us = state.phase, time_us
+    if off_reason is not None:
+        state.phase, state.off_reason = Phase.OFF, off_reason
+        return None
+    state.off_reason = ""
+    if not is_loud:
+        if before is Phase.OFF:
+            state.phase, state.last_loud_boot_us = Phase.QUIET, time_us
+        elif time_us - state.last_loud_boot_us >= REARM_US:
+            state.phase = Phase.ARMED
+        return None
+    state.last_loud_boot_us = time_us
+    if before is Phase.ARMED:
+        state.phase = Phase.CONTACT
+        state.peak_specific_force_m_s2 = size_m_s2
+        return Impact(time_us, free_until_us, force_frd_m_s2)
+    if before is Phase.CONTACT:
+        state.peak_specific_force_m_s2 = max(state.peak_specific_force_m_s2, size_m_s2)
+    else:
+        state.phase = Phase.QUIET
+    return None

@@ -1,0 +1,101 @@
+"""The detectors that `fused` is compared with: each sees what its source says it sees, and not what it cannot."""
+
+import math
+
+import pytest
+
+from companion.detection.fuzzy import FuzzyConfig, FuzzyDetector
+from companion.detection.interface import Situation
+from companion.detection.registry import DETECTORS
+from companion.detection.watch import advance, start_watch
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition
+from companion.mission.config import CompanionConfig
+
+TICK_US = 4_000
+HIT_US = 4_000_000
+HOVER = 0.7
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+
+def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
+    """North at 2 m/s behind a setpoint that goes on; pushed by `push(t)`, m/s^2."""
+    watch = start_watch(CompanionConfig(detector=detector), 0)
+    velocity, position, impacts = [2.0, 0.0, 0.0], [0.0, 0.0, -3.0], []
+    for t in range(TICK_US, until_us, TICK_US):
+        p, thrust = push(t), lift(t)
+        force = (p[0], p[1], p[2] - thrust)
+        acceleration = (force[0], force[1], force[2] + 9.81)
+        velocity = [v + a * TICK_US * 1e-6 for v, a in zip(velocity, acceleration, strict=True)]
+        position = [x + v * TICK_US * 1e-6 for x, v in zip(position, velocity, strict=True)]
+        wobble = 0.1 * math.sin(t)
+        samples = [ImuSample(t, (force[0] + wobble, force[1], force[2]), (0.0, 0.0, 0.0))]
+        if t % 20_000 == 0:
+            samples.append(LocalPosition(t, tuple(position), tuple(velocity)))
+            samples.append(Attitude(t, LEVEL))
+            samples.append(AttitudeTarget(t, HOVER * thrust / 9.81))
+        situation = Situation(
+            off_reason=off,
+            armed=True,
+            landed_state=LandedState.IN_AIR,
+            height_m=3.0,
+            setpoint_position_ned_m=(2.0 * t * 1e-6, 0.0, -3.0),
+        )
+        impacts += advance(watch, samples, situation, t).impacts
+    return impacts
+
+
+def wall(strength, length_us=60_000):
+    return lambda t: (-strength, 0.0, 0.0) if HIT_US <= t < HIT_US + length_us else (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("detector", sorted(DETECTORS))
+def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it_is_off(detector):
+    """Twice what the published threshold asks for, for sixty milliseconds; the vehicle is thrown back at 0.4 m/s."""
+    impacts = fly(detector, wall(40.0))
+    assert len(impacts) == 1
+    assert HIT_US <= impacts[0].impact.sample_time_boot_us < HIT_US + 800_000
+    assert impacts[0].impact.contact_free_until_boot_us < HIT_US
+    assert fly(detector, wall(40.0), off="landing") == []
+
+
+LATENCY_MS = {"fused": 0, "lateral": 0, "fuzzy": 0, "hybrid": 4, "threshold": 36, "momentum": 60, "tracking": 400}
+
+
+@pytest.mark.parametrize("detector", sorted(DETECTORS))
+def test_how_late_each_is_follows_from_what_it_looks_at(detector):
+    (impact,) = fly(detector, wall(40.0))
+    late_ms = 1e-3 * (impact.impact.sample_time_boot_us - HIT_US)
+    assert late_ms <= LATENCY_MS[detector]
+    if detector in ("threshold", "momentum", "tracking"):
+        assert late_ms > 0.2 * LATENCY_MS[detector]
+
+
+@pytest.mark.parametrize("detector", sorted(DETECTORS))
+def test_a_climb_with_its_thrust_told_is_no_hit(detector):
+    def climb(t):
+        return 9.81 + 3.0 * max(0.0, math.sin((t - HIT_US) * 4e-6)) if HIT_US < t < HIT_US + 785_000 else 9.81
+
+    if detector != "tracking":  # its setpoint does not climb
+        assert fly(detector, lift=climb) == []
+
+
+def test_the_fixed_threshold_misses_what_is_weak_or_short():
+    assert fly("threshold", wall(18.0)) == []
+    assert fly("threshold", wall(150.0, length_us=4_000)) == []
+
+
+def test_the_response_grows_with_each_input_and_stays_a_share():
+    fuzzy = FuzzyDetector(FuzzyConfig(), 4_000)
+    weak = fuzzy.intensity(8.0, 0.0, 0.0)
+    assert weak == pytest.approx(0.2)
+    for stronger in (fuzzy.intensity(20.0, 0.0, 0.0), fuzzy.intensity(8.0, 0.5, 0.0), fuzzy.intensity(8.0, 0.0, 3.0)):
+        assert weak < stronger <= 1.0
+    assert fuzzy.intensity(60.0, 1.5, 9.0) > 0.85
+
+
+def test_a_flip_towards_the_obstacle_asks_for_more_than_one_away_from_it():
+    """Ahead is a wall: it pushes to the rear, and the nose goes down (q < 0) into it or up away from it."""
+    into = ImuSample(1, (-20.0, 0.0, -9.8), (0.0, -3.0, 0.0))
+    away = ImuSample(1, (-20.0, 0.0, -9.8), (0.0, 3.0, 0.0))
+    assert FuzzyDetector._flip(into, 20.0) == pytest.approx(3.0)
+    assert FuzzyDetector._flip(away, 20.0) == pytest.approx(-3.0)
