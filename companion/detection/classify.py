@@ -5,8 +5,8 @@ import math
 from companion.detection.interface import ImpactKind, Situation
 from companion.messages import Vector3
 
-# A vehicle slower than this did not run into anything: the obstacle came to it. Ten times the noise of a good estimate.
-HOVER_M_S = 0.3
+# A vehicle slower than this did not run into anything: the obstacle came to it. Six times the noise of a good estimate.
+HOVER_M_S = 0.2
 # Push within 45 degrees of the vertical: from a ceiling or a floor.
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from companion.detection.fused import FusedConfig
+from companion.detection.fused_config import FusedConfig
 from companion.detection.fuzzy import FuzzyConfig
 from companion.detection.hybrid import HybridConfig
 from companion.detection.lateral import LateralConfig

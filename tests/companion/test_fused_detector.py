@@ -5,7 +5,8 @@ import random
 
 import pytest
 
-from companion.detection.fused import FusedConfig, FusedDetector
+from companion.detection.fused import FusedDetector
+from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
 

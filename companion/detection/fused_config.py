@@ -1,0 +1,41 @@
+"""Settings of the detector `fused`, each with its reason."""
+
+from companion.written import NotNegative, Positive, Written
+
+
+class FusedConfig(Written):
+    """Settings of the detector `fused`."""
+
+    # A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its spread reads half too much, to be safe); a gust
+    # of 5 m/s adds 1.1 m/s^2 of drag at most. Eq. 2 begins with b_s v_c = 15 m/s^2 at 0.5 m/s.
+    side_threshold_m_s2: Positive = 1.75
+    # Beyond nothing and beyond the propellers' most: those bounds are themselves uncertain by a tenth of hover.
+    vertical_threshold_m_s2: Positive = 4.0
+    # Of the spread as `floor` has it, at least 1.5 times the true one: 6.3 standard deviations, which sideways two of
+    # 10^9 normal samples exceed, one in half a thousand hours at 250 Hz.
+    noise_factor: Positive = 4.2
+    # Drag per mass is 0.2 to 0.4 /s times the speed and turns with the vehicle.
+    drag_per_s: NotNegative = 0.3
+    # A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; ten times that. A rigid vehicle's hit
+    # at 0.5 m/s changes its velocity by 0.95 m/s, a foldable one's by 0.7.
+    velocity_step_m_s: Positive = 0.2
+    # With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by 2 rad/s changes its velocity
+    # by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s.
+    velocity_step_turned_m_s: Positive = 0.07
+    rate_step_rad_s: Positive = 2.0
+    # Thrust that turns at 1 rad/s changes the acceleration by 0.6 m/s^2 in 60 ms; the estimate's 20 ms of delay make
+    # 0.012 m/s of that. Turning about the thrust itself changes nothing.
+    velocity_per_rate_m: NotNegative = 0.01
+    # A jolt: rates that step from one sample to the next by more than motors can, 200 rad/s^2 at full moment. With half
+    # of a force threshold, on z against the mean, it is a contact that grazes; alone it is no hit.
+    jolt_rad_s: Positive = 0.4
+    jolt_rad_s2: Positive = 200.0
+    # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
+    rearm_quiet_s: Positive = 0.04
+    # Longer loud than this is no contact but a new way to shake, and is learnt.
+    longest_contact_s: Positive = 0.5
+    # After a contact the estimate swings (its delay, a filter's switching): velocities count again after this.
+    velocity_rest_s: Positive = 0.15
+    # A hand is slower than an obstacle: below `soft_m_s2` on a hovering vehicle wait for the force to show itself.
+    soft_m_s2: Positive = 8.0
+    soft_wait_s: Positive = 0.02
