@@ -95,14 +95,26 @@ def start(mission: Mission, now_us: int) -> Core:
 def advance(core: Core, samples: Sequence[Sample], now_us: int) -> Outputs:
     """One step: what was heard, whether it shows a hit, what follows for the flight, what is due to be sent."""
     core.now_us = now_us
-    refusal = hear(core, samples, now_us)
-    impacts = detect(core, samples, now_us)
-    moved = fly(core, samples, impacts, refusal, now_us)
-    follow_contact(core)
+    moved = react(core, samples, now_us)
     stream_setpoint(core, moved, now_us)
     beat(core, now_us)
     inform(core, now_us)
     return collect(core)
+
+
+def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
+    """All that a fault in this program could be in: whatever is raised, the vehicle is handed over, and it is told.
+
+    Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
+    """
+    try:
+        refusal = hear(core, samples, now_us)
+        impacts = () if core.flight.fault else detect(core, samples, now_us)
+        moved = fly(core, samples, impacts, refusal, now_us)
+        follow_contact(core)
+    except Exception as error:
+        return core.machine.fail(error, now_us)
+    return moved
 
 
 def hear(core: Core, samples: Sequence[Sample], now_us: int) -> str | None:
@@ -203,7 +215,11 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
         return
     due_us = core.setpoint_due_us + core.setpoint_interval_us
     core.setpoint_due_us = due_us if not moved and due_us > now_us else now_us + core.setpoint_interval_us
-    wanted = core.machine.activity.target(now_us)
+    try:
+        wanted = core.machine.activity.target(now_us)
+    except Exception as error:
+        core.machine.fail(error, now_us)
+        wanted = core.flight.target
     if wanted is None:
         return
     target = core.flight.target = within_envelope(core, wanted, moved, now_us)

@@ -114,6 +114,7 @@ class FlightContext:
     outcome: Outcome | None = None
     reason: str = ""
     ended_at_us: int | None = None
+    fault: str = ""  # of this program
 
     def __post_init__(self) -> None:
         config = self.mission.companion.flight

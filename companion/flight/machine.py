@@ -1,12 +1,13 @@
 """Runs the state table: looks for triggers, moves between states, makes each state's activity."""
 
+import traceback
 from dataclasses import dataclass
 
 from companion.flight import expecting
 from companion.flight.after_hit import decide
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
-from companion.flight.guards import guard
+from companion.flight.guards import ON_THE_GROUND, guard
 from companion.flight.handover import HandOver, LetGo
 from companion.flight.landing import Land
 from companion.flight.progress import FlyItems, HoldAfterRecovery
@@ -47,6 +48,19 @@ class Machine:
             move = self.activity.step(self.flight, Inputs(), now_us)
         if self.flight.expectations:
             expecting.review(self.flight, now_us)
+        return self.activity is not before
+
+    def fail(self, error: Exception, now_us: int) -> bool:
+        """This program is at fault: hand the vehicle over while that can still be done, and say what happened."""
+        flight, before = self.flight, self.activity
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"fault of the companion, please report it: {type(error).__name__} in {place.name}: {error}"
+        flight.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
+        if flight.fault or self.state in FINAL_STATES:
+            # even handing over fails: silence lets the vehicle's own failsafe act
+            self.activity = LetGo()
+        flight.fault = text
+        self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
         return self.activity is not before
 
     def _take(self, move: Move | None, now_us: int) -> None:
@@ -96,7 +110,7 @@ class Machine:
 
     def _aborted(self, move: Move, now_us: int) -> Activity:
         flight = self.flight
-        flight.outcome = "failed" if move.trigger is Trigger.REFUSED else "aborted"
+        flight.outcome = "failed" if move.trigger is Trigger.REFUSED or flight.fault else "aborted"
         flight.reason = move.text
         expecting.close(flight, now_us)
         text = f"{flight.outcome}: {move.text}"

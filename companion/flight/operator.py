@@ -61,6 +61,10 @@ def _as_it_stands(event: Event, mission: str, hits: int) -> StatusText:
     return StatusText(Severity.WARNING, event.text[:1].upper() + event.text[1:])
 
 
+def _fault(event: Event, mission: str, hits: int) -> StatusText:
+    return StatusText(Severity.ERROR, "Fault in the companion, vehicle handed over")
+
+
 _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "armed": _began,
     "detection": _hit,
@@ -69,6 +73,7 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "timeout": _as_it_stands,
     "envelope": _as_it_stands,
     "link": _as_it_stands,
+    "fault": _fault,
     "done": _ended,
     "aborted": _ended,
 }

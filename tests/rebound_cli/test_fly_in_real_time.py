@@ -6,6 +6,7 @@ import signal
 import time
 import tomllib
 
+from companion.shell.tlog import read_tlog
 from tests.rebound_cli.command import (
     HOP,
     QUICK,
@@ -20,6 +21,13 @@ from tests.rebound_cli.command import (
     wait_for_event,
     wait_until_gone,
 )
+
+# A hit within three seconds of take-off.
+NEAR_WALL = (
+    *("--set", "items.0.takeoff.height_m=0.9", "--set", "items.1.go_to.position_ned_m=[5, 0, -0.9]"),
+    *("--set", "sim.walls.0.point_ned_m=[1.5, 0, -1.5]"),
+)
+SET_POSITION_TARGET = 84
 
 
 def summary_of(folder):
@@ -65,19 +73,25 @@ def test_ctrl_c_hands_the_vehicle_over_and_finishes_the_log(tmp_path):
     assert "Ctrl-C" in assert_comes_again(folder).report.reason
 
 
-def test_a_killed_flight_takes_its_vehicle_with_it(tmp_path):
-    # Given a flight under way
+def test_a_flight_killed_while_it_recovers_leaves_a_log_complete_to_the_last_second(tmp_path):
+    # Given a flight that has just been hit
     folder = tmp_path / "run"
-    process = start("fly", WALL, "--sim", *QUICK, "--out", folder)
-    wait_for_event(folder, "connected")
+    process = start("fly", WALL, "--sim", *QUICK, *NEAR_WALL, "--out", folder)
+    wait_for_event(folder, "detection", timeout_s=60.0)
     assert len(processes_naming(folder)) == 2
+    time.sleep(0.6)
     # When it is killed without a chance to clean up
     os.kill(process.pid, signal.SIGKILL)
+    killed_at_us = time.time_ns() // 1000
     process.communicate(timeout=10)
-    # Then the vehicle's process ends by itself, and the log holds what had happened
+    # Then the log ends less than a second before, and the recovery setpoint is in it; the events are whole
+    packets = list(read_tlog(folder / "flight.tlog"))
+    assert killed_at_us - packets[-1][0] < 1_000_000
+    assert [event["kind"] for event in events_of(folder)][-1] == "detection"
+    detected_at_us = events_of(folder)[-1]["time_us"]
+    assert any(packet[7] == SET_POSITION_TARGET and at_us >= detected_at_us for at_us, packet in packets)
+    # And the vehicle's process ends by itself, and all of it can be decided again
     wait_until_gone(folder)
-    assert (folder / "flight.tlog").stat().st_size > 10_000
-    # And all of it can be decided again
     assert assert_comes_again(folder).is_cut
 
 

@@ -1,0 +1,63 @@
+"""A fault in the program itself: the vehicle is handed over, and heartbeats, setpoints and events go on until it is."""
+
+import itertools
+
+import pytest
+
+from companion.detection import watch
+from companion.flight.progress import FlyItems
+from tests.companion.fake_vehicle import LOITER, Flight, flight
+
+
+class SumError(Exception):
+    pass
+
+
+def breaks(*arguments):
+    raise SumError("the sum is not the sum")
+
+
+def in_mission() -> Flight:
+    f = flight()
+    f.run_to("mission")
+    f.run_for(0.5)
+    return f
+
+
+@pytest.mark.parametrize(("place", "name"), [(FlyItems, "step"), (FlyItems, "target"), (watch, "advance")])
+def test_whatever_breaks_in_the_air_the_vehicle_is_handed_over(monkeypatch, place, name):
+    f = in_mission()
+    broken_at_us = f.now_us
+    monkeypatch.setattr(place, name, breaks)
+    f.run_to_end(3.0)
+
+    report = f.companion.report()
+    assert report.outcome == "failed"
+    assert "SumError in breaks: the sum is not the sum" in report.reason
+    assert f.vehicle.mode == LOITER and f.vehicle.armed
+    assert "test_faults.py" in f.event("fault").data["traceback"]
+    times_us = [at_us for at_us, _ in f.setpoints_since(broken_at_us - 100_000)]
+    assert max(b - a for a, b in itertools.pairwise(times_us)) <= 50_000, "no gap before the mode is seen to hold"
+    last = f.setpoints_since(broken_at_us)[-1][1]
+    assert last[7] == 84
+
+
+def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
+    f = flight(confirmed=False)
+    f.run_until(f.companion.plan_is_ready)
+    commands = len(f.vehicle.commands)
+    monkeypatch.setattr(watch, "advance", breaks)
+    f.run_to_end(1.0)
+    assert f.companion.report().outcome == "failed"
+    assert len(f.vehicle.commands) == commands and f.vehicle.setpoints == []
+
+
+def test_when_even_the_hand_over_breaks_silence_leaves_the_vehicle_to_its_failsafe(monkeypatch):
+    f = in_mission()
+    monkeypatch.setattr(FlyItems, "step", breaks)
+    monkeypatch.setattr("companion.flight.handover.HandOver.step", breaks)
+    f.run_to_end(1.0)
+    since = f.now_us
+    f.run_for(2.0)
+    assert f.setpoints_since(since) == []
+    assert f.kinds().count("fault") == 2
