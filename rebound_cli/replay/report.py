@@ -82,8 +82,8 @@ def _finding_text(replay: Replay, finding: Finding, picture: str | None) -> str:
         f"{lead}{kind}, confidence {final.confidence:.2f}",
         f"seen by {_HOW[impact.evidence]}: {force:.1f} m/s^2, a hit from {finding.threshold_m_s2:.1f} on",
         f"v_c {math.hypot(*first.velocity_ned_m_s):.2f} m/s {_vector(first.velocity_ned_m_s)} NED, "
-        f"normal {_vector(final.normal_ned)}, contact since {replay.log.seconds(_on_log(finding)):.3f} s "
-        f"+-{first.time_error_us / 1e3:.1f} ms",
+        f"normal {_vector(final.normal_ned)}",
+        f"contact since {replay.log.seconds(_on_log(finding)):.3f} s +-{first.time_error_us / 1e3:.1f} ms",
         f"peak {at_least}{final.peak_specific_force_m_s2:.1f} m/s^2, impulse {at_least}{final.impulse_m_s:.2f} m/s",
         f"{_circumstances(finding)}",
     ]

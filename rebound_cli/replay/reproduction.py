@@ -39,7 +39,7 @@ def reproduce(recording: Recording) -> Reproduction:
         result = companion.step(b"".join(step.received), step.time_us)
         comparison.compare(step, result)
         for event in result.events:
-            notebook.tell(event.time_us, f"{event.kind}: {event.text}")
+            notebook.tell(event.time_us, event.text)
         assert companion.core is not None, "the first step begins it"
         notebook.note(companion.core.watch, known, step.time_us)
         if step.confirms:
