@@ -47,17 +47,19 @@ def _turbulence(rng: np.random.Generator) -> Mishaps:
 
 
 def _vibration(rng: np.random.Generator) -> Mishaps:
-    """From a good vehicle's to a bent propeller's, which reaches the sensor's range again and again."""
+    """From a good vehicle's to a bent propeller's, which reaches the sensor's range again and again.
+
+    From take-off on: a blade that breaks in the air is no healthy flight any more, and its first jolt is a hit's.
+    """
     fault = {
         "kind": "vibration",
+        "at_s": 0.0,
         "accelerometer_rms_m_s2": float(10.0 ** rng.uniform(0.3, 1.9)),
         "gyroscope_rms_rad_s": float(10.0 ** rng.uniform(-1.5, -0.3)),
         "motor_hz": float(rng.uniform(80.0, 220.0)),
     }
     if rng.random() < 0.5:
         fault["motor"] = int(rng.integers(4))
-    (late_s,) = _moments(rng, 1)
-    fault["at_s"] = late_s if rng.random() < 0.3 else 0.0
     return Mishaps((fault,))
 
 

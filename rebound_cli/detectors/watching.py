@@ -19,6 +19,7 @@ ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 SWEPT_FACTORS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 # Its settings; of detectors that are not here it is the first of their settings.
 SWEPT_FIELDS = {
+    "hybrid": ("threshold_m_s2", "torque_threshold_rad_s2"),
     "lateral": ("threshold_m_s2", "noise_factor"),
     "fused": (
         "side_threshold_m_s2",
@@ -27,6 +28,8 @@ SWEPT_FIELDS = {
         "velocity_step_m_s",
         "velocity_step_turned_m_s",
         "rate_step_rad_s",
+        "jolt_rad_s",
+        "jolt_rad_s2",
     ),
 }
 
