@@ -44,7 +44,10 @@ POLL_INTERVAL_US = 50_000
 # A setpoint at the edge of the envelope may cross it fifty times a second.
 LEAST_BETWEEN_LIMITS_US = 1_000_000
 
-DETECTING_STATES = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
+# Between take-off and landing: the floor counts.
+ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
+# Off the ground, which is the detector's affair by height, a hit in the climb is a hit too.
+DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF}
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +241,7 @@ def within_envelope(core: Core, wanted: Target, moved: bool, now_us: int) -> Tar
     around = Surroundings(
         vehicle_ned_m=None if latest is None else latest.position_ned_m,
         origin_ned_m=flight.origin_ned_m,
-        has_floor=core.machine.state in DETECTING_STATES,
+        has_floor=core.machine.state in ON_THE_WAY,
         last_ned_m=None if moved else core.last_setpoint_ned_m,
         since_last_s=(now_us - core.last_setpoint_us) * 1e-6,
     )

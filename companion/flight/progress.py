@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from companion.flight import expecting
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.course import stay, way_of
+from companion.flight.course import climb, stay, way_of
 from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
 from companion.flight.states import Trigger
@@ -21,6 +21,7 @@ from companion.mission.items import (
     ReturnItem,
     SetSpeedItem,
     SetYawItem,
+    TakeoffItem,
     VelocityItem,
     WaitForItem,
 )
@@ -54,6 +55,9 @@ class FlyItems:
         match self._action:
             case GoToItem() | VelocityItem() | PathItem() | OrbitItem():
                 self._way = way_of(self._action, start, replace(flight.pace, factor=flight.tally.pace_factor))
+            case TakeoffItem():
+                # tried again after a hit in the climb
+                self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
             case SetSpeedItem():
                 flight.pace = flight.pace.changed_to(self._action)
         again = "" if flight.tally.pace_factor == 1.0 else f", at {flight.tally.pace_factor:.0%} of the speed"

@@ -58,6 +58,7 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
         Trigger.CONTROL_LOST: State.ABORTED,
         Trigger.INTERRUPTED: State.ABORTED,
         Trigger.REFUSED: State.ABORTED,
+        Trigger.COLLISION: State.RECOVERING,
         Trigger.TAKEN_OFF: State.MISSION,
     },
     State.MISSION: {

@@ -242,15 +242,30 @@ def test_a_hit_on_a_hovering_vehicle_is_detected():
     assert f.companion.report().outcome == "completed"
 
 
-@pytest.mark.parametrize("state", ["takeoff", "landing"])
-def test_takeoff_and_landing_shake_without_a_detection(state):
+@pytest.mark.parametrize(("state", "off"), [("takeoff", "below 0.5 m"), ("landing", "landing")])
+def test_takeoff_and_landing_shake_without_a_detection(state, off):
     f = flight()
     f.run_to(state)
-    f.run_for(2.2)
-    assert f.companion.status().detector == f"off ({state})"
+    f.run_for(1.6 if state == "takeoff" else 2.2)
+    assert f.companion.status().detector == f"off ({off})"
     strike(f, 15.0, 15.0)
     f.run_to_end()
     assert f.companion.report().collisions == ()
+
+
+@pytest.mark.parametrize(("then", "first_item"), [("hold", 2), ("retry", 1)])
+def test_a_hit_in_the_climb_is_recovered_from(then, first_item):
+    items = [{"takeoff": {"height_m": 4}}, {"go_to": {"position_ned_m": [2, 0, -4]}}, {"land": {}}]
+    f = flight(items=items, on_collision={"then": then, "hold_s": 0.5})
+    f.run_until(lambda: f.vehicle.position[2] < -1.5)
+    assert f.state == "takeoff"
+    strike(f, 12.0, 0.0)
+    assert f.state == "recovering"
+    (hit,) = f.companion.report().collisions
+    assert hit.recovery_setpoint_ned_m[2] == pytest.approx(f.vehicle.position[2], abs=0.2)
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    assert [e.data["number"] for e in f.events if e.kind == "item"] == list(range(first_item, 4))
 
 
 def test_below_the_minimum_height_nothing_is_detected():

@@ -14,6 +14,7 @@ EXPECTED = {
     (State.TAKEOFF, Trigger.CONTROL_LOST): State.ABORTED,
     (State.TAKEOFF, Trigger.REFUSED): State.ABORTED,
     (State.TAKEOFF, Trigger.INTERRUPTED): State.ABORTED,
+    (State.TAKEOFF, Trigger.COLLISION): State.RECOVERING,
     (State.TAKEOFF, Trigger.TAKEN_OFF): State.MISSION,
     (State.MISSION, Trigger.CONTROL_LOST): State.ABORTED,
     (State.MISSION, Trigger.INTERRUPTED): State.ABORTED,
