@@ -16,6 +16,7 @@ from rebound_cli.detectors.campaigns import flights_campaign, healthy_campaign, 
 from rebound_cli.detectors_report import comparison, flights, hits, pictures
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.detectors_report.numbers import Hits
+from rebound_cli.detectors_report.reading import HOW_TO_READ
 
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
 START_MARK, END_MARK = "<!-- generated: detectors -->", "<!-- end -->"
@@ -67,6 +68,7 @@ def _sections(worked_out: Worked, bars: list[Bar]) -> list[str]:
     all_hits = _hits(worked_out)
     parts: list[tuple[str, str]] = [
         ("What must be shown", bars_text(bars)),
+        ("", HOW_TO_READ),
         ("Every detector on simulated hits", hits.comparison_text(all_hits)),
         ("", "![detection rate by speed](images/detection/speed.png)\n"),
         ("", "![false alarms against detection rate](images/detection/roc.png)\n"),

@@ -24,7 +24,7 @@ from rebound_cli.campaign.run import Workers, run_campaign
 if __name__ == "__main__":
     who, folder = sys.argv[1], Path(sys.argv[2])
     if who == "scheduler":
-        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=':0') as cluster:
             print(table(run_campaign(campaign(), Workers(scheduler=cluster.scheduler_address), folder)))
     else:
         print(table(run_campaign(campaign(), Workers(int(who)), folder)))

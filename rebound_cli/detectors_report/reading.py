@@ -1,0 +1,40 @@
+"""What the tables count, for whoever reads them: written into the document beside them."""
+
+HOW_TO_READ = """\
+### How it is measured
+
+*Hits.* A vehicle cruises in trimmed flight, nose anywhere, into a wall square to its path, at a slant of up to 60° or
+leaning by up to 45°, into a ceiling (climbing at up to the airframe's 3 m/s) or, anywhere across its width, into a
+pole of 2 to 30 cm radius. Speeds are drawn from 0.5 to 5 m/s, one in sixteen from 0.3 to 0.5. Friction is 0.3, the
+spread of an IMU sample 0.25 m/s² on each axis, the noise of the vehicle's velocity 0.032 m/s RMS on each axis, where
+a table does not say otherwise. Each hit is simulated once and heard on three links, which ask for `HIGHRES_IMU` at
+50, 100 and 250 Hz and receive what PX4's rule sends and its late loops leave (50, 100 and 246 Hz); everything else
+comes at the rates that the companion asks for. Every detector hears the same samples, with its default settings.
+
+*Found*: a collision is reported within 0.4 s of the first touch. A touch that is classed as a landing or a hand is
+not a collision. *False before*: reports before the first touch.
+
+*The first sample that shows it*: the first received sample whose averaging window holds the obstacle's force, by the
+simulator's truth, at a mean of more than six standard deviations of the sample's noise: of the 2.7 · 10⁷ numbers of
+ten hours of samples noise alone takes one beyond that with a probability of 0.05. Where no received sample does, the
+hit *fell between the samples*. Latency counts from the first touch.
+
+*v_c error*: the estimated speed just before the hit less the true one; as a vector: the length of the difference.
+*Normal error*: between the estimated normal, when the contact is over, and the normal of the surface where it was
+touched first.
+
+*Healthy flights*: from the ground to the ground, 100 s of dashes at up to 8 m/s, jumps, stops from full speed,
+slaloms, spins and flips in between, calm or with gusts, turbulence, vibration up to a bent propeller's, a payload
+dropped, a weak battery, estimator resets, free fall or a motor that fails (until a second after it did). Detectors
+are off in take-off only. *Touches told as such*: reports that are no collisions.
+
+*Recorded flights* are PX4 logs of other people's vehicles: four without a collision, ordinary landings included, and
+one that strikes the ground. *Semi-synthetic* hits are recorded impacts (drops of a 0.24 kg quadrotor on concrete,
+±200 g at 1 kHz) put into recorded flights, away from commanded descents to the ground: turned to come from any side,
+added to what the flight's accelerometer showed, each axis of each millisecond clipped at ±16 g, averaged over the
+flight's own integration intervals of 5 ms. The flight's velocity takes what its accelerometer showed of the impact,
+as PX4's estimator would; its gyroscope shows nothing of it.
+
+*Threshold sweeps* (the picture of false alarms against detection rate): every detector again with its thresholds
+times 1/4 to 4, on one hit in twenty and one flight in eight.
+"""
