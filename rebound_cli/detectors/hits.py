@@ -32,8 +32,9 @@ SLOW_SHARE = 0.06
 
 # Off the ground by more than any fall within a hit; nothing about the ground is wanted here.
 HEIGHT_M = 30.0
-# The detector has 0.5 s to learn the vehicle's shaking, the velocity filter looks back 0.5 s.
-FREE_FLIGHT_S = (0.9, 1.2)
+# The detector learns the vehicle: its shaking in 0.5 s, how its velocity keeps to its accelerometer in 20 velocities at
+# 30 Hz; the velocity filter looks back 0.5 s.
+FREE_FLIGHT_S = (1.5, 1.9)
 SWITCHED_ON_AFTER_S = 0.5
 # Touches later than planned: a slow vehicle whose last centimetres were not in the plan.
 PATIENCE_S = 3.0
