@@ -131,10 +131,10 @@ def _fly_beside_px4(flight: Flight, connection: Connection, instance: int) -> Fl
 
 def _with_truth(flight: Flight, flown: Flown) -> Flown:
     """The flight beside what the simulated vehicle's process wrote; without it if PX4 never flew."""
-    from sim_vehicle.shell.truth_file import load_truth
+    from sim_vehicle.shell.truth_file import load_faults, load_truth
 
     path = flight.folder / run_folder.TRUTH_NAME
-    return replace(flown, truth=FlightTruth(*load_truth(path))) if path.exists() else flown
+    return replace(flown, truth=FlightTruth(*load_truth(path), load_faults(path))) if path.exists() else flown
 
 
 def _fly_lockstep(flight: Flight) -> Flown:
@@ -150,7 +150,7 @@ def _fly_lockstep(flight: Flight) -> Flown:
 
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
-    from rebound_cli.figure import draw_flight
+    from rebound_cli.figure.flight import draw_flight
 
     world = flight.world
     facts = FlightFacts(

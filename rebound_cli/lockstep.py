@@ -62,7 +62,7 @@ def fly_mission_lockstep(
         reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
         report = replace(report, outcome="failed", reason=reason)
     truth = vehicle.truth
-    return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US)), truth
+    return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)), truth
 
 
 def run_lockstep(

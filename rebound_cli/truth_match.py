@@ -10,7 +10,7 @@ import numpy.typing as npt
 from companion.report import CollisionReport
 
 if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulator's compiled kernels
-    from sim_vehicle.truth import Hit
+    from sim_vehicle.truth import FaultSpan, Hit
 
 # An IMU sample seen after a contact's end can still cover part of it: samples of PX4's default
 # 50 Hz stream are 20 ms apart.
@@ -27,6 +27,7 @@ class FlightTruth:
     hits: "Sequence[Hit]"
     series: Series
     epoch_at_boot_us: float
+    faults: "Sequence[FaultSpan]" = ()
 
     def past_setpoint_and_below(self, hit: "Hit", setpoint_ned_m: Vector3, until_boot_us: float) -> tuple[float, float]:
         """Furthest distance past the setpoint along the wall's normal and greatest loss of height, in metres.

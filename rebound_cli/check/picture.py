@@ -11,8 +11,8 @@ from matplotlib.patches import Circle, Polygon
 
 from companion.mission.fence import Fence
 from companion.mission.model import Mission
-from rebound_cli.check.outline import footprint
 from rebound_cli.check.ways import Way
+from rebound_cli.figure.outline import footprint
 from sim_vehicle.scene import Scene
 
 _WAY = "tab:orange"

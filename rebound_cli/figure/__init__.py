@@ -1,0 +1,1 @@
+"""`flight.png`, the picture of a flight."""
