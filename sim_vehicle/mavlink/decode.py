@@ -30,6 +30,8 @@ _AROUND_V2, _AROUND_V1, _SIGNATURE = 12, 8, 13
 _SIGNED_FLAG = 0x01
 
 _DO_SET_MODE = 176
+# Its target is a system, too, under another name.
+_MANUAL_CONTROL_ID = 69
 _GREATEST_INT32 = 2**31 - 1
 _FORCE_BIT = 0x200
 _YAW_IGNORED, _YAW_RATE_IGNORED = 0x400, 0x800
@@ -111,7 +113,8 @@ class Decoder:
         self.heard_mavlink_2 |= raw[0] == _MARKER_V2
         if self.foreign is None:
             return
-        target = _target(packet) if hasattr(packet, "target_system") else (EVERY_ID, EVERY_ID)
+        is_addressed = hasattr(packet, "target_system") or packet.id == _MANUAL_CONTROL_ID
+        target = _target(packet) if is_addressed else (EVERY_ID, EVERY_ID)
         if target != self._us:
             self.foreign.append(ForeignPacket(raw, *target))
 
@@ -136,7 +139,8 @@ def _end_of_packet(buffer: bytes, start: int) -> int | None:
 
 def _target(packet: dialect.MAVLink_message) -> tuple[int, int]:
     """Whom it addresses; a message without a component is for all of them."""
-    return packet.target_system, getattr(packet, "target_component", EVERY_ID)
+    system = packet.target if packet.id == _MANUAL_CONTROL_ID else packet.target_system
+    return system, getattr(packet, "target_component", EVERY_ID)
 
 
 def _heartbeat(packet: dialect.MAVLink_heartbeat_message) -> PeerHeartbeat:
@@ -246,5 +250,6 @@ _NOT_ADDRESSED = (4, 75, 76)
 _ADDRESSED = frozenset(
     number
     for number in READERS
-    if "target_system" in dialect.mavlink_map[number].fieldnames and number not in _NOT_ADDRESSED
+    if ("target_system" in dialect.mavlink_map[number].fieldnames or number == _MANUAL_CONTROL_ID)
+    and number not in _NOT_ADDRESSED
 )
