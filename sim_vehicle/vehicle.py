@@ -64,6 +64,8 @@ class SimulatedVehicle:
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
         self._autopilot = Autopilot(airframe.hover_fraction, first, parameters, self._missions)
+        # Taken once: looking a record's field up costs microseconds.
+        self._body = self._plant.state.body
         identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
         self._telemetry = Telemetry(
             sample=first,
@@ -73,7 +75,7 @@ class SimulatedVehicle:
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
-            true_body=self._plant.state.body,
+            true_body=self._body,
             attitude_setpoint=self._plant.state.attitude_setpoint,
             epoch_at_boot_us=self._epoch_at_boot_us,
             system=identity.system,
@@ -173,7 +175,7 @@ class SimulatedVehicle:
         if faults is not None:
             slow.gps_is_blocked |= faults.is_lost("gps", self.time_boot_us / 1e6)
             self._autopilot.battery.supply_share = faults.voltage_share
-        slow.update(self.time_boot_us, self._plant.state.body)
+        slow.update(self.time_boot_us, self._body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
 

@@ -53,6 +53,7 @@ class Link:
         self._buffer = Buffer(options.line, self.now_us)
         self._outbox = Outbox(self._encoder, self._buffer)
         self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, options.line)
+        self._choose_protocol()
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
         self._handlers: dict[type, Handler] = {
@@ -111,6 +112,7 @@ class Link:
             handler = self._handlers.get(type(message))
             if handler is not None:
                 handler(message)
+        self._choose_protocol()
         return decoder.foreign or []
 
     def forward(self, packets: Iterable[ForeignPacket]) -> None:
@@ -124,8 +126,10 @@ class Link:
     def update(self, now_us: int, texts: Sequence[StatusText]) -> None:
         """Send what is due at the end of the interval."""
         self.now_us = now_us
-        self._buffer.advance(now_us)
-        self._choose_protocol()
+        if self.options.line.baud is not None:
+            self._buffer.advance(now_us)
+        if self._board.signing.key is not self._signed_with or self._signed_with is not None:
+            self._sign()
         for text in texts:
             self._texts.add(text, now_us)
         for message in self._texts.due(now_us):
@@ -141,13 +145,14 @@ class Link:
         return any(source[0] == system and component in (EVERY_ID, source[1]) for source in sources)
 
     def _choose_protocol(self) -> None:
-        board, encoder = self._board, self._encoder
-        begins_with_1 = board.parameters["MAV_PROTO_VER"] <= _BEGINS_WITH_MAVLINK_1
-        encoder.speaks_mavlink_1 = begins_with_1 and not self._decoder.heard_mavlink_2
-        key = board.signing.key
-        if key is not None or self._signed_with is not None:
-            self._signed_with = key
-            encoder.sign(key, self._number, board.signing.next_stamps(board.telemetry.epoch_at_boot_us + self.now_us))
+        begins_with_1 = self._board.parameters["MAV_PROTO_VER"] <= _BEGINS_WITH_MAVLINK_1
+        self._encoder.speaks_mavlink_1 = begins_with_1 and not self._decoder.heard_mavlink_2
+
+    def _sign(self) -> None:
+        board = self._board
+        key = self._signed_with = board.signing.key
+        stamp = board.signing.next_stamps(board.telemetry.epoch_at_boot_us + self.now_us)
+        self._encoder.sign(key, self._number, stamp)
 
     def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
         self._texts.heard(heartbeat, self.now_us)

@@ -10,7 +10,6 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
 from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.setpoint import TrajectorySetpoint
 
 # What PX4's simulated receiver states (sensor_gps_sim).
 _HDOP_CENTI, _VDOP_CENTI, _SPEED_ACCURACY_MM_S = 70, 110, 400
@@ -128,12 +127,13 @@ def estimator_status(state: Telemetry) -> Message:
     )
 
 
-def position_target_global_int(state: Telemetry) -> Message:
-    """Where a mode that flies by itself is going; see `Topic.TARGET`."""
+def position_target_global_int(state: Telemetry) -> Message | None:
+    """Where a mode that flies by itself is going; nothing in all others."""
     target, applied = state.autopilot.auto_target_ned_m, state.autopilot.applied
+    if target is None:
+        return None
     flown = applied if isinstance(applied, TrajectorySetpoint) else None
-    # A mode that has just ended leaves a message that was already due.
-    place = state.origin.place_at(state.published.position_ned_m if target is None else target)
+    place = state.origin.place_at(target)
     velocity = flown.velocity_ned_m_s if flown is not None else (None, None, None)
     return dialect.MAVLink_position_target_global_int_message(
         boot_ms(state.published),

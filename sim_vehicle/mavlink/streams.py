@@ -32,7 +32,8 @@ class StreamKind:
 
     message_id: int
     topic: Topic
-    build: Callable[[Telemetry], Message]
+    build: Callable[[Telemetry], Message | None]
+    """None where there is nothing to say at the moment."""
     notes: tuple[Topic, ...] = ()
     """Slower topics whose news the message marks as such: `Telemetry.renewed`, in this order."""
 
@@ -74,7 +75,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(74, Topic.POSITION, navigation.vfr_hud),
     StreamKind(36, Topic.SAMPLE, condition.servo_output_raw),
     StreamKind(24, Topic.GPS, navigation.gps_raw_int),
-    StreamKind(87, Topic.TARGET, navigation.position_target_global_int),
+    StreamKind(87, Topic.POSITION, navigation.position_target_global_int),
     StreamKind(230, Topic.POSITION, navigation.estimator_status),
     StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin),
     StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position),
@@ -162,10 +163,12 @@ class Stream:
 
     def renewed(self, versions: list[int]) -> tuple[bool, ...]:
         """Which of the noted topics have news since the last message."""
-        now = [versions[topic] for topic in self.kind.notes]
-        new = tuple(a != b for a, b in zip(now, self.noted, strict=True))
-        self.noted = now
-        return new
+        new, noted = [], self.noted
+        for place, topic in enumerate(self.kind.notes):
+            version = versions[topic]
+            new.append(version != noted[place])
+            noted[place] = version
+        return tuple(new)
 
     def sent(self, now_us: int) -> None:
         """Keep the mean rate by counting from when it was due, unless that is long ago."""
@@ -240,7 +243,9 @@ class Streams:
             stream.sent(now_us)
             if kind.notes:
                 state.renewed = stream.renewed(versions)
-            outbox.send(kind.build(state))
+            message = kind.build(state)
+            if message is not None:
+                outbox.send(message)
 
     # --- commands ----------------------------------------------------------------------------------------
 
@@ -279,7 +284,10 @@ class Streams:
         stream.seen = version
         if stream.kind.notes:
             self._state.renewed = stream.renewed(self._versions)
-        self._outbox.send(stream.kind.build(self._state))
+        message = stream.kind.build(self._state)
+        if message is None:
+            return False
+        self._outbox.send(message)
         return True
 
 

@@ -27,14 +27,12 @@ class Topic(IntEnum):
     BATTERY = 9
     ORIGIN = 10
     """New once: it does not move."""
-    TARGET = 11
-    """New with every position, while a mode flies somewhere by itself."""
-    MAGNETIC_FIELD = 12
-    RADIO = 13
+    MAGNETIC_FIELD = 11
+    RADIO = 12
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.TARGET, Topic.RADIO)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.RADIO)
 
 
 class Topics:
@@ -59,19 +57,22 @@ class Topics:
         versions[0] += 1
         versions[1] += 1
         state = self._state
-        if new_position:
-            versions[2] += 1
-            self._count_target()
+        if state.true_body is not None:
+            versions[6] += 1
+        if not new_position:
+            return
+        # All else is slow enough to be looked at this often only.
+        versions[2] += 1
         channels = state.autopilot.radio_channels
         if channels is not self._channels:
             self._channels = channels
-            versions[13] += 1
+            versions[12] += 1
         if state.air is not self._air:
             self._air = state.air
             versions[8] += 1
         if state.magnetic_field_frd_gauss is not self._field:
             self._field = state.magnetic_field_frd_gauss
-            versions[12] += 1
+            versions[11] += 1
         if state.gps is not self._fix:
             self._fix = state.gps
             versions[7] += 1
@@ -84,14 +85,8 @@ class Topics:
         if state.range is not self._range:
             self._range = state.range
             versions[Topic.RANGE] += 1
-        if state.true_body is not None:
-            versions[Topic.TRUTH] += 1
         autopilot, now_us = state.autopilot, state.sample.time_boot_us
         status = (autopilot.modes.mode, autopilot.arming.armed, autopilot.system_status)
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[3] += 1
-
-    def _count_target(self) -> None:
-        if self._state.autopilot.auto_target_ned_m is not None:
-            self.versions[Topic.TARGET] += 1
