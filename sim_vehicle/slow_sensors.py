@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
+from sim_vehicle.hil.earth import HOME
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.hil.sensors import Barometer, Gps, Magnetometer
+from sim_vehicle.hil.sensors import BAROMETER_NOISE_PA, Gps, Magnetometer
 from sim_vehicle.world import Vector3
 
 # SENS_MAG_RATE 15 Hz and SENS_BARO_RATE 20 Hz, in whole intervals of 4 ms; PX4's simulated receiver gives 8 fixes a
@@ -16,7 +17,17 @@ MAGNETOMETER_PERIOD_US = 64_000
 BAROMETER_PERIOD_US = 48_000
 GPS_PERIOD_US = 124_000
 
-Quaternion = tuple[float, float, float, float]
+_SEA_LEVEL_PA, _SEA_LEVEL_K, _LAPSE_K_M = 101_325.0, 288.15, 0.0065
+# Gravity over the lapse rate and the gas constant of air.
+_EXPONENT = 9.80665 / (287.0528 * _LAPSE_K_M)
+
+
+def air_at(altitude_m: float, noise_pa: float = 0.0) -> Air:
+    """The ICAO standard atmosphere of the lowest eleven kilometres, by its formula (PX4's lib/atmosphere)."""
+    share = 1 - _LAPSE_K_M * altitude_m / _SEA_LEVEL_K
+    pressure_pa = _SEA_LEVEL_PA * share**_EXPONENT + noise_pa
+    shown_m = _SEA_LEVEL_K / _LAPSE_K_M * (1 - (pressure_pa / _SEA_LEVEL_PA) ** (1 / _EXPONENT))
+    return Air(pressure_pa / 100, shown_m, _SEA_LEVEL_K * share - 273.15)
 
 
 class SlowSensors:
@@ -24,7 +35,7 @@ class SlowSensors:
 
     def __init__(self, airframe: Airframe, seed: int) -> None:
         rng = random.Random(seed)
-        self._magnetometer, self._barometer, self._gps = Magnetometer(rng), Barometer(rng), Gps(airframe, rng)
+        self._magnetometer, self._gps, self._rng = Magnetometer(rng), Gps(airframe, rng), rng
         self._due_us = [0, 0, 0]
         self._next_us = 0
         self.magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
@@ -44,7 +55,7 @@ class SlowSensors:
             self.magnetic_field_frd_gauss = self._magnetometer.sample((w, x, y, z))
         if now_us >= due_us[1]:
             due_us[1] = now_us + BAROMETER_PERIOD_US
-            self.air = self._barometer.sample((north, east, down))
+            self.air = air_at(HOME.altitude_m - down, self._rng.gauss(0, BAROMETER_NOISE_PA))
         if now_us >= due_us[2]:
             due_us[2] = now_us + GPS_PERIOD_US
             fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from ambiance import Atmosphere
 from pygeomag import GeoMag
 
 from sim_vehicle.hil.messages import Air, Place
@@ -52,6 +51,9 @@ class StandardAir:
     """Pressure and temperature of the ICAO standard atmosphere near home."""
 
     def __init__(self, home: Place = HOME) -> None:
+        # Here, because it brings scipy's optimizers, which take half a second to load.
+        from ambiance import Atmosphere
+
         self._home_altitude_m = home.altitude_m
         heights_m = home.altitude_m + np.arange(_LOWEST_M, _HIGHEST_M + 1)
         atmosphere = Atmosphere(heights_m)

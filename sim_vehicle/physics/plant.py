@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
-from sim_vehicle.estimator.onboard import OnboardEstimator
 from sim_vehicle.faults.plan import Faults, with_losses
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import (
@@ -30,7 +30,7 @@ from sim_vehicle.physics.layout import (
     initial_state,
 )
 from sim_vehicle.physics.proximity import points_behind
-from sim_vehicle.physics.record import boxed, new_record
+from sim_vehicle.physics.record import Floats, boxed, new_record
 from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.physics.trim import trim
@@ -38,6 +38,9 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Vector3
+
+if TYPE_CHECKING:
+    from sim_vehicle.estimator.onboard import OnboardEstimator
 
 Quadruple = tuple[float, float, float, float]
 
@@ -62,6 +65,13 @@ class PlantOutput:
     """Thrust commanded of each motor over its greatest, in motor order."""
     reset_counter: int = 0
     """How often the estimator has let its position or velocity jump."""
+
+
+def _onboard_estimator(airframe: Airframe, faces: Floats, body: Floats, seed: int) -> "OnboardEstimator":
+    # Here, because its Kalman filter brings scipy's statistics, which take half a second to load.
+    from sim_vehicle.estimator.onboard import OnboardEstimator
+
+    return OnboardEstimator(airframe, faces, body, seed)
 
 
 class Plant:
@@ -91,7 +101,7 @@ class Plant:
         self._errors = estimate_errors(airframe, self.state.body, self._rng)
         self.onboard: OnboardEstimator | None = None
         if airframe.estimate.kind == "ekf":
-            self.onboard = OnboardEstimator(airframe, self._flat_faces, self.state.body, seed)
+            self.onboard = _onboard_estimator(airframe, self._flat_faces, self.state.body, seed)
         self._estimate = self.state.estimate
         self._frame_offset_ned_m = self.state.frame_offset_ned_m
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
@@ -207,7 +217,7 @@ class Plant:
             faces[mover.rows, FACE_POINT : FACE_POINT + 3] = mover.points_ned_m + now_ned_m
             faces[mover.rows, FACE_VELOCITY : FACE_VELOCITY + 3] = (then_ned_m - now_ned_m) / interval_s
 
-    def _estimate_state(self, onboard: OnboardEstimator, flies: bool) -> None:
+    def _estimate_state(self, onboard: "OnboardEstimator", flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
         estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
         onboard.update(int(self._report[0]), self._report[SENSED], flies, self._body, estimate, acceleration)
