@@ -121,9 +121,11 @@ class Autopilot:
     def run_commander(self) -> list[CommandAck]:
         """Commands, failsafes, arming: everything that can change mode or arming."""
         self._look()
+        self._run_mission_commands()
         self.commander.run(self._now_us, self._estimate.attitude_wxyz)
         acks: list[CommandAck] = []
         if self._commands:
+            self.navigator.notice_changes()  # a list that has just come is judged before it is to be flown
             queue, self._commands = self._commands, []
             acks = [ack for command in queue if (ack := self._execute(command)) is not None]
         if self.modes.flown is not self._flown:
@@ -190,7 +192,6 @@ class Autopilot:
         texts = self.navigator.take_texts()
         if texts:
             self.texts += texts
-        self._run_mission_commands()
         self._demand = demand = self._demand_of_mode(1e-6 * elapsed_us)
         down_m, armed = self._estimate.position_ned_m[2], self.arming.armed
         if demand is not None and not isinstance(demand, TrajectorySetpoint):
@@ -209,6 +210,7 @@ class Autopilot:
         view.landed, view.armed = self.detector.landed, self.arming.armed
 
     def _run_mission_commands(self) -> None:
+        """In the interval after the items that gave them: what was reached until then has been told by now."""
         queue = self.navigator.mission.commands
         if not queue:
             return

@@ -174,7 +174,7 @@ class Navigator:
         if view.now_us - self._updated_us < PERIOD_US:
             return
         self._updated_us = view.now_us
-        self._notice_changes()
+        self.notice_changes()
         was_breached = self.fence.breached
         self.fence.update(view, self._holds_after_breach)
         if self.fence.breached and not was_breached and view.armed:
@@ -200,7 +200,7 @@ class Navigator:
             if self._mode is Mode.LOITER:
                 self._target, self._reposition = self._reposition, None
 
-    def _notice_changes(self) -> None:
+    def notice_changes(self) -> None:
         """Uploads, another current item, another home: all are judged anew."""
         missions = self._missions
         seen = (missions.mission_changes, missions.fence_changes, self.view.home_ned_m)

@@ -10,7 +10,8 @@ from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
 from sim_vehicle.autopilot.messages import Result
-from sim_vehicle.autopilot.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_messages import MissionItem, MissionType
+from sim_vehicle.autopilot.mission_store import Plan
 from sim_vehicle.autopilot.modes import Mode
 from tests.sim_vehicle.autopilot.flying import action, hovering, item, set_mode, upload
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
@@ -35,6 +36,16 @@ def reached(flight: Flight, number: int, at_most_s: float = 60.0) -> float:
 
 def north_east(flight: Flight) -> tuple[float, float]:
     return flight.state.position_ned_m[:2]
+
+
+@pytest.mark.parametrize("steps", range(4))
+def test_a_mission_may_be_started_in_whatever_interval_its_upload_ends(steps):
+    # Lists are judged every 8 ms; a start that came between the two was refused
+    flight = Flight()
+    for _ in range(steps):
+        flight.step()
+    flight.autopilot.missions.replace(MissionType.MISSION, Plan((TAKEOFF, NORTH, LAND_AT_HOME), 1))
+    assert flight.ask(MISSION_START, 0) is Result.ACCEPTED
 
 
 def test_a_mission_from_the_ground_and_back_disarms_and_says_so():
@@ -139,7 +150,14 @@ def test_a_jump_repeats_as_often_as_it_says_then_goes_on():
 
 def test_return_as_an_item_returns():
     flight = begun(TAKEOFF, NORTH, action(kinds.RETURN_TO_LAUNCH))
-    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.RETURN, 60.0)
+    # The place before is told as reached before the mode is another, and the item itself is not, as in PX4:
+    # MAVSDK's clients count on both
+    told = []
+    while flight.autopilot.modes.flown is Mode.MISSION:
+        flight.step()
+        told.append(flight.autopilot.missions.progress.reached)
+    assert max(told) == 1
+    assert flight.autopilot.modes.flown is Mode.RETURN
     assert "Returning to launch" in flight.texts()
 
 
