@@ -1,7 +1,12 @@
 """Assertions in a mission: met or not, the flight goes on; one not met makes it a failed one."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from companion.flight.context import Expectation
+from companion.flight.expecting import review
+from companion.mission.expectations import ExpectItem
 from tests.companion.fake_vehicle import FakeVehicle, Flight, flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
@@ -66,3 +71,14 @@ def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():
 def test_the_first_of_several_failures_is_the_reason():
     f = flown({"expect": {"no_collision": {}}}, INTO_WALL, {"expect": {"collisions": {"exactly": 0}}})
     assert f.companion.report().reason.endswith(", and 1 more")
+
+
+def test_a_hit_that_is_heard_of_late_came_late():
+    """Hit and deadline in one step, as when packets come in batches: the hit's own time counts."""
+    wish = Expectation("2", "a hit", ExpectItem(collision={"within_s": 5}), 0, 0)
+    for hit_at_us, met in ((4_990_000, True), (5_010_000, False)):
+        wish.met = None
+        hit = SimpleNamespace(impact_speed_m_s=2.0, detected_at_us=hit_at_us)
+        record = SimpleNamespace(report=lambda hit=hit: hit)
+        review(SimpleNamespace(expectations=[wish], collisions=[record], tell=lambda *a, **b: None), 5_050_000)
+        assert wish.met is met

@@ -53,6 +53,8 @@ def test_an_orbit_keeps_its_distance_and_looks_at_the_centre():
     asked = setpoints_in(f, "orbit")
     on_circle = [m for m in asked if abs(math.hypot(m.x - 2, m.y) - 1.5) < 1e-3]
     assert len(on_circle) * 0.02 == pytest.approx(1.25 * math.tau * 1.5, rel=0.2), "at 1 m/s"
+    # onto the circle in the south, and clockwise from there: to the west
+    assert min(on_circle[:100], key=lambda m: m.y).y < -0.5
     facing = [abs(math.remainder(m.yaw - math.atan2(-m.y, 2 - m.x), math.tau)) for m in on_circle]
     assert max(facing) < math.radians(5)
 
@@ -121,6 +123,17 @@ def test_waiting_until_steady():
     f = flown({"go_to": {"position_ned_m": [2, 0, -1.5], "speed_m_s": 2.0}}, settle)
     assert item_times_s(f)[1] > 0.6
     assert f.vehicle.position[0] == pytest.approx(2.0, abs=0.05)
+
+
+def test_whoever_is_pushed_is_not_steady():
+    f = flight(items=[TAKEOFF, {"wait_for": {"steady": {"for_s": 1.0}}}, LAND])
+    f.run_until(lambda: f.state == "mission" and abs(f.vehicle.velocity[2]) < 0.05)
+    f.run_for(0.8)
+    assert f.state == "mission"
+    f.vehicle.position[1] += 0.4
+    f.run_for(0.9)
+    assert f.state == "mission", "the second is counted anew"
+    f.run_to("landing", 3.0)
 
 
 @pytest.mark.parametrize(("on_timeout", "mode", "outcome"), [("abort", LOITER, "aborted"), ("land", None, "completed")])

@@ -17,9 +17,9 @@ ITEMS = [
 FIRST = {"origin_ned_m": [10.0, 5.0, 0.0], "armed_at_us": EPOCH_US - 600_000_000}
 
 
-def resumed(at_step: int, boot_us: int, confirmed=True) -> Flight:
+def resumed(at_step: int, boot_us: int, confirmed=True, **changes) -> Flight:
     """The vehicle was armed `boot_us` after its start, ten minutes ago, two metres from where it stands."""
-    resume = {"at_step": at_step, **FIRST, "armed_boot_us": boot_us}
+    resume = {"at_step": at_step, **FIRST, "armed_boot_us": boot_us, **changes}
     vehicle = FakeVehicle(start_ned_m=(12.0, 5.0, 0.0), time_us=605_000_000)
     return flight(vehicle, confirmed, items=ITEMS, resume=resume)
 
@@ -50,6 +50,13 @@ def test_after_a_restart_the_new_arming_position_counts():
     f.run_to("landing")
     assert "the vehicle was restarted" in f.event("resume").text
     assert f.vehicle.position == pytest.approx([15.0, 5.0, -1.5], abs=0.3)
+
+
+def test_a_flight_of_the_future_tells_nothing_of_the_vehicle():
+    """The companion's clock was set back: no time has passed in which the vehicle's clock could have gone on."""
+    f = resumed(4, 1_605_000_000, armed_at_us=EPOCH_US + 1_000_000_000)
+    f.run_until(lambda: "resume" in f.kinds())
+    assert "the vehicle was restarted" in f.event("resume").text
 
 
 def test_an_interrupted_flight_says_where_to_go_on_and_a_resumed_one_too():

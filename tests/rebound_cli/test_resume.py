@@ -8,7 +8,7 @@ from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
 from rebound_cli.resume import resume_of
 from rebound_cli.run_folder import EVENTS_NAME
-from tests.rebound_cli.command import QUICK, SQUARE, events_of
+from tests.rebound_cli.command import QUICK, SQUARE, assert_comes_again, events_of
 
 
 def fly(*arguments):
@@ -43,3 +43,12 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
     cut = [line for line in events if '"aborted"' not in line and '"mode"' not in line]
     (first / EVENTS_NAME).write_text("".join(cut) + cut[-1][:20])
     assert resume_of(first, mission_from(load_mission_document(SQUARE, QUICK[1:])))["at_step"] == 3
+
+
+def test_a_mission_that_waits_for_a_file_goes_on_when_it_is_there_and_replays(tmp_path):
+    sign, folder = tmp_path / "go", tmp_path / "run"
+    sign.touch()
+    items = f"items=[{{takeoff: {{height_m: 0.6}}}}, {{wait_for: {{file: {sign}}}}}, {{land: {{}}}}]"
+    assert fly("--set", items, *QUICK, "--out", folder) == 0
+    assert steps(folder) == [1, 2]
+    assert_comes_again(folder)
