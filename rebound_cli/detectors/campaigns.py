@@ -18,19 +18,19 @@ from rebound_cli.detectors.recorded import (
 )
 from rebound_cli.detectors.watching import detector_names
 
-# Measured on everything; the others are compared on a share of it.
+# Tried on everything. The others are compared on at least so many hits and flights, and on one in eight at most sizes:
+# all seven take three times as long as these two.
 THOROUGH = ("fused", "threshold")
-COMPARED_EVERY = 4
+COMPARED_HITS, COMPARED_FLIGHTS, COMPARED_EVERY_AT_MOST = 400, 16, 8
+# Of these so many are heard at other thresholds too: seven detectors at seven thresholds take fifty times as long.
+SWEPT_HITS = 200
 
 # Beside the hits of the airframes as they are, one in so many again with more vibration, and with a worse velocity.
-VARIED_SHARE = 8
+VARIED_SHARE = 16
 # An IMU sample's spread on each axis: four public PX4 logs of healthy flights lie between 1.2 and 4 m/s^2.
 VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
 # Of the vehicle's velocity estimate, RMS on each axis: motion capture, GPS with RTK, plain GPS.
 VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
-# Every so manyeth pair of hits (flights) is heard by each detector at other thresholds too.
-SWEEP_HITS_EVERY, SWEEP_FLIGHTS_EVERY = 20, 16
-
 USES = ("rebound_cli.logs", "rebound_cli.replay")
 
 # Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
@@ -38,13 +38,15 @@ FLIGHT_S = AIRBORNE_S + 40.0
 
 
 def hits_campaign(hits: int) -> Campaign:
-    """So many hits as the airframes are, and an eighth more of each variation."""
+    """So many hits as the airframes are, and a sixteenth more of each variation."""
+    every = _every(hits, COMPARED_HITS)
+    swept = every * max(1, round(hits / (every * SWEPT_HITS)))
     cases: list[HitCase] = [
-        draw_case("plain", seed, _compared(seed), sweeps=seed // 2 % SWEEP_HITS_EVERY == 0) for seed in range(hits)
+        draw_case("plain", seed, _compared(seed, every), sweeps=_is_turn(seed, swept)) for seed in range(hits)
     ]
     for seed in range(hits, hits + hits // VARIED_SHARE):
         level = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
-        cases.append(draw_case("vibration", seed, _compared(seed), vibration_m_s2=level))
+        cases.append(draw_case("vibration", seed, _compared(seed, every), vibration_m_s2=level))
     for seed in range(2 * hits, 2 * hits + hits // VARIED_SHARE):
         noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
         cases.append(draw_case("velocity", seed, _thorough(), velocity_noise_m_s=noise))
@@ -54,14 +56,14 @@ def hits_campaign(hits: int) -> Campaign:
 def flights_campaign(hours: float) -> Campaign:
     """At least so many hours of flight, airframes in turn."""
     count = max(2, math.ceil(3600.0 * hours / FLIGHT_S))
-    families = list(FAMILIES)
+    families, every = list(FAMILIES), _every(count, COMPARED_FLIGHTS)
     cases = [
         FlightCase(
             family=families[seed // 2 % len(families)],
             seed=seed,
             airframe=AIRFRAMES[seed % 2],
-            detectors=_compared(seed),
-            sweeps=seed % SWEEP_FLIGHTS_EVERY < 2,
+            detectors=_compared(seed, every),
+            sweeps=_is_turn(seed, 2 * every),
         )
         for seed in range(count)
     ]
@@ -79,18 +81,27 @@ def injected_campaign(folder: Path, rounds: int) -> Campaign:
     """Every recorded impact so many times, each time in another flight. Raises DataError."""
     logs, drops = data_files(folder)
     healthy = [log for log in logs if log != STRIKE_LOG]
-    cases = [
-        InjectedCase(str(folder), healthy[(number + turn) % len(healthy)], drop, turn * len(drops) + number, names)
-        for turn in range(rounds)
-        for number, drop in enumerate(drops)
-        if (names := _compared(number))
-    ]
+    cases = []
+    for turn in range(rounds):
+        detectors = detector_names() if turn == 0 else _thorough()
+        for number, drop in enumerate(drops):
+            log, seed = healthy[(number + turn) % len(healthy)], turn * len(drops) + number
+            cases.append(InjectedCase(str(folder), log, drop, seed, detectors))
     return Campaign("recorded-impacts", {"logs": healthy, "rounds": rounds}, cases, work_out_injected, USES)
 
 
-def _compared(seed: int) -> tuple[str, ...]:
-    """All detectors on some, in pairs so that both airframes are among them."""
-    return detector_names() if seed // 2 % COMPARED_EVERY == 0 else _thorough()
+def _every(cases: int, compared: int) -> int:
+    """One in how many cases is for all detectors."""
+    return max(1, min(COMPARED_EVERY_AT_MOST, cases // compared))
+
+
+def _is_turn(seed: int, every: int) -> bool:
+    """In pairs, so that both airframes have their turns."""
+    return seed // 2 % every == 0
+
+
+def _compared(seed: int, every: int) -> tuple[str, ...]:
+    return detector_names() if _is_turn(seed, every) else _thorough()
 
 
 def _thorough() -> tuple[str, ...]:

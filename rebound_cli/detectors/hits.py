@@ -44,11 +44,11 @@ FOLLOWED_S = 0.45
 SLANT_MAX_DEG = 60.0
 LEAN_MAX_DEG = 45.0
 # Of a flight into a ceiling against the horizontal, and of the ceiling itself against level.
-CLIMB_DEG = (20.0, 90.0)
-CEILING_TILT_MAX_DEG = 20.0
+CLIMB_DEG = (30.0, 90.0)
+CEILING_TILT_MAX_DEG = 10.0
 POLE_RADIUS_M = (0.02, 0.30)
 # Beside the middle, as a share of what still touches.
-POLE_OFFSET_SHARE = 0.85
+POLE_OFFSET_SHARE = 0.8
 
 
 class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is

@@ -16,7 +16,7 @@ from rebound_cli.detectors.wire import BUILDERS, Heard
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 
 # What a detector's sensitivity hangs on is taken times these.
-SWEPT_FACTORS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+SWEPT_FACTORS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)
 # Its settings; of detectors that are not here it is the first of their settings.
 SWEPT_FIELDS = {
     "hybrid": ("threshold_m_s2", "torque_threshold_rad_s2"),

@@ -21,7 +21,7 @@ from rebound_cli.detectors_report.reading import HOW_TO_READ
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
 START_MARK, END_MARK = "<!-- generated: detectors -->", "<!-- end -->"
 # Recorded impacts: each once for a first look, more often where the hits are many.
-HITS_PER_ROUND = 1000
+HITS_PER_ROUND = 2500
 
 
 def run_detectors(options: Namespace) -> int:

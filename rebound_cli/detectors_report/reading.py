@@ -4,12 +4,13 @@ HOW_TO_READ = """\
 ### How it is measured
 
 *Hits.* A vehicle cruises in trimmed flight, nose anywhere, into a wall square to its path, at a slant of up to 60° or
-leaning by up to 45°, into a ceiling (climbing at up to the airframe's 3 m/s) or, anywhere across its width, into a
-pole of 2 to 30 cm radius. Speeds are drawn from 0.5 to 5 m/s, one in sixteen from 0.3 to 0.5. Friction is 0.3, the
-spread of an IMU sample 0.25 m/s² on each axis, the noise of the vehicle's velocity 0.032 m/s RMS on each axis, where
-a table does not say otherwise. Each hit is simulated once and heard on three links, which ask for `HIGHRES_IMU` at
-50, 100 and 250 Hz and receive what PX4's rule sends and its late loops leave (50, 100 and 246 Hz); everything else
-comes at the rates that the companion asks for. Every detector hears the same samples, with its default settings.
+leaning by up to 45°, into a ceiling (climbing at 30° or more, at up to the airframe's 3 m/s; tilted by up to 10°) or,
+anywhere across its width, into a pole of 2 to 30 cm radius. Speeds are drawn from 0.5 to 5 m/s, one in sixteen from
+0.3 to 0.5. Friction is 0.3, the spread of an IMU sample 0.25 m/s² on each axis, the noise of the vehicle's velocity
+0.032 m/s RMS on each axis, where a table does not say otherwise. Each hit is simulated once and heard on three links,
+which ask for `HIGHRES_IMU` at 50, 100 and 250 Hz and receive what PX4's rule sends and its late loops leave (50, 100
+and 246 Hz); everything else comes at the rates that the companion asks for. Every detector hears the same samples,
+with its default settings.
 
 *Found*: a collision is reported within 0.4 s of the first touch. A touch that is classed as a landing or a hand is
 not a collision. *False before*: reports before the first touch.
@@ -36,5 +37,5 @@ flight's own integration intervals of 5 ms. The flight's velocity takes what its
 as PX4's estimator would; its gyroscope shows nothing of it.
 
 *Threshold sweeps* (the picture of false alarms against detection rate): every detector again with its thresholds
-times 1/4 to 4, on one hit in twenty and one flight in eight.
+times 1/4 to 4, on a share of the hits and flights.
 """

@@ -121,7 +121,7 @@ def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):
         yield from work_out(campaign.work_out, missing)
 
     monkeypatch.setattr(running, "_outcomes", outcomes)
-    monkeypatch.setattr(campaigns, "detector_names", lambda: ("fused", "lateral", "threshold"))
+    monkeypatch.setattr(campaigns, "detector_names", lambda: ("fused", "threshold"))
     monkeypatch.setattr(flown, "AIRBORNE_S", 1.0)
     monkeypatch.setattr(pilot, "FLOOR_M", 3.5)
     monkeypatch.setattr(pilot, "CEILING_M", 5.0)
@@ -132,9 +132,9 @@ def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):
     assert main(command) == 0
     first = (tmp_path / "docs" / "detection.md").read_text()
     assert main(command) == 0
-    # Then all three detectors are in the tables, the pictures are there, and the second run says the same
+    # Then both detectors are in the tables, the pictures are there, and the second run says the same
     assert (tmp_path / "docs" / "detection.md").read_text() == first
-    for name in ("fused", "lateral", "threshold"):
+    for name in ("fused", "threshold"):
         assert f"| {name} | foldable | 246 |" in first
     assert "rebound detectors --hits 4 --hours 0.01" in first
     assert {path.name for path in (tmp_path / "docs" / "images" / "detection").iterdir()} == {
