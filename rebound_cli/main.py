@@ -22,6 +22,7 @@ from rebound_cli.arguments import (
 from rebound_cli.check.arguments import add_check
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.plan.arguments import add_plan
+from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
 from rebound_cli.tune.arguments import add_tune
 
@@ -64,6 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_results(commands)
     _add_paper(commands)
     _add_detectors(commands)
+    add_preflight(commands)
     add_replay(commands)
     add_tune(commands)
     _add_airframe(commands)

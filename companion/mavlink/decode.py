@@ -4,6 +4,7 @@ Packets are found by their header here, so that the many the companion has no us
 rest, checksums included, is pymavlink's.
 """
 
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -20,13 +21,16 @@ from companion.messages import (
     CommandAck,
     CommandResult,
     CurrentMode,
+    EstimatorStatus,
     ExtendedState,
     Heartbeat,
     ImuSample,
     LandedState,
     LocalPosition,
     Odometry,
+    Parameter,
     Sample,
+    TimeSyncAnswer,
     TimeSyncRequest,
     Vibration,
 )
@@ -119,8 +123,25 @@ def _command_ack(m: Any) -> CommandAck | None:
     return CommandAck(m.command, CommandResult(m.result)) if ours and known else None
 
 
-def _timesync(m: Any) -> TimeSyncRequest | None:
-    return TimeSyncRequest(m.ts1) if m.tc1 == 0 else None
+def _timesync(m: Any) -> TimeSyncRequest | TimeSyncAnswer:
+    return TimeSyncRequest(m.ts1) if m.tc1 == 0 else TimeSyncAnswer(m.ts1, m.tc1)
+
+
+def _parameter(m: Any) -> Parameter | None:
+    # PX4 has two kinds; the bytes of a whole number travel in the float's place.
+    if m.param_type == dialect.MAV_PARAM_TYPE_INT32:
+        return Parameter(m.param_id, struct.unpack("<i", struct.pack("<f", m.param_value))[0])
+    return Parameter(m.param_id, m.param_value) if m.param_type == dialect.MAV_PARAM_TYPE_REAL32 else None
+
+
+def _estimator_status(m: Any) -> EstimatorStatus:
+    return EstimatorStatus(
+        m.vel_ratio,
+        m.pos_horiz_ratio,
+        m.pos_vert_ratio,
+        bool(m.flags & dialect.ESTIMATOR_VELOCITY_HORIZ),
+        bool(m.flags & dialect.ESTIMATOR_ACCEL_ERROR),
+    )
 
 
 def _autopilot_version(m: Any) -> AutopilotVersion:
@@ -142,6 +163,8 @@ CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
     dialect.MAVLINK_MSG_ID_CURRENT_MODE: _current_mode,
     dialect.MAVLINK_MSG_ID_COMMAND_ACK: _command_ack,
     dialect.MAVLINK_MSG_ID_TIMESYNC: _timesync,
+    dialect.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
+    dialect.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _estimator_status,
     dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION: _autopilot_version,
 }
 

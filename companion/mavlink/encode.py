@@ -1,5 +1,6 @@
 """Typed commands to MAVLink 2 bytes. Sequence numbers, type masks and NaN exist only here."""
 
+import struct
 from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
@@ -10,12 +11,15 @@ from companion.messages import (
     OnboardHeartbeat,
     Outgoing,
     PositionSetpoint,
+    ReadParameter,
     RequestMessage,
     SendCommand,
     SetArmed,
     SetMessageInterval,
     SetMode,
+    SetParameter,
     StatusText,
+    TimeSyncAsk,
     TimeSyncReply,
     VehicleCommand,
 )
@@ -35,7 +39,17 @@ NAN = float("nan")
 # STATUSTEXT's field.
 TEXT_LENGTH = 50
 
-SinglePacket: TypeAlias = SendCommand | PositionSetpoint | OnboardHeartbeat | TimeSyncReply | NamedValue | DebugVector
+SinglePacket: TypeAlias = (
+    SendCommand
+    | PositionSetpoint
+    | OnboardHeartbeat
+    | TimeSyncReply
+    | TimeSyncAsk
+    | ReadParameter
+    | SetParameter
+    | NamedValue
+    | DebugVector
+)
 
 
 class Encoder:
@@ -99,6 +113,12 @@ class Encoder:
                 return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case TimeSyncReply(vehicle_time_ns, companion_time_ns):
                 return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
+            case TimeSyncAsk(companion_time_ns):
+                return dialect.MAVLink_timesync_message(0, companion_time_ns)
+            case ReadParameter(name):
+                return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
+            case SetParameter(name, value):
+                return dialect.MAVLink_param_set_message(*self._target, name.encode(), *_as_float(value))
 
     def _setpoint(self, setpoint: PositionSetpoint) -> Any:
         type_mask = IGNORE_YAW_RATE
@@ -124,6 +144,13 @@ class Encoder:
             yaw,
             NAN,
         )
+
+
+def _as_float(value: int | float) -> tuple[float, int]:
+    """PARAM_SET's value and type: a whole number's bytes travel in the float's place."""
+    if isinstance(value, int):
+        return struct.unpack("<f", struct.pack("<i", value))[0], dialect.MAV_PARAM_TYPE_INT32
+    return value, dialect.MAV_PARAM_TYPE_REAL32
 
 
 def _parameters(command: VehicleCommand) -> tuple[float, ...]:

@@ -142,6 +142,13 @@ class CompanionConfig(Written):
     flight: FlightConfig = FlightConfig()
     operator: OperatorConfig = OperatorConfig()
 
+    @property
+    def least_threshold_m_s2(self) -> float | None:
+        """What the chosen detector asks for sideways of a vehicle that does not shake; None if it looks at no force."""
+        settings = getattr(self, self.detector)
+        names = ("side_threshold_m_s2", "threshold_m_s2")
+        return next((float(getattr(settings, name)) for name in names if hasattr(settings, name)), None)
+
     @field_validator("detector")
     @classmethod
     def _known_detector(cls, name: str) -> str:

@@ -17,8 +17,6 @@ from sim_vehicle.scene import Scene
 
 # How much of the approach and of the time after the recovery is shown around a hit.
 _BEFORE_S, _AFTER_S = 2.0, 1.5
-# What detectors call the force they ask for.
-_THRESHOLDS = ("side_threshold_m_s2", "threshold_m_s2")
 
 
 def draw_flight(
@@ -54,7 +52,7 @@ def _draw_hit(
     hit = first_hit(mission, report, truth)
     draw_position(axes[0, 0], hit, log, report)
     draw_velocity(axes[1, 0], hit, log, report, truth)
-    draw_specific_force(axes[0, 1], hit, log, report, _least_threshold_m_s2(mission))
+    draw_specific_force(axes[0, 1], hit, log, report, mission.companion.least_threshold_m_s2)
     if truth is not None and folds(truth):
         draw_fold(axes[1, 1], hit, report, truth)
     else:
@@ -77,11 +75,5 @@ def _draw_free_flight(
     draw_map(axes[0, 0], log, report, scene)
     draw_height(axes[0, 1], log, report)
     draw_speed(axes[1, 0], log, report)
-    draw_felt(axes[1, 1], log, report, _least_threshold_m_s2(mission))
+    draw_felt(axes[1, 1], log, report, mission.companion.least_threshold_m_s2)
     mark_faults((axes[0, 1], axes[1, 0], axes[1, 1]), report, truth)
-
-
-def _least_threshold_m_s2(mission: Mission) -> float | None:
-    """What the detector asks for sideways of a vehicle that does not shake; None where it looks at no force."""
-    settings = getattr(mission.companion, mission.companion.detector)
-    return next((getattr(settings, name) for name in _THRESHOLDS if hasattr(settings, name)), None)

@@ -1,6 +1,7 @@
 """MAVLink bytes to samples and commands to bytes, against pymavlink's own packing and parsing."""
 
 import math
+import struct
 
 import pytest
 from pymavlink.dialects.v20 import development as mav
@@ -15,6 +16,7 @@ from companion.messages import (
     CommandAck,
     CommandResult,
     CurrentMode,
+    EstimatorStatus,
     ExtendedState,
     Heartbeat,
     ImuSample,
@@ -22,12 +24,17 @@ from companion.messages import (
     LocalPosition,
     Odometry,
     OnboardHeartbeat,
+    Parameter,
     PositionSetpoint,
+    ReadParameter,
     RequestMessage,
     SendCommand,
     SetArmed,
     SetMessageInterval,
     SetMode,
+    SetParameter,
+    TimeSyncAnswer,
+    TimeSyncAsk,
     TimeSyncReply,
     TimeSyncRequest,
     Vibration,
@@ -75,6 +82,17 @@ CASES = [
     (mav.MAVLink_current_mode_message(0, 6 << 16, 0), CurrentMode(6 << 16, None)),
     (mav.MAVLink_command_ack_message(400, 1, 0, 0, 1, 191), CommandAck(400, CommandResult.TEMPORARILY_REJECTED)),
     (mav.MAVLink_timesync_message(0, 777), TimeSyncRequest(777)),
+    (mav.MAVLink_timesync_message(5, 777), TimeSyncAnswer(777, 5)),
+    (mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", 0.5, 9, 900, 12), Parameter("COM_OF_LOSS_T", 0.5)),
+    # The bytes of a whole number travel in the float's place
+    (
+        mav.MAVLink_param_value_message(b"IMU_INTEG_RATE", struct.unpack("<f", struct.pack("<i", 250))[0], 6, 900, 13),
+        Parameter("IMU_INTEG_RATE", 250),
+    ),
+    (
+        mav.MAVLink_estimator_status_message(0, 2, 0.25, 0.5, 0.75, 0, 0, 0, 0, 0),
+        EstimatorStatus(0.25, 0.5, 0.75, True, False),
+    ),
     (
         mav.MAVLink_autopilot_version_message(0, 0x010F02FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),
         AutopilotVersion((1, 15, 2)),
@@ -177,11 +195,10 @@ def test_only_heartbeats_are_heard_before_the_vehicle_is_known_and_only_the_vehi
     assert decoder.feed(packed(HEARTBEAT[0], 1, 190))[0][1] is None
 
 
-def test_answers_to_others_replies_to_our_own_requests_and_numberless_values_are_not_samples():
+def test_answers_to_others_and_numberless_values_are_not_samples():
     nan = float("nan")
     for message in (
         mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
-        mav.MAVLink_timesync_message(5, 777),
         mav.MAVLink_local_position_ned_message(5000, nan, 0, 0, 0, 0, 0),
         mav.MAVLink_highres_imu_message(1, nan, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F),
         mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
@@ -243,6 +260,23 @@ def test_the_companion_is_an_onboard_computer_of_the_vehicles_system():
 def test_time_replies_echo_the_vehicles_time():
     m = sent(TimeSyncReply(777, 12345))
     assert (m.ts1, m.tc1) == (777, 12345)
+
+
+def test_our_own_time_request_is_told_from_an_answer():
+    m = sent(TimeSyncAsk(12345))
+    assert (m.ts1, m.tc1) == (12345, 0)
+
+
+def test_a_parameter_is_asked_for_by_name():
+    m = sent(ReadParameter("COM_OF_LOSS_T"))
+    assert (m.target_system, m.target_component, m.param_id, m.param_index) == (7, 1, "COM_OF_LOSS_T", -1)
+
+
+@pytest.mark.parametrize(("value", "kind"), [(0.5, 9), (4, 6), (-1, 6)])
+def test_a_parameter_is_set_with_its_type_and_bytes(value, kind):
+    m = sent(SetParameter("COM_OBL_RC_ACT", value))
+    assert (m.target_system, m.param_id, m.param_type) == (7, "COM_OBL_RC_ACT", kind)
+    assert struct.pack("<f", m.param_value) == struct.pack("<f" if kind == 9 else "<i", value)
 
 
 def test_sequence_numbers_count_up_and_wrap():

@@ -1,4 +1,4 @@
-"""Typed samples in and typed commands out: the only language between the codec and the core.
+"""Typed samples in.
 
 World frame NED, body frame FRD, SI units, quaternions (w, x, y, z) body to NED. Times named `time_boot_us`
 are the vehicle's own boot clock. None means "not given"; MAVLink's NaN and type masks stay in the codec.
@@ -6,7 +6,7 @@ are the vehicle's own boot clock. None means "not given"; MAVLink's NaN and type
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import ClassVar, TypeAlias
+from typing import TypeAlias
 
 Vector3: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
@@ -51,13 +51,11 @@ class MessageId(IntEnum):
     ATTITUDE_TARGET = 83
     HIGHRES_IMU = 105
     AUTOPILOT_VERSION = 148
+    ESTIMATOR_STATUS = 230
     VIBRATION = 241
     EXTENDED_SYS_STATE = 245
     ODOMETRY = 331
     CURRENT_MODE = 436
-
-
-# --- samples in -------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +158,33 @@ class TimeSyncRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class TimeSyncAnswer:
+    """TIMESYNC that answers ours: the time we sent, and the vehicle's when it answered."""
+
+    companion_time_ns: int
+    vehicle_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """PARAM_VALUE; whole numbers are int."""
+
+    name: str
+    value: int | float
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorStatus:
+    """ESTIMATOR_STATUS: squared innovations against their gates (1 is turned down), and what is estimated."""
+
+    velocity_ratio: float
+    horizontal_position_ratio: float
+    vertical_position_ratio: float
+    horizontal_velocity_is_good: bool
+    accelerometer_is_doubted: bool
+
+
+@dataclass(frozen=True, slots=True)
 class AutopilotVersion:
     flight_version: tuple[int, int, int]
 
@@ -177,107 +202,8 @@ Sample: TypeAlias = (
     | CurrentMode
     | CommandAck
     | TimeSyncRequest
+    | TimeSyncAnswer
+    | Parameter
+    | EstimatorStatus
     | AutopilotVersion
-)
-
-
-# --- commands out -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class SetMode:
-    """MAV_CMD_DO_SET_MODE; `custom_mode` in PX4's packing (main << 16 | sub << 24)."""
-
-    command_id: ClassVar[int] = 176
-    custom_mode: int
-
-
-@dataclass(frozen=True, slots=True)
-class SetArmed:
-    """MAV_CMD_COMPONENT_ARM_DISARM, never forced."""
-
-    command_id: ClassVar[int] = 400
-    armed: bool
-
-
-@dataclass(frozen=True, slots=True)
-class SetMessageInterval:
-    """MAV_CMD_SET_MESSAGE_INTERVAL."""
-
-    command_id: ClassVar[int] = 511
-    message_id: int
-    interval_us: int
-
-
-@dataclass(frozen=True, slots=True)
-class RequestMessage:
-    """MAV_CMD_REQUEST_MESSAGE."""
-
-    command_id: ClassVar[int] = 512
-    message_id: int
-
-
-VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage
-
-
-@dataclass(frozen=True, slots=True)
-class SendCommand:
-    """A command with its transmission count, as COMMAND_LONG.confirmation wants it."""
-
-    command: VehicleCommand
-    confirmation: int
-
-
-@dataclass(frozen=True, slots=True)
-class PositionSetpoint:
-    """Setpoint in the vehicle's local NED; a None part is left to the vehicle."""
-
-    time_us: int
-    position_ned_m: Vector3
-    yaw_rad: float | None
-    velocity_ned_m_s: Vector3 | None = None
-    acceleration_ned_m_s2: Vector3 | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class OnboardHeartbeat:
-    """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""
-
-    active: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TimeSyncReply:
-    vehicle_time_ns: int
-    companion_time_ns: int
-
-
-@dataclass(frozen=True, slots=True)
-class StatusText:
-    """STATUSTEXT, in as many packets as its length needs."""
-
-    severity: Severity
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
-class NamedValue:
-    """NAMED_VALUE_FLOAT: a number to plot; the name has at most ten characters."""
-
-    time_us: int
-    name: str
-    value: float
-
-
-@dataclass(frozen=True, slots=True)
-class DebugVector:
-    """DEBUG_VECT: three numbers to plot; the name has at most ten characters."""
-
-    time_us: int
-    name: str
-    vector: Vector3
-
-
-Outgoing: TypeAlias = (
-    SendCommand | PositionSetpoint | OnboardHeartbeat | TimeSyncReply | StatusText | NamedValue | DebugVector
 )

@@ -1,0 +1,244 @@
+"""What the survey says, item by item: good, doubtful or bad, and the exact remedy."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+from companion.preflight.survey import LISTENING_US, Survey, spread
+
+
+class Verdict(Enum):
+    GOOD = "ok"
+    DOUBTFUL = "look"
+    BAD = "no"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """`fix` is a parameter and the value that mends it; None where only a person can."""
+
+    item: str
+    verdict: Verdict
+    found: str
+    remedy: str = ""
+    fix: tuple[str, int | float] | None = None
+
+
+# PX4's parameters in bits and values (their descriptions in PX4's commander module).
+RCL_EXCEPT_OFFBOARD = 4
+RC_DISABLED = 4
+FLIGHTTERM_OFF = 121212
+# COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
+LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
+LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
+# A vehicle whose companion died in front of a wall must not go on for longer.
+LONGEST_LOSS_S = 1.0
+# Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
+LEAST_INTEG_HZ = 200
+# A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
+STIFF_CONTACT_S = 0.001
+# Eq. 2 of the paper: a foldable arm's push begins with b_s v_c, b_s = 30 /s.
+FOLDING_DAMPING_PER_S = 30.0
+# The position of a vehicle that stands: more than this and a recovery by half a metre is lost in it.
+MOST_WANDER_M, DOUBTFUL_WANDER_M = 0.5, 0.1
+# Innovation test ratios: at 1 the estimator turns its sensors down, and PX4 warns from 0.5 on.
+DOUBTFUL_RATIO, BAD_RATIO = 0.5, 1.0
+# A round trip of 20 ms is five IMU samples; of 100 ms, 0.2 m at 2 m/s.
+DOUBTFUL_TRIP_MS, BAD_TRIP_MS = 20.0, 100.0
+# PX4's BAT_LOW_THR is 15 %; a flight needs something above it.
+DOUBTFUL_BATTERY, BAD_BATTERY = 50, 20
+# A vehicle that stands still does not clip; a sensor that does shakes in its mount.
+STANDS_M_S2 = 1.0
+
+
+def findings(survey: Survey) -> list[Finding]:
+    """All items, in the order in which they would be mended."""
+    return [
+        *_streams(survey),
+        *_integration(survey),
+        *_offboard_loss(survey),
+        *_radio(survey),
+        *_termination(survey),
+        *_estimate(survey),
+        *_vibration(survey),
+        *_time(survey),
+        *_battery(survey),
+        *_sight(survey),
+    ]
+
+
+def _streams(survey: Survey) -> Iterator[Finding]:
+    rates = survey.streams.rates_hz()
+    for stream in survey.streams.streams:
+        if not stream.min_hz:
+            continue
+        name, rate_hz = stream.message_id.name, rates.get(stream.message_id.name, 0.0)
+        found = f"{rate_hz:.0f} Hz of {stream.asked_hz:g} asked for"
+        if rate_hz < stream.min_hz:
+            text = "serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again"
+            yield Finding(name, Verdict.BAD, found, f"at least {stream.min_hz:g} Hz are needed; {text}")
+        elif rate_hz < 0.4 * stream.asked_hz:
+            text = "the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz"
+            yield Finding(name, Verdict.DOUBTFUL, found, text)
+        else:
+            yield Finding(name, Verdict.GOOD, found)
+
+
+def _integration(survey: Survey) -> Iterator[Finding]:
+    rate_hz = survey.parameters.get("IMU_INTEG_RATE")
+    if rate_hz is None:
+        yield _unread("IMU_INTEG_RATE")
+        return
+    found = f"{rate_hz:g} Hz: each sample is a mean over {1e3 / rate_hz:.1f} ms"
+    if rate_hz < LEAST_INTEG_HZ:
+        remedy = f"IMU_INTEG_RATE = {LEAST_INTEG_HZ}, then reboot"
+        yield Finding("IMU_INTEG_RATE", Verdict.DOUBTFUL, found, remedy, ("IMU_INTEG_RATE", LEAST_INTEG_HZ))
+    elif 1.0 / rate_hz > survey.config.estimate.imu_averaging_interval_s:
+        remedy = f"companion.estimate.imu_averaging_interval_s: {1.0 / rate_hz:.4f} in the mission"
+        yield Finding("IMU_INTEG_RATE", Verdict.DOUBTFUL, found, remedy)
+    else:
+        yield Finding("IMU_INTEG_RATE", Verdict.GOOD, found)
+
+
+def _offboard_loss(survey: Survey) -> Iterator[Finding]:
+    loss_s, action = survey.parameters.get("COM_OF_LOSS_T"), survey.parameters.get("COM_OBL_RC_ACT")
+    if loss_s is None:
+        yield _unread("COM_OF_LOSS_T")
+    elif loss_s > LONGEST_LOSS_S:
+        remedy = f"COM_OF_LOSS_T = {LONGEST_LOSS_S:g}"
+        found = f"{loss_s:g} s until PX4 acts when the companion has died"
+        yield Finding("COM_OF_LOSS_T", Verdict.DOUBTFUL, found, remedy, ("COM_OF_LOSS_T", LONGEST_LOSS_S))
+    else:
+        yield Finding("COM_OF_LOSS_T", Verdict.GOOD, f"{loss_s:g} s until PX4 acts when the companion has died")
+    if action is None:
+        yield _unread("COM_OBL_RC_ACT")
+        return
+    number = int(action)
+    name = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
+    found = f"{number} ({name}) when setpoints stop"
+    remedy, fix = f"COM_OBL_RC_ACT = {LOSS_LAND} (land)", ("COM_OBL_RC_ACT", LOSS_LAND)
+    if number in LOSS_DROPS:
+        yield Finding("COM_OBL_RC_ACT", Verdict.BAD, found + ": the vehicle would fall", remedy, fix)
+    elif number in LOSS_NEEDS_STICKS:
+        text = "; without sticks PX4 sinks and lands, or returns"
+        yield Finding("COM_OBL_RC_ACT", Verdict.DOUBTFUL, found + text, remedy, fix)
+    else:
+        yield Finding("COM_OBL_RC_ACT", Verdict.GOOD, found)
+
+
+def _radio(survey: Survey) -> Iterator[Finding]:
+    except_bits, source = survey.parameters.get("COM_RCL_EXCEPT"), survey.parameters.get("COM_RC_IN_MODE")
+    if except_bits is None:
+        yield _unread("COM_RCL_EXCEPT")
+    elif source == RC_DISABLED:
+        yield Finding("COM_RCL_EXCEPT", Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
+    elif int(except_bits) & RCL_EXCEPT_OFFBOARD:
+        yield Finding("COM_RCL_EXCEPT", Verdict.GOOD, "a lost radio does not end OFFBOARD")
+    else:
+        value = int(except_bits) | RCL_EXCEPT_OFFBOARD
+        found = f"{int(except_bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
+        remedy = f"COM_RCL_EXCEPT = {value}, if the flight may go on without a radio"
+        yield Finding("COM_RCL_EXCEPT", Verdict.DOUBTFUL, found, remedy, ("COM_RCL_EXCEPT", value))
+
+
+def _termination(survey: Survey) -> Iterator[Finding]:
+    breaker = survey.parameters.get("CBRK_FLIGHTTERM")
+    if breaker is None:
+        yield _unread("CBRK_FLIGHTTERM")
+    elif breaker == FLIGHTTERM_OFF:
+        yield Finding("CBRK_FLIGHTTERM", Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
+    else:
+        found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
+        remedy = f"CBRK_FLIGHTTERM = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
+        yield Finding("CBRK_FLIGHTTERM", Verdict.DOUBTFUL, found, remedy, ("CBRK_FLIGHTTERM", FLIGHTTERM_OFF))
+
+
+def _estimate(survey: Survey) -> Iterator[Finding]:
+    if not survey.positions_ned_m:
+        remedy = "wait for GPS, flow or motion capture; QGroundControl's arming checks name what is missing"
+        yield Finding("position", Verdict.BAD, "no LOCAL_POSITION_NED", remedy)
+        return
+    wander_m, noise_m_s = spread(survey.positions_ned_m), spread(survey.velocities_ned_m_s)
+    seconds = LISTENING_US / 1e6
+    found = f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)"
+    remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
+    verdict = Verdict.BAD if wander_m > MOST_WANDER_M else Verdict.DOUBTFUL
+    yield (
+        Finding("position", Verdict.GOOD, found)
+        if wander_m <= DOUBTFUL_WANDER_M
+        else Finding("position", verdict, found, remedy)
+    )
+    ratios = [max(e.velocity_ratio, e.horizontal_position_ratio, e.vertical_position_ratio) for e in survey.estimator]
+    if not ratios:
+        yield Finding("estimator", Verdict.DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
+        return
+    found = f"largest innovation test ratio {max(ratios):.2f}"
+    if max(ratios) >= BAD_RATIO or any(e.accelerometer_is_doubted for e in survey.estimator):
+        yield Finding("estimator", Verdict.BAD, found, "the estimator turns its sensors down: calibrate, check mounts")
+    elif max(ratios) >= DOUBTFUL_RATIO:
+        yield Finding("estimator", Verdict.DOUBTFUL, found, "calibrate compass and accelerometer")
+    else:
+        yield Finding("estimator", Verdict.GOOD, found)
+
+
+def _vibration(survey: Survey) -> Iterator[Finding]:
+    if survey.vibration:
+        first, last = survey.vibration[0].clipping_counts, survey.vibration[-1].clipping_counts
+        clipped = sum(last) - sum(first)
+        found = f"{clipped} clipped samples while standing"
+        if clipped:
+            yield Finding("clipping", Verdict.BAD, found, "fasten the flight controller; check the accelerometer")
+        else:
+            yield Finding("clipping", Verdict.GOOD, found)
+    if survey.imu:
+        shakes_m_s2 = spread([sample.specific_force_frd_m_s2 for sample in survey.imu])
+        found = f"{shakes_m_s2:.2f} m/s^2 (RMS) while standing"
+        if shakes_m_s2 > STANDS_M_S2:
+            yield Finding("shaking", Verdict.DOUBTFUL, found, "let the vehicle stand still, motors off, and ask again")
+        else:
+            yield Finding("shaking", Verdict.GOOD, found)
+
+
+def _time(survey: Survey) -> Iterator[Finding]:
+    if not survey.round_trips_us:
+        yield Finding("time", Verdict.DOUBTFUL, "TIMESYNC is not answered", "MAVLink 2 on the link (MAV_PROTO_VER 2)")
+        return
+    trip_ms = sorted(survey.round_trips_us)[len(survey.round_trips_us) // 2] / 1e3
+    found = f"{trip_ms:.1f} ms there and back (median)"
+    if trip_ms > BAD_TRIP_MS:
+        yield Finding("time", Verdict.BAD, found, "a wire or a direct link instead of this one")
+    elif trip_ms > DOUBTFUL_TRIP_MS:
+        yield Finding("time", Verdict.DOUBTFUL, found, "a wire instead of a radio; serial: baud rate 921600")
+    else:
+        yield Finding("time", Verdict.GOOD, found)
+
+
+def _battery(survey: Survey) -> Iterator[Finding]:
+    if survey.battery is None:
+        yield Finding("battery", Verdict.DOUBTFUL, "unknown", "set up the power module (BAT1_SOURCE)")
+        return
+    remaining = survey.battery.remaining_percent
+    verdict = Verdict.BAD if remaining < BAD_BATTERY else Verdict.DOUBTFUL
+    if remaining >= DOUBTFUL_BATTERY:
+        yield Finding("battery", Verdict.GOOD, f"{remaining} %")
+    else:
+        yield Finding("battery", verdict, f"{remaining} %", "charge it")
+
+
+def _sight(survey: Survey) -> Iterator[Finding]:
+    """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
+    rate_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
+    if not rate_hz:
+        return
+    integ_hz = float(survey.parameters.get("IMU_INTEG_RATE", 1.0 / survey.config.estimate.imu_averaging_interval_s))
+    threshold_m_s2 = survey.config.least_threshold_m_s2 or 0.0
+    seen = min(1.0, rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
+    folding = f"arms that fold: from {threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
+    stiff = f"stiff frames: {100 * seen:.0f} % of 1 ms contacts fall into a sample"
+    verdict = Verdict.GOOD if seen > 0.9 else Verdict.DOUBTFUL
+    remedy = "" if verdict is Verdict.GOOD else "a faster HIGHRES_IMU (see above); what falls between is found later"
+    yield Finding("smallest hit", verdict, f"{folding}; {stiff}", remedy)
+
+
+def _unread(name: str) -> Finding:
+    return Finding(name, Verdict.DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")

@@ -1,0 +1,1 @@
+"""`rebound preflight`: what a connected vehicle needs before its first flight."""

@@ -1,0 +1,95 @@
+"""`rebound preflight` on a real connection and the real clock."""
+
+import json
+import sys
+from argparse import Namespace
+from dataclasses import asdict
+
+from companion.errors import ConfigurationError
+from companion.preflight.checks import Finding, Verdict
+from companion.preflight.preflight import Preflight
+from companion.shell.clock import Clock
+from companion.shell.connection import Connection, open_connection
+from rebound_cli.console import Console, console_for
+from rebound_cli.replay.settings import companion_settings
+
+EXIT_NOT_READY = 1
+LONGEST_WAIT_S = 0.05
+# PX4 answers a parameter within 50 ms; after a second it has not taken it.
+SETTING_TAKES_S = 1.0
+
+
+def run_preflight(options: Namespace) -> int:
+    """Print the findings; 0 when none of them is bad. Raises ConfigurationError, ConnectionSetupError."""
+    console, clock = console_for(options.json), Clock()
+    if options.yes and not options.fix:
+        raise ConfigurationError("--yes answers the question of --fix: give both.")
+    config = companion_settings(options.companion, (), None)
+    connection = open_connection(options.connect)
+    try:
+        preflight = Preflight(config, clock.now_us())
+        console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
+        while not preflight.finished:
+            _exchange(preflight, connection, clock)
+        if preflight.survey.refusal is not None:
+            raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
+        found = preflight.findings()
+        _show(console, preflight, found)
+        if options.json:
+            print(json.dumps([_plain(finding) for finding in found], indent=2))
+        if options.fix:
+            found = _fix(console, preflight, connection, clock, found, options.yes)
+    finally:
+        connection.close()
+    return EXIT_NOT_READY if any(finding.verdict is Verdict.BAD for finding in found) else 0
+
+
+def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> None:
+    received = connection.receive(LONGEST_WAIT_S)
+    for frame in preflight.step(received, clock.now_us()):
+        connection.send(frame)
+
+
+def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
+    identity, version = preflight.survey.identity, preflight.survey.version
+    release = "" if version is None else " " + ".".join(map(str, version))
+    kind = identity.vehicle_type if identity is not None else "vehicle"
+    console.print(f"\nPX4{release}, {kind}")
+    for finding in found:
+        console.print(f"  {finding.verdict.value:4}  {finding.item:20} {finding.found}")
+        if finding.remedy:
+            console.print(f"        {'':20} -> {finding.remedy}")
+    counts = [sum(finding.verdict is verdict for finding in found) for verdict in Verdict]
+    console.print(f"\n  {counts[0]} good, {counts[1]} worth a look, {counts[2]} in the way of a flight")
+
+
+def _fix(
+    console: Console, preflight: Preflight, connection: Connection, clock: Clock, found: list[Finding], is_agreed: bool
+) -> list[Finding]:
+    """Set what can be set, one by one as the person agrees; the findings afterwards."""
+    if preflight.survey.armed:
+        raise ConfigurationError("The vehicle is armed: nothing is set on a vehicle that may be flying.")
+    for finding in found:
+        if finding.fix is None:
+            continue
+        name, value = finding.fix
+        if not is_agreed and not _agrees(console, f"Set {name} = {value:g}? [y/N] "):
+            continue
+        for frame in preflight.set_parameter(name, value, clock.now_us()):
+            connection.send(frame)
+        until_us = clock.now_us() + round(SETTING_TAKES_S * 1e6)
+        while preflight.parameter(name) is None and clock.now_us() < until_us:
+            _exchange(preflight, connection, clock)
+        answer = preflight.parameter(name)
+        console.print(f"  {name} is {'not told' if answer is None else format(answer, 'g')} now")
+    return preflight.findings()
+
+
+def _agrees(console: Console, question: str) -> bool:
+    """The end of input is a no."""
+    console.ask(question)
+    return sys.stdin.readline().strip().lower() in ("y", "yes")
+
+
+def _plain(finding: Finding) -> dict[str, object]:
+    return {**asdict(finding), "verdict": finding.verdict.value}
