@@ -86,7 +86,8 @@ class Failsafe:
         self._last_us: int | None = None
         self._armed = False
         self._intended: Mode | None = None
-        self._start_delay_us: int | None = None
+        self._start_delay_us = 0
+        self._parameter_changes = -1
         self._delay_us = 0
         self._announce = False
 
@@ -107,8 +108,9 @@ class Failsafe:
             self._forget_kept()
         self._delay_us = max(0, self._delay_us - elapsed_us)
         configured_us = int(1e6 * parameters["COM_FAIL_ACT_T"])
-        if self._start_delay_us is None:
-            self._start_delay_us = configured_us
+        if parameters.changes != self._parameter_changes:
+            # Any parameter: PX4 forgets that the last failsafe has used up a part of its hold
+            self._parameter_changes, self._start_delay_us = parameters.changes, configured_us
         self._check(now, parameters)
         if self.action > Action.HOLD or Mode.LOITER in now.cannot_run or self.took_over:
             self._delay_us = 0
@@ -119,7 +121,7 @@ class Failsafe:
         return Decision(decision.action, decision.intended, says)
 
     def _run_start_delay(self, elapsed_us: int, runs: bool, configured_us: int) -> None:
-        start_us = self._start_delay_us or 0
+        start_us = self._start_delay_us
         if runs:
             self._start_delay_us = max(0, start_us - elapsed_us)
         else:
@@ -162,7 +164,7 @@ class Failsafe:
             if parameters["COM_FAIL_ACT_T"] > _NO_DELAY_S:
                 takeover = Takeover.ALWAYS
                 if response.action is not Action.WARN and self._delay_us == 0:
-                    self._delay_us = self._start_delay_us or 0
+                    self._delay_us = self._start_delay_us
         self._active[trigger] = _Active(response, takeover)
         self._announce = self._announce or response.action is Action.WARN
         if response.action >= Action.HOLD:

@@ -60,6 +60,7 @@ class Mission:
         self.target = Target(Kind.IDLE, (0.0, 0.0, 0.0))
         self.texts: list[StatusText] = []
         self.commands: list[MissionCommand] = []
+        self._given: list[MissionCommand] = []
 
     # --- beginning and ending ----------------------------------------------------------------------------------
 
@@ -84,7 +85,7 @@ class Mission:
     def end(self) -> None:
         """The mode was left: what was begun begins anew when it comes back."""
         self._work, self._climb_down_m = Work.ITEM, None
-        self.runs = False
+        self.runs, self._given = False, []
         self._store.progress.reached = -1
 
     def forget(self) -> None:
@@ -129,6 +130,10 @@ class Mission:
 
     def update(self, view: View) -> None:
         """Go on where the item is over; call it at the navigator's rate."""
+        if self._given:
+            # A command acts when its item counts as reached: a return at the end finds the mission finished
+            self.commands += self._given
+            self._given = []
         if not self.runs:
             return
         self._look_at_roi(view)
@@ -238,7 +243,7 @@ class Mission:
             is_place = item.frame != kinds.FRAME_MISSION and item.params[0] != kinds.ROI_NONE
             is_place = is_place or item.command == kinds.DO_SET_ROI_LOCATION
             self._roi = item if is_place and item.command != kinds.DO_SET_ROI_NONE else None
-        self.commands.append(MissionCommand(item.command, item.params))
+        self._given.append(MissionCommand(item.command, item.params))
 
     def _begin_with_jump(self, view: View) -> None:
         self._store.current -= 1

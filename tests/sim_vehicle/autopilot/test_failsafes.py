@@ -338,3 +338,26 @@ def test_without_a_global_position_a_hold_becomes_a_landing():
     flight.autopilot.commander.has_global_position = True
     flight.fly(0.1)
     assert flown(flight) is Mode.LOITER
+
+
+@pytest.mark.parametrize(("changes_a_parameter", "hold_s"), [(False, 2.4), (True, 5.0)])
+def test_a_second_failsafe_soon_after_holds_shorter_unless_a_parameter_was_set(changes_a_parameter, hold_s):
+    failsafe, parameters, now_us = Failsafe(), Parameters(), 0
+    parameters.set("NAV_DLL_ACT", 3)
+
+    def act(lost: bool, for_s: float) -> list[Action]:
+        nonlocal now_us
+        actions = []
+        for _ in range(round(for_s * 10)):
+            now_us += SECOND // 10
+            # A mode that is chosen ends the failsafe
+            failsafe.update(now_us, situation(ground_station_lost=lost, mode_requested=not lost), parameters)
+            actions.append(failsafe.action)
+        return actions
+
+    assert act(True, 6.0).count(Action.HOLD) == pytest.approx(50, abs=1)
+    # Of the time without one a quarter comes back
+    act(False, 8.0)
+    if changes_a_parameter:
+        parameters.set("RTL_RETURN_ALT", 33.0)
+    assert act(True, 6.0).count(Action.HOLD) == pytest.approx(10 * hold_s, abs=1)

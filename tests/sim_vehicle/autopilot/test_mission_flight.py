@@ -150,15 +150,16 @@ def test_a_jump_repeats_as_often_as_it_says_then_goes_on():
 
 def test_return_as_an_item_returns():
     flight = begun(TAKEOFF, NORTH, action(kinds.RETURN_TO_LAUNCH))
-    # The place before is told as reached before the mode is another, and the item itself is not, as in PX4:
-    # MAVSDK's clients count on both
+    # Measured on PX4: the item counts as reached and the mission as finished before the mode is another, and
+    # finished it stays (MAVSDK asks for that)
     told = []
     while flight.autopilot.modes.flown is Mode.MISSION:
         flight.step()
         told.append(flight.autopilot.missions.progress.reached)
-    assert max(told) == 1
-    assert flight.autopilot.modes.flown is Mode.RETURN
-    assert "Returning to launch" in flight.texts()
+    assert max(told) == 2
+    assert flight.autopilot.modes.flown is Mode.RETURN and flight.autopilot.missions.progress.finished
+    said = flight.texts()
+    assert said.index("Mission finished, loitering") < said.index("Returning to launch")
 
 
 def test_an_item_without_autocontinue_is_stayed_at():
