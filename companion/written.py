@@ -8,7 +8,9 @@ from pydantic import BaseModel, ConfigDict, Field
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.0)]
-PositionNed = tuple[Number, Number, Number]
+# A hundred kilometres: no companion's radio, and no flat map, reaches further.
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-100_000.0, le=100_000.0)]
+PositionNed = tuple[Coordinate, Coordinate, Coordinate]
 
 
 class Written(BaseModel):

@@ -124,7 +124,7 @@ def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us
         return ground_ned_m
     passed_us = now_us - resume.armed_at_us
     drift_us = abs(boot_us - resume.armed_boot_us - passed_us)
-    same_frame = passed_us > 0 and drift_us <= BOOT_CLOCK_DRIFT * passed_us + BOOT_CLOCK_SLACK_US
+    same_frame = drift_us <= BOOT_CLOCK_DRIFT * passed_us + BOOT_CLOCK_SLACK_US
     which = "the first flight's arming position" if same_frame else "this arming position: the vehicle was restarted"
     flight.tell(now_us, "resume", f"coordinates count from {which}")
     return resume.origin_ned_m if same_frame else ground_ned_m

@@ -6,7 +6,6 @@ from companion.flight.plan import describe_item, describe_modifiers, mission_lin
 from companion.mission.model import Mission
 from rebound_cli.check.ways import Meeting, Way
 
-_ITEM_WIDTH = 62
 # A repeat's laps are shown whole up to so many rows; a longer list hides what matters.
 _MOST_ROWS = 60
 
@@ -16,8 +15,9 @@ def mission_text(mission: Mission, ways: Sequence[Way]) -> str:
     title = f"{mission.name}: {mission.description}" if mission.description else mission.name
     shown = ways if len(ways) <= _MOST_ROWS else ways[: _MOST_ROWS - 1]
     width = max(4, *(len(way.leg.step.label) for way in shown)) + 2
-    head = f"  {'item':<{width}}{'':<{_ITEM_WIDTH}}{'length':>9}{'time':>9}{'begins':>9}"
-    rows = [row for way in shown for row in _rows(way, width)]
+    text_width = max(len(describe_item(way.leg.step.action)) for way in shown) + 1
+    head = f"  {'item':<{width + text_width}}{'length':>9}{'time':>9}{'begins':>9}"
+    rows = [row for way in shown for row in _rows(way, width, text_width)]
     if len(shown) < len(ways):
         rows.append(f"  ... {len(ways) - len(shown)} more steps")
     # the policies, without the items: those are in the table
@@ -25,13 +25,13 @@ def mission_text(mission: Mission, ways: Sequence[Way]) -> str:
     return "\n".join([title, "", head, *rows, "", f"  {_total(ways)}", "", *rules])
 
 
-def _rows(way: Way, width: int) -> list[str]:
+def _rows(way: Way, width: int, text_width: int) -> list[str]:
     step, leg = way.leg.step, way.leg
     text = describe_item(step.action)
     length = f"{way.length_m:.1f} m" if way.length_m else ""
     begins = "?" if way.begins_s is None else f"{way.begins_s:.1f} s"
     lasts = "?" if leg.lasts_s is None else f"{leg.lasts_s:.1f} s"
-    lines = [f"  {step.label:<{width}}{text:<{_ITEM_WIDTH}}{length:>9}{lasts:>9}{begins:>9}"]
+    lines = [f"  {step.label:<{width}}{text:<{text_width}}{length:>9}{lasts:>9}{begins:>9}"]
     notes = [_meeting(way.meets, way)] if way.meets else []
     notes += [describe_modifiers(step.item)] if describe_modifiers(step.item) else []
     return lines + [f"  {'':<{width + 2}}{note}" for note in notes]

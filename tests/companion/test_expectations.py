@@ -2,8 +2,6 @@
 
 from types import SimpleNamespace
 
-import pytest
-
 from companion.flight.context import Expectation
 from companion.flight.expecting import review
 from companion.mission.expectations import ExpectItem
@@ -19,42 +17,49 @@ def flown(*items, wall_north_m=3.0) -> Flight:
     return f
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "met", "detail"),
-    [
-        ({"collision": {"within_s": 5}}, None, True, "2.0"),
-        ({"collision": {"within_s": 1}}, None, False, "no hit"),
-        ({"collision": {"within_s": 5, "min_speed_m_s": 2.5}}, None, False, "hit at 2.0"),
-        ({"collision": {"within_s": 5, "max_speed_m_s": 2.5}}, None, True, "2.0"),
-        ({"no_collision": None}, None, False, "hit at"),
-        ({"no_collision": {"for_s": 0.5}}, None, True, "none"),
-        (None, {"no_collision": {}}, True, "none until the end"),
-        (None, {"collision": {"within_s": 100}}, False, "none until the end"),
-        (None, {"collisions": {"exactly": 1}}, True, "1"),
-        (None, {"collisions": {"at_least": 2}}, False, "1"),
-        (None, {"collisions": {"at_most": 1}}, True, "1"),
-        (None, {"recovered": None}, True, "settled after"),
-        (None, {"recovered": {"within_s": 0.1}}, False, "settled after"),
-        (None, {"recovered": {"max_overshoot_m": 0.5}}, True, "too far"),
-        (None, {"position": {"ned_m": [2, 0, -1.5], "within_m": 0.3}}, True, ""),
-        (None, {"position": {"ned_m": [5, 0, -1.5], "within_m": 0.3}}, False, ""),
-        (None, {"height": {"min_m": 1.3, "max_m": 1.7}}, True, "1.5"),
-        (None, {"height": {"max_m": 1.0}}, False, "1.5"),
-        (None, {"speed": {"max_m_s": 0.2}}, True, "m/s"),
-        (None, {"flight_time": {"at_most_s": 5}}, False, " s"),
-        (None, {"flight_time": {"at_most_s": 60}}, True, " s"),
-    ],
-)
-def test_an_expectation_is_met_or_makes_the_flight_a_failed_one(before, after, met, detail):
-    f = flown(*([{"expect": before}] if before else []), INTO_WALL, *([{"expect": after}] if after else []))
+# (expectation, whether it is met, a piece of what was found), for a flight into a wall at 2 m/s
+BEFORE_THE_HIT = [
+    ({"collision": {"within_s": 5}}, True, "2.0"),
+    ({"collision": {"within_s": 1}}, False, "no hit"),
+    ({"collision": {"within_s": 5, "min_speed_m_s": 2.5}}, False, "hit at 2.0"),
+    ({"collision": {"within_s": 5, "max_speed_m_s": 2.5}}, True, "2.0"),
+    ({"no_collision": None}, False, "hit at"),
+    ({"no_collision": {"for_s": 0.5}}, True, "none"),
+]
+AFTER_IT = [
+    ({"no_collision": {}}, True, "none until the end"),
+    ({"collision": {"within_s": 100}}, False, "none until the end"),
+    ({"collisions": {"exactly": 1}}, True, "1"),
+    ({"collisions": {"at_least": 2}}, False, "1"),
+    ({"collisions": {"at_most": 1}}, True, "1"),
+    ({"recovered": None}, True, "settled after"),
+    ({"recovered": {"within_s": 0.1}}, False, "settled after"),
+    ({"recovered": {"max_overshoot_m": 0.5}}, True, "too far"),
+    ({"position": {"ned_m": [2, 0, -1.5], "within_m": 0.3}}, True, ""),
+    ({"position": {"ned_m": [5, 0, -1.5], "within_m": 0.3}}, False, ""),
+    ({"height": {"min_m": 1.3, "max_m": 1.7}}, True, "1.5"),
+    ({"height": {"max_m": 1.0}}, False, "1.5"),
+    ({"speed": {"max_m_s": 0.2}}, True, "m/s"),
+    ({"flight_time": {"at_most_s": 5}}, False, " s"),
+    ({"flight_time": {"at_most_s": 60}}, True, " s"),
+]
+
+
+def test_each_expectation_is_met_or_not_and_the_flight_goes_on():
+    before, after = ([{"expect": wish} for wish, _, _ in wishes] for wishes in (BEFORE_THE_HIT, AFTER_IT))
+    f = flown(*before, INTO_WALL, *after)
     report = f.companion.report()
-    (result,) = report.expectations
-    assert result.met is met
-    assert detail in result.detail
-    assert report.outcome == ("completed" if met else "failed")
+    for result, (wish, met, detail) in zip(report.expectations, [*BEFORE_THE_HIT, *AFTER_IT], strict=True):
+        assert result.met is met, (wish, result)
+        assert detail in result.detail, (wish, result)
+    assert report.outcome == "failed"
+    assert report.reason.startswith("expectation of item 3 not met: a hit within 1 s (was: no hit), and ")
     assert f.vehicle.landed == 1 and not f.vehicle.armed, "it lands as it would have"
-    if not met:
-        assert report.reason.startswith(f"expectation of item {2 if before else 3} not met: ")
+
+
+def test_a_flight_whose_expectations_are_all_met_is_completed():
+    f = flown({"expect": {"collision": {"within_s": 5}}}, INTO_WALL, {"expect": {"collisions": {"exactly": 1}}})
+    assert (f.companion.report().outcome, f.companion.report().reason) == ("completed", "landed and disarmed")
 
 
 def test_what_was_expected_of_a_flight_that_ended_early_is_told_too():

