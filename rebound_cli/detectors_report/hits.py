@@ -64,6 +64,8 @@ def hit_bars(hits: Hits) -> list[Bar]:
         bars += _speed_bars(airframe, rate, scored)
     for (airframe, rate), scored in groups.items():
         bars += _normal_bars(airframe, rate, scored)
+    for (airframe, rate), scored in groups.items():
+        bars += _contact_bars(airframe, rate, scored)
     return bars
 
 
@@ -153,6 +155,33 @@ def _normal_bars(airframe: str, rate: int, hits: Sequence[Scored]) -> list[Bar]:
             )
         )
     return bars
+
+
+def _contact_bars(airframe: str, rate: int, hits: Sequence[Scored]) -> list[Bar]:
+    """When it was, and how honest the impulse is."""
+    found = [hit for hit in hits if hit.is_found]
+    clipped = [hit for hit in found if hit.hit["clipped"]]
+    if not clipped:
+        return []
+    late = [hit.entry["time_error_ms"] for hit in found]
+    impulses = [hit.entry["impulse"] for hit in clipped]
+    return [
+        Bar(
+            f"{airframe}, {rate} Hz: time of contact",
+            "no bar",
+            f"{text_of(percentile(late, 5))} to {text_of(percentile(late, 95))} ms off (5 to 95 %)",
+            None,
+            f"{len(found)} hits",
+        ),
+        Bar(
+            f"{airframe}, {rate} Hz, clipped: peak and impulse told as lower bounds",
+            "no bar",
+            f"{per_cent(share(hit.entry['bound'] for hit in clipped))} %; impulse as told over the true change of "
+            f"velocity: {text_of(percentile(impulses, 50), 2)} (median)",
+            None,
+            f"{len(clipped)} hits",
+        ),
+    ]
 
 
 # --- tables -----------------------------------------------------------------------------------------------------------

@@ -28,6 +28,9 @@ ENTRY = {
     "velocity_error_m_s": 0.03,
     "normal_error_deg": 5.0,
     "first_normal_error_deg": 5.0,
+    "time_error_ms": 0.5,
+    "bound": False,
+    "impulse": 1.0,
 }
 
 
