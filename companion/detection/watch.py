@@ -4,7 +4,7 @@ A `Watch` is changed only by `advance`: the same samples at the same times give 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
@@ -12,8 +12,16 @@ from companion.detection.registry import DETECTORS
 from companion.detection.sight import Sight, heard, why_blind
 from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
-from companion.messages import ImuSample, Sample
+from companion.messages import AttitudeTarget, ImuSample, MessageId, Odometry, Sample, Vibration
 from companion.mission.config import CompanionConfig
+
+# What a detector may make use of besides HIGHRES_IMU; the slowest is PX4's VIBRATION, every two seconds by default.
+WISHED: dict[type, MessageId] = {
+    AttitudeTarget: MessageId.ATTITUDE_TARGET,
+    Odometry: MessageId.ODOMETRY,
+    Vibration: MessageId.VIBRATION,
+}
+HEARD_US = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +42,11 @@ class Watch:
     state: DetectorState
     estimator: ImpactEstimator
     sight: Sight
+    started_us: int
     last_imu_boot_us: int = 0
     threshold_told: bool = False
+    losses_told: bool = False
+    heard: set[MessageId] = field(default_factory=set)
 
     @property
     def blind_reason(self) -> str | None:
@@ -68,7 +79,7 @@ def start_watch(config: CompanionConfig, now_us: int) -> Watch:
     """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
     detector = DETECTORS[config.detector](getattr(config, config.detector), averaging_us)
-    return Watch(config, detector, detector.initial(), ImpactEstimator(config.estimate), Sight(now_us, now_us))
+    return Watch(config, detector, detector.initial(), ImpactEstimator(config.estimate), Sight(now_us, now_us), now_us)
 
 
 def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_us: int) -> Seen:
@@ -82,6 +93,8 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
             if 0 <= watch.last_imu_boot_us - sample.time_boot_us < REBOOT_US:
                 continue
             watch.last_imu_boot_us = sample.time_boot_us
+        elif not watch.losses_told and type(sample) in WISHED:
+            watch.heard.add(WISHED[type(sample)])
         watch.estimator.hear(sample)
         watch.state, impact = watch.detector.step(watch.state, sample, situation)
         if impact is not None:
@@ -111,4 +124,9 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
         threshold_m_s2 = watch.state.threshold_m_s2
         text = f"detector '{watch.detector.name}' on the watch: a hit is {threshold_m_s2:.1f} m/s^2 or more"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
+    if not watch.losses_told and watch.state.phase is Phase.ARMED and now_us - watch.started_us >= HEARD_US:
+        watch.losses_told = True
+        for message, loss in watch.detector.losses.items():
+            if message not in watch.heard:
+                notices.append(Notice("link", f"no {message.name}: {loss}", {}))
     return notices

@@ -124,7 +124,7 @@ class OperatorConfig(Written):
 class CompanionConfig(Written):
     """All settings of the companion."""
 
-    detector: str = "lateral"
+    detector: str = "fused"
     # Ground handling, landing gear and ground effect are below this height above the arming position.
     min_detection_height_m: NotNegative = 0.5
     fused: FusedConfig = FusedConfig()

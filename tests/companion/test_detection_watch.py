@@ -95,3 +95,10 @@ def test_a_watch_that_is_not_wanted_is_off_not_blind():
     fly(watch, 1_000_000, situation=Situation("landing"))
     seen = advance(watch, [], Situation("landing"), 3_000_000)
     assert (seen.notices, watch.blind_reason, watch.describe()) == ((), None, "off (landing)")
+
+
+def test_what_is_lost_without_a_message_is_said_once():
+    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    _, _, notices = fly(watch, 8_000_000)
+    losses = [notice.text for notice in notices if notice.text.startswith("no ")]
+    assert [text.split(":")[0] for text in losses] == ["no ATTITUDE_TARGET", "no VIBRATION", "no ODOMETRY"]
