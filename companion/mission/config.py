@@ -28,8 +28,9 @@ class StreamsConfig(Written):
     attitude_hz: Rate = 50.0
     # Take-off and touchdown last longer than a second.
     extended_sys_state_hz: Rate = 5.0
-    # The thrust asked for changes within a motor's lag of 20 ms. Asked for only by a detector that uses it.
-    attitude_target_hz: Rate = 50.0
+    # The thrust asked for changes by less than a third of the greatest within 33 ms (see detection.thrust). Asked for
+    # only by a detector that uses it.
+    attitude_target_hz: Rate = 30.0
     # PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of.
     odometry_hz: Rate = 30.0
     # Cumulative counts; twice a second is PX4's own rate.
