@@ -37,6 +37,7 @@ class Aftermath:
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
+    velocity_ned_m_s: Vector3 | None = None
     residuals: list[tuple[int, float, float, float]] = field(default_factory=list)
     variance_m2_s2: float = 0.0
     known: int = 0
@@ -65,6 +66,12 @@ class Aftermath:
     def step_m_s(self, time_us: int, velocity_ned_m_s: Vector3) -> Vector3 | None:
         """Take one velocity: how far it is from what the recent ones and the accelerometer lead to, or None."""
         residuals = self.residuals
+        stands_still = velocity_ned_m_s == self.velocity_ned_m_s
+        self.velocity_ned_m_s = velocity_ned_m_s
+        if stands_still:
+            # To the last digit: nothing is estimated now, and what comes after is a new beginning.
+            residuals.clear()
+            return None
         if residuals and not 0 < time_us - residuals[-1][0] < LONGEST_STEP_US:
             residuals.clear()
         u = self.strapdown.sum_at(time_us)

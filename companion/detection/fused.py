@@ -43,6 +43,13 @@ SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
 # 11 m/s^2 in one sample, nothing in the next): the next one must show it, too.
 CLEAR = 1.6
+# Vibration that falls between the samples is missing in their sum: the spread, over the unseen time of each of the up
+# to eight samples that a velocity and those it is compared with are apart, with some reserve.
+SHAKEN = 10.0
+# A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
+# been, is another hit: a vehicle that scrapes along the ground and then strikes it.
+WORSE_AFTER_US = 100_000
+WORSE = 1.5
 # Velocities of ODOMETRY are taken for as long as they come; LOCAL_POSITION_NED has no reset counter.
 ODOMETRY_KEPT_US = 500_000
 
@@ -169,6 +176,7 @@ class FusedDetector:
         self._learn(s, f, before_us)
         if s.phase is Phase.OFF:
             s.phase, s.off_reason, s.last_loud_boot_us = Phase.QUIET, "", now_us
+            s.contact_began_boot_us = now_us
         elif s.phase is not Phase.ARMED and now_us - s.last_loud_boot_us >= self._rearm_us:
             s.phase = Phase.ARMED
 
@@ -178,13 +186,18 @@ class FusedDetector:
         now_us = s.last_sample_boot_us
         if s.phase is Phase.CONTACT:
             s.last_loud_boot_us = now_us
+            if now_us - s.contact_began_boot_us > WORSE_AFTER_US and size > WORSE * s.peak_specific_force_m_s2:
+                return self._fire(s, now_us, situation, force, s.aftermath.previous_imu_us, Evidence.FORCE, 1.0)
             s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             if now_us - s.contact_began_boot_us > self._longest_us:
                 self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
             return None
         if s.phase is not Phase.ARMED:
             # Switched on in the middle of a shake: it is learnt too, or a threshold too low would never rise.
-            s.phase, s.off_reason, s.last_loud_boot_us = Phase.QUIET, "", now_us
+            if s.phase is Phase.OFF:
+                s.contact_began_boot_us = now_us
+            waited = now_us - s.contact_began_boot_us > self._longest_us
+            s.phase, s.off_reason, s.last_loud_boot_us = Phase.ARMED if waited else Phase.QUIET, "", now_us
             self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
             return None
         free_until_us = min(now_us - self._averaging_us, s.aftermath.previous_imu_us)
@@ -270,8 +283,10 @@ class FusedDetector:
         turned = aftermath.rate_step_near(time_us) >= config.rate_step_rad_s
         least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
         p, q, _ = aftermath.strapdown.rates_frd_rad_s
+        unseen_us = aftermath.strapdown.time_boot_us - aftermath.previous_imu_us - self._averaging_us
+        shaken = SHAKEN * s.floor.side_m_s2 * max(0, unseen_us) * 1e-6
         room = config.velocity_per_rate_m * (abs(p) + abs(q))
-        threshold = caution * max(least, config.noise_factor * spread_m_s) + room
+        threshold = caution * max(least, config.noise_factor * spread_m_s, shaken) + room
         if size < threshold or s.phase is not Phase.ARMED:
             return None
         free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)

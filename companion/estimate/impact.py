@@ -25,6 +25,8 @@ ODOMETRY_KEPT_US = 500_000
 REST_US = 150_000
 # PX4 sends VIBRATION every two seconds by default.
 CLIPPING_TOLD_US = 2_100_000
+# A detector that waited for no more than this many samples still knows what the contact did to the present one.
+LATE_SAMPLES = 3
 # Sums kept to look back: a contact between samples is known 100 ms later.
 SUMS_KEPT = 64
 # What the detector leaves open or takes for soft is not classified anew.
@@ -145,16 +147,20 @@ class ImpactEstimator:
         return estimate
 
     def _begin_push(self, impact: Impact) -> Push | None:
-        """The contact's course, its first sample taken."""
+        """The contact's course, its first sample taken; None for one that was reported late, its course unseen."""
         sample = self.imu
-        if sample is None:
+        if sample is None or len(self.sums) < 2:
+            return None
+        averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
+        between_us = self.sums[-1][0] - self.sums[-2][0]
+        if sample.time_boot_us - impact.contact_free_until_boot_us > LATE_SAMPLES * between_us + averaging_us:
             return None
         f, force, w = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
         behind_s = (sample.time_boot_us - self.strapdown.attitude_boot_us) * 1e-6
         push = Push(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
             attitude_wxyz=turned(self.strapdown.attitude_wxyz, w, behind_s if abs(behind_s) < 0.1 else 0.0),
-            averaging_us=round(self.config.imu_averaging_interval_s * 1e6),
+            averaging_us=averaging_us,
             range_m_s2=self.config.accelerometer_range_m_s2,
             started_boot_us=impact.contact_free_until_boot_us,
         )

@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -136,6 +137,35 @@ def test_a_jump_that_the_estimator_counts_as_its_own_is_no_hit(counted, heard_od
     heard = (LocalPosition, Odometry, Attitude) if heard_odometry else (LocalPosition, Attitude)
     jump = (3_000_000, (0.8, 0.0, 0.0), counted)
     assert len(Flight(imu_every_us=20_000, jump=jump, heard=heard).fly()) == hits
+
+
+def test_velocities_that_stood_still_to_the_digit_and_then_jump_are_no_evidence():
+    """An estimator that has stopped for half a second, as a vehicle falls, and goes on."""
+
+    class Stuck(Flight):
+        def samples(self, until_us):
+            kept = {}
+            for t, sample in super().samples(until_us):
+                if isinstance(sample, (Odometry, LocalPosition)) and 2_500_000 < t < 3_000_000:
+                    held = kept.setdefault(type(sample), sample.velocity_ned_m_s)
+                    sample = replace(sample, velocity_ned_m_s=held)
+                yield t, sample
+
+    assert Stuck(imu_every_us=20_000, lift=lambda t: 4.0 if 2_600_000 < t < 3_000_000 else GRAVITY).fly() == []
+
+
+def test_a_scrape_that_ends_in_a_strike_is_two_hits():
+    def scrape(t):
+        return (
+            (-8.0, 0.0, 0.0)
+            if HIT_US <= t < HIT_US + 150_000
+            else (-90.0, 0.0, 0.0)
+            if t < HIT_US + 170_000
+            else nothing(t)
+        )
+
+    impacts = Flight(lambda t: scrape(t) if t >= HIT_US else nothing(t)).fly()
+    assert [i.sample_time_boot_us for i in impacts] == [3_004_000, 3_152_000]
 
 
 # --- no collision -------------------------------------------------------------------------------------------
