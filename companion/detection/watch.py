@@ -128,5 +128,5 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
         watch.losses_told = True
         for message, loss in watch.detector.losses.items():
             if message not in watch.heard:
-                notices.append(Notice("link", f"no {message.name}: {loss}", {}))
+                notices.append(Notice("loss", f"no {message.name}: {loss}", {}))
     return notices

@@ -33,7 +33,7 @@ def test_a_mission_without_a_hit_completes():
     assert report.stream_rates_hz["HIGHRES_IMU"] == pytest.approx(250, rel=0.01)
     assert report.stream_rates_hz["LOCAL_POSITION_NED"] == pytest.approx(50, rel=0.01)
     assert report.started_at_us < report.armed_at_us < report.ended_at_us
-    assert [k for k in f.kinds() if k not in ("mode", "item", "link")] == [
+    assert [k for k in f.kinds() if k not in ("mode", "item", "loss")] == [
         *("connected", "streams", "plan", "takeoff", "armed", "detector", "landing", "disarmed", "done")
     ]
 
