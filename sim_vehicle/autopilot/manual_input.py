@@ -15,6 +15,8 @@ _NOBODY = 0
 # The filter of MovingDiff, and how long a gesture has to be held.
 _DIFFERENCE_TIME_CONSTANT_S = 0.1
 _GESTURE_US = 1_000_000
+# How often PX4 looks for sticks that no longer arrive, counted from the last that did.
+_LOOK_US = 200_000
 # Of a radio's pulses, in microseconds.
 _CENTRE_PULSE_US, _HALF_PULSE_US = 1500, 500
 _IGNORED_PULSES = (0, 0xFFFF)
@@ -109,7 +111,8 @@ class ManualInput:
         sticks = self.sticks
         if sticks is None:
             return
-        if now_us - self._heard_us >= 1e6 * self._parameters["COM_RC_LOSS_T"] or not self._counts(sticks.source):
+        looked_us = now_us - (now_us - self._heard_us) % _LOOK_US
+        if looked_us - self._heard_us >= 1e6 * self._parameters["COM_RC_LOSS_T"] or not self._counts(sticks.source):
             self.sticks, self.moving = None, False
             self._speed = [0.0] * 4
             self._arm, self._disarm = _Held(), _Held()

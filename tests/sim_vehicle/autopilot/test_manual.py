@@ -76,11 +76,12 @@ def test_with_fallback_the_other_takes_over_and_with_the_first_kept_it_does_not(
     for mode, then in ((2, RADIO), (3, None)):
         manual = ManualInput(Parameters({"COM_RC_IN_MODE": mode, "COM_RC_LOSS_T": 0.5}))
         manual.heard(StickInput(0, 0, 0, 0, FIRST), 0)
-        manual.update(499_000)
+        # Looked for every 200 ms: COM_RC_LOSS_T is over after 500, which shows after 600
+        manual.update(599_000)
         assert chosen(manual) == FIRST
-        manual.update(500_000)
+        manual.update(600_000)
         assert chosen(manual) is None
-        manual.heard(StickInput(0, 0, 0, 0, RADIO), 510_000)
+        manual.heard(StickInput(0, 0, 0, 0, RADIO), 610_000)
         assert chosen(manual) == then
 
 
