@@ -13,7 +13,7 @@ from rebound_cli import __version__
 from rebound_cli.campaign.plan import Campaign
 from rebound_cli.campaign.run import Results, Workers, failures_text, run_campaign
 from rebound_cli.detectors.campaigns import flights_campaign, healthy_campaign, hits_campaign, injected_campaign
-from rebound_cli.detectors_report import comparison, flights, hits, pictures
+from rebound_cli.detectors_report import comparison, flights, hit_bars, hits, pictures
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.detectors_report.numbers import Hits
 from rebound_cli.detectors_report.reading import HOW_TO_READ
@@ -55,7 +55,7 @@ def _hits(worked_out: Worked) -> Hits:
 
 def _bars(worked_out: Worked) -> list[Bar]:
     campaign, results = worked_out["flights"]
-    bars = hits.hit_bars(_hits(worked_out)) + flights.flight_bars(campaign.cases, results.results)
+    bars = hit_bars.hit_bars(_hits(worked_out)) + flights.flight_bars(campaign.cases, results.results)
     for name, judge in (("recorded-flights", flights.recorded_bars), ("recorded-impacts", flights.injected_bars)):
         if name in worked_out:
             recorded, found = worked_out[name]

@@ -13,7 +13,7 @@ from rebound_cli.detectors_report.hits import DEFAULT
 from rebound_cli.detectors_report.numbers import Entry, per_cent, percentile, share, text_of
 from rebound_cli.paper.table import markdown
 
-# Of the issue.
+# What must be shown.
 HOURS_BAR = 10.0
 INJECTED_BARS = {"200": 0.995, "50": 0.95}
 LANDING_PHASES = frozenset({"landing", "landed"})

@@ -14,7 +14,7 @@ from rebound_cli.detectors_report.bars import MET, MISSED, REPORTED, Bar, summar
 from rebound_cli.detectors_report.command import END_MARK, START_MARK, with_tables
 from rebound_cli.detectors_report.comparison import comparison_bars
 from rebound_cli.detectors_report.flights import flight_bars
-from rebound_cli.detectors_report.hits import hit_bars
+from rebound_cli.detectors_report.hit_bars import hit_bars
 from rebound_cli.detectors_report.numbers import Hits, per_cent
 from rebound_cli.main import main
 
