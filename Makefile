@@ -4,13 +4,34 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: fly test check lint types results paper schema diagrams clean
+.PHONY: fly test clients check lint types results paper schema diagrams clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml --sim
 
 test: $(READY)
 	$(BIN)/python -m pytest
+
+# Other people's clients on the simulated vehicle, each in an environment of its own: MAVSDK 3 and 4 cannot share one.
+# In real time: some minutes.
+CLIENTS := $(abspath .venv-clients)
+CLIENT_TEST := -m pytest -q -p no:cacheprovider --rootdir=.
+
+clients: $(READY) $(CLIENTS)/mavsdk3/.ready $(CLIENTS)/mavproxy/.ready
+	cd tests/clients && $(abspath $(BIN))/python $(CLIENT_TEST) test_mavutil.py test_mavsdk_v4.py
+	cd tests/clients && REBOUND_PYTHON=$(abspath $(BIN))/python $(CLIENTS)/mavsdk3/bin/python $(CLIENT_TEST) test_mavsdk_v3.py
+	cd tests/clients && REBOUND_PYTHON=$(abspath $(BIN))/python MAVPROXY=$(CLIENTS)/mavproxy/bin/mavproxy.py \
+		$(CLIENTS)/mavproxy/bin/python $(CLIENT_TEST) test_mavproxy.py
+
+$(CLIENTS)/mavsdk3/.ready:
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check mavsdk==3.17.4 pytest==9.2.0
+	touch $@
+
+$(CLIENTS)/mavproxy/.ready:
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check MAVProxy==1.8.75 pytest==9.2.0
+	touch $@
 
 check: lint types test
 
@@ -41,5 +62,5 @@ diagrams: $(READY)
 	$(BIN)/python -m rebound_cli.diagrams docs/architecture.md
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache runs
+	rm -rf $(VENV) $(CLIENTS) .pytest_cache .mypy_cache .ruff_cache runs
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

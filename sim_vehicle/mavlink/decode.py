@@ -19,7 +19,7 @@ from sim_vehicle.autopilot.messages import (
     SigningSetup,
     TimeSyncRequest,
 )
-from sim_vehicle.mavlink import flight_reader, mission_reader, parameter_reader
+from sim_vehicle.mavlink import file_service, flight_reader, mission_reader, parameter_reader
 from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
 from sim_vehicle.setpoint import Axis3
 
@@ -241,6 +241,7 @@ READERS: dict[int, Reader] = {
     84: _position_target,
     111: _timesync,
     **parameter_reader.READERS,
+    **file_service.READERS,
     **flight_reader.READERS,
     **mission_reader.READERS,
 }

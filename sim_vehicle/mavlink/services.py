@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.command_service import CommandService
+from sim_vehicle.mavlink.file_service import FileService
 from sim_vehicle.mavlink.mission_service import MissionService
 from sim_vehicle.mavlink.parameter_service import ParameterService
 from sim_vehicle.mavlink.service import Service
@@ -21,4 +22,5 @@ SERVICES: "tuple[Callable[[Link, Board], Service], ...]" = (
     SetpointService,
     ParameterService,
     MissionService,
+    FileService,
 )

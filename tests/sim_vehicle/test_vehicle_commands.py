@@ -55,6 +55,7 @@ def client() -> Client:
         (SET_HOME, (0, 0, 0, 0, 47.3977, 8.5456, 500), [ACCEPTED]),
         (SET_HOME, (0, 0, 0, 0, NAN, 8.5456, 500), [DENIED]),
         (STORAGE, (1,), [ACCEPTED]),
+        (241, (1,), [UNSUPPORTED]),
         (REBOOT, (0,), [ACCEPTED]),
         (REBOOT, (2,), [DENIED]),
         (401, (1,), [ACCEPTED]),

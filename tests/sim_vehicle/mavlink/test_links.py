@@ -1,6 +1,7 @@
 """Several links at once, slow ones, MAVLink 1, pings, forwarding and signing; all in virtual time."""
 
 import hashlib
+import struct
 from collections import Counter
 from itertools import pairwise
 
@@ -295,3 +296,21 @@ def test_a_key_is_taken_away_only_by_somebody_who_has_it(guarded):
     end.packets.clear()
     guarded.run(0.2)
     assert all(not raw[2] & 1 for raw in end.packets)
+
+
+def test_who_asks_for_files_is_told_that_there_are_none():
+    vehicle = Vehicle(ONBOARD)
+    (end,) = vehicle.ends
+    # Opening, listing, something unknown, and giving a session up
+    for number, operation in enumerate((4, 3, 99, 1)):
+        header = struct.pack("<HBBBBBBI", number, 0, operation, 5, 0, 0, 0, 0) + b"/logs"
+        end.send(dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, header.ljust(251, b"\0")))
+    vehicle.run(0.02)
+    answers = [bytes(message.payload) for message in end.all("FILE_TRANSFER_PROTOCOL")]
+    assert [(answer[3], answer[5], answer[12] if answer[4] else None) for answer in answers] == [
+        (129, 4, 10),
+        (129, 3, 6),
+        (129, 99, 7),
+        (128, 1, None),
+    ]
+    assert all(message.target_system == 255 for message in end.all("FILE_TRANSFER_PROTOCOL"))

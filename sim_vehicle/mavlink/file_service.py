@@ -1,0 +1,71 @@
+"""FILE_TRANSFER_PROTOCOL: a server without files, so that clients which ask for one are told at once.
+
+Source: MAVLink's file transfer protocol and PX4's mavlink/mavlink_ftp.cpp. PX4 keeps descriptions of itself and logs
+there; this vehicle has none of either.
+"""
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.mavlink.board import Board
+from sim_vehicle.mavlink.service import Handler
+
+if TYPE_CHECKING:
+    from sim_vehicle.mavlink.link import Link
+
+_HEADER = struct.Struct("<HBBBBBBI")
+PAYLOAD_BYTES = 251
+
+_TERMINATE, _RESET, _LIST, _OPEN, _BURST_READ = 1, 2, 3, 4, 15
+_ACK, _NAK = 128, 129
+_NO_SESSION, _END_OF_FILE, _UNKNOWN_COMMAND, _NO_SUCH_FILE = 4, 6, 7, 10
+# Reading, checksum and size name a file or a session that cannot be there.
+_REFUSALS = {_LIST: _END_OF_FILE, _OPEN: _NO_SUCH_FILE, 5: _NO_SESSION, _BURST_READ: _NO_SESSION, 14: _NO_SUCH_FILE}
+
+
+@dataclass(frozen=True, slots=True)
+class FileRequest:
+    """One operation on the server, as it came."""
+
+    source_system: int
+    source_component: int
+    payload: bytes
+
+
+def read(packet: dialect.MAVLink_file_transfer_protocol_message) -> FileRequest:
+    return FileRequest(packet.get_srcSystem(), packet.get_srcComponent(), bytes(packet.payload))
+
+
+READERS = {110: read}
+
+
+class FileService:
+    """Says that there is nothing."""
+
+    def __init__(self, link: "Link", board: Board) -> None:
+        self._link = link
+
+    @property
+    def handlers(self) -> Mapping[type, Handler]:
+        return {FileRequest: self._answer}
+
+    def update(self, now_us: int) -> None:
+        """Nothing waits."""
+
+    def _answer(self, request: FileRequest) -> None:
+        number, session, operation, *_ = _HEADER.unpack_from(request.payload)
+        if operation >= _ACK:
+            return
+        next_number = (number + 1) & 0xFFFF
+        if operation in (_TERMINATE, _RESET):
+            answer = _HEADER.pack(next_number, session, _ACK, 0, operation, 0, 0, 0)
+        else:
+            why = _REFUSALS.get(operation, _UNKNOWN_COMMAND)
+            answer = _HEADER.pack(next_number, session, _NAK, 1, operation, 0, 0, 0) + bytes([why])
+        payload = answer.ljust(PAYLOAD_BYTES, b"\0")
+        target = (request.source_system, request.source_component)
+        self._link.send(dialect.MAVLink_file_transfer_protocol_message(0, *target, payload))

@@ -1,0 +1,59 @@
+"""`rebound sim` as a process of its own, for clients that know nothing of this project's code.
+
+REBOUND_PYTHON names the interpreter in whose environment the simulator is installed; by default this one.
+"""
+
+import os
+import select
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+START_TIMEOUT_S = 60.0
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Where its links are."""
+
+    companion_port: int
+    """It sends here unasked, as PX4's SITL does to 14540."""
+    tcp_port: int
+
+
+def free_port(kind: int = socket.SOCK_DGRAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def simulator(*options: str) -> Iterator[Simulator]:
+    """On free ports; it ends with the block, or with this process."""
+    companion, tcp = free_port(), free_port(socket.SOCK_STREAM)
+    command = [os.environ.get("REBOUND_PYTHON", sys.executable), "-m", "rebound_cli", "sim", "--stop-with-stdin"]
+    command += ["--port", "0", "--remote", f"127.0.0.1:{companion}", "--link", f"tcpin://127.0.0.1:{tcp}", *options]
+    process = subprocess.Popen(
+        command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert process.stdin is not None and process.stdout is not None
+    try:
+        ready, _, _ = select.select([process.stdout], [], [], START_TIMEOUT_S)
+        assert ready and process.stdout.readline().startswith(b"Simulated vehicle"), "the simulator did not start"
+        yield Simulator(companion, tcp)
+    finally:
+        process.stdin.close()
+        process.wait(10)
+
+
+def wait_until(condition, at_most_s: float, what: str) -> None:
+    until_s = time.monotonic() + at_most_s
+    while not condition():
+        assert time.monotonic() < until_s, f"not within {at_most_s} s: {what}"
+        time.sleep(0.05)

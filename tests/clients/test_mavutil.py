@@ -1,0 +1,97 @@
+"""pymavlink's own helpers on the simulated vehicle: heartbeat, modes, arming, parameters, its log reader."""
+
+import math
+import os
+import time
+
+import pytest
+
+os.environ["MAVLINK20"] = "1"
+from pymavlink import mavutil
+from simulator import simulator, wait_until
+
+
+@pytest.fixture(params=["udp", "tcp"])
+def vehicle(request):
+    with simulator() as simulated:
+        address = {"udp": f"udpin:127.0.0.1:{simulated.companion_port}", "tcp": f"tcp:127.0.0.1:{simulated.tcp_port}"}
+        connection = mavutil.mavlink_connection(address[request.param], source_system=255)
+        yield connection
+        connection.close()
+
+
+def heartbeats(connection, seconds: float) -> None:
+    until_s = time.monotonic() + seconds
+    while time.monotonic() < until_s:
+        connection.mav.heartbeat_send(6, 8, 0, 0, 4)
+        connection.recv_match(type="HEARTBEAT", blocking=True, timeout=1.0)
+
+
+def flies_in(connection, mode: str) -> bool:
+    connection.recv_match(type="HEARTBEAT", blocking=True, timeout=1)
+    return connection.flightmode == mode
+
+
+def test_heartbeat_modes_arming_takeoff_and_land(vehicle):
+    assert vehicle.wait_heartbeat(timeout=5).autopilot == mavutil.mavlink.MAV_AUTOPILOT_PX4
+    assert vehicle.target_system == 1
+    assert {"LOITER", "OFFBOARD", "RTL", "TAKEOFF"} <= set(vehicle.mode_mapping())
+    for mode in ("POSCTL", "LOITER"):
+        vehicle.set_mode(mode)
+        wait_until(
+            lambda mode=mode: vehicle.recv_match(type="HEARTBEAT", timeout=1) and vehicle.flightmode == mode, 5, mode
+        )
+    vehicle.arducopter_arm()
+    vehicle.motors_armed_wait()
+    vehicle.set_mode("TAKEOFF")
+    heartbeats(vehicle, 9.0)
+    height_m = -vehicle.recv_match(type="LOCAL_POSITION_NED", blocking=True, timeout=2).z
+    assert height_m == pytest.approx(2.5, abs=0.5)
+    vehicle.set_mode("LAND")
+    vehicle.motors_disarmed_wait()
+
+
+def has_all(connection) -> bool:
+    value = connection.recv_match(type="PARAM_VALUE", blocking=True, timeout=1)
+    return value is not None and len(connection.params) >= value.param_count
+
+
+def test_parameters(vehicle):
+    vehicle.wait_heartbeat(timeout=5)
+    vehicle.param_fetch_all()
+    wait_until(lambda: has_all(vehicle), 15, "all parameters")
+    assert vehicle.params["MIS_TAKEOFF_ALT"] == 2.5
+    vehicle.param_set_send("MIS_TAKEOFF_ALT", 4.0, mavutil.mavlink.MAV_PARAM_TYPE_REAL32)
+    wait_until(lambda: has_all(vehicle) and vehicle.params["MIS_TAKEOFF_ALT"] == 4.0, 5, "the new value")
+
+
+def test_a_log_of_it_is_read_back(vehicle, tmp_path):
+    path = tmp_path / "flight.tlog"
+    vehicle.setup_logfile(str(path))
+    vehicle.wait_heartbeat(timeout=5)
+    for _ in range(200):
+        vehicle.recv_match(blocking=True, timeout=1)
+    vehicle.logfile.close()
+    vehicle.logfile = None
+    log = mavutil.mavlink_connection(str(path))
+    kinds = set()
+    while (message := log.recv_match()) is not None:
+        kinds.add(message.get_type())
+    assert {"ATTITUDE", "LOCAL_POSITION_NED"} <= kinds and "BAD_DATA" not in kinds
+
+
+def test_a_mission_goes_up_and_comes_down_again(vehicle):
+    vehicle.wait_heartbeat(timeout=5)
+    points = [(22, 47.397742, 8.545594, 5.0), (16, 47.39785, 8.545594, 5.0), (21, 47.39785, 8.545594, 0.0)]
+    vehicle.mav.mission_count_send(1, 1, len(points), 0)
+    for _ in points:
+        request = vehicle.recv_match(type=["MISSION_REQUEST_INT", "MISSION_REQUEST"], blocking=True, timeout=3)
+        command, latitude, longitude, height_m = points[request.seq]
+        vehicle.mav.mission_item_int_send(
+            *(1, 1, request.seq, 6, command, 0, 1, 0, 0, 0, math.nan),
+            *(round(latitude * 1e7), round(longitude * 1e7), height_m),
+            0,
+        )
+    assert vehicle.recv_match(type="MISSION_ACK", blocking=True, timeout=3).type == 0
+    vehicle.waypoint_request_list_send()
+    assert vehicle.recv_match(type="MISSION_COUNT", blocking=True, timeout=3).count == len(points)
