@@ -189,7 +189,7 @@ def test_missions_fences_and_sticks():
             )
             for north in (5.0, 10.0)
         ]
-        await mission.set_return_to_launch_after_mission(True)
+        await mission.set_return_to_launch_after_mission(False)
         await mission.upload_mission(mission_types.MissionPlan(items))
         assert len((await mission.download_mission()).mission_items) == 2
         corners = [
@@ -201,7 +201,7 @@ def test_missions_fences_and_sticks():
         await ActionAsync(system).arm()
         await mission.start_mission()
         await first(mission.subscribe_mission_progress(), lambda at: at.current == at.total, 60.0)
-        await first(telemetry.subscribe_armed(), lambda armed: not armed, 60.0)
+        await land(system)
         await mission.clear_mission()
         await fence.clear_geofence()
         sticks = ManualControlAsync(system)
