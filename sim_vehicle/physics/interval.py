@@ -71,7 +71,7 @@ def advance_interval(
 ) -> None:
     """Advance ``state`` by one integration interval, renew the vehicle's estimate, fill ``report``.
 
-    Who drives the motors from outside has an estimate of its own; none is made here then.
+    Who drives the motors from outside has an estimate and a frame of its own: a hit notes no offset of ours then.
 
     ``motors``: off, idling, flying the setpoint, or driven (as `State.motor_command_n` says). ``noise`` is
     standard normal: six values a raw sample, then nine for the estimate.
@@ -99,9 +99,10 @@ def advance_interval(
         add_raw_sample(state, scratch, noise, raw, constants, disturbance)
         state.time_us += constants.raw_interval_us
     close_old_hit(state)
-    if motors != MOTORS_DRIVEN:
-        update_estimate(state, errors, noise[6 * constants.raw_per_interval :], disturbance)
-        update_slope(state, errors, interval_s)
+    update_estimate(state, errors, noise[6 * constants.raw_per_interval :], disturbance)
+    update_slope(state, errors, interval_s)
+    if motors == MOTORS_DRIVEN:
+        state.frame_offset_ned_m[:] = 0.0
     write_report(state, constants, report)
 
 
