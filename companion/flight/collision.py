@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from companion.detection.interface import DetectorState
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.messages import LocalPosition, Vector3
+from companion.recovery.direction import away_from
 from companion.recovery.interface import Contact
 from companion.report import CollisionReport
 
@@ -37,6 +38,7 @@ class CollisionRecord:
     normal_ned: Vector3
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
+    impulse_m_s: float
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
@@ -50,7 +52,8 @@ class CollisionRecord:
             return
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-        self.normal_ned = horizontal_unit(estimate.normal_ned)
+        self.normal_ned = away_from(estimate.normal_ned)
+        self.impulse_m_s = estimate.impulse_m_s
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""
@@ -67,8 +70,10 @@ class CollisionRecord:
     def _direction_away(self) -> Vector3:
         """From the contact towards the setpoint; along the normal when the two coincide."""
         x, s = self.contact.position_ned_m, self.setpoint_ned_m
-        way = (s[0] - x[0], s[1] - x[1], 0.0)
-        return horizontal_unit(way) if math.hypot(*way) >= LEAST_WAY_M else self.normal_ned
+        length_m = math.dist(x, s)
+        if length_m < LEAST_WAY_M:
+            return self.normal_ned
+        return ((s[0] - x[0]) / length_m, (s[1] - x[1]) / length_m, (s[2] - x[2]) / length_m)
 
     def _direction_back(self) -> Vector3:
         """Against the approach; along the normal for a vehicle hit while it hovered."""

@@ -129,15 +129,17 @@ def mission_lines(mission: Mission) -> list[str]:
     for number, item in enumerate(mission.items, start=1):
         lines += _item_lines(f"{number}.", item, "Items" if number == 1 else "")
     gamma_1, gamma_2 = mission.recovery.gamma_per_axis
+    has_gamma = mission.recovery.law != "adaptive"
+    law = mission.recovery.law + (f" with gamma {gamma_1:g}, {gamma_2:g} s" if has_gamma else "")
     on_hit = mission.on_collision
     lines += [
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
-        f"On a hit   detector {mission.companion.detector}, recovery law {mission.recovery.law} with gamma "
-        f"{gamma_1:g}, {gamma_2:g} s; then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
+        f"On a hit   detector {mission.companion.detector}, recovery law {law}; "
+        f"then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
     ]
-    if max(gamma_1, gamma_2) > LARGE_GAMMA_S:
+    if has_gamma and max(gamma_1, gamma_2) > LARGE_GAMMA_S:
         lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
     return lines
 

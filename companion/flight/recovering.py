@@ -1,76 +1,175 @@
 """State recovering: from the hit to rest at the recovery setpoint."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards
-from companion.flight.collision import CollisionRecord, horizontal_unit
+from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
-from companion.recovery.envelope import Envelope, away_from_both
-from companion.recovery.interface import Contact
+from companion.messages import LocalPosition, Vector3
+from companion.recovery.direction import away_from, plus, split
+from companion.recovery.envelope import Envelope
+from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
+from companion.recovery.room import Room, Surface
+
+# The motion after the contact is read this long after the hit's first sample. Spring arms push for 15 to 60 ms, and
+# the vehicle's estimate is some 20 ms late; waiting for 120 ms makes no better recoveries, only later ones.
+REBOUND_KNOWN_US = 80_000
+# A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
+REBOUND_SLACK_M_S = 0.5
+REBOUND_SLACK_M = 0.2
+# A contact that still pushes this long after it began is no hit but something that carries the vehicle along.
+CARRIED_AFTER_US = 250_000
+# It pushes still when it pushed within this: a few IMU samples of the slowest stream.
+STILL_PUSHING_US = 60_000
+# The place to recover to is then found anew, ten times a second.
+CARRIED_EVERY_US = 100_000
 
 
 class Recover:
-    """Fly to the newest collision's setpoint, which never changes, and wait until the vehicle has settled."""
+    """Glide to the newest collision's setpoint, which is final once the rebound is known, and wait for rest there."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._record = flight.collisions[-1]
+        self._law = _law(flight)
         self._started_us = now_us
+        self._contact = self._record.contact
         if flight.target is not None:
             flight.yaw_rad = flight.target.yaw_rad
-        self._target = Target(self._record.setpoint_ned_m, flight.yaw_rad)
-        self._monitor = SettlingMonitor(self._record.setpoint_ned_m, flight.mission.companion.settled)
+        self._yaw_rad = flight.yaw_rad
+        self._is_refined = not self._law.is_refined
+        self._refined_boot_us = self._record.sample_time_boot_us
+        self._take(flight, self._law.expected(self._contact), now_us)
+
+    def _take(self, flight: FlightContext, motion: Moving, now_us: int) -> None:
+        """The way from this motion to the record's setpoint."""
+        goal = self._record.setpoint_ned_m
+        self._way, self._way_began_us = self._law.way(motion, goal), now_us
+        self._monitor = SettlingMonitor(goal, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
-        return self._target
+        motion = self._way.at((now_us - self._way_began_us) * 1e-6)
+        return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, motion.acceleration_ned_m_s2)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
         for sample in inputs.positions:
             record.follow_recovery(sample)
+            self._refine(flight, sample, now_us)
             since_us = self._monitor.settled_since(sample)
             if since_us is not None:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.tell(now_us, "recovered", _recovered_text(record), **figures)
-                return afterwards(flight)
+                return self._leave(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._started_us > timeout_s * 1e6:
             record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.tell(now_us, "recovered", text, settled_after_s=None)
-            return afterwards(flight)
+            return self._leave(flight)
         return None
+
+    def _leave(self, flight: FlightContext) -> Move:
+        """What follows begins at rest at the setpoint."""
+        flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
+        return afterwards(flight)
+
+    def _refine(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
+        """With the motion after the contact, once; while something goes on pushing, again and again."""
+        record = self._record
+        since_us = sample.time_boot_us - record.sample_time_boot_us
+        if not self._is_refined and since_us >= REBOUND_KNOWN_US:
+            self._is_refined = True
+        elif not self._is_carried(sample, since_us):
+            return
+        else:
+            self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
+        self._refined_boot_us = sample.time_boot_us
+        self._contact = replace(self._contact, normal_ned=record.normal_ned)
+        motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
+        if motion is None:
+            return
+        record.setpoint_ned_m = _setpoint(flight, self._law, self._contact, motion, flight.collisions[:-1])
+        self._take(flight, motion, now_us)
+        off_m_s, place = split(motion.velocity_ned_m_s, self._contact.normal_ned)[0], record.setpoint_ned_m
+        text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
+        flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+    def _is_carried(self, sample: LocalPosition, since_us: int) -> bool:
+        now_us, record = sample.time_boot_us, self._record
+        return (
+            self._law.is_refined
+            and since_us > CARRIED_AFTER_US
+            and now_us - record.contact_ended_boot_us < STILL_PUSHING_US
+            and now_us - self._refined_boot_us >= CARRIED_EVERY_US
+        )
+
+
+def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, since_s: float) -> Moving | None:
+    """The motion measured after a contact; None where the hit cannot have caused it.
+
+    A contact changes the velocity by its impulse, and by no more than twice the speed into the obstacle. What
+    estimators say after a stiff hit can be anything.
+    """
+    change_m_s = math.dist(sample.velocity_ned_m_s, contact.velocity_ned_m_s)
+    into_m_s = abs(split(contact.velocity_ned_m_s, contact.normal_ned)[0])
+    most_m_s = max(2.0 * into_m_s, impulse_m_s) + REBOUND_SLACK_M_S
+    most_m = (math.hypot(*contact.velocity_ned_m_s) + most_m_s) * since_s + REBOUND_SLACK_M
+    if change_m_s > most_m_s or math.dist(sample.position_ned_m, contact.position_ned_m) > most_m:
+        return None
+    off_m_s, along = split(sample.velocity_ned_m_s, contact.normal_ned)
+    # Still in contact, or the estimate is late: towards the obstacle is never asked for.
+    return Moving(sample.position_ned_m, plus(along, max(0.0, off_m_s), contact.normal_ned))
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
-    """A new collision: what was known just before it, and from that the setpoint, set once."""
+    """A new collision: what was known just before it, and from that the setpoint."""
     mission, impact = flight.mission, estimate.impact
-    normal = horizontal_unit(estimate.normal_ned)
+    normal = away_from(estimate.normal_ned)
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
-    law = RECOVERY_LAWS[mission.recovery.law](mission.recovery)
-    assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    fence = Envelope(flight.origin_ned_m, mission.fence)
-    wanted = law.setpoint_ned_m(contact)
-    if flight.collisions and not flight.collisions[-1].is_over:
-        earlier = flight.collisions[-1]
-        wanted = away_from_both(wanted, normal, earlier.setpoint_ned_m, earlier.normal_ned)
-    setpoint = fence.clamp(contact.position_ned_m, wanted)
-    strength = math.hypot(*impact.specific_force_frd_m_s2)
+    law = _law(flight)
     record = CollisionRecord(
         detected_at_us=now_us,
         sample_time_boot_us=impact.sample_time_boot_us,
         detector=mission.companion.detector,
         contact=contact,
-        setpoint_ned_m=setpoint,
+        setpoint_ned_m=_setpoint(flight, law, contact, law.expected(contact), flight.collisions),
         normal_ned=normal,
-        peak_specific_force_m_s2=strength,
+        peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
+        impulse_m_s=estimate.impulse_m_s,
     )
     flight.collisions.append(record)
     _tell_detection(flight, record, now_us)
+
+
+def _law(flight: FlightContext) -> RecoveryLaw:
+    return RECOVERY_LAWS[flight.mission.recovery.law](flight.mission.recovery)
+
+
+def _setpoint(
+    flight: FlightContext, law: RecoveryLaw, contact: Contact, motion: Moving, earlier: Sequence[CollisionRecord]
+) -> Vector3:
+    """The law's goal, as what is around lets it be."""
+    assert flight.origin_ned_m is not None, "hits are detected only in flight"
+    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), _surfaces(earlier))
+    return room.goal(contact.position_ned_m, contact.normal_ned, law.goal_ned_m(contact, motion))
+
+
+def _surfaces(earlier: Sequence[CollisionRecord]) -> list[Surface]:
+    """What was hit before in the same recovery, each with the distance that its own recovery wanted."""
+    surfaces: list[Surface] = []
+    for record in reversed(earlier):
+        if record.is_over:
+            break
+        touched = Surface(record.contact.position_ned_m, record.normal_ned, 0.0)
+        surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))
+    return surfaces
 
 
 def _tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:

@@ -1,17 +1,32 @@
-"""The interface of all recovery laws: what is known of the contact in, a setpoint out."""
+"""The interface of all recovery laws: what is known of the contact in, a place to rest and the way there out."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Literal, Protocol
+
+from pydantic import Field
 
 from companion.messages import Vector3
-from companion.written import Positive, Written
+from companion.recovery.way import Way
+from companion.written import NotNegative, Positive, Written
 
 
 class RecoveryConfig(Written):
-    """The mission's `recovery:` part; gamma in seconds, one number or one for each horizontal axis."""
+    """The mission's `recovery:` part; `gamma` in seconds, one number or one for each horizontal axis."""
 
-    law: str = "paper"
+    law: str = "adaptive"
+    # Laws `paper` and `normal`. The paper's flights have 0.5 s.
     gamma: Positive | tuple[Positive, Positive] = 0.5
+    # Laws `normal` and `adaptive`: what becomes of the motion along the obstacle.
+    tangential: Literal["damped", "kept"] = "damped"
+    # Law `adaptive`, from here on. The guards stay 0.3 m clear; the wavering of a hover on optical flow takes 5 cm.
+    clearance_m: Positive = 0.35
+    # More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
+    # trimmed against the drag of its approach stops short by, 0.012 s times v_c in simulation.
+    clearance_s: NotNegative = 0.27
+    # PX4's MPC_ACC_HOR: a tilt of 17 degrees, which leaves a vehicle that hovers at 78 % of its thrust its height.
+    acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 3.0
+    # Of the speed into the obstacle, until the rebound has been measured: spring arms, 0.15 to 0.3 in simulation.
+    restitution: Annotated[NotNegative, Field(le=1.0)] = 0.2
 
     @property
     def gamma_per_axis(self) -> tuple[float, float]:
@@ -20,7 +35,10 @@ class RecoveryConfig(Written):
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """The vehicle at the time of contact t_c: x(t_c), v_c, and the obstacle's outward normal; NED, SI."""
+    """The vehicle at the time of contact t_c: x(t_c), v_c, and the obstacle's outward normal; NED, SI.
+
+    The normal is horizontal, or the obstacle's own where that is steep (see direction.away_from); zero: not known.
+    """
 
     time_boot_us: int
     position_ned_m: Vector3
@@ -28,11 +46,28 @@ class Contact:
     normal_ned: Vector3
 
 
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """Where the vehicle is and how it moves, local NED."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+
+
 class RecoveryLaw(Protocol):
-    """Pure: the same contact gives the same setpoint."""
+    """Pure: the same contact and motion give the same goal and the same way."""
 
     name: str
+    is_refined: bool  # whether goal and way are found anew once the motion after the contact is known
 
-    def setpoint_ned_m(self, contact: Contact) -> Vector3:
-        """Where to go after the contact, in the frame of the contact's position."""
+    def expected(self, contact: Contact) -> Moving:
+        """The motion after the contact as far as it can be known before it has been measured."""
+        ...
+
+    def goal_ned_m(self, contact: Contact, motion: Moving) -> Vector3:
+        """Where to come to rest, if there is nothing else around."""
+        ...
+
+    def way(self, motion: Moving, goal_ned_m: Vector3) -> Way:
+        """How to get there; the goal may have been moved by what is around."""
         ...

@@ -2,10 +2,16 @@
 
 from collections.abc import Callable, Container
 
+from companion.recovery.adaptive import AdaptiveLaw
 from companion.recovery.interface import RecoveryConfig, RecoveryLaw
+from companion.recovery.normal import NormalLaw
 from companion.recovery.paper import PaperLaw
 
-RECOVERY_LAWS: dict[str, Callable[[RecoveryConfig], RecoveryLaw]] = {PaperLaw.name: PaperLaw}
+RECOVERY_LAWS: dict[str, Callable[[RecoveryConfig], RecoveryLaw]] = {
+    PaperLaw.name: PaperLaw,
+    NormalLaw.name: NormalLaw,
+    AdaptiveLaw.name: AdaptiveLaw,
+}
 
 
 def check_known_law(name: str, known: Container[str]) -> None:

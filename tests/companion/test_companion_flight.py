@@ -16,8 +16,11 @@ INTO_WALL = [
 ]
 
 
+PAPER = {"law": "paper", "gamma": 0.5}
+
+
 def at_wall(**changes) -> Flight:
-    return flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL, **changes)
+    return flight(FakeVehicle(wall_north_m=3.0), items=INTO_WALL, **{"recovery": PAPER, **changes})
 
 
 def times_of(f: Flight, kind: str) -> list[int]:
@@ -84,7 +87,7 @@ def test_nothing_arms_before_the_plan_is_confirmed():
         "take off to 1.5 m",
         "15 m",
         "6 m",
-        "gamma",
+        "recovery law adaptive",
         "hold for 3 s",
         "HIGHRES_IMU",
     ):
@@ -298,7 +301,7 @@ def test_a_recovery_that_does_not_settle_is_reported_and_the_mission_goes_on():
 
 
 def test_the_recovery_stays_inside_the_fence():
-    f = at_wall(recovery={"gamma": [5.0, 0.5]}, fence={"radius_m": 6, "max_height_m": 3})
+    f = at_wall(recovery={"law": "paper", "gamma": [5.0, 0.5]}, fence={"radius_m": 6, "max_height_m": 3})
     f.run_to("recovering")
     assert f.companion.report().collisions[0].recovery_setpoint_ned_m[0] == pytest.approx(-6.0, abs=0.01)
 

@@ -1,0 +1,61 @@
+"""Recovery law `adaptive`: as near as is safe, by a way that the vehicle can follow.
+
+From the motion x, v that follows the contact, with u = v . n the speed off the obstacle and v_t the rest of v:
+
+    D   = max(d_0,  t_0 |v_c . n|,  (x - x(t_c)) . n + u T / 2)
+    x_d = x + (D - (x - x(t_c)) . n) n + v_t T / 2,  height x_3(t_c) unless the obstacle is steep
+
+that is, d_0 (clearance_m) or t_0 |v_c . n| (clearance_s) off the obstacle, further where the rebound would carry the
+vehicle further before it could stop, and along the obstacle where it comes to rest. v T / 2 is the length of a glide
+that only brakes. The way is a quintic from x, v to rest (way.Glide), sent with its velocity and acceleration, and T the
+shortest duration of at least 1 s for which its acceleration stays within a_max. At first the motion is the one
+expected: x(t_c), u = e |v_c . n| with the airframe's restitution e, v_t of the approach. It is measured once the
+contact is over, and goal and way are found anew.
+"""
+
+from companion.messages import Vector3
+from companion.recovery.direction import plus, split
+from companion.recovery.interface import Contact, Moving, RecoveryConfig
+from companion.recovery.way import REST, SHORTEST_S, STEP, Way, glide, most_of
+
+
+class AdaptiveLaw:
+    """Twice a collision: with the rebound expected, and with the one measured."""
+
+    name = "adaptive"
+    is_refined = True
+
+    def __init__(self, config: RecoveryConfig) -> None:
+        self._config = config
+
+    def expected(self, contact: Contact) -> Moving:
+        into_m_s, tangential = split(contact.velocity_ned_m_s, contact.normal_ned)
+        velocity = plus(tangential, -self._config.restitution * min(0.0, into_m_s), contact.normal_ned)
+        return Moving(contact.position_ned_m, velocity)
+
+    def goal_ned_m(self, contact: Contact, motion: Moving) -> Vector3:
+        config, normal = self._config, contact.normal_ned
+        off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
+        off_m = split(_difference(motion.position_ned_m, contact.position_ned_m), normal)[0]
+        into_m_s, _ = split(contact.velocity_ned_m_s, normal)
+        missing_m = max(config.clearance_m, config.clearance_s * abs(into_m_s)) - off_m
+        if normal[2] == 0.0:
+            tangential = (tangential[0], tangential[1], 0.0)
+        duration_s, way = SHORTEST_S, REST
+        while True:
+            off = plus(REST, max(missing_m, 0.5 * off_m_s * duration_s), normal)
+            way = plus(off, 0.5 * duration_s, tangential)
+            if most_of(way, motion.velocity_ned_m_s, duration_s) <= config.acceleration_m_s2:
+                break
+            duration_s *= STEP
+        if config.tangential == "kept":
+            way = plus(way, config.gamma_per_axis[0], tangential)
+        goal = plus(motion.position_ned_m, 1.0, way)
+        return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])
+
+    def way(self, motion: Moving, goal_ned_m: Vector3) -> Way:
+        return glide(motion.position_ned_m, motion.velocity_ned_m_s, goal_ned_m, self._config.acceleration_m_s2)
+
+
+def _difference(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
