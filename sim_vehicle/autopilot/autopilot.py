@@ -121,8 +121,8 @@ class Autopilot:
     def run_commander(self) -> list[CommandAck]:
         """Commands, failsafes, arming: everything that can change mode or arming."""
         self._look()
-        self._run_mission_commands()
         self.commander.run(self._now_us, self._estimate.attitude_wxyz)
+        self._run_mission_commands()
         acks: list[CommandAck] = []
         if self._commands:
             self.navigator.notice_changes()  # a list that has just come is judged before it is to be flown

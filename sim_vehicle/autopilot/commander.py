@@ -11,14 +11,14 @@ from sim_vehicle.autopilot import preflight
 from sim_vehicle.autopilot.arming import Arming, Reason
 from sim_vehicle.autopilot.battery import Battery
 from sim_vehicle.autopilot.battery import Warning as BatteryWarning
-from sim_vehicle.autopilot.estimate import Quaternion
+from sim_vehicle.autopilot.estimate import Quaternion, roll_pitch_of
 from sim_vehicle.autopilot.failsafe import Failsafe
 from sim_vehicle.autopilot.failsafe_table import Action, Situation
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.links_heard import GroundStation
 from sim_vehicle.autopilot.manual_input import Gesture, ManualInput
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
-from sim_vehicle.autopilot.modes import NOT_ARMABLE, Conditions, Event, Mode, ModeState, Need, missing
+from sim_vehicle.autopilot.modes import NEEDS, NOT_ARMABLE, Conditions, Event, Mode, ModeState, Need, missing
 from sim_vehicle.autopilot.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardSignal
 from sim_vehicle.parameters.store import Parameters
@@ -100,7 +100,7 @@ class Commander:
     def _stick_refusal(self, reason: Reason) -> str | None:
         """What is wrong with the throttle in a mode that sticks fly, or with the mode for a gesture."""
         sticks, mode = self.sticks.sticks, self.modes.flown
-        if Need.STICKS not in _needs(mode):
+        if Need.STICKS not in NEEDS[mode]:
             return "switch to manual mode first" if reason is Reason.GESTURE else None
         if sticks is None:
             return None
@@ -134,13 +134,23 @@ class Commander:
         self.signal.update(now_us)
         self.sticks.update(now_us)
         self._obey_sticks()
-        if self.modes.flown is Mode.TAKEOFF and self._navigator.takeoff_is_over and not self._detector.landed:
-            self.modes.apply(Event.TAKEOFF_REACHED, self._conditions)
+        over = None if self._detector.landed else self._what_is_over()
+        if over is not None and self.modes.apply(over, self._conditions):
             self._judge()
         self._disarm_by_itself()
         if now_us - self._judged_us >= PERIOD_US or heard != (self.signal.arrives, self.signal.is_back):
             self._watch(attitude_wxyz)
             self._judge()
+
+    def _what_is_over(self) -> Event | None:
+        """Commander::checkForMissionUpdate."""
+        progress = self._navigator.progress
+        if self.modes.flown is Mode.MISSION:
+            return Event.MISSION_FINISHED if progress.finished else None
+        if self.modes.flown is not Mode.TAKEOFF or not self._navigator.takeoff_is_over:
+            return None
+        goes_on = self._parameters["COM_TAKEOFF_ACT"] == 1 and progress.valid
+        return Event.MISSION_AFTER_TAKEOFF if goes_on else Event.TAKEOFF_REACHED
 
     def _obey_sticks(self) -> None:
         if self.sticks.gesture is Gesture.ARM:
@@ -166,7 +176,7 @@ class Commander:
         mode, mask = self.modes.flown, int(self._parameters["COM_RC_OVERRIDE"])
         if mode is Mode.OFFBOARD:
             return bool(mask & _OVERRIDES_OFFBOARD)
-        return Need.STICKS not in _needs(mode) and bool(mask & _OVERRIDES_AUTO)
+        return Need.STICKS not in NEEDS[mode] and bool(mask & _OVERRIDES_AUTO)
 
     def _disarm_by_itself(self) -> None:
         if not self.arming.armed:
@@ -183,7 +193,7 @@ class Commander:
     def _watch(self, attitude_wxyz: Quaternion) -> None:
         """The ground station, and whether the vehicle lies on its side (FailureDetector::updateAttitudeStatus)."""
         self.texts += self.ground_station.update(self._now_us)
-        roll, pitch = _roll_pitch(attitude_wxyz)
+        roll, pitch = roll_pitch_of(attitude_wxyz)
         most_roll, most_pitch = self._parameters["FD_FAIL_R"], self._parameters["FD_FAIL_P"]
         tips = (0.0 < most_roll < abs(math.degrees(roll))) or (0.0 < most_pitch < abs(math.degrees(pitch)))
         if not tips:
@@ -286,10 +296,6 @@ class Commander:
 _CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL, Mode.POSITION_SLOW)
 
 
-def _needs(mode: Mode) -> frozenset[Need]:
-    return missing(mode, frozenset())
-
-
 @cache
 def _available(has_global: bool, has_sticks: bool, has_setpoints: bool, has_mission: bool) -> frozenset[Need]:
     there = {
@@ -310,9 +316,3 @@ def _cannot_run(available: frozenset[Need], has_setpoints: bool) -> frozenset[Mo
         available | {Need.STICKS, Need.SETPOINTS} if has_setpoints else (available | {Need.STICKS}) - {Need.SETPOINTS}
     )
     return frozenset(mode for mode in Mode if missing(mode, there))
-
-
-def _roll_pitch(attitude_wxyz: Quaternion) -> tuple[float, float]:
-    w, x, y, z = attitude_wxyz
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    return roll, math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))

@@ -36,3 +36,10 @@ def yaw_of(attitude_wxyz: Quaternion) -> float:
     """Heading of the nose from north, radians, clockwise from above."""
     w, x, y, z = attitude_wxyz
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def roll_pitch_of(attitude_wxyz: Quaternion) -> tuple[float, float]:
+    """Both lean angles in radians."""
+    w, x, y, z = attitude_wxyz
+    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    return roll, math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))

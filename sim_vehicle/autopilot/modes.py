@@ -91,6 +91,8 @@ class Event(StrEnum):
 
     REQUEST = "requested"
     TAKEOFF_REACHED = "takeoff height reached"
+    MISSION_AFTER_TAKEOFF = "takeoff height reached, COM_TAKEOFF_ACT 1"
+    MISSION_FINISHED = "mission finished in the air"
     STICKS = "sticks moved"
     DISARMED = "disarmed"
 
@@ -143,6 +145,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.OFFBOARD),
     _request(Mode.TERMINATION, Guard.ALWAYS),
     Transition((Mode.TAKEOFF,), Event.TAKEOFF_REACHED, Guard.ARMED, Mode.LOITER),
+    Transition((Mode.TAKEOFF,), Event.MISSION_AFTER_TAKEOFF, Guard.ARMED, Mode.MISSION),
+    Transition((Mode.MISSION,), Event.MISSION_FINISHED, Guard.ARMED, Mode.LOITER),
     Transition(_FLOWN_WITHOUT_STICKS, Event.STICKS, Guard.ARMED, Mode.POSCTL),
     Transition(tuple(sorted(NOT_KEPT_AFTER_DISARMING)), Event.DISARMED, Guard.ALWAYS, None),
 )

@@ -79,7 +79,16 @@ def test_without_a_landing_it_holds_at_the_last_place():
     assert "Mission finished, loitering" in flight.texts()
     flight.fly(10.0)
     assert math.dist(north_east(flight), (20.0, 0.0)) < 0.1
-    assert flight.autopilot.modes.flown is Mode.MISSION
+    assert flight.autopilot.modes.flown is Mode.LOITER
+
+
+def test_a_takeoff_may_lead_into_the_mission():
+    flight = Flight()
+    flight.parameters.set("COM_TAKEOFF_ACT", 1)
+    upload(flight, TAKEOFF, NORTH)
+    set_mode(flight, Mode.TAKEOFF)
+    flight.ask(COMPONENT_ARM_DISARM, 1)
+    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.MISSION, 30.0)
 
 
 def test_it_climbs_before_it_goes_where_the_first_place_is_higher():
@@ -160,6 +169,8 @@ def test_return_as_an_item_returns():
     assert flight.autopilot.modes.flown is Mode.RETURN and flight.autopilot.missions.progress.finished
     said = flight.texts()
     assert said.index("Mission finished, loitering") < said.index("Returning to launch")
+    flight.fly_until(lambda: not flight.autopilot.arming.armed, 120.0)
+    assert flight.autopilot.modes.intended is Mode.LOITER
 
 
 def test_an_item_without_autocontinue_is_stayed_at():

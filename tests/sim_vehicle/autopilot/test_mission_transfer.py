@@ -62,7 +62,10 @@ def test_lists_survive_loss_repetition_and_reordering(seed, loss, repeat, latest
     results = []
     while MissionResult.ACCEPTED not in results:
         results.append(exchange.upload(items, within_s=120.0))
-        assert len(results) < 20
+        assert len(results) < 200
+        # No client begins anew while packets of its last attempt are on their way
+        for _ in range(25):
+            exchange.step()
     # Then the vehicle holds exactly that list, never parts of it
     stored = exchange.store.mission.items
     assert [round(1e7 * item.latitude_deg) for item in stored] == [item.x for item in items]
