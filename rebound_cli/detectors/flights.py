@@ -94,7 +94,7 @@ def fly_healthy(case: FlightCase, airframe: Airframe) -> Flown:
     flown = Flown(Recording(), [])
     ground_m = plant.state.body[2]
     for asked in pilot.fly():
-        output = plant.step(asked.setpoint, asked.armed) if asked.driven is None else plant.drive(asked.driven)
+        output = plant.step(asked.setpoint, asked.armed)
         flown.recording.add(plant, output, _situation(asked, ground_m - output.position_ned_m[2]), airframe.mass_kg)
         flown.phases.append(asked.phase)
         is_lost = asked.phase not in NEAR_GROUND and ground_m - plant.state.body[2] < LOST_BELOW_M

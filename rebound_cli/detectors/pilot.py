@@ -13,8 +13,8 @@ import numpy as np
 from companion.flight.trajectory import LineProfile
 from companion.messages import LandedState
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.physics.plant import Plant, Quadruple
-from sim_vehicle.setpoint import FREE, TrajectorySetpoint
+from sim_vehicle.physics.plant import Plant
+from sim_vehicle.setpoint import FREE, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.world import Vector3
 
 # A companion's setpoints come at 50 Hz: one in five intervals of 4 ms.
@@ -27,22 +27,18 @@ TOUCH_MARGIN_M = 0.01
 # PX4's land detector says "landed" about a second after the touch.
 LANDED_AFTER_S = 1.0
 FLIP_RATE_RAD_S = 12.0
-# Share of a motor's thrust for a radian per second that is missing in a flip.
-FLIP_GAIN = 0.02
+FLIP_THRUST = 0.5
 
 Manoeuvre = Iterator["Asked"]
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What is asked of the vehicle in an interval, and what the flight knows about it."""
+    """What is asked of the vehicle in an interval (None: idling motors), and what the flight knows about it."""
 
     phase: str
-    setpoint: TrajectorySetpoint | None = None
-    """None: motors idle, or driven."""
+    setpoint: Setpoint | None = None
     armed: bool = True
-    driven: Quadruple | None = None
-    """Shares of each motor's thrust, past all control loops."""
     landed_state: LandedState = LandedState.IN_AIR
     off_reason: str | None = None
 
@@ -141,22 +137,18 @@ class Pilot:
         yield from self._hold("hover", place, self._uniform(1.0, 4.0))
 
     def _flip(self) -> Manoeuvre:
-        """Once round about roll or pitch, motors driven directly, then caught by the position control."""
+        """Once round about roll or pitch at a rate, then caught by the position control."""
         yield from self._line("climb", self._anywhere(floor_m=0.5 * (FLOOR_M + CEILING_M)), 3.0, 2.0)
         axis = int(self._rng.integers(2))
-        sign = 1.0 if self._rng.random() < 0.5 else -1.0
-        # More thrust on the left rolls right, more in front pitches up; order front right, rear left, front left, ...
-        mix = ((-1.0, 1.0, 1.0, -1.0), (1.0, -1.0, 1.0, -1.0))[axis]
+        rate_rad_s = FLIP_RATE_RAD_S if self._rng.random() < 0.5 else -FLIP_RATE_RAD_S
+        setpoint = RatesSetpoint((0.0, rate_rad_s, 0.0) if axis else (rate_rad_s, 0.0, 0.0), FLIP_THRUST)
         turned_rad = 0.0
         for _ in range(self._intervals(2.0)):
-            rate = float(self._body[10 + axis])
-            turned_rad += abs(rate) * self._step_s
+            turned_rad += abs(float(self._body[10 + axis])) * self._step_s
             # The rest of the turn is left to the attitude control, which then takes the short way.
             if turned_rad > 1.7 * math.pi:
                 break
-            lean = FLIP_GAIN * (sign * FLIP_RATE_RAD_S - rate)
-            one, two, three, four = (min(max(0.5 + m * lean, 0.05), 1.0) for m in mix)
-            yield Asked("flip", driven=(one, two, three, four))
+            yield Asked("flip", setpoint)
         yield from self._hold("caught", self._at_velocity((0.0, 0.0, 0.0)), 2.5)
 
     # --- how ------------------------------------------------------------------------------------------------------
@@ -205,9 +197,9 @@ class Pilot:
         return round(seconds / self._step_s)
 
 
-def as_known(setpoint: TrajectorySetpoint | None, part: str) -> Any:
+def as_known(setpoint: Setpoint | None, part: str) -> Any:
     """A setpoint's position or velocity as a companion that sent it knows it: None unless all of it was given."""
-    if setpoint is None:
+    if not isinstance(setpoint, TrajectorySetpoint):
         return None
     vector = getattr(setpoint, part)
     return None if None in vector else vector
