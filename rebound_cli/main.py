@@ -63,6 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_plan(commands)
     _add_sim(commands)
     _add_results(commands)
+    _add_recoveries(commands)
     _add_paper(commands)
     _add_detectors(commands)
     add_preflight(commands)
@@ -142,6 +143,20 @@ def _add_results(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     results.add_argument("--seeds", type=int, default=20, help="flights for each speed and airframe (default 20)")
     results.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
     results.set_defaults(run=_results)
+
+
+def _add_recoveries(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    recoveries = commands.add_parser(
+        "recoveries",
+        help="fly the same hits with two recovery laws and write the table",
+        description="Lockstep wall hits at 1 to 5 m/s, square and slanted, both airframes, laws paper and adaptive.",
+    )
+    recoveries.add_argument(
+        "--out", type=Path, default=Path("docs/recovery.md"), metavar="FILE", help="default: docs/recovery.md"
+    )
+    recoveries.add_argument("--seeds", type=int, default=10, help="flights for each hit and law (default 10)")
+    recoveries.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
+    recoveries.set_defaults(run=_recoveries)
 
 
 def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -242,6 +257,12 @@ def _sim(options: argparse.Namespace) -> int:
     from rebound_cli.sim import run_sim
 
     return run_sim(options)
+
+
+def _recoveries(options: argparse.Namespace) -> int:
+    from rebound_cli.recoveries.command import run_recoveries
+
+    return run_recoveries(options)
 
 
 def _results(options: argparse.Namespace) -> int:

@@ -15,6 +15,7 @@ from companion.recovery.envelope import Envelope
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
+from companion.recovery.way import Coast, Way
 
 # The motion after the contact is read this long after the hit's first sample. Spring arms push for 15 to 60 ms, and
 # the vehicle's estimate is some 20 ms late; waiting for 120 ms makes no better recoveries, only later ones.
@@ -22,6 +23,18 @@ REBOUND_KNOWN_US = 80_000
 # A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
 REBOUND_SLACK_M_S = 0.5
 REBOUND_SLACK_M = 0.2
+# A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
+TELLING_CHANGE_M_S = 1.0
+# Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
+AGREEING = 0.87
+# A glancing hit on one guard spins the vehicle, at 5 m/s with up to 16 rad/s. What it leans to is then turned away from
+# what was asked by rate times lag: 6 rad/s times 0.2 s are 70 degrees. Braking so would throw it about and let it fall
+# by metres; it coasts until it spins slower, which takes up to a second.
+SPINNING_RAD_S = 6.0
+SPINNING_MOST_US = 1_000_000
+# Coasting leaves room to brake in before the fence: half a second's way.
+COASTED_S = 0.5
+ROUNDING_M = 1e-3
 # A contact that still pushes this long after it began is no hit but something that carries the vehicle along.
 CARRIED_AFTER_US = 250_000
 # It pushes still when it pushed within this: a few IMU samples of the slowest stream.
@@ -41,14 +54,15 @@ class Recover:
         if flight.target is not None:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
-        self._is_refined = not self._law.is_refined
+        self._is_seen = self._is_refined = not self._law.is_refined
         self._refined_boot_us = self._record.sample_time_boot_us
         self._take(flight, self._law.expected(self._contact), now_us)
 
     def _take(self, flight: FlightContext, motion: Moving, now_us: int) -> None:
         """The way from this motion to the record's setpoint."""
         goal = self._record.setpoint_ned_m
-        self._way, self._way_began_us = self._law.way(motion, goal), now_us
+        self._way: Way = self._law.way(motion, goal)
+        self._way_began_us = now_us
         self._monitor = SettlingMonitor(goal, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
@@ -83,14 +97,19 @@ class Recover:
         """With the motion after the contact, once; while something goes on pushing, again and again."""
         record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
+        if not self._is_seen and since_us >= REBOUND_KNOWN_US:
+            self._is_seen = True
+            normal = agreed_normal(record.normal_ned, self._contact.velocity_ned_m_s, sample.velocity_ned_m_s)
+            self._contact = replace(self._contact, normal_ned=normal)
         if not self._is_refined and since_us >= REBOUND_KNOWN_US:
-            self._is_refined = True
+            self._is_refined = not self._coasts(flight, sample, since_us, now_us)
+            if not self._is_refined:
+                return
         elif not self._is_carried(sample, since_us):
             return
         else:
             self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
         self._refined_boot_us = sample.time_boot_us
-        self._contact = replace(self._contact, normal_ned=record.normal_ned)
         motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
         if motion is None:
             return
@@ -99,6 +118,23 @@ class Recover:
         off_m_s, place = split(motion.velocity_ned_m_s, self._contact.normal_ned)[0], record.setpoint_ned_m
         text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
         flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+    def _coasts(self, flight: FlightContext, sample: LocalPosition, since_us: int, now_us: int) -> bool:
+        """Go on as it flies, level and inside the fence, while the vehicle spins."""
+        attitude, origin = flight.vehicle.attitude, flight.origin_ned_m
+        if attitude is None or attitude.angular_velocity_frd_rad_s is None or since_us >= SPINNING_MOST_US:
+            return False
+        motion = believable(sample, self._contact, self._record.impulse_m_s, since_us * 1e-6)
+        if abs(attitude.angular_velocity_frd_rad_s[2]) < SPINNING_RAD_S or motion is None or origin is None:
+            return False
+        (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
+        start, velocity = (n, e, self._contact.position_ned_m[2]), (u, v, 0.0)
+        way = Coast(start, velocity, self._record.setpoint_ned_m)
+        ahead = way.at(COASTED_S).position_ned_m
+        if math.dist(Envelope(origin, flight.mission.fence).clamp(start, ahead), ahead) > ROUNDING_M:
+            return False
+        self._way, self._way_began_us = way, now_us
+        return True
 
     def _is_carried(self, sample: LocalPosition, since_us: int) -> bool:
         now_us, record = sample.time_boot_us, self._record
@@ -110,15 +146,27 @@ class Recover:
         )
 
 
+def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
+    """The normal by the push, or by what it did to the velocity where the two do not agree.
+
+    The push of a contact of a millisecond is one sample, shaken and clipped; the change of velocity is all of it.
+    """
+    change = tuple(b - a for a, b in zip(before_ned_m_s, after_ned_m_s, strict=True))
+    size = math.hypot(*change)
+    moved = away_from((change[0], change[1], change[2]))
+    if size < TELLING_CHANGE_M_S or sum(p * m for p, m in zip(pushed_ned, moved, strict=True)) > AGREEING:
+        return pushed_ned
+    return moved
+
+
 def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, since_s: float) -> Moving | None:
     """The motion measured after a contact; None where the hit cannot have caused it.
 
-    A contact changes the velocity by its impulse, and by no more than twice the speed into the obstacle. What
-    estimators say after a stiff hit can be anything.
+    A contact changes the velocity by its impulse (of which a clipped sensor shows a part), and where the obstacle
+    stands still by no more than twice the speed of the approach. What estimators say after a stiff hit can be anything.
     """
     change_m_s = math.dist(sample.velocity_ned_m_s, contact.velocity_ned_m_s)
-    into_m_s = abs(split(contact.velocity_ned_m_s, contact.normal_ned)[0])
-    most_m_s = max(2.0 * into_m_s, impulse_m_s) + REBOUND_SLACK_M_S
+    most_m_s = max(2.0 * math.hypot(*contact.velocity_ned_m_s), impulse_m_s) + REBOUND_SLACK_M_S
     most_m = (math.hypot(*contact.velocity_ned_m_s) + most_m_s) * since_s + REBOUND_SLACK_M
     if change_m_s > most_m_s or math.dist(sample.position_ned_m, contact.position_ned_m) > most_m:
         return None

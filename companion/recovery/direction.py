@@ -4,9 +4,10 @@ import math
 
 from companion.messages import Vector3
 
-# Sine of the normal's angle from the horizontal. Below it height is held, as the normal of a wall is known to ten
-# degrees and the vehicle's own lean adds to that; above it the obstacle is a ceiling, a floor or a steep roof.
-STEEP = 0.5
+# Sine of the normal's angle from the horizontal. Below it height is held, as the vehicle's own lean and a single
+# clipped sample tilt the normal of a wall; above it the obstacle is a ceiling, a floor or a steep roof. As in
+# estimate.normal.
+STEEP = 0.7
 
 
 def away_from(normal_ned: Vector3) -> Vector3:

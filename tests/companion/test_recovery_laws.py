@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.flight.recovering import believable
+from companion.flight.recovering import agreed_normal, believable
 from companion.messages import LocalPosition
 from companion.mission.fence import Fence
 from companion.recovery.adaptive import AdaptiveLaw
@@ -224,3 +224,19 @@ def sample(velocity, position=AT):
 )
 def test_a_rebound_that_the_hit_cannot_have_caused_is_not_believed(moving, impulse_m_s, believed):
     assert (believable(moving, hit(2.0), impulse_m_s, 0.08) is not None) is believed
+
+
+@pytest.mark.parametrize(
+    ("pushed", "after", "normal"),
+    [
+        (
+            (-0.94, 0.34, 0.0),
+            (-0.5, 0.0, 0.0),
+            (-0.94, 0.34, 0.0),
+        ),  # 20 degrees beside the change: friction may be that
+        ((0.0, 1.0, 0.0), (-0.5, 0.0, 0.0), (-1.0, 0.0, 0.0)),  # a sample gone wrong
+        ((0.0, 1.0, 0.0), (1.9, 0.3, 0.0), (0.0, 1.0, 0.0)),  # a graze: the change says little
+    ],
+)
+def test_the_normal_is_the_pushs_unless_the_velocity_says_otherwise(pushed, after, normal):
+    assert agreed_normal(pushed, (2.0, 0.0, 0.0), after) == pytest.approx(normal)

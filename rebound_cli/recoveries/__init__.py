@@ -1,0 +1,1 @@
+"""Recovery laws side by side: the same hits, flown through the whole wire."""
