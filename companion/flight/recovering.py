@@ -54,7 +54,8 @@ class Recover:
         if flight.target is not None:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
-        self._is_seen = self._is_refined = not self._law.is_refined
+        self._is_refined = not self._law.is_refined
+        self._after_ned_m_s: Vector3 | None = None  # the first velocity after the contact
         self._refined_boot_us = self._record.sample_time_boot_us
         self._take(flight, self._law.expected(self._contact), now_us)
 
@@ -97,9 +98,10 @@ class Recover:
         """With the motion after the contact, once; while something goes on pushing, again and again."""
         record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
-        if not self._is_seen and since_us >= REBOUND_KNOWN_US:
-            self._is_seen = True
-            normal = agreed_normal(record.normal_ned, self._contact.velocity_ned_m_s, sample.velocity_ned_m_s)
+        if self._after_ned_m_s is None and since_us >= REBOUND_KNOWN_US:
+            self._after_ned_m_s = sample.velocity_ned_m_s
+        if self._law.is_refined and self._after_ned_m_s is not None:
+            normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
             self._contact = replace(self._contact, normal_ned=normal)
         if not self._is_refined and since_us >= REBOUND_KNOWN_US:
             self._is_refined = not self._coasts(flight, sample, since_us, now_us)
@@ -205,18 +207,21 @@ def _setpoint(
 ) -> Vector3:
     """The law's goal, as what is around lets it be."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), _surfaces(earlier))
+    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), _surfaces(law, earlier))
     return room.goal(contact.position_ned_m, contact.normal_ned, law.goal_ned_m(contact, motion))
 
 
-def _surfaces(earlier: Sequence[CollisionRecord]) -> list[Surface]:
-    """What was hit before in the same recovery, each with the distance that its own recovery wanted."""
+def _surfaces(law: RecoveryLaw, earlier: Sequence[CollisionRecord]) -> list[Surface]:
+    """What was hit before in the same recovery, each with the distance that its own recovery wants."""
     surfaces: list[Surface] = []
     for record in reversed(earlier):
         if record.is_over:
             break
-        touched = Surface(record.contact.position_ned_m, record.normal_ned, 0.0)
-        surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))
+        contact = replace(record.contact, normal_ned=record.normal_ned)
+        touched = Surface(contact.position_ned_m, contact.normal_ned, 0.0)
+        wanted = law.goal_ned_m(contact, law.expected(contact))
+        distance_m = max(0.0, touched.off_m(wanted), touched.off_m(record.setpoint_ned_m))
+        surfaces.append(replace(touched, distance_m=distance_m))
     return surfaces
 
 
