@@ -13,6 +13,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.mavlink.encode import COMPONENT_ID
+from companion.mavlink.frequent import FREQUENT, finite
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -27,7 +28,6 @@ from companion.messages import (
     ImuSample,
     LandedState,
     LocalPosition,
-    Odometry,
     Parameter,
     Sample,
     TimeSyncAnswer,
@@ -42,14 +42,6 @@ HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 FLAG_SIGNED = 0x01
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
-# HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
-ACCELEROMETER_UPDATED = 0x7
-
-
-def _finite(*values: float) -> bool:
-    """False when any value is NaN or infinite (either makes the difference NaN)."""
-    total = sum(values)
-    return total - total == 0.0
 
 
 def _heartbeat(m: Any) -> Heartbeat:
@@ -59,43 +51,16 @@ def _heartbeat(m: Any) -> Heartbeat:
     )
 
 
-def _imu(m: Any) -> ImuSample | None:
-    if m.fields_updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED or not _finite(m.xacc, m.yacc, m.zacc):
-        return None
-    return ImuSample(m.time_usec, (m.xacc, m.yacc, m.zacc), (m.xgyro, m.ygyro, m.zgyro))
-
-
-def _local_position(m: Any) -> LocalPosition | None:
-    if not _finite(m.x, m.y, m.z, m.vx, m.vy, m.vz):
-        return None
-    return LocalPosition(m.time_boot_ms * 1000, (m.x, m.y, m.z), (m.vx, m.vy, m.vz))
-
-
-def _attitude(m: Any) -> Attitude | None:
-    if not _finite(m.q1, m.q2, m.q3, m.q4):
-        return None
-    rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
-    return Attitude(m.time_boot_ms * 1000, (m.q1, m.q2, m.q3, m.q4), rates if _finite(*rates) else None)
-
-
-def _odometry(m: Any) -> Odometry | None:
-    # PX4 sends NED velocity under child frame LOCAL_NED; any other frame would have to be turned first.
-    in_ned = m.frame_id == dialect.MAV_FRAME_LOCAL_NED and m.child_frame_id == dialect.MAV_FRAME_LOCAL_NED
-    if not in_ned or not _finite(m.x, m.y, m.z, m.vx, m.vy, m.vz):
-        return None
-    return Odometry(m.time_usec, (m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.reset_counter)
-
-
 def _attitude_target(m: Any) -> AttitudeTarget | None:
-    if m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE or not _finite(m.thrust):
+    if m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE or not finite(m.thrust):
         return None
-    given = not m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and _finite(*m.q)
+    given = not m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and finite(*m.q)
     w, x, y, z = m.q
     return AttitudeTarget(m.time_boot_ms * 1000, m.thrust, (w, x, y, z) if given else None)
 
 
 def _vibration(m: Any) -> Vibration | None:
-    if not _finite(m.vibration_y, m.vibration_z):
+    if not finite(m.vibration_y, m.vibration_z):
         return None
     counts = (m.clipping_0, m.clipping_1, m.clipping_2)
     return Vibration(m.time_usec, m.vibration_y, m.vibration_z, counts)
@@ -152,10 +117,6 @@ def _autopilot_version(m: Any) -> AutopilotVersion:
 
 CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: _heartbeat,
-    dialect.MAVLINK_MSG_ID_HIGHRES_IMU: _imu,
-    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
-    dialect.MAVLINK_MSG_ID_ODOMETRY: _odometry,
-    dialect.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude,
     dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: _attitude_target,
     dialect.MAVLINK_MSG_ID_VIBRATION: _vibration,
     dialect.MAVLINK_MSG_ID_SYS_STATUS: _battery,
@@ -217,21 +178,29 @@ class Decoder:
             source, message_id = (packet[5], packet[6]), packet[7] | packet[8] << 8 | packet[9] << 16
         else:
             source, message_id = (packet[3], packet[4]), packet[5]
-        converter = CONVERTERS.get(message_id)
-        if converter is None:
+        frequent, converter = FREQUENT.get(message_id), CONVERTERS.get(message_id)
+        if frequent is None and converter is None:
             return None
         if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
             return None
-        try:
-            sample = converter(self._mavlink.decode(bytearray(packet)))
-        except dialect.MAVError:
-            return None
+        if converter is not None:
+            sample = self._converted(converter, packet)
+        else:
+            assert frequent is not None
+            start = HEADER_V2 if packet[0] == MAGIC_V2 else HEADER_V1
+            sample = frequent.sample(packet[start : start + packet[1]])
         if isinstance(sample, ImuSample):
             self._boot_us = sample.time_boot_us
         elif self._boot_us > WRAP_US // 2 and isinstance(sample, LocalPosition | Attitude | AttitudeTarget):
             wraps = round((self._boot_us - sample.time_boot_us) / WRAP_US)
             return replace(sample, time_boot_us=sample.time_boot_us + wraps * WRAP_US) if wraps else sample
         return sample
+
+    def _converted(self, converter: Callable[[Any], Sample | None], packet: bytes) -> Sample | None:
+        try:
+            return converter(self._mavlink.decode(bytearray(packet)))
+        except dialect.MAVError:
+            return None
 
 
 def _packet_length(data: bytes, start: int) -> int:
