@@ -7,6 +7,7 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message, boot_ms
 from sim_vehicle.mavlink.telemetry import Telemetry
 
@@ -163,7 +164,7 @@ def flight_information(state: Telemetry) -> Message:
 
 def attitude_target(state: Telemetry) -> Message:
     """The attitude control's setpoint; it has none for the rates."""
-    return dialect.MAVLink_attitude_target_message(
+    return framing.AttitudeTarget(
         boot_ms(state.sample), 0, state.attitude_setpoint_wxyz(), 0.0, 0.0, 0.0, state.sample.thrust_fraction
     )
 

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.estimate import Estimate
 from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.modes import NUMBERS, base_mode
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
@@ -79,12 +80,10 @@ def highres_imu(state: Telemetry) -> Message:
     if field_is_new:
         fields |= _MAGNETIC_FIELDS
     if air is None:
-        return dialect.MAVLink_highres_imu_message(
-            sample.time_boot_us, ax, ay, az, p, q, r, mx, my, mz, 0.0, 0.0, 0.0, 0.0, fields
-        )
+        return framing.HighresImu(sample.time_boot_us, ax, ay, az, p, q, r, mx, my, mz, 0.0, 0.0, 0.0, 0.0, fields)
     if air_is_new:
         fields |= _AIR_FIELDS
-    return dialect.MAVLink_highres_imu_message(
+    return framing.HighresImu(
         sample.time_boot_us,
         ax,
         ay,
@@ -107,7 +106,7 @@ def local_position_ned(state: Telemetry) -> Message:
     estimate = state.published
     x, y, z = estimate.position_ned_m
     vx, vy, vz = estimate.velocity_ned_m_s
-    return dialect.MAVLink_local_position_ned_message(boot_ms(estimate), x, y, z, vx, vy, vz)
+    return framing.LocalPositionNed(boot_ms(estimate), x, y, z, vx, vy, vz)
 
 
 def attitude(state: Telemetry) -> Message:
@@ -117,14 +116,14 @@ def attitude(state: Telemetry) -> Message:
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     p, q, r = sample.angular_velocity_frd_rad_s
-    return dialect.MAVLink_attitude_message(boot_ms(sample), roll, pitch, yaw, p, q, r)
+    return framing.Attitude(boot_ms(sample), roll, pitch, yaw, p, q, r)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
     sample = state.sample
     w, x, y, z = sample.attitude_wxyz
     p, q, r = sample.angular_velocity_frd_rad_s
-    return dialect.MAVLink_attitude_quaternion_message(boot_ms(sample), w, x, y, z, p, q, r, _NO_OFFSET)
+    return framing.AttitudeQuaternion(boot_ms(sample), w, x, y, z, p, q, r, _NO_OFFSET)
 
 
 def odometry(state: Telemetry) -> Message:
@@ -133,7 +132,7 @@ def odometry(state: Telemetry) -> Message:
     x, y, z = estimate.position_ned_m
     vx, vy, vz = estimate.velocity_ned_m_s
     p, q, r = estimate.angular_velocity_frd_rad_s
-    return dialect.MAVLink_odometry_message(
+    return framing.Odometry(
         estimate.time_boot_us,
         dialect.MAV_FRAME_LOCAL_NED,
         dialect.MAV_FRAME_LOCAL_NED,

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
+from sim_vehicle.mavlink import framing
 
 Message: TypeAlias = Any
 
@@ -120,7 +121,7 @@ def _gps(fix: HilGps) -> Message:
 
 
 def _motion_capture(seen: MotionCapture) -> Message:
-    return dialect.MAVLink_odometry_message(
+    return framing.Odometry(
         seen.time_us,
         dialect.MAV_FRAME_LOCAL_NED,
         dialect.MAV_FRAME_LOCAL_NED,

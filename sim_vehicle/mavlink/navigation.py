@@ -8,6 +8,7 @@ import math
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import TrajectorySetpoint
@@ -25,7 +26,7 @@ def global_position_int(state: Telemetry) -> Message:
     estimate = state.published
     place = state.origin.place_at(estimate.position_ned_m)
     v_north, v_east, v_down = estimate.velocity_ned_m_s
-    return dialect.MAVLink_global_position_int_message(
+    return framing.GlobalPositionInt(
         boot_ms(estimate),
         round(1e7 * place.latitude_deg),
         round(1e7 * place.longitude_deg),

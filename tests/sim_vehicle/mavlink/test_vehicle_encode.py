@@ -18,7 +18,7 @@ from sim_vehicle.autopilot.messages import (
     TimeSyncRequest,
 )
 from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.mavlink import condition, encode
+from sim_vehicle.mavlink import condition, encode, framing
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.texts import TextLink
@@ -278,3 +278,20 @@ def test_a_long_text_comes_in_pieces():
     assert [(piece.id, piece.chunk_seq, piece.severity) for piece in pieces] == [(1, 0, 2), (1, 1, 2)]
     assert "".join(piece.text.rstrip("\0") for piece in pieces) == long.text + "\t"
     assert len(pieces[0].text) == 50
+
+
+def test_frequent_messages_are_framed_as_pymavlink_frames_them():
+    """Zeros at the end of a payload, an all-zero payload and a wrapped sequence number included."""
+    plain, framed = dialect.MAVLink(None, 7, 1), dialect.MAVLink(None, 7, 1)
+    cases = [
+        (dialect.MAVLink_local_position_ned_message, framing.LocalPositionNed, (5, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0)),
+        (dialect.MAVLink_local_position_ned_message, framing.LocalPositionNed, (0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        (dialect.MAVLink_attitude_message, framing.Attitude, (5, 0.1, 0.2, 0.3, 0.0, 0.0, 1.0)),
+        (dialect.MAVLink_highres_imu_message, framing.HighresImu, (9, *[0.5] * 13, 0x3F)),
+        (dialect.MAVLink_attitude_target_message, framing.AttitudeTarget, (5, 0, (1, 0, 0, 0), 0, 0, 0, 0.5)),
+    ]
+    for sequence in (0, 255):
+        plain.seq = framed.seq = sequence
+        for theirs, ours, values in cases:
+            assert ours(*values).pack(framed) == theirs(*values).pack(plain)
+            assert ours(*values).pack(framed, force_mavlink1=True) == theirs(*values).pack(plain, force_mavlink1=True)
