@@ -8,7 +8,7 @@ from rebound_cli.detectors.watching import ASKED_HZ
 from rebound_cli.detectors_report.bars import Bar
 from rebound_cli.detectors_report.flights import alarms
 from rebound_cli.detectors_report.hits import DEFAULT, plain
-from rebound_cli.detectors_report.numbers import Entry, Hits, Scored, percentile
+from rebound_cli.detectors_report.numbers import Entry, Hits, Scored, percentile, text_of
 from rebound_cli.paper.table import markdown
 
 BASELINE = "threshold"
@@ -70,8 +70,8 @@ def baseline_text(hits: Hits) -> str:
                     f"{airframe}, {rate}",
                     f"{len(every)}",
                     *[f"{sum(not pair[side].is_found for pair in every)}" for side in (0, 1)],
-                    *[f"{percentile([pair[side] for pair in both], 50):.1f}" for side in (0, 1)],
-                    f"{ratio:.1f}",
+                    *[text_of(percentile([pair[side] for pair in both], 50), 1) for side in (0, 1)],
+                    text_of(ratio, 1),
                 ]
             )
     return markdown(COLUMNS, rows)
