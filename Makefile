@@ -15,7 +15,7 @@ test: $(READY)
 # Other people's clients on the simulated vehicle, each in an environment of its own: MAVSDK 3 and 4 cannot share one.
 # In real time: some minutes.
 CLIENTS := $(abspath .venv-clients)
-CLIENT_TEST := -m pytest -q -p no:cacheprovider --rootdir=.
+CLIENT_TEST := -m pytest -q -o addopts= -p no:cacheprovider --rootdir=.
 
 clients: $(READY) $(CLIENTS)/mavsdk3/.ready $(CLIENTS)/mavproxy/.ready
 	cd tests/clients && $(abspath $(BIN))/python $(CLIENT_TEST) test_mavutil.py test_mavsdk_v4.py test_mavsdk_missions.py
