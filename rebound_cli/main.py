@@ -173,7 +173,7 @@ def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="folder of paper.md and images/paper (default: docs)",
     )
     paper.add_argument(
-        "--seeds", type=count, default=10, help="walls from any side: flights at each speed (default 10)"
+        "--seeds", type=count, default=6, help="walls from any side: flights at each speed (default 6)"
     )
     paper.add_argument("--jobs", type=count, default=2, help="processes at a time (default 2)")
     paper.set_defaults(run=_paper)

@@ -109,4 +109,4 @@ def results_text(findings: Sequence[Findings], seeds: int) -> str:
 
 
 # Chosen so that all of it takes less than five minutes on two cores.
-DEFAULT_SEEDS = 10
+DEFAULT_SEEDS = 6
