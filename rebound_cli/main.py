@@ -154,7 +154,7 @@ def _add_recoveries(commands: "argparse._SubParsersAction[argparse.ArgumentParse
     recoveries.add_argument(
         "--out", type=Path, default=Path("docs/recovery.md"), metavar="FILE", help="default: docs/recovery.md"
     )
-    recoveries.add_argument("--seeds", type=int, default=10, help="flights for each hit and law (default 10)")
+    recoveries.add_argument("--seeds", type=count, default=10, help="flights for each hit and law (default 10)")
     recoveries.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
     recoveries.set_defaults(run=_recoveries)
 
@@ -172,9 +172,7 @@ def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         metavar="DIR",
         help="folder of paper.md and images/paper (default: docs)",
     )
-    paper.add_argument(
-        "--seeds", type=count, default=6, help="walls from any side: flights at each speed (default 6)"
-    )
+    paper.add_argument("--seeds", type=count, default=6, help="walls from any side: flights at each speed (default 6)")
     paper.add_argument("--jobs", type=count, default=2, help="processes at a time (default 2)")
     paper.set_defaults(run=_paper)
 
