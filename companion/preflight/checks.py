@@ -173,6 +173,10 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
         yield Finding("estimator", Verdict.DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
         return
     found = f"largest innovation test ratio {max(ratios):.2f}"
+    if not survey.estimator[-1].horizontal_velocity_is_good:
+        remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
+        yield Finding("estimator", Verdict.BAD, "no horizontal velocity", remedy)
+        return
     if max(ratios) >= BAD_RATIO or any(e.accelerometer_is_doubted for e in survey.estimator):
         yield Finding("estimator", Verdict.BAD, found, "the estimator turns its sensors down: calibrate, check mounts")
     elif max(ratios) >= DOUBTFUL_RATIO:

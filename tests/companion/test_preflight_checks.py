@@ -30,7 +30,9 @@ HEALTHY = {
 }
 
 
-def surveyed(parameters=HEALTHY, imu_hz=250, wander_m=0.0, ratio=0.1, trip_us=2_000, battery=90, clipped=0) -> Survey:
+def surveyed(
+    parameters=HEALTHY, imu_hz=250, wander_m=0.0, ratio=0.1, trip_us=2_000, battery=90, clipped=0, velocity=True
+) -> Survey:
     """A vehicle that was listened to for the whole time."""
     survey = start_survey(CompanionConfig(), 0)
     advance(survey, [PX4], 0)
@@ -44,7 +46,7 @@ def surveyed(parameters=HEALTHY, imu_hz=250, wander_m=0.0, ratio=0.1, trip_us=2_
             north_m = wander_m if number % 2 else -wander_m
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
         if number % 250 == 0:
-            samples += [EstimatorStatus(ratio, ratio, ratio, True, False), Battery(battery)]
+            samples += [EstimatorStatus(ratio, ratio, ratio, velocity, False), Battery(battery)]
             samples += [
                 Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0)),
                 TimeSyncAnswer(1000 * (now_us - trip_us), 1),
@@ -96,6 +98,7 @@ def test_a_radio_that_may_be_lost_is_excepted_and_the_other_exceptions_stay():
         ({"wander_m": 0.8}, "position", Verdict.BAD),
         ({"ratio": 0.7}, "estimator", Verdict.DOUBTFUL),
         ({"ratio": 1.2}, "estimator", Verdict.BAD),
+        ({"velocity": False}, "estimator", Verdict.BAD),
         ({"trip_us": 40_000}, "time", Verdict.DOUBTFUL),
         ({"trip_us": 200_000}, "time", Verdict.BAD),
         ({"battery": 30}, "battery", Verdict.DOUBTFUL),
