@@ -47,11 +47,6 @@ class Return:
         self.target = Target(Kind.IDLE, self._place_ned_m)
         self.texts: list[StatusText] = []
 
-    @property
-    def is_landing(self) -> bool:
-        """Whether the last leg has come."""
-        return self._leg is Leg.LAND
-
     def begin(self, view: View, rally: tuple[MissionItem, ...]) -> None:
         """Choose where to and how high, and start."""
         self._choose_place(view, rally)
