@@ -5,44 +5,36 @@ same outputs, which is what makes a flight replayable.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from companion.detection import watch
 from companion.detection.interface import Situation
 from companion.detection.watch import Watch, start_watch
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.connecting import Connect
-from companion.flight.context import FlightContext, Inputs, Target
-from companion.flight.envelope import Surroundings, bounded
+from companion.flight.context import FlightContext, Inputs
+from companion.flight.hearing import hear
+from companion.flight.limiting import Limiter
 from companion.flight.machine import Machine
 from companion.flight.operator import status_text, values
 from companion.flight.states import FINAL_STATES, State
-from companion.link.identity import identify, is_autopilot
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
-    Heartbeat,
     LocalPosition,
     OnboardHeartbeat,
     Outgoing,
     PositionSetpoint,
     Sample,
-    TimeSyncReply,
-    TimeSyncRequest,
-    Vector3,
 )
 from companion.mission.model import Mission
-from companion.px4_mode import mode_name
 from companion.report import Event
 
 # MAVLink's heartbeat microservice: once a second.
 HEARTBEAT_INTERVAL_US = 1_000_000
 # All timeouts are noticed within this, when nothing arrives.
 POLL_INTERVAL_US = 50_000
-
-# A setpoint at the edge of the envelope may cross it fifty times a second.
-LEAST_BETWEEN_LIMITS_US = 1_000_000
 
 # Between take-off and landing: the floor counts.
 ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
@@ -69,10 +61,7 @@ class Core:
     setpoint_interval_us: int
     stop_reason: str | None = None
     values_due_us: int = 0
-    last_setpoint_ned_m: Vector3 | None = None
-    last_setpoint_us: int = 0
-    limited_by: str = ""
-    limit_told_us: int = 0
+    limiter: Limiter = field(default_factory=Limiter)
 
     @property
     def flight(self) -> FlightContext:
@@ -111,40 +100,13 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
     """
     try:
-        refusal = hear(core, samples, now_us)
+        refusal = hear(core.flight, samples, now_us)
         impacts = () if core.flight.fault else detect(core, samples, now_us)
         moved = fly(core, samples, impacts, refusal, now_us)
         follow_contact(core)
     except Exception as error:
         return core.machine.fail(error, now_us)
     return moved
-
-
-def hear(core: Core, samples: Sequence[Sample], now_us: int) -> str | None:
-    """Bring the vehicle view up to date, answer time requests; why the vehicle is refused, or None."""
-    flight = core.flight
-    vehicle, streams = flight.vehicle, flight.streams
-    mode, armed = vehicle.custom_mode, vehicle.armed
-    for sample in samples:
-        if isinstance(sample, Heartbeat):
-            if not is_autopilot(sample):
-                continue
-            if vehicle.identity is None:
-                identity = identify(sample)
-                if isinstance(identity, str):
-                    return identity
-                vehicle.identity = identity
-            if sample.system_id != vehicle.identity.system_id:
-                continue
-        elif isinstance(sample, TimeSyncRequest):
-            flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
-        vehicle.hear(sample, now_us)
-        streams.count(type(sample), now_us)
-    if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
-        flight.tell(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
-    if vehicle.armed is False and armed:
-        flight.tell(now_us, "disarmed", "disarmed")
-    return None
 
 
 def detect(core: Core, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
@@ -225,33 +187,14 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
         wanted = core.flight.target
     if wanted is None:
         return
-    target = core.flight.target = within_envelope(core, wanted, moved, now_us)
+    has_floor = core.machine.state in ON_THE_WAY
+    target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)
     time_us = now_us - core.started_at_us
     core.flight.outbox.append(
         PositionSetpoint(
             time_us, target.position_ned_m, target.yaw_rad, target.velocity_ned_m_s, target.acceleration_ned_m_s2
         )
     )
-
-
-def within_envelope(core: Core, wanted: Target, moved: bool, now_us: int) -> Target:
-    """The setpoint as the mission's fence and limits let it pass; told when they do not."""
-    flight = core.flight
-    latest = flight.vehicle.history.latest()
-    around = Surroundings(
-        vehicle_ned_m=None if latest is None else latest.position_ned_m,
-        origin_ned_m=flight.origin_ned_m,
-        has_floor=core.machine.state in ON_THE_WAY,
-        last_ned_m=None if moved else core.last_setpoint_ned_m,
-        since_last_s=(now_us - core.last_setpoint_us) * 1e-6,
-    )
-    target, reason = bounded(wanted, around, flight.mission.fence, flight.mission.limits)
-    if reason != core.limited_by and now_us - core.limit_told_us >= LEAST_BETWEEN_LIMITS_US:
-        core.limited_by, core.limit_told_us = reason, now_us
-        text = f"setpoint held back: {reason}" if reason else "setpoint free again"
-        flight.tell(now_us, "envelope", text, reason=reason)
-    core.last_setpoint_ned_m, core.last_setpoint_us = target.position_ned_m, now_us
-    return target
 
 
 def beat(core: Core, now_us: int) -> None:
