@@ -111,6 +111,18 @@ class Imu(_Part):
         return self
 
 
+class Clipping(_Part):
+    """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (docs/px4.md).
+
+    The hidden part is missing in the velocity at once. `late_s` later the error of the place that grows from it begins
+    to correct both, as a second-order system.
+    """
+
+    late_s: NotNegative
+    frequency_rad_s: Positive
+    damping: Positive
+
+
 class Estimate(_Part):
     """Where the vehicle's own state estimate comes from.
 
@@ -126,6 +138,8 @@ class Estimate(_Part):
     velocity_correlation_s: Positive
     attitude_noise_rad: NotNegative
     attitude_correlation_s: Positive
+    clipping: Clipping | None
+    """None: the estimate knows all of a hit, whatever the accelerometer saw of it."""
 
 
 class Control(_Part):

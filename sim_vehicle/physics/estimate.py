@@ -9,7 +9,7 @@ import numpy.typing as npt
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import Disturbance, State
-from sim_vehicle.physics.rotation import turn
+from sim_vehicle.physics.rotation import matrix_from_quaternion, turn
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -17,6 +17,8 @@ Ints = npt.NDArray[np.int64]
 # Low-pass on the slope of the estimated velocity, the D of eq. 6: the noise of an optical-flow velocity
 # differentiated at 100 Hz would otherwise tilt the vehicle by degrees.
 SLOPE_TIME_CONSTANT_S = 0.05
+# Less than this hidden in an interval disturbs nobody: a propeller that makes the sensor clip now and then.
+LEAST_HIDDEN_M_S = 0.02
 
 
 class EstimateErrors(NamedTuple):
@@ -28,6 +30,10 @@ class EstimateErrors(NamedTuple):
     past: Floats  # (delay in intervals + 1, 13); without rows the estimate comes from elsewhere
     cursor: Ints  # (1,)
     velocity_before: Floats  # (3,) the estimate's, one interval ago
+    missed: Floats  # (6,) position m, velocity m/s, NED: what the estimate is off by since clipping hid a hit from it
+    since_missed_s: Floats  # (1,) since clipping last hid something
+    rotation: Floats  # (3, 3) working memory
+    clipping: Floats  # (4,) interval s, late s, frequency rad/s, damping; frequency 0: nothing is missed
 
 
 def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) -> EstimateErrors:
@@ -40,6 +46,8 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
     )
     keep = np.exp(-interval_s / correlation_s)
     slots = round(estimate.delay_s / interval_s) + 1 if estimate.kind == "markov" else 0
+    found = estimate.clipping
+    clipping = (found.late_s, found.frequency_rad_s, found.damping) if found else (0.0, 0.0, 0.0)
     return EstimateErrors(
         error=sigma * rng.standard_normal(9),
         keep=keep,
@@ -47,6 +55,10 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         past=np.tile(body, (slots, 1)),
         cursor=np.zeros(1, np.int64),
         velocity_before=np.zeros(3),
+        missed=np.zeros(6),
+        since_missed_s=np.zeros(1),
+        rotation=np.empty((3, 3)),
+        clipping=np.array([interval_s, *clipping]),
     )
 
 
@@ -63,11 +75,38 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturb
         errors.velocity_before[i] = state.estimate[3 + i]
     for i in range(9):
         errors.error[i] = errors.keep[i] * errors.error[i] + errors.drive[i] * noise[i]
+    miss_what_was_clipped(state, errors)
     for i in range(6):
-        state.estimate[i] = delayed[i] + errors.error[i] + disturbance.estimate_jump[i]
+        state.estimate[i] = delayed[i] + errors.error[i] + errors.missed[i] + disturbance.estimate_jump[i]
     for i in range(3):
-        state.frame_offset_ned_m[i] = errors.error[i] + disturbance.estimate_jump[i]
+        state.frame_offset_ned_m[i] = errors.error[i] + errors.missed[i] + disturbance.estimate_jump[i]
     turn(state.body, errors.error[6], errors.error[7], errors.error[8], state.estimate)
+
+
+@njit
+def miss_what_was_clipped(state: State, errors: EstimateErrors) -> None:
+    """What clipping hides of a hit is missing in the velocity, until other sensors have put velocity and place right.
+
+    An estimator of second order that is corrected by the error of its position, some time after the hit.
+    """
+    step_s, late_s, frequency, damping = errors.clipping
+    missed = errors.missed
+    hidden = abs(state.clipped_off_m_s[0]) + abs(state.clipped_off_m_s[1]) + abs(state.clipped_off_m_s[2])
+    if frequency == 0.0:
+        return
+    errors.since_missed_s[0] += step_s
+    if hidden >= LEAST_HIDDEN_M_S:
+        matrix_from_quaternion(state.body, errors.rotation)
+        errors.since_missed_s[0] = 0.0
+        for i in range(3):
+            for j in range(3):
+                missed[3 + i] -= errors.rotation[i, j] * state.clipped_off_m_s[j]
+    for i in range(3):
+        missed[i] += step_s * missed[3 + i]
+        if errors.since_missed_s[0] > late_s:
+            off_m = missed[i]
+            missed[i] -= step_s * 2.0 * damping * frequency * off_m
+            missed[3 + i] -= step_s * frequency * frequency * off_m
 
 
 @njit
