@@ -152,6 +152,20 @@ class World:
     kinds: tuple[str, ...]
     """ground, wall, ceiling, floor, edge or pole."""
     movers: tuple[Mover, ...]
+    obstacles: tuple[Obstacle, ...]
+    owners: Ints
+    """Which of the obstacles each row is a part of; -1 for the ground."""
+
+    def rows_in(self, other: "World") -> Ints:
+        """For each row, which one it is in another world; -1 where its obstacle is not there. The same obstacles are
+        the same objects.
+        """
+        there = {id(obstacle): number for number, obstacle in enumerate(other.obstacles)} | {id(None): -1}
+        found = np.full(len(self.owners), -1)
+        for number, obstacle in ((-1, None), *enumerate(self.obstacles)):
+            if id(obstacle) in there:
+                found[self.owners == number] = np.flatnonzero(other.owners == there[id(obstacle)])
+        return found
 
 
 def build_world(obstacles: tuple[Obstacle, ...]) -> World:
@@ -174,6 +188,8 @@ def build_world(obstacles: tuple[Obstacle, ...]) -> World:
         names=tuple(GROUND if number < 0 else obstacles[number].name for number, _, _ in parts),
         kinds=tuple(kind for _, kind, _ in parts),
         movers=tuple(movers),
+        obstacles=obstacles,
+        owners=owners,
     )
 
 

@@ -37,8 +37,18 @@ class Schedule:
         self._period_us = round(1e6 / aid.rate_hz)
         self._interval_us = interval_us
         self._share_lost = aid.share_lost
-        self._lost_us = [(1e6 * start, 1e6 * end) for start, end in aid.lost_between_s]
+        self.lost_us: list[tuple[float, float]] = []
         self._rng = rng
+        for window_s in aid.lost_between_s:
+            self.lose(window_s)
+
+    def lose(self, window_s: tuple[float, float]) -> None:
+        """Every sample between two times since boot is lost."""
+        self.lost_us.append((1e6 * window_s[0], 1e6 * window_s[1]))
+
+    def find(self, window_s: tuple[float, float]) -> None:
+        """They are not, from now on."""
+        self.lost_us.remove((1e6 * window_s[0], 1e6 * window_s[1]))
 
     def is_due(self, time_us: int) -> bool:
         """Whether the interval just ended contains a multiple of the period."""
@@ -46,7 +56,7 @@ class Schedule:
 
     def is_lost(self, time_us: int) -> bool:
         """Whether the sample of this moment is lost, by the file's plan or by chance."""
-        if any(start <= time_us < end for start, end in self._lost_us):
+        if any(start <= time_us < end for start, end in self.lost_us):
             return True
         return self._share_lost > 0 and self._rng.random() < self._share_lost
 
@@ -58,21 +68,25 @@ class FlowSensor:
         self._spec = spec
         self._faces = faces
         self._step_s = 1e-6 * interval_us
-        self._schedule = Schedule(spec, interval_us, rng)
+        self.schedule = Schedule(spec, interval_us, rng)
         self._rng = rng
         self._camera = np.zeros(CAMERA_ROWS)
         self._last_us = 0
 
+    def look_at(self, faces: Floats) -> None:
+        """See another world from now on."""
+        self._faces = faces
+
     def observe(self, time_us: int, body: Floats) -> FlowSample | None:
         """See one interval; the sample if one is due."""
         watch(body, self._faces, self._step_s, self._camera)
-        if not self._schedule.is_due(time_us):
+        if not self.schedule.is_due(time_us):
             return None
         seen: list[float] = self._camera.tolist()
         self._camera[FLOW_X : TURN_Z + 1] = 0.0
         self._camera[FASTEST] = 0.0
         integration_us, self._last_us = time_us - self._last_us, time_us
-        if not self._sees(seen) or self._schedule.is_lost(time_us):
+        if not self._sees(seen) or self.schedule.is_lost(time_us):
             return FlowSample(time_us, integration_us, (0.0, 0.0), (0.0, 0.0, 0.0), NO_QUALITY)
         spec, gauss, seconds = self._spec, self._rng.gauss, 1e-6 * integration_us
         turn_x, turn_y, turn_z = (
@@ -98,18 +112,18 @@ class RangeSensor:
 
     def __init__(self, spec: RangeFinder, interval_us: int, rng: random.Random) -> None:
         self._spec = spec
-        self._schedule = Schedule(spec, interval_us, rng)
+        self.schedule = Schedule(spec, interval_us, rng)
         self._rng = rng
         self._bias_m = rng.gauss(0, spec.bias_m)
 
     def is_due(self, time_us: int) -> bool:
-        return self._schedule.is_due(time_us)
+        return self.schedule.is_due(time_us)
 
     def observe(self, time_us: int, distance_m: float) -> RangeSample:
         """The sample of a true distance, which is only worth computing when one is due."""
         spec = self._spec
         least_m, most_m = spec.distance_min_m, spec.distance_max_m
-        if self._schedule.is_lost(time_us) or not least_m <= distance_m <= most_m:
+        if self.schedule.is_lost(time_us) or not least_m <= distance_m <= most_m:
             return RangeSample(time_us, None, least_m, most_m)
         measured_m = distance_m + self._bias_m + self._rng.gauss(0, spec.noise_m)
         return RangeSample(time_us, max(measured_m, 0.0), least_m, most_m)
@@ -120,12 +134,12 @@ class CompassSensor:
 
     def __init__(self, spec: Compass, interval_us: int, rng: random.Random) -> None:
         self._spec = spec
-        self._schedule = Schedule(spec, interval_us, rng)
+        self.schedule = Schedule(spec, interval_us, rng)
         self._rng = rng
 
     def observe(self, time_us: int, body: Floats) -> HeadingSample | None:
         """The sample if one is due and not lost."""
-        if not self._schedule.is_due(time_us) or self._schedule.is_lost(time_us):
+        if not self.schedule.is_due(time_us) or self.schedule.is_lost(time_us):
             return None
         return HeadingSample(time_us, true_yaw(body) + self._rng.gauss(0, self._spec.noise_rad))
 
@@ -135,12 +149,12 @@ class CaptureSensor:
 
     def __init__(self, spec: MotionCapture, interval_us: int, rng: random.Random) -> None:
         self._spec = spec
-        self._schedule = Schedule(spec, interval_us, rng)
+        self.schedule = Schedule(spec, interval_us, rng)
         self._rng = rng
 
     def observe(self, time_us: int, body: Floats) -> CaptureSample | None:
         """The sample if one is due and not lost."""
-        if not self._schedule.is_due(time_us) or self._schedule.is_lost(time_us):
+        if not self.schedule.is_due(time_us) or self.schedule.is_lost(time_us):
             return None
         gauss, noise_m = self._rng.gauss, self._spec.noise_m
         x, y, z = body[0:3].tolist()

@@ -1,19 +1,18 @@
 """Faults of the vehicle's body: motors, supply, load, and hands."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import BatterySag, FreeFall, HandCatch, MotorFailure, PayloadDrop, Push
 from sim_vehicle.faults.wind import risen
 from sim_vehicle.physics.layout import Disturbance, State
 
 
-class Motors:
+class Motors(Group[MotorFailure | FreeFall | BatterySag]):
     """What each motor gives of what it is commanded."""
 
-    def __init__(self, faults: Sequence[MotorFailure | FreeFall | BatterySag]) -> None:
-        self._faults = faults
+    def __init__(self) -> None:
+        super().__init__()
         self.voltage_share = 1.0
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
@@ -35,25 +34,19 @@ class Motors:
         disturbance.motor_share[:] = shares
 
 
-class Load:
+class Load(Group[PayloadDrop]):
     """What the vehicle still carries."""
 
-    def __init__(self, drops: Sequence[PayloadDrop]) -> None:
-        self._drops = drops
-
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
-        disturbance.carried_kg = sum(drop.mass_kg for drop in self._drops if time_s < drop.window_s[0])
+        disturbance.carried_kg = sum(drop.mass_kg for drop in self._faults if time_s < drop.window_s[0])
 
 
-class Pushes:
+class Pushes(Group[Push]):
     """Forces on a point of the body, one at a time."""
-
-    def __init__(self, pushes: Sequence[Push]) -> None:
-        self._pushes = pushes
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
         disturbance.pushes = 0
-        for push in self._pushes:
+        for push in self._faults:
             start_s, end_s = push.window_s
             if start_s <= time_s < end_s:
                 share = risen(time_s, start_s, end_s, push.rise_s) if push.rise_s > 0.0 else 1.0
@@ -62,16 +55,16 @@ class Pushes:
                 disturbance.push_point_frd_m[:] = push.point_frd_m
 
 
-class Hands:
+class Hands(Group[HandCatch]):
     """Hands that take hold of the vehicle where it is."""
 
-    def __init__(self, catches: Sequence[HandCatch]) -> None:
-        self._catches = catches
+    def __init__(self) -> None:
+        super().__init__()
         self._held: HandCatch | None = None
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
         held = None
-        for catch in self._catches:
+        for catch in self._faults:
             start_s, end_s = catch.window_s
             if start_s <= time_s < end_s:
                 held = catch

@@ -1,10 +1,11 @@
 """Faults of the vehicle's estimate: it jumps, it misses what clipping hid, it drifts without its sensors."""
 
-from collections.abc import Sequence
+from bisect import insort
 
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import AidingLoss, EstimatorAfterClipping, EstimatorReset
 from sim_vehicle.physics.layout import Disturbance, State
 from sim_vehicle.physics.rotation import matrix_from_quaternion
@@ -12,30 +13,33 @@ from sim_vehicle.physics.rotation import matrix_from_quaternion
 Floats = npt.NDArray[np.float64]
 
 
-class Estimate:
+class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
     """How far the estimate is off (position m, velocity m/s, NED), and how often it has said that it jumped."""
 
-    def __init__(
-        self,
-        faults: Sequence[EstimatorReset | EstimatorAfterClipping | AidingLoss],
-        drifts: bool,
-        step_s: float,
-        rng: np.random.Generator,
-    ) -> None:
+    def __init__(self, drifts: bool, step_s: float, rng: np.random.Generator) -> None:
         """``drifts``: nothing else models what the loss of a sensor does."""
-        self._resets = [fault for fault in faults if isinstance(fault, EstimatorReset)]
-        self._clippings = [fault for fault in faults if isinstance(fault, EstimatorAfterClipping)]
-        self._losses = [fault for fault in faults if isinstance(fault, AidingLoss)] if drifts else []
+        super().__init__()
+        self._drifts = drifts
+        self._pending: list[EstimatorReset] = []
         self._step_s = step_s
         self._rng = rng
-        self._pending = sorted(self._resets, key=lambda fault: fault.window_s)
-        self._lost_before: set[int] = set()
+        self._straying: list[AidingLoss] = []
         self._due_s: list[float] = []
         self._kick_m_s = 0.0
         self._settles_s = 1.0
         self._rotation = np.empty((3, 3))
         self._shift, self._velocity, self._drift = np.zeros(3), np.zeros(3), np.zeros(6)
         self.reset_counter = 0
+
+    def add(self, fault: EstimatorReset | EstimatorAfterClipping | AidingLoss) -> None:
+        super().add(fault)
+        if isinstance(fault, EstimatorReset):
+            insort(self._pending, fault, key=lambda reset: reset.window_s)
+
+    def remove(self, fault: EstimatorReset | EstimatorAfterClipping | AidingLoss) -> None:
+        """What has jumped stays; a sensor that was lost is back."""
+        super().remove(fault)
+        self._pending = [reset for reset in self._pending if reset is not fault]
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
         self._velocity *= np.exp(-self._step_s / self._settles_s)
@@ -55,7 +59,9 @@ class Estimate:
 
     def _miss(self, time_s: float, state: State) -> None:
         """Velocity that clipping has hidden is missing at once; resets follow, each leaving an error of its own."""
-        for fault in self._clippings:
+        for fault in self._faults:
+            if not isinstance(fault, EstimatorAfterClipping):
+                continue
             start_s, end_s = fault.window_s
             hidden = np.array(state.clipped_off_m_s)
             if not start_s <= time_s < end_s or float(np.linalg.norm(hidden)) < fault.least_hidden_m_s:
@@ -73,18 +79,20 @@ class Estimate:
 
     def _stray(self, time_s: float) -> None:
         """Random walk of the velocity while a sensor is lost; when it is back the estimate jumps back to the truth."""
-        for number, fault in enumerate(self._losses):
-            start_s, end_s = fault.window_s
-            if start_s <= time_s < end_s:
-                self._lost_before.add(number)
-                axes = _STRAYING.get(fault.sensor, slice(0, 0))
-                walk = fault.drift_m_s2 * np.sqrt(self._step_s) * self._rng.standard_normal(3)
-                self._drift[3:6][axes] += walk[axes]
-                self._drift[0:3][axes] += self._step_s * self._drift[3:6][axes]
-            elif number in self._lost_before:
-                self._lost_before.discard(number)
-                self._drift[:] = 0.0
-                self.reset_counter += 1
+        if not self._drifts:
+            return
+        losses = [fault for fault in self._faults if isinstance(fault, AidingLoss)]
+        acting = [fault for fault in losses if fault.window_s[0] <= time_s < fault.window_s[1]]
+        for fault in acting:
+            axes = _STRAYING.get(fault.sensor, slice(0, 0))
+            walk = fault.drift_m_s2 * np.sqrt(self._step_s) * self._rng.standard_normal(3)
+            self._drift[3:6][axes] += walk[axes]
+            self._drift[0:3][axes] += self._step_s * self._drift[3:6][axes]
+        over = [fault for fault in self._straying if not any(fault is still for still in acting)]
+        if over:
+            self._drift[:] = 0.0
+            self.reset_counter += len(over)
+        self._straying = acting
 
 
 # Which axes of velocity and position nobody watches any more.

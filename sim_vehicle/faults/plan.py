@@ -1,7 +1,9 @@
 """All faults of a flight but the wire's: before each interval they write what disturbs it."""
 
-from collections.abc import Sequence
-from typing import Protocol
+from bisect import insort
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -36,13 +38,6 @@ from sim_vehicle.world import Vector3
 _OWN_SEED = 0xFA17
 
 
-class Act(Protocol):
-    """One group of faults that disturb the same things."""
-
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
-        """Write what holds for the interval that begins at ``time_s``."""
-
-
 class Faults:
     """The faults of one flight and their state. The same seed gives the same faults."""
 
@@ -50,35 +45,51 @@ class Faults:
         rng = np.random.default_rng((seed, _OWN_SEED))
         step_s = 1e-6 * airframe.imu.integration_interval_us
         raw = airframe.imu.integration_interval_us // airframe.imu.raw_interval_us
-        self._faults = faults
-        self._shaking = Shaking([fault for fault in faults if isinstance(fault, Vibration)])
         self._rng = rng
-        winds = [fault for fault in faults if isinstance(fault, Gust | Turbulence)]
-        motors = [fault for fault in faults if isinstance(fault, MotorFailure | FreeFall | BatterySag)]
-        drops = [fault for fault in faults if isinstance(fault, PayloadDrop)]
-        pushes = [fault for fault in faults if isinstance(fault, Push)]
-        catches = [fault for fault in faults if isinstance(fault, HandCatch)]
-        sensor = [fault for fault in faults if isinstance(fault, ImuBias | ImuStuck)]
-        shaken = [fault for fault in faults if isinstance(fault, Vibration)]
-        estimate = [
-            fault for fault in faults if isinstance(fault, EstimatorReset | EstimatorAfterClipping | AidingLoss)
-        ]
-        self._motors = Motors(motors)
-        self._estimate = Estimate(estimate, airframe.estimate.kind == "markov", step_s, rng)
-        groups: tuple[tuple[Sequence[Fault], Act], ...] = (
-            (winds, Air(winds, wind_ned_m_s, step_s, rng)),
-            (motors, self._motors),
-            (drops, Load(drops)),
-            (pushes, Pushes(pushes)),
-            (catches, Hands(catches)),
-            (sensor, InertialSensor(sensor, raw)),
-            (shaken, self._shaking),
-            (estimate, self._estimate),
+        self._shaking, self._motors = Shaking(), Motors()
+        self._estimate = Estimate(airframe.estimate.kind == "markov", step_s, rng)
+        # Which group takes which faults, in the order in which they write.
+        self._groups: tuple[tuple[tuple[type[Any], ...], Any], ...] = (
+            ((Gust, Turbulence), Air(wind_ned_m_s, step_s, rng)),
+            ((MotorFailure, FreeFall, BatterySag), self._motors),
+            ((PayloadDrop,), Load()),
+            ((Push,), Pushes()),
+            ((HandCatch,), Hands()),
+            ((ImuBias, ImuStuck), InertialSensor(raw)),
+            ((Vibration,), self._shaking),
+            ((EstimatorReset, EstimatorAfterClipping, AidingLoss), self._estimate),
         )
-        self._acts = tuple(act for members, act in groups if members)
-        self._ahead = sorted((time_s, index) for index, fault in enumerate(faults) for time_s in _turns_s(fault))
+        self._acts: list[Callable[[float, State, Disturbance], None]] = []
+        self._faults: dict[int, Fault] = {}
+        self._count = 0
+        self._ahead: list[tuple[float, int]] = []
         self._spans: dict[int, int] = {}
         self.spans: list[FaultSpan] = []
+        for fault in faults:
+            self.add(fault)
+
+    def add(self, fault: Fault) -> None:
+        """One more; it acts when its time comes."""
+        number, self._count = self._count, self._count + 1
+        self._faults[number] = fault
+        for time_s in _turns_s(fault):
+            insort(self._ahead, (time_s, number))
+        for kinds, group in self._groups:
+            if isinstance(fault, kinds):
+                group.add(fault)
+        # A group that never had a fault has nothing to write.
+        self._acts = [group.act for _, group in self._groups if group.had_any]
+
+    def remove(self, fault: Fault, time_us: int) -> None:
+        """The very fault that was added is over, or never comes."""
+        number = next(number for number, known in self._faults.items() if known is fault)
+        del self._faults[number]
+        self._ahead = [(time_s, other) for time_s, other in self._ahead if other != number]
+        if number in self._spans:
+            self._end(self._spans[number], time_us)
+        for kinds, group in self._groups:
+            if isinstance(fault, kinds):
+                group.remove(fault)
 
     @property
     def reset_counter(self) -> int:
@@ -101,25 +112,28 @@ class Faults:
         while self._ahead and self._ahead[0][0] <= time_s:
             self._note(self._ahead.pop(0)[1], time_us)
         for act in self._acts:
-            act.act(time_s, state, disturbance)
+            act(time_s, state, disturbance)
 
     def is_lost(self, sensor: str, time_s: float) -> bool:
         """Whether an aiding sensor is lost at a time."""
         return any(
             isinstance(fault, AidingLoss) and fault.sensor == sensor and fault.window_s[0] <= time_s < fault.window_s[1]
-            for fault in self._faults
+            for fault in self._faults.values()
         )
 
-    def _note(self, index: int, time_us: int) -> None:
-        fault = self._faults[index]
-        if index in self._spans:
-            began = self.spans[self._spans[index]]
-            self.spans[self._spans[index]] = FaultSpan(began.kind, began.began_at_boot_us, time_us, began.details)
+    def _note(self, number: int, time_us: int) -> None:
+        if number in self._spans:
+            self._end(self._spans[number], time_us)
             return
-        self._spans[index] = len(self.spans)
+        fault = self._faults[number]
+        self._spans[number] = len(self.spans)
         ended_us = time_us if isinstance(fault, Moment) else None
         details = fault.model_dump(mode="json", exclude={"kind", "at_s", "between_s"}, exclude_none=True)
         self.spans.append(FaultSpan(fault.kind, time_us, ended_us, details))
+
+    def _end(self, index: int, time_us: int) -> None:
+        if self.spans[index].ended_at_boot_us is None:
+            self.spans[index] = replace(self.spans[index], ended_at_boot_us=time_us)
 
 
 def _turns_s(fault: Fault) -> tuple[float, ...]:
@@ -127,9 +141,14 @@ def _turns_s(fault: Fault) -> tuple[float, ...]:
     return fault.window_s[:1] if isinstance(fault, Moment) else fault.window_s
 
 
+def is_of_filter(fault: Fault) -> TypeGuard[AidingLoss]:
+    """Whether it takes a sensor away from the vehicle's own filter, which does without GPS."""
+    return isinstance(fault, AidingLoss) and fault.sensor != "gps"
+
+
 def with_losses(airframe: Airframe, faults: Sequence[Fault]) -> Airframe:
     """The airframe whose own filter goes without the sensors that faults take away, while they do."""
-    losses = [fault for fault in faults if isinstance(fault, AidingLoss) and fault.sensor != "gps"]
+    losses = [fault for fault in faults if is_of_filter(fault)]
     if not losses:
         return airframe
     sensors = airframe.sensors

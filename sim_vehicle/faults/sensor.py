@@ -1,25 +1,22 @@
 """Faults of the inertial sensor and what shakes it."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
+from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import ImuBias, ImuStuck, Vibration
 from sim_vehicle.physics.layout import Disturbance, State
 
 _AXES = ("accelerometer_x", "accelerometer_y", "accelerometer_z", "gyroscope_x", "gyroscope_y", "gyroscope_z")
 
 
-class Shaking:
+class Shaking(Group[Vibration]):
     """Vibration of the rotors, several sources of it adding as powers do."""
-
-    def __init__(self, vibrations: Sequence[Vibration]) -> None:
-        self._vibrations = vibrations
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
         squares = np.zeros((2, 4))
-        for vibration in self._vibrations:
+        for vibration in self._faults:
             start_s, end_s = vibration.window_s
             if not start_s <= time_s < end_s:
                 continue
@@ -37,11 +34,11 @@ class Shaking:
         state.rotor_phase[:] = rng.uniform(0.0, 2.0 * math.pi, 4)
 
 
-class InertialSensor:
+class InertialSensor(Group[ImuBias | ImuStuck]):
     """Zeros that move and axes that are stuck."""
 
-    def __init__(self, faults: Sequence[ImuBias | ImuStuck], raw_per_interval: int) -> None:
-        self._faults = faults
+    def __init__(self, raw_per_interval: int) -> None:
+        super().__init__()
         self._raw_per_interval = raw_per_interval
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:

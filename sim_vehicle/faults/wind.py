@@ -1,10 +1,10 @@
 """Wind that changes: the discrete gust and the continuous turbulence of MIL-F-8785C."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
+from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import Gust, Turbulence
 from sim_vehicle.physics.layout import Disturbance, State
 from sim_vehicle.world import Vector3
@@ -80,28 +80,33 @@ class Dryden:
         return _ROOT_3 * state[0] + (1.0 - _ROOT_3) * state[1]
 
 
-class Air:
+class Air(Group[Gust | Turbulence]):
     """The wind of a flight: the steady one, gusts and turbulence together."""
 
-    def __init__(
-        self, faults: Sequence[Gust | Turbulence], steady_ned_m_s: Vector3, step_s: float, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, steady_ned_m_s: Vector3, step_s: float, rng: np.random.Generator) -> None:
+        super().__init__()
         self._steady_ned_m_s = np.array(steady_ned_m_s)
-        self._gusts = [fault for fault in faults if isinstance(fault, Gust)]
-        self._turbulences = [
-            (fault, Dryden(fault.wind_20ft_m_s, steady_ned_m_s, step_s, rng))
-            for fault in faults
-            if isinstance(fault, Turbulence)
-        ]
+        self._along_ned, self._step_s, self._rng = steady_ned_m_s, step_s, rng
+        self._drydens: list[tuple[Turbulence, Dryden]] = []
+
+    def add(self, fault: Gust | Turbulence) -> None:
+        super().add(fault)
+        if isinstance(fault, Turbulence):
+            self._drydens.append((fault, Dryden(fault.wind_20ft_m_s, self._along_ned, self._step_s, self._rng)))
+
+    def remove(self, fault: Gust | Turbulence) -> None:
+        super().remove(fault)
+        self._drydens = [(kept, dryden) for kept, dryden in self._drydens if kept is not fault]
 
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
         wind = self._steady_ned_m_s.copy()
-        for gust in self._gusts:
-            wind += risen(time_s, *gust.window_s, gust.rise_s) * np.array(gust.velocity_ned_m_s)
-        if self._turbulences:
+        for gust in self._faults:
+            if isinstance(gust, Gust):
+                wind += risen(time_s, *gust.window_s, gust.rise_s) * np.array(gust.velocity_ned_m_s)
+        if self._drydens:
             body = state.body
             airspeed_m_s = float(np.linalg.norm(body[3:6] - self._steady_ned_m_s))
-            for fault, dryden in self._turbulences:
+            for fault, dryden in self._drydens:
                 if fault.window_s[0] <= time_s < fault.window_s[1]:
                     wind += dryden.next(-float(body[2]), airspeed_m_s)
         disturbance.wind_ned_m_s[:] = wind

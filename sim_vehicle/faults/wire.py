@@ -46,10 +46,24 @@ class Wire:
 
     def __init__(self, faults: Iterable[WireFault], seed: int, number_of: Callable[[str], int] | None = None) -> None:
         """``number_of`` turns a message's name into its number; needed only where faults name messages."""
-        self._stretches = [_Stretch(fault, random.Random(seed + 7919 * i), number_of) for i, fault in enumerate(faults)]
+        self._seed, self._number_of = seed, number_of
+        self._stretches: list[_Stretch] = []
+        self._faults_so_far = 0
         self._held: list[tuple[int, int, bytes]] = []
         self._count = 0
         self.lost = 0
+        for fault in faults:
+            self.add(fault)
+
+    def add(self, fault: WireFault) -> None:
+        """One more fault, with chances of its own."""
+        rng = random.Random(self._seed + 7919 * self._faults_so_far)
+        self._faults_so_far += 1
+        self._stretches.append(_Stretch(fault, rng, self._number_of))
+
+    def remove(self, fault: WireFault) -> None:
+        """The very fault that was added is over; what it holds back still arrives when it would have."""
+        self._stretches = [stretch for stretch in self._stretches if stretch.fault is not fault]
 
     def carry(self, frames: Sequence[bytes], now_us: int) -> tuple[bytes, ...]:
         """Put frames in at a time; take out all that have arrived by then, in the order of their arrival."""
@@ -81,7 +95,7 @@ class _Stretch:
 
     def __init__(self, fault: WireFault, rng: random.Random, number_of: Callable[[str], int] | None) -> None:
         self.start_s, self.end_s = fault.window_s
-        self._fault = fault
+        self.fault = fault
         self._rng = rng
         self._numbers = {_number(message, number_of) for message in fault.messages}
         self._in_burst = False
@@ -93,7 +107,7 @@ class _Stretch:
 
     def fates(self, frame: bytes, due_us: int) -> list[tuple[int, bytes]]:
         """When which copies of a frame arrive."""
-        fault, chance = self._fault, self._rng.random
+        fault, chance = self.fault, self._rng.random
         if self._is_lost():
             return []
         due_us += round(1e6 * (fault.delay_s + fault.jitter_s * chance()))
@@ -107,7 +121,7 @@ class _Stretch:
 
     def _is_lost(self) -> bool:
         """Gilbert's channel: while it is bad everything is lost; how often it turns makes share and run length."""
-        fault, chance = self._fault, self._rng.random()
+        fault, chance = self.fault, self._rng.random()
         if fault.loss in (0.0, 1.0):
             return fault.loss == 1.0
         if fault.burst_packets == 1.0:

@@ -1,14 +1,18 @@
 """The plant: a state of arrays, moved by the kernels one IMU interval at a time."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
-from sim_vehicle.faults.plan import Faults, with_losses
+from sim_vehicle.faults.plan import Faults, is_of_filter, with_losses
+from sim_vehicle.faults.spec import Fault
+from sim_vehicle.physics.asked import AskedSetpoint
 from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.interval import (
     FINE_STEPS,
@@ -18,26 +22,16 @@ from sim_vehicle.physics.interval import (
     MOTORS_OFF,
     advance_boxed,
 )
-from sim_vehicle.physics.layout import (
-    ASKED_ATTITUDE,
-    ASKED_RATES,
-    ASKED_TRAJECTORY,
-    POINTS,
-    Asked,
-    Scratch,
-    calm,
-    constants_from,
-    initial_state,
-)
+from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import Floats, boxed, new_record
 from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
-from sim_vehicle.physics.rotation import matrix_from_quaternion
+from sim_vehicle.physics.surroundings import Surroundings
 from sim_vehicle.physics.trim import trim
 from sim_vehicle.scene import Scene
-from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
+from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.truth import TruthRecorder
-from sim_vehicle.world import FACE_POINT, FACE_VELOCITY, Vector3
+from sim_vehicle.world import Vector3, World
 
 if TYPE_CHECKING:
     from sim_vehicle.estimator.onboard import OnboardEstimator
@@ -87,10 +81,6 @@ class Plant:
     ) -> None:
         airframe = with_losses(airframe, scene.faults)
         self._rng = np.random.default_rng(seed)
-        self._world = scene.world()
-        # What a camera or a beam sees: poles and edges are too thin.
-        self._flat_faces = self._world.faces[: self._world.flat_count]
-        self._moving = np.array([row for mover in self._world.movers for row in mover.rows], np.int64)
         self._constants = constants_from(airframe, self._rng)
         self.disturbance = calm(scene.wind_ned_m_s)
         self._fine_steps = fine_steps
@@ -98,39 +88,29 @@ class Plant:
         north, east, _ = scene.start.position_ned_m
         centre: Vector3 = (north, east, -airframe.geometry.foot_depth_m)
         self.state = initial_state(centre, math.radians(scene.start.yaw_deg))
+        self.interval_us = airframe.imu.integration_interval_us
+        self._around = Surroundings(scene.world(), centre, 0, self.interval_us)
         self._errors = estimate_errors(airframe, self.state.body, self._rng)
         self.onboard: OnboardEstimator | None = None
         if airframe.estimate.kind == "ekf":
-            self.onboard = _onboard_estimator(airframe, self._flat_faces, self.state.body, seed)
+            self.onboard = _onboard_estimator(airframe, self._around.flat_faces, self.state.body, seed)
         self._estimate = self.state.estimate
         self._frame_offset_ned_m = self.state.frame_offset_ned_m
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
         self._body = self.state.body
         self._report = np.zeros(REPORT_COLUMNS)
-        self._asked = new_record(Asked)
-        self._taken: Setpoint | None = None
-        # Views into the records, taken once: looking a field up in Python costs microseconds.
-        self._asked_value, self._asked_given, self._asked_yaw = (
-            self._asked.value,
-            self._asked.given,
-            self._asked.yaw,
-        )
+        self._asked = AskedSetpoint()
         self._motor_command_n = self.state.motor_command_n
         self._motor_max_n = airframe.motors.max_thrust_n
         self._finished_hits = self.state.finished_hits
-        self._behind = points_behind(self._world.faces, centre)
-        self._near = np.zeros(len(self._world.faces), np.int64)
-        self._forces = np.zeros((2, POINTS, len(self._world.faces)))
-        self._state_box, self._asked_box = boxed(self.state), boxed(self._asked)
+        self._state_box = boxed(self.state)
         self._constants_box, self._disturbance_box = boxed(self._constants), boxed(self.disturbance)
         self._scratch_box = boxed(new_record(Scratch))
-        self.interval_us = airframe.imu.integration_interval_us
         self.truth = TruthRecorder(keeps_path)
         self.faults: Faults | None = None
+        self._new_faults = partial(Faults, airframe=airframe, wind_ned_m_s=scene.wind_ned_m_s, seed=seed)
         if scene.faults:
-            self.faults = Faults(scene.faults, airframe, scene.wind_ned_m_s, seed)
-            self.truth.faults = self.faults.spans
-            self.faults.begin(self.state)
+            self._begin_faults(scene.faults)
 
     def tune(self, gains: PositionGains) -> None:
         """Change the gains and limits of the position control."""
@@ -147,31 +127,74 @@ class Plant:
     def take_over(self, other: "Plant") -> None:
         """Go on where ``other`` is, as the same body with other software or another inertial sensor."""
         np.copyto(self._state_box, other._state_box)
-        self._behind[:] = other._behind
+        self._around = other._around
         self.truth, self.faults = other.truth, other.faults
         np.copyto(self._disturbance_box, other._disturbance_box)
-        if self.onboard is not None:
+        if self.onboard is not None and other.onboard is not None:
+            self.onboard.look_at(self._around.flat_faces)
+            self.onboard.lose_as(other.onboard)
             self.onboard.start(self.state.body, self.state.time_us)
+
+    @property
+    def world(self) -> World:
+        """Ground and obstacles."""
+        return self._around.world
+
+    def change_world(self, world: World) -> None:
+        """Put other obstacles around the vehicle, none of them through it; a hit on one that goes is over."""
+        hit = self.state.hit
+        if hit[HIT_ACTIVE] == 1.0:
+            row = np.flatnonzero(world.rows_in(self.world) == int(hit[HIT_FACE]))
+            if len(row) == 0:
+                self.truth.add_hit(hit, self.world)
+                hit[HIT_ACTIVE] = 0.0
+            else:
+                hit[HIT_FACE] = row[0]
+        x, y, z = self._body[:3].tolist()
+        self._around = self._around.changed(world, (x, y, z), int(self.state.time_us))
+        if self.onboard is not None:
+            self.onboard.look_at(self._around.flat_faces)
+
+    def add_fault(self, fault: Fault) -> None:
+        """One more fault from now on."""
+        if self.faults is None:
+            self._begin_faults(())
+        assert self.faults is not None
+        self.faults.add(fault)
+        if self.onboard is not None and is_of_filter(fault):
+            self.onboard.lose(fault.sensor, fault.window_s)
+
+    def remove_fault(self, fault: Fault) -> None:
+        """The very fault that was added is over."""
+        assert self.faults is not None
+        self.faults.remove(fault, int(self.state.time_us))
+        if self.onboard is not None and is_of_filter(fault):
+            self.onboard.find(fault.sensor, fault.window_s)
+
+    def _begin_faults(self, faults: Sequence[Fault]) -> None:
+        self.faults = self._new_faults(faults)
+        self.truth.faults = self.faults.spans
+        self.faults.begin(self.state)
 
     def place(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
         """Put the level vehicle somewhere in flight, for studies of single hits."""
         self.state.body[0:6] = [*position_ned_m, *velocity_ned_m_s]
-        self._behind[:] = points_behind(self._world.faces, position_ned_m)
+        self._around.behind[:] = points_behind(self._around.faces, position_ned_m)
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
 
     def cruise(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float) -> None:
         """Put the vehicle into a flight that has been steady for a while."""
         trim(self.state, self._errors, self._constants, self.disturbance, position_ned_m, velocity_ned_m_s, yaw_rad)
-        self._behind[:] = points_behind(self._world.faces, position_ned_m)
+        self._around.behind[:] = points_behind(self._around.faces, position_ned_m)
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
 
     def step(self, setpoint: Setpoint | None, armed: bool) -> PlantOutput:
         """Advance one interval: armed with a setpoint flies it, armed without idles, disarmed is off."""
         motors = MOTORS_OFF if not armed else MOTORS_IDLE if setpoint is None else MOTORS_FLYING
-        if setpoint is not None and setpoint is not self._taken:
-            self._take_setpoint(setpoint)
+        if setpoint is not None:
+            self._asked.take(setpoint)
         return self._advance(motors)
 
     def drive(self, motor_fractions: Quadruple) -> PlantOutput:
@@ -181,23 +204,24 @@ class Plant:
         return self._advance(MOTORS_DRIVEN)
 
     def _advance(self, motors: int) -> PlantOutput:
-        if self._world.movers:
-            self._move_obstacles()
+        around = self._around
+        if around.world.movers:
+            around.move(int(self.state.time_us))
         if self.faults is not None:
             self.faults.before(self.state, self.disturbance)
         advance_boxed(
             self._state_box,
-            self._asked_box,
+            self._asked.box,
             motors,
             self._rng.standard_normal(6 * self._raw_samples + 9),
             self._fine_steps,
             self._constants_box,
             self._disturbance_box,
-            self._world.faces,
-            self._moving,
-            self._behind,
-            self._near,
-            self._forces,
+            around.faces,
+            around.moving,
+            around.behind,
+            around.near,
+            around.forces,
             self._scratch_box,
             self._errors,
             self._report,
@@ -206,16 +230,6 @@ class Plant:
         if self.onboard is not None and motors != MOTORS_DRIVEN:
             self._estimate_state(self.onboard, motors == MOTORS_FLYING)
         return self._output()
-
-    def _move_obstacles(self) -> None:
-        """Put what moves where it is and give it the velocity that takes it to where it will be."""
-        faces, interval_s = self._world.faces, 1e-6 * self.interval_us
-        time_s = 1e-6 * self.state.time_us
-        for mover in self._world.movers:
-            now_ned_m = np.array(mover.motion.offset_ned_m(time_s))
-            then_ned_m = np.array(mover.motion.offset_ned_m(time_s + interval_s))
-            faces[mover.rows, FACE_POINT : FACE_POINT + 3] = mover.points_ned_m + now_ned_m
-            faces[mover.rows, FACE_VELOCITY : FACE_VELOCITY + 3] = (then_ned_m - now_ned_m) / interval_s
 
     def _estimate_state(self, onboard: "OnboardEstimator", flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
@@ -231,37 +245,10 @@ class Plant:
         own = 0 if self.onboard is None else self.onboard.reset_counter
         return own if self.faults is None else own + self.faults.reset_counter
 
-    def _take_setpoint(self, setpoint: Setpoint) -> None:
-        """Write the setpoint where the kernels read it."""
-        if isinstance(setpoint, TrajectorySetpoint):
-            self._take_trajectory(setpoint)
-        else:
-            self._take_thrust(setpoint)
-        self._taken = setpoint
-
-    def _take_thrust(self, setpoint: AttitudeSetpoint | RatesSetpoint) -> None:
-        asked = self._asked
-        asked.thrust = setpoint.thrust_fraction
-        if isinstance(setpoint, RatesSetpoint):
-            asked.level = ASKED_RATES
-            asked.rates_frd_rad_s[:] = setpoint.rates_frd_rad_s
-            return
-        asked.level = ASKED_ATTITUDE
-        matrix_from_quaternion(np.array([0.0] * 6 + [*setpoint.attitude_wxyz]), asked.attitude)
-        self._asked_yaw[:] = (0.0, 0.0, setpoint.yaw_rate_rad_s)
-
-    def _take_trajectory(self, setpoint: TrajectorySetpoint) -> None:
-        if self._asked.level != ASKED_TRAJECTORY:
-            self._asked.level = ASKED_TRAJECTORY
-        rows = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
-        self._asked_value[:] = [[0.0 if value is None else value for value in row] for row in rows]
-        self._asked_given[:] = [[value is not None for value in row] for row in rows]
-        self._asked_yaw[:] = (setpoint.yaw_rad or 0.0, setpoint.yaw_rad is not None, setpoint.yaw_rate_rad_s or 0.0)
-
     def _record_truth(self) -> None:
         self.truth.record(self._report[TRUTH])
         for row in self._finished_hits[: int(self._report[HITS_ENDED])]:
-            self.truth.add_hit(row, self._world)
+            self.truth.add_hit(row, self.world)
 
     def _output(self) -> PlantOutput:
         row: list[float] = self._report.tolist()
