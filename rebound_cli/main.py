@@ -218,9 +218,9 @@ def _add_airframe(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
     airframe.add_argument("--airframe", default="foldable", metavar="NAME|FILE", help="default: foldable")
     airframe.add_argument(
         "--position",
-        choices=("mocap", "gps"),
+        choices=("mocap", "gps", "flow"),
         default="mocap",
-        help="what PX4 flies by: motion capture, as indoors (default), or an RTK GPS",
+        help="what PX4 flies by: motion capture, as indoors (default), an RTK GPS, or optical flow and a range finder",
     )
     airframe.add_argument(
         "--format",

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.world import Vector3
 
 Quadruple = tuple[float, float, float, float]
@@ -74,7 +75,7 @@ class HilState:
     angular_velocity_frd_rad_s: Vector3
 
 
-ToPx4: TypeAlias = HilSensor | HilGps | MotionCapture | HilState
+ToPx4: TypeAlias = HilSensor | HilGps | MotionCapture | FlowSample | RangeSample | HilState
 
 
 @dataclass(frozen=True, slots=True)

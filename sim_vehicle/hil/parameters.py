@@ -25,7 +25,7 @@ _FIRST_MOTOR_FUNCTION = 101
 # FILTER_UPDATE_PERIOD of PX4's EKF2: its noises are standard deviations over one such step.
 EKF_PERIOD_S = 0.01
 
-Position = Literal["mocap", "gps"]
+Position = Literal["mocap", "gps", "flow"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +118,22 @@ def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
         yield Parameter("EKF2_EVA_NOISE", 0.05, "rad, the least that PX4 takes")
         # With both, PX4 takes motion capture as relative to GPS and no better than it.
         yield Parameter("EKF2_GPS_CTRL", 0, "no GPS indoors")
+    elif position == "flow":
+        sensors = airframe.sensors
+        yield Parameter("EKF2_EV_CTRL", 0, "no motion capture")
+        yield Parameter("EKF2_GPS_CTRL", 0, "no GPS indoors")
+        yield Parameter("EKF2_OF_CTRL", 1, "velocity from optical flow")
+        yield Parameter("EKF2_OF_DELAY", 0.0, "ms; the simulator's samples are of the moment")
+        yield Parameter("EKF2_RNG_CTRL", 2, "the range finder at any speed")
+        yield Parameter("EKF2_RNG_DELAY", 0.0, "ms; the same")
+        yield Parameter("EKF2_HGT_REF", 2, "height from the range finder")
+        yield Parameter("EKF2_MIN_RNG", airframe.geometry.foot_depth_m, "m; what it shows on the ground")
+        yield Parameter("SENS_FLOW_MAXHGT", sensors.optical_flow.distance_max_m, "m")
+        yield Parameter("SENS_FLOW_MAXR", sensors.optical_flow.rate_max_rad_s, "rad/s")
+        # On the ground the camera is too near to see, and says so by its quality; above this height's limit PX4 would
+        # not even begin to use it, and not arm.
+        yield Parameter("SENS_FLOW_MINHGT", airframe.geometry.foot_depth_m / 2, "m; less than on the ground")
+        yield Parameter("SENS_FLOW_ROT", 0, "mounted along the body's axes")
     else:
         yield Parameter("EKF2_EV_CTRL", 0, "no motion capture outdoors")
         yield Parameter("EKF2_GPS_P_NOISE", 0.05, "m; the fix is an RTK receiver's")

@@ -4,6 +4,8 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe, Imu
+from sim_vehicle.estimator.samples import FlowSample
+from sim_vehicle.hil.downward import DownwardSensors
 from sim_vehicle.hil.earth import place_at
 from sim_vehicle.hil.messages import HilSensor, HilState, Quadruple, ToPx4
 from sim_vehicle.hil.sensors import (
@@ -56,6 +58,7 @@ class HilVehicle:
         self._gps = Gps(airframe, rng)
         self._cameras = Cameras(rng)
         self.interval_us = self._plant.interval_us
+        self._downward = DownwardSensors(airframe, self._plant.seen_faces, self.interval_us, random.Random(~seed))
         self.time_boot_us = 0
 
     @property
@@ -77,6 +80,10 @@ class HilVehicle:
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
+        for sample in self._downward.observe(now_us, self._plant.state.body, self._plant.seen_faces):
+            sensor = "optical_flow" if isinstance(sample, FlowSample) else "range_finder"
+            if faults is None or not faults.is_lost(sensor, now_us / 1e6):
+                messages.append(sample)
         if self._is_due(STATE_PERIOD_US):
             place = place_at(position_ned_m)
             messages.append(HilState(now_us, place, velocity_ned_m_s, attitude_wxyz, (p, q, r)))

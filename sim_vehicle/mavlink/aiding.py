@@ -7,6 +7,7 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.telemetry import Telemetry
 
@@ -43,10 +44,28 @@ def optical_flow_rad(state: Telemetry) -> Message:
     )
 
 
+def hil_optical_flow(sample: FlowSample) -> Message:
+    """The same sample for PX4's simulator port; the distance goes in a DISTANCE_SENSOR of its own."""
+    return dialect.MAVLink_hil_optical_flow_message(
+        sample.time_us,
+        0,
+        sample.integration_us,
+        *sample.flow_frd_rad,
+        *sample.gyroscope_frd_rad,
+        0,
+        sample.quality,
+        0,
+        _UNKNOWN_DISTANCE,
+    )
+
+
 def distance_sensor(state: Telemetry) -> Message:
+    assert state.range is not None, "streamed only once there is a sample"
+    return distance_looking_down(state.range)
+
+
+def distance_looking_down(sample: RangeSample) -> Message:
     """In whole centimetres; what was not seen is one beyond the greatest, with a bad signal."""
-    sample = state.range
-    assert sample is not None, "streamed only once there is a sample"
     least_cm, most_cm = round(100 * sample.distance_min_m), round(100 * sample.distance_max_m)
     seen = sample.distance_m is not None
     return dialect.MAVLink_distance_sensor_message(

@@ -8,8 +8,9 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
-from sim_vehicle.mavlink import framing
+from sim_vehicle.mavlink import aiding, framing
 
 Message: TypeAlias = Any
 
@@ -67,6 +68,10 @@ def _filled(message: ToPx4) -> Message:
         return _gps(message)
     if isinstance(message, MotionCapture):
         return _motion_capture(message)
+    if isinstance(message, FlowSample):
+        return aiding.hil_optical_flow(message)
+    if isinstance(message, RangeSample):
+        return aiding.distance_looking_down(message)
     return _state(message)
 
 

@@ -131,7 +131,7 @@ class Plant:
         self.truth, self.faults = other.truth, other.faults
         np.copyto(self._disturbance_box, other._disturbance_box)
         if self.onboard is not None and other.onboard is not None:
-            self.onboard.look_at(self._around.flat_faces)
+            self.onboard.look_at(self.seen_faces)
             self.onboard.lose_as(other.onboard)
             self.onboard.start(self.state.body, self.state.time_us)
 
@@ -139,6 +139,11 @@ class Plant:
     def world(self) -> World:
         """Ground and obstacles."""
         return self._around.world
+
+    @property
+    def seen_faces(self) -> Floats:
+        """Ground and obstacles as the optics see them, where they are now."""
+        return self._around.flat_faces
 
     def change_world(self, world: World) -> None:
         """Put other obstacles around the vehicle, none of them through it; a hit on one that goes is over."""
@@ -153,7 +158,7 @@ class Plant:
         x, y, z = self._body[:3].tolist()
         self._around = self._around.changed(world, (x, y, z), int(self.state.time_us))
         if self.onboard is not None:
-            self.onboard.look_at(self._around.flat_faces)
+            self.onboard.look_at(self.seen_faces)
 
     def add_fault(self, fault: Fault) -> None:
         """One more fault from now on."""

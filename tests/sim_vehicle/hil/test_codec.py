@@ -5,6 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, Air, HilGps, HilSensor, HilState, MotionCapture, Place
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
 
@@ -104,3 +105,22 @@ def test_a_stream_cut_anywhere_gives_the_same_answers():
         pieces = [stream[i : i + size] for i in range(0, len(stream), size)]
         found = [controls for piece in pieces for controls in decoder.push(piece)]
         assert [controls.time_us for controls in found] == [4_000, 8_000, 12_000]
+
+
+def test_optical_flow_as_px4_takes_it():
+    """The simulator's message, with the gyroscope beside the flow; the distance is a range finder's business."""
+    sent = on_the_wire(FlowSample(200_000, 100_000, (0.02, -0.1), (0.01, 0.002, -0.003), 200))
+    assert sent.get_type() == "HIL_OPTICAL_FLOW"
+    assert (sent.time_usec, sent.integration_time_us, sent.quality) == (200_000, 100_000, 200)
+    assert (sent.integrated_x, sent.integrated_y) == pytest.approx((0.02, -0.1))
+    assert (sent.integrated_xgyro, sent.integrated_ygyro, sent.integrated_zgyro) == pytest.approx((0.01, 0.002, -0.003))
+    assert sent.distance < 0  # unknown
+
+
+@pytest.mark.parametrize(("distance_m", "shown_cm", "signal"), [(1.234, 123, 100), (None, 4001, 1)])
+def test_the_range_finder_looks_down(distance_m: float | None, shown_cm: int, signal: int):
+    sent = on_the_wire(RangeSample(200_000, distance_m, 0.01, 40.0))
+    assert sent.get_type() == "DISTANCE_SENSOR"
+    assert (sent.orientation, sent.id) == (dialect.MAV_SENSOR_ROTATION_PITCH_270, 0)
+    assert (sent.current_distance, sent.min_distance, sent.max_distance) == (shown_cm, 1, 4000)
+    assert sent.signal_quality == signal

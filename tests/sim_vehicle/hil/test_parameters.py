@@ -95,3 +95,9 @@ def test_every_format_has_every_parameter():
         kind = 6 if isinstance(parameter.value, int) else 9
         assert f"1\t1\t{parameter.name}\t{parameter.text}\t{kind}" in params
         assert f"param set-default {parameter.name} {parameter.text}" in airframe
+
+
+def test_by_flow_px4_is_told_of_flow_and_range_alone():
+    found = values(position="flow")
+    assert (found["EKF2_OF_CTRL"], found["EKF2_GPS_CTRL"], found["EKF2_EV_CTRL"]) == (1, 0, 0)
+    assert (found["EKF2_RNG_CTRL"], found["EKF2_HGT_REF"]) == (2, 2)

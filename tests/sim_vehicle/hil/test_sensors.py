@@ -6,6 +6,7 @@ import random
 import pytest
 
 from sim_vehicle.airframe import load_built_in
+from sim_vehicle.estimator.samples import BEST_QUALITY, FlowSample, RangeSample
 from sim_vehicle.hil.earth import HOME, StandardAir, magnetic_field_ned_gauss, place_at
 from sim_vehicle.hil.messages import MOTORS_STOPPED, HilGps, HilSensor, HilState, MotionCapture
 from sim_vehicle.hil.sensors import Cameras, Gps, Magnetometer, to_body, turned
@@ -185,3 +186,25 @@ def test_the_same_seed_gives_the_same_samples():
 
 def rms(values: list[float]) -> float:
     return math.sqrt(sum(value * value for value in values) / len(values))
+
+
+def test_what_looks_down_sees_height_and_stands_still_in_a_straight_climb():
+    """Given a climb, then range is the true height and nothing flows sideways, ten times a second."""
+    vehicle = new_vehicle()
+    messages = flown(vehicle, 1.0, 0.95)
+    flows, ranges = of_kind(messages, FlowSample), of_kind(messages, RangeSample)
+
+    assert len(flows) == len(ranges) == 10
+    height_m = -vehicle._plant.state.body[2]
+    assert ranges[-1].distance_m == pytest.approx(height_m, abs=0.05)
+    assert flows[-1].quality == BEST_QUALITY
+    assert flows[-1].flow_frd_rad == pytest.approx((0, 0), abs=0.015)
+
+
+@pytest.mark.parametrize(("sensor", "kind"), [("optical_flow", FlowSample), ("range_finder", RangeSample)])
+def test_a_lost_sensor_is_silent(sensor: str, kind: type):
+    scene = Scene.model_validate({"faults": [{"kind": "aiding_loss", "sensor": sensor, "at_s": 0.5}]})
+    vehicle = HilVehicle(FOLDABLE, scene, seed=1, sample_interval_us=4_000)
+
+    assert len(of_kind(flown(vehicle, 0.45, 0.0), kind)) == 4
+    assert not of_kind(flown(vehicle, 1.0, 0.0)[50:], kind)
