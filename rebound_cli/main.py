@@ -19,6 +19,7 @@ from rebound_cli.arguments import (
     port,
     speed,
 )
+from rebound_cli.campaign_report.arguments import add_campaign
 from rebound_cli.check.arguments import add_check
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.plan.arguments import add_plan
@@ -64,6 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_sim(commands)
     _add_results(commands)
     _add_recoveries(commands)
+    add_campaign(commands)
     _add_paper(commands)
     _add_detectors(commands)
     add_preflight(commands)

@@ -1,0 +1,46 @@
+"""The arguments of `rebound campaign`; what they run is imported when it runs."""
+
+import argparse
+import os
+from pathlib import Path
+
+from rebound_cli.arguments import count
+
+
+def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    campaign = commands.add_parser(
+        "campaign",
+        help="fly random missions in random rooms and write what became of them",
+        description="Random missions with both airframes, and hits with both recovery laws; see docs/campaign.md.",
+    )
+    campaign.add_argument("--missions", type=count, default=1000, metavar="N", help="random missions (default 1000)")
+    campaign.add_argument(
+        "--first-seed", type=count, default=1, metavar="SEED", help="of the first; the others follow (default 1)"
+    )
+    campaign.add_argument(
+        "--hits", type=count, default=5, metavar="SEEDS", help="of each hit with each recovery law (default 5)"
+    )
+    campaign.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
+    campaign.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"
+    )
+    campaign.add_argument(
+        "--only", type=count, metavar="SEED", help="fly this one mission again and keep its whole run folder"
+    )
+    campaign.add_argument(
+        "--airframe", choices=("foldable", "rigid"), default="foldable", help="with --only (default foldable)"
+    )
+    campaign.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder of campaign.md and images (default: docs); with --only the run folder "
+        "(default: runs/<time>-random-SEED)",
+    )
+    campaign.set_defaults(run=_campaign)
+
+
+def _campaign(options: argparse.Namespace) -> int:
+    from rebound_cli.campaign_report.command import run_campaign_command
+
+    return run_campaign_command(options)

@@ -1,0 +1,93 @@
+"""`rebound campaign`: flies everything that must be shown and writes the tables of docs/campaign.md."""
+
+import re
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from rebound_cli import __version__
+from rebound_cli.campaign.plan import Campaign
+from rebound_cli.campaign.run import Results, Workers, failures_text, run_campaign
+from rebound_cli.campaign_report import tables
+from rebound_cli.campaign_report.flown import Missions
+from rebound_cli.campaign_report.law_bars import law_bars
+from rebound_cli.campaign_report.mission_bars import mission_bars
+from rebound_cli.campaign_report.only import run_only
+from rebound_cli.campaign_report.picture import missions_figure
+from rebound_cli.campaign_report.reading import HOW_TO_READ
+from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
+from rebound_cli.random_missions.campaign import missions_campaign
+from rebound_cli.recoveries.hits import recoveries_campaign
+
+DOCUMENT_NAME, PICTURE = "campaign.md", Path("images") / "campaign" / "missions.png"
+START_MARK, END_MARK = "<!-- generated: campaign -->", "<!-- end -->"
+
+
+def run_campaign_command(options: Namespace) -> int:
+    """0 when everything is written, whatever it says; 1 when a case failed to be flown."""
+    if options.only is not None:
+        return run_only(options.only, options.airframe, options.out)
+    started_s = time.monotonic()
+    workers, out = Workers(options.jobs, options.scheduler), options.out or Path("docs")
+    flown = missions_campaign(options.missions, options.first_seed)
+    missions_results = run_campaign(flown, workers)
+    hits = recoveries_campaign(options.hits)
+    hits_results = run_campaign(hits, workers)
+    worked_out = [(flown, missions_results), (hits, hits_results)]
+    failed = [text for campaign, results in worked_out if (text := failures_text(campaign, results))]
+    missions = Missions(flown.cases, missions_results.results)
+    bars = mission_bars(missions) + law_bars(hits.cases, hits_results.results)
+    _write(out, missions, _text(options, missions, bars, worked_out))
+    print(summary_text(bars))
+    for text in failed:
+        print(text)
+    print(f"Written to {out / DOCUMENT_NAME} in {time.monotonic() - started_s:.0f} s.")
+    return 1 if failed else 0
+
+
+def _text(options: Namespace, missions: Missions, bars: list[Bar], worked_out: list[tuple[Campaign, Results]]) -> str:
+    return "\n".join(
+        [
+            _lead(options, worked_out),
+            f"### What must be shown\n\n{bars_text(bars)}",
+            HOW_TO_READ,
+            f"### Missions that did not end as they say\n\n{tables.causes_text(missions)}",
+            tables.failures_text(missions),
+            f"### By room, stream and wind\n\nMissions that ended as they say.\n\n{tables.kinds_text(missions)}",
+            f"### Recoveries by speed\n\n{tables.speeds_text(missions)}",
+            f"![the first missions from above]({PICTURE.as_posix()})\n",
+        ]
+    )
+
+
+def _lead(options: Namespace, worked_out: list[tuple[Campaign, Results]]) -> str:
+    """What was run and how to run it again."""
+    missions, hits = (results for _, results in worked_out)
+    first = "" if options.first_seed == 1 else f" --first-seed {options.first_seed}"
+    command = f"rebound campaign --missions {options.missions}{first} --hits {options.hits}"
+    last_seed = options.first_seed + options.missions - 1
+    seconds = sum(result["seconds"] for result in missions.results.values())
+    failed = len(missions.failures) + len(hits.failures)
+    return (
+        f"\nWritten by `{command}` (version {__version__}): {len(missions.results)} flights of seeds "
+        f"{options.first_seed} to {last_seed}, {seconds / 3600:.1f} h in the vehicle's time, and {len(hits.results)} "
+        f"hits with a recovery law each.{f' {failed} cases failed.' if failed else ''}\n"
+    )
+
+
+def _write(folder: Path, missions: Missions, text: str) -> None:
+    """The picture beside the document; what stands between its marks made anew, the rest left as it is."""
+    (folder / PICTURE.parent).mkdir(parents=True, exist_ok=True)
+    missions_figure(missions).savefig(folder / PICTURE)
+    path = folder / DOCUMENT_NAME
+    before = path.read_text(encoding="utf-8") if path.exists() else f"# Campaign\n\n{START_MARK}\n{END_MARK}\n"
+    path.write_text(with_tables(before, text), encoding="utf-8")
+
+
+def with_tables(document: str, text: str) -> str:
+    """The document with what stands between its marks made anew; raises ValueError where there are none."""
+    marked = re.compile(rf"({re.escape(START_MARK)}\n).*?({re.escape(END_MARK)})", re.DOTALL)
+    changed, found = marked.subn(lambda match: match[1] + text + match[2], document)
+    if found != 1:
+        raise ValueError(f"the document has {found} places for the campaign's tables, not one")
+    return changed

@@ -1,0 +1,78 @@
+"""What the random missions must show."""
+
+import statistics
+from collections.abc import Iterator
+
+from rebound_cli.campaign.plan import Json
+from rebound_cli.campaign_report.flown import HIT_SPEEDS_M_S, Missions, answered, level
+from rebound_cli.detectors_report.bars import Bar
+from rebound_cli.detectors_report.numbers import per_cent, share
+
+MISSIONS_WANTED = {"foldable": 0.995, "rigid": 0.95}
+CLEAN_WANTED = 0.99
+OVERSHOOT_MOST_M = 0.05
+LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
+RISEN_MOST_M = 0.05
+
+
+def mission_bars(missions: Missions) -> list[Bar]:
+    return [*_endings(missions), *_hits(missions)]
+
+
+def _endings(missions: Missions) -> Iterator[Bar]:
+    for airframe, wanted in MISSIONS_WANTED.items():
+        flown = missions.of(airframe)
+        good = share(one.is_good for one in flown)
+        failed = sum(not one.is_good for one in flown)
+        yield Bar(
+            f"{airframe}: missions that end as they say, without a crash",
+            f"≥ {100 * wanted:g} %",
+            per_cent(good, 2),
+            good >= wanted,
+            f"{len(flown)} missions, {failed} not",
+        )
+
+
+def _hits(missions: Missions) -> Iterator[Bar]:
+    for airframe in MISSIONS_WANTED:
+        hits = missions.hits(airframe, *HIT_SPEEDS_M_S)
+        clean = share(is_clean(hit) for hit in answered(hits))
+        judged = airframe == "foldable"
+        yield Bar(
+            f"{airframe}, 1 to 5 m/s: hits without 5 cm of overshoot and without touching the surface again",
+            f"≥ {100 * CLEAN_WANTED:g} %" if judged else "",
+            per_cent(clean),
+            clean >= CLEAN_WANTED if judged else None,
+            f"{len(answered(hits))} hits, {_reasons(answered(hits))}",
+        )
+        slow = level(missions.hits(airframe, 0.0, LOST_UP_TO_M_S))
+        yield _worst(f"{airframe}, level, up to 2.5 m/s: height lost", slow, "lost_m", LOST_MOST_M)
+        yield _worst(
+            f"{airframe}, level: height gained", level(missions.hits(airframe, 0.0, 99.0)), "risen_m", RISEN_MOST_M
+        )
+        every = missions.hits(airframe, 0.5, 99.0)
+        yield Bar(
+            f"{airframe}, from 0.5 m/s: hits noticed", "", per_cent(share(h["seen"] for h in every)), None, _of(every)
+        )
+
+
+def is_clean(hit: Json) -> bool:
+    return bool(hit["past_m"] <= OVERSHOOT_MOST_M and not hit["again"])
+
+
+def _reasons(hits: list[Json]) -> str:
+    past = sum(hit["past_m"] > OVERSHOOT_MOST_M for hit in hits)
+    return f"{past} past by more, {sum(hit['again'] > 0 for hit in hits)} touched again"
+
+
+def _worst(what: str, hits: list[Json], key: str, most_m: float) -> Bar:
+    if not hits:
+        return Bar(what, f"≤ {100 * most_m:g} cm", "-", None, "no hit")
+    values = [hit[key] for hit in hits]
+    over = sum(value > most_m for value in values)
+    measured = f"{100 * max(values):.1f} cm at most, {100 * statistics.median(values):.1f} in the median"
+    return Bar(what, f"≤ {100 * most_m:g} cm", measured, over == 0, f"{len(hits)} hits, {over} beyond")
+
+
+def _of(hits: list[Json]) -> str:
+    return f"{len(hits)} hits"

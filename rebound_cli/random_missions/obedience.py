@@ -1,0 +1,89 @@
+"""Whether what the companion did, event by event, is what docs/missions.md says follows from the mission."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from companion.mission.model import Mission
+from companion.mission.policy import OnCollision
+from companion.mission.program import Step, program
+from companion.report import Event, FlightReport
+from rebound_cli.random_missions.flight import JudgedFlight
+
+
+@dataclass(slots=True)
+class _Course:
+    """Where in the mission the flight is, by the rules alone."""
+
+    mission: Mission
+    steps: tuple[Step, ...]
+    index: int = 0
+    hits: int = 0
+    hits_of_step: int = 0
+    going_home: bool = False
+    due: str | None = None
+    """What the latest hit's policy says follows the recovery."""
+    held: bool = False
+    timed_out: str | None = None
+    complaints: list[str] = field(default_factory=list)
+
+    def policy(self) -> tuple[OnCollision, int]:
+        own = self.steps[self.index].item.on_collision
+        return (self.mission.on_collision, self.hits) if own is None else (own, self.hits_of_step)
+
+    def take(self, event: Event) -> None:
+        match event.kind:
+            case "detection":
+                self._hit()
+            case "timeout":
+                self.timed_out = self.steps[self.index].item.on_timeout
+            case "hold":
+                self._expect(self.due == "hold", "held")
+                self.held = True
+            case "item":
+                self._item(int(str(event.data["step"])))
+            case "return":
+                is_item = self.steps[self.index].name == "return"
+                on_way = self.going_home and self.due in (None, "return")
+                self._expect(self.due == "return" or (self.due is None and is_item) or on_way, "returned")
+                self.going_home, self.due = True, None
+            case "landing":
+                is_item = self.steps[self.index].name == "land" or self.going_home
+                self._expect(self.due == "land" or (self.due is None and is_item), "landed")
+                self.due = None
+
+    def _hit(self) -> None:
+        self.hits += 1
+        self.hits_of_step += 1
+        self.held = False
+        policy, hits = self.policy()
+        if hits >= policy.max_hits:
+            self.due = "land" if self.going_home else policy.after_max_hits
+        else:
+            self.due = "return" if self.going_home else policy.then
+
+    def _item(self, step: int) -> None:
+        after = {"continue": self.index + 1, "hold": self.index + 1 if self.held else -1, "retry": self.index}
+        wanted = self.index + 1 if self.due is None else after.get(self.due, -1)
+        self._expect(step == wanted, f"began step {step}")
+        if step != self.index:
+            self.hits_of_step = 0
+        self.index, self.due, self.held = step, None, False
+
+    def _expect(self, is_so: bool, what: str) -> None:
+        if not is_so:
+            instead = f"after the hit: {self.due}" if self.due else "to go on"
+            self.complaints.append(f"{what} at step {self.index} instead of {instead}")
+
+
+def disobediences(flight: JudgedFlight) -> list[str]:
+    """In words; empty where everything followed from the mission."""
+    course = _Course(flight.mission, program(flight.mission))
+    for event in flight.events:
+        course.take(event)
+    return [*course.complaints, *_ending(course, flight.report)]
+
+
+def _ending(course: _Course, report: FlightReport) -> Iterator[str]:
+    wanted = "aborted" if course.due == "abort" else "completed"
+    if report.outcome != wanted:
+        yield f"{report.outcome} instead of {wanted}: {report.reason}"

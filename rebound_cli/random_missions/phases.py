@@ -1,0 +1,60 @@
+"""What the companion was doing at any moment of a flight, by the events it told."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from companion.report import Event
+
+
+class Phase(Enum):
+    GROUND = "on the ground"
+    CLIMB = "take-off"
+    ITEM = "item"
+    RECOVERING = "recovering"
+    HOLDING = "holding"
+    RETURNING = "returning"
+    LANDING = "landing"
+    OVER = "over"
+
+
+_BEGUN_BY = {
+    "armed": Phase.CLIMB,
+    "item": Phase.ITEM,
+    "detection": Phase.RECOVERING,
+    "hold": Phase.HOLDING,
+    "return": Phase.RETURNING,
+    "landing": Phase.LANDING,
+    "done": Phase.OVER,
+    "aborted": Phase.OVER,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Phases:
+    """Times in microseconds of the vehicle's boot clock."""
+
+    begins_us: tuple[float, ...]
+    phases: tuple[Phase, ...]
+
+    def at(self, boot_us: float) -> Phase:
+        index = bisect_right(self.begins_us, boot_us) - 1
+        return self.phases[index] if index >= 0 else Phase.GROUND
+
+    def first(self, phase: Phase) -> float | None:
+        """When it began for the first time."""
+        return next((at for at, what in zip(self.begins_us, self.phases, strict=True) if what is phase), None)
+
+    def end_of(self, boot_us: float) -> float | None:
+        """When the phase of this moment ended; None if it did not."""
+        index = bisect_right(self.begins_us, boot_us) - 1
+        return next(
+            (self.begins_us[k] for k in range(index + 1, len(self.phases)) if self.phases[k] is not self.phases[index]),
+            None,
+        )
+
+
+def phases_of(events: Sequence[Event], epoch_at_boot_us: float) -> Phases:
+    told = [(event.time_us - epoch_at_boot_us, _BEGUN_BY[event.kind]) for event in events if event.kind in _BEGUN_BY]
+    return Phases(tuple(at for at, _ in told), tuple(phase for _, phase in told))

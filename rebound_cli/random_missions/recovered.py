@@ -1,0 +1,77 @@
+"""Figures of every recovery of a flight, by the simulator's truth. SI units."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rebound_cli.campaign.plan import Json
+from rebound_cli.random_missions.contacts import Contact, Role
+from rebound_cli.random_missions.flight import JudgedFlight
+from rebound_cli.summary import LONGEST_RECOVERY_S
+
+# The vehicle is watched at rest for this long, unless it flies on earlier.
+RESTING_S = 0.5
+_DIGITS = 4
+
+
+def recoveries(flight: JudgedFlight, contacts: Sequence[Contact]) -> list[Json]:
+    """One for each hit, with what it touched until it had recovered; landings are none."""
+    episodes: list[list[Contact]] = []
+    for contact in contacts:
+        if contact.role is Role.HIT:
+            episodes.append([contact])
+        elif contact.role is not Role.LANDING and episodes:
+            episodes[-1].append(contact)
+    return [_figures(flight, episode) for episode in episodes]
+
+
+def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
+    first = episode[0]
+    normal = first.hit.normal_ned
+    found: Json = {
+        "obstacle": first.hit.obstacle,
+        "kind": first.hit.kind,
+        "phase": first.phase.value,
+        "speed_m_s": round(first.speed_m_s, _DIGITS),
+        "closing_m_s": round(first.closing_m_s, _DIGITS),
+        "climbing_m_s": round(-first.hit.impact_velocity_ned_m_s[2], _DIGITS),
+        "steepness": round(normal[2], _DIGITS),
+        "seen": first.collision is not None,
+        "again": sum(contact.role is Role.AGAIN for contact in episode),
+        "others": sum(contact.role is Role.NEXT for contact in episode),
+    }
+    if first.collision is not None:
+        collision = flight.report.collisions[first.collision]
+        detected_boot_us = collision.detected_at_us - flight.truth.epoch_at_boot_us
+        found["latency_ms"] = round(1e-3 * (detected_boot_us - first.hit.contact_at_boot_us), 3)
+    seen = [contact for contact in episode if contact.collision is not None]
+    return found | (_recovery(flight, seen[-1]) if seen else {})
+
+
+def _recovery(flight: JudgedFlight, contact: Contact) -> Json:
+    """After the last hit of an episode that was seen: its setpoint is the one that is flown to."""
+    assert contact.collision is not None
+    collision, hit = flight.report.collisions[contact.collision], contact.hit
+    series = flight.truth.series
+    since_s = 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us)
+    settled_s = collision.settled_after_s
+    if settled_s is not None:
+        settled_s += 1e-6 * (collision.sample_time_boot_us - hit.contact_at_boot_us)
+    until_s = LONGEST_RECOVERY_S if settled_s is None else settled_s + flight.mission.companion.settled.duration_s
+    later = [other.contact_at_boot_us for other in flight.truth.hits if other.contact_at_boot_us > hit.ended_at_boot_us]
+    if later:
+        until_s = min(until_s, 1e-6 * (later[0] - hit.contact_at_boot_us))
+    until_boot_us = hit.contact_at_boot_us + 1e6 * until_s
+    past_m, lost_m = flight.truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, until_boot_us)
+    during = (since_s >= 0.0) & (since_s <= until_s)
+    resting = (since_s >= until_s - RESTING_S) & (since_s <= until_s)
+    path, touched, normal = series["position_ned_m"], np.array(hit.contact_position_ned_m), np.array(hit.normal_ned)
+    clear_m = float(((path[resting] - touched) @ normal).min()) if settled_s is not None and resting.any() else None
+    risen_m = float((touched[2] - path[during, 2]).max()) if during.any() else 0.0
+    return {
+        "settled_s": None if settled_s is None else round(settled_s, _DIGITS),
+        "past_m": round(past_m, _DIGITS),
+        "lost_m": round(lost_m, _DIGITS),
+        "risen_m": round(max(0.0, risen_m), _DIGITS),
+        "clear_m": None if clear_m is None else round(clear_m, _DIGITS),
+    }
