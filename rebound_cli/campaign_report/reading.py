@@ -4,12 +4,12 @@ HOW_TO_READ = """\
 ### How it is measured
 
 *A random mission* follows from its seed, which is also the seed of the simulated vehicle; both airframes fly the
-same. Rooms: four walls around the vehicle (every second one with a ceiling; in two of five the fence is the room, 0.3 m in),
-walls that stand free at any angle or lean, corners of 60 to 130°, corridors of 2 to 4.5 m, poles of 2 to 30 cm
-radius, boxes; poles and ceilings come on top in others, now and then a beam over the start or a box that comes and
-goes. Wind up to 5 m/s, two of five with a gust. One to three ways (`go_to`, `velocity`, `path`, `orbit`, straight
-up) at 0.5 to 4 m/s, two thirds of them into something, holds, turns, waits and repeats in between, any policy for
-the mission and for some items, the end a `land` or a `return`. `HIGHRES_IMU` comes with 200 Hz (PX4's
+same. Rooms: four walls around the vehicle (every second one with a ceiling; in two of five the fence is the room,
+0.3 m in), walls that stand free at any angle or lean, corners of 60 to 130°, corridors of 2 to 4.5 m, poles of 2
+to 30 cm radius, boxes; poles and ceilings come on top in others, now and then a beam over the start or a box that
+comes and goes. Wind up to 5 m/s, two of five with a gust. One to three ways (`go_to`, `velocity`, `path`, `orbit`,
+straight up) at 0.5 to 4 m/s, two thirds of them into something, holds, turns, waits and repeats in between, any
+policy for the mission and for some items, the end a `land` or a `return`. `HIGHRES_IMU` comes with 200 Hz (PX4's
 `IMU_INTEG_RATE` on a flight controller) or with 50 Hz (its default stream); everything else is the default.
 
 *Ended as it says*: no crash; every hit of 0.5 m/s and more into a surface noticed, and none answered that was
