@@ -7,16 +7,17 @@ same outputs, which is what makes a flight replayable.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from companion.detection import watch
 from companion.detection.interface import Situation
 from companion.detection.watch import Watch, start_watch
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs
+from companion.flight.detecting import collisions, follow_contact
 from companion.flight.hearing import hear
 from companion.flight.limiting import Limiter
 from companion.flight.machine import Machine
 from companion.flight.operator import status_text, values
+from companion.flight.outputs import Outputs, collect
 from companion.flight.states import FINAL_STATES, State
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
@@ -24,12 +25,10 @@ from companion.messages import (
     CommandAck,
     LocalPosition,
     OnboardHeartbeat,
-    Outgoing,
     PositionSetpoint,
     Sample,
 )
 from companion.mission.model import Mission
-from companion.report import Event
 
 # MAVLink's heartbeat microservice: once a second.
 HEARTBEAT_INTERVAL_US = 1_000_000
@@ -40,12 +39,6 @@ POLL_INTERVAL_US = 50_000
 ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
 # Off the ground, which is the detector's affair by height, a hit in the climb is a hit too.
 DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF}
-
-
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    messages: tuple[Outgoing, ...]
-    events: tuple[Event, ...]
 
 
 @dataclass(slots=True)
@@ -91,7 +84,7 @@ def advance(core: Core, samples: Sequence[Sample], now_us: int) -> Outputs:
     stream_setpoint(core, moved, now_us)
     beat(core, now_us)
     inform(core, now_us)
-    return collect(core)
+    return collect(core.flight)
 
 
 def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
@@ -101,30 +94,12 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     """
     try:
         refusal = hear(core.flight, samples, now_us)
-        impacts = () if core.flight.fault else detect(core, samples, now_us)
+        impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
         moved = fly(core, samples, impacts, refusal, now_us)
-        follow_contact(core)
+        follow_contact(core.flight, core.watch)
     except Exception as error:
         return core.machine.fail(error, now_us)
     return moved
-
-
-def detect(core: Core, samples: Sequence[Sample], now_us: int) -> Sequence[ImpactEstimate]:
-    """The samples through the watch; the impacts that ask for a recovery."""
-    seen = watch.advance(core.watch, samples, situation(core), now_us)
-    for notice in seen.notices:
-        core.flight.tell(now_us, notice.kind, notice.text, **notice.data)
-    for estimate in seen.impacts:
-        if not estimate.impact.is_collision:
-            tell_contact(core, estimate, now_us)
-    return [estimate for estimate in seen.impacts if estimate.impact.is_collision]
-
-
-def tell_contact(core: Core, estimate: ImpactEstimate, now_us: int) -> None:
-    """A touch that is no collision is worth a line and nothing more."""
-    kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
-    text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
-    core.flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
 
 
 def situation(core: Core) -> Situation:
@@ -166,12 +141,6 @@ def fly(
     if core.machine.finished and flight.ended_at_us is None:
         flight.ended_at_us = now_us
     return moved
-
-
-def follow_contact(core: Core) -> None:
-    """Let the latest collision's record see the contact's course."""
-    if core.flight.collisions:
-        core.flight.collisions[-1].follow_contact(core.watch.state, core.watch.estimate)
 
 
 def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
@@ -219,19 +188,6 @@ def inform(core: Core, now_us: int) -> None:
         core.values_due_us = now_us + round(1e6 / operator.values_hz)
         latest = flight.collisions[-1] if flight.collisions else None
         flight.outbox += values(core.machine.state, core.watch, latest, hits, now_us - core.started_at_us)
-
-
-def collect(core: Core) -> Outputs:
-    """Empty the outbox and the timeline into the step's outputs."""
-    flight = core.flight
-    if not flight.outbox and not flight.events:
-        return NOTHING
-    outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
-    flight.outbox, flight.events = [], []
-    return outputs
-
-
-NOTHING = Outputs((), ())
 
 
 def next_deadline_us(core: Core) -> int:

@@ -1,6 +1,7 @@
 """PX4's flight modes as HEARTBEAT.custom_mode packs them: main << 16 | sub << 24 (PX4's px4_custom_mode.h)."""
 
 OFFBOARD = 6 << 16
+POSCTL = 3 << 16
 AUTO_LOITER = 4 << 16 | 3 << 24
 AUTO_LAND = 4 << 16 | 6 << 24
 
@@ -24,3 +25,8 @@ def mode_name(custom_mode: int) -> str:
     if name == "AUTO":
         return f"AUTO.{_AUTO_NAMES.get(sub, str(sub))}"
     return name
+
+
+MODE_NAMES = frozenset(
+    {name for name in _MAIN_NAMES.values() if name != "AUTO"} | {f"AUTO.{name}" for name in _AUTO_NAMES.values()}
+)

@@ -24,7 +24,7 @@ class Connect:
         if flight.vehicle.identity is None:
             return self._wait_for_heartbeat(flight, now_us)
         if self._requests is None:
-            self._requests = self._list_requests(flight)
+            self._requests = deque(request_streams(flight))
             flight.tell(now_us, "connected", _connected_text(flight), system_id=flight.vehicle.identity.system_id)
         if self._measuring_since_us is None:
             self._send_requests(flight, self._requests, inputs, now_us)
@@ -38,10 +38,6 @@ class Connect:
         if now_us - self._started_us < wait_s * 1e6:
             return None
         return Move(Trigger.REFUSED, f"no HEARTBEAT from an autopilot within {wait_s:g} s; is the address right?")
-
-    def _list_requests(self, flight: FlightContext) -> deque[VehicleCommand]:
-        version: list[VehicleCommand] = [RequestMessage(MessageId.AUTOPILOT_VERSION)]
-        return deque(version + [stream.request() for stream in flight.streams.streams])
 
     def _send_requests(
         self, flight: FlightContext, requests: deque[VehicleCommand], inputs: Inputs, now_us: int
@@ -86,6 +82,12 @@ class Ready:
             return None
         complaint = ground_check(flight)
         return Move(Trigger.REFUSED, complaint) if complaint is not None else Move(Trigger.PLAN_CONFIRMED)
+
+
+def request_streams(flight: FlightContext) -> list[VehicleCommand]:
+    """What is asked of a vehicle that has just been met."""
+    version: list[VehicleCommand] = [RequestMessage(MessageId.AUTOPILOT_VERSION)]
+    return version + [stream.request() for stream in flight.streams.streams]
 
 
 def ground_check(flight: FlightContext) -> str | None:

@@ -5,7 +5,7 @@ rest, checksums included, is pymavlink's.
 """
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -29,7 +29,9 @@ from companion.messages import (
     LandedState,
     LocalPosition,
     Parameter,
+    PositionTarget,
     Sample,
+    Sticks,
     TimeSyncAnswer,
     TimeSyncRequest,
     Vibration,
@@ -42,6 +44,8 @@ HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 FLAG_SIGNED = 0x01
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
+# POSITION_TARGET_TYPEMASK: x, y or z.
+POSITION_IGNORED = 0x7
 
 
 def _heartbeat(m: Any) -> Heartbeat:
@@ -130,13 +134,32 @@ CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
 }
 
 
+def _position_target(m: Any) -> PositionTarget:
+    known = not m.type_mask & POSITION_IGNORED and finite(m.x, m.y, m.z)
+    return PositionTarget((m.x, m.y, m.z) if known else None)
+
+
+def _sticks(m: Any) -> Sticks:
+    # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp).
+    return Sticks((m.x / 1000.0, m.y / 1000.0, m.z / 500.0 - 1.0, m.r / 1000.0))
+
+
+# What only a guard looks at: another's setpoints and the pilot's hands.
+GUARD_CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
+    **CONVERTERS,
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: _position_target,
+    dialect.MAVLINK_MSG_ID_MANUAL_CONTROL: _sticks,
+}
+
+
 class Decoder:
     """A byte stream in any chunks, with any damage, to packets; never raises on what it is fed.
 
     Until `listen_to` names the vehicle only heartbeats are converted; then only what that component sent.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, converters: Mapping[int, Callable[[Any], Sample | None]] = CONVERTERS) -> None:
+        self._converters = converters
         self._mavlink = dialect.MAVLink(None)
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
@@ -178,7 +201,7 @@ class Decoder:
             source, message_id = (packet[5], packet[6]), packet[7] | packet[8] << 8 | packet[9] << 16
         else:
             source, message_id = (packet[3], packet[4]), packet[5]
-        frequent, converter = FREQUENT.get(message_id), CONVERTERS.get(message_id)
+        frequent, converter = FREQUENT.get(message_id), self._converters.get(message_id)
         if frequent is None and converter is None:
             return None
         if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):

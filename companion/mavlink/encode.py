@@ -67,9 +67,11 @@ class Encoder:
 
     def packets(self, outgoing: Outgoing) -> list[bytes]:
         """All that it takes; of most messages one."""
-        if isinstance(outgoing, StatusText):
-            return [self._pack(message) for message in self._chunks(outgoing)]
-        return [self.encode(outgoing)]
+        return [self._pack(message) for message in self.messages(outgoing)]
+
+    def messages(self, outgoing: Outgoing) -> list[Any]:
+        """The same, as pymavlink has them before they are bytes."""
+        return self._chunks(outgoing) if isinstance(outgoing, StatusText) else [self._message(outgoing)]
 
     def encode(self, outgoing: SinglePacket) -> bytes:
         """One packet."""

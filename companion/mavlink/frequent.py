@@ -4,7 +4,7 @@ The packets' layout is pymavlink's own; only its message objects are left out, w
 """
 
 from collections.abc import Callable
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
@@ -60,6 +60,11 @@ class FrequentReader:
         self._pick = itemgetter(*[places.index(name) for name in fields])
         self._unpacker = message.unpacker
         self._make = make
+        self._fields = attrgetter(*fields)
+
+    def from_message(self, message: Any) -> Sample | None:
+        """Of a message whose fields are its attributes; where a name stands for several values, there is none."""
+        return self._make(*self._fields(message))
 
     def sample(self, payload: bytes) -> Sample | None:
         """MAVLink 2 leaves out the zeros at a payload's end."""

@@ -48,7 +48,9 @@ class MessageId(IntEnum):
 
     ATTITUDE_QUATERNION = 31
     LOCAL_POSITION_NED = 32
+    MANUAL_CONTROL = 69
     ATTITUDE_TARGET = 83
+    POSITION_TARGET_LOCAL_NED = 85
     HIGHRES_IMU = 105
     AUTOPILOT_VERSION = 148
     ESTIMATOR_STATUS = 230
@@ -111,6 +113,20 @@ class AttitudeTarget:
     time_boot_us: int
     thrust_fraction: float  # collective over the greatest, 0 to 1
     attitude_wxyz: Quaternion | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PositionTarget:
+    """POSITION_TARGET_LOCAL_NED: the place that the vehicle's position control flies to; None where there is none."""
+
+    position_ned_m: Vector3 | None
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks:
+    """MANUAL_CONTROL as PX4 tells it: the pilot's pitch, roll, throttle and yaw sticks, -1 to 1, 0 in the middle."""
+
+    deflections: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +212,8 @@ Sample: TypeAlias = (
     | Odometry
     | Attitude
     | AttitudeTarget
+    | PositionTarget
+    | Sticks
     | Vibration
     | Battery
     | ExtendedState

@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot.flight_messages import RadioChannels
+from sim_vehicle.autopilot.flight_messages import RadioChannels, StickInput
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Air, HilGps
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -29,10 +29,11 @@ class Topic(IntEnum):
     """New once: it does not move."""
     MAGNETIC_FIELD = 11
     RADIO = 12
+    STICKS = 13
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.RADIO)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.RADIO, Topic.STICKS)
 
 
 class Topics:
@@ -47,6 +48,7 @@ class Topics:
         self._battery = 0
         self._air: Air | None = None
         self._channels: RadioChannels | None = None
+        self._sticks: StickInput | None = None
         self._field = state.magnetic_field_frd_gauss
         self._status: tuple[int, bool, int] | None = None
         self._status_us = state.sample.time_boot_us
@@ -67,6 +69,10 @@ class Topics:
         if channels is not self._channels:
             self._channels = channels
             versions[12] += 1
+        sticks = state.autopilot.sticks
+        if sticks is not self._sticks and sticks is not None:
+            self._sticks = sticks
+            versions[13] += 1
         if state.air is not self._air:
             self._air = state.air
             versions[8] += 1

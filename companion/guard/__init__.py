@@ -1,0 +1,1 @@
+"""Protection for flights that something else commands: watch, take over at a hit, recover, give back."""

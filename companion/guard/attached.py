@@ -1,0 +1,78 @@
+"""The guard on a program's own connection: messages as names and fields in and out, and a gate for what passes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from companion.guard.config import GuardConfig
+from companion.guard.core import GuardCore, advance, next_deadline_us, start
+from companion.guard.gate import SETPOINTS, Gate
+from companion.guard.states import State
+from companion.link.identity import AUTOPILOT_COMPONENT_ID
+from companion.mavlink.encode import Encoder
+from companion.mavlink.fields import fields_from, sample_from
+from companion.messages import OnboardHeartbeat, Sample, TimeSyncReply
+from companion.report import Event
+
+
+@dataclass(frozen=True, slots=True)
+class AttachedStep:
+    """What is to be sent, in order, and what is to be told."""
+
+    sent: Sequence[tuple[str, Mapping[str, Any]]]
+    events: Sequence[Event]
+
+
+class AttachedGuard:
+    """Joins fields with the pure core; holds no clock and no thread. Times are microseconds, any epoch.
+
+    The program's own heartbeats and its answers to time requests are already there; none are added.
+    """
+
+    def __init__(self, config: GuardConfig, system_id: int, now_us: int) -> None:
+        self.core: GuardCore = start(config, True, now_us)
+        self._source = (system_id, AUTOPILOT_COMPONENT_ID)
+        self._encoder = Encoder()
+        self._encoder.speak_to(*self._source)
+        self._gate = Gate()
+
+    def hear(self, name: str, source: tuple[int, int], fields: Mapping[str, Any], now_us: int) -> AttachedStep:
+        """A message that has arrived."""
+        if source != self._source:
+            return self.step((), now_us)
+        sample = sample_from(name, source, fields)
+        return self.step(() if sample is None else (sample,), now_us)
+
+    def step(self, samples: Sequence[Sample], now_us: int) -> AttachedStep:
+        """Samples that have been heard, or none when only time has passed."""
+        outputs = advance(self.core, samples, now_us)
+        sent: list[tuple[str, Mapping[str, Any]]] = []
+        for message in outputs.messages:
+            if not isinstance(message, OnboardHeartbeat | TimeSyncReply):
+                sent += fields_from(self._encoder, message)
+        for name, fields in sent:
+            if name in SETPOINTS:
+                self._gate.sends(fields)
+        return AttachedStep(sent, outputs.events)
+
+    def lets_pass(self, name: str, fields: Mapping[str, Any], now_us: int) -> bool:
+        """Whether a message on its way to the vehicle may go on: all but others' setpoints while the guard holds."""
+        if name not in SETPOINTS or self._gate.is_own(fields):
+            return True
+        self.core.guard.others_setpoint_us = now_us
+        if not self.core.machine.holds:
+            return True
+        self._gate.kept_out += 1
+        return False
+
+    @property
+    def kept_out(self) -> int:
+        """Setpoints that did not go on."""
+        return self._gate.kept_out
+
+    @property
+    def finished(self) -> bool:
+        return self.core.machine.state is State.ENDED
+
+    def next_deadline_us(self) -> int:
+        return next_deadline_us(self.core)

@@ -1,0 +1,66 @@
+"""A guard's settings: every key optional, every default with its reason."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from companion.mission.config import CompanionConfig
+from companion.mission.fence import Fence
+from companion.mission.items import LandItem, TakeoffItem
+from companion.mission.model import Mission, MissionItem
+from companion.mission.policy import Limits
+from companion.px4_mode import MODE_NAMES
+from companion.recovery.interface import RecoveryConfig
+from companion.recovery.registry import RECOVERY_LAWS, check_known_law
+from companion.written import Positive, Written
+
+# Modes in which PX4 itself holds a position or a height. Not AUTO.LAND: its end is a hit on the ground. Not the modes
+# that a pilot flies by attitude: there the stick is the only brake, and it is not to be taken away unasked.
+DEFAULT_MODES = (
+    *("POSCTL", "ALTCTL", "OFFBOARD"),
+    *("AUTO.TAKEOFF", "AUTO.LOITER", "AUTO.MISSION", "AUTO.RTL", "AUTO.FOLLOW"),
+)
+
+
+class GuardConfig(Written):
+    """The file of `rebound guard --config`; a mission's parts of the same name mean the same."""
+
+    modes: Annotated[tuple[str, ...], Field(min_length=1)] = DEFAULT_MODES
+    # hold: what flew into the wall does not do it again unless somebody says so.
+    then: Literal["previous", "hold"] = "hold"
+    # With `then: previous` a mission flies into the same wall again. Three hits in one flight are no accident.
+    max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
+    # The answer takes 10 ms, CURRENT_MODE at 10 Hz 100 ms; a command lost on the way is repeated after 500 ms.
+    confirm_within_s: Annotated[Positive, Field(ge=0.2)] = 1.0
+    # PX4 wants 2 Hz to be seen before it takes OFFBOARD; five times that survives a link that loses packets.
+    lead_hz: Annotated[Positive, Field(ge=2.0, le=50.0)] = 10.0
+    # From where the vehicle was armed. Nobody knows a stranger's field: as good as none until it is given.
+    fence: Fence = Fence(radius_m=100_000.0, max_height_m=10_000.0)
+    limits: Limits = Limits()
+    recovery: RecoveryConfig = RecoveryConfig()
+    companion: CompanionConfig = CompanionConfig()
+
+    @field_validator("modes")
+    @classmethod
+    def _known_modes(cls, modes: tuple[str, ...]) -> tuple[str, ...]:
+        for mode in modes:
+            if mode not in MODE_NAMES:
+                raise ValueError(f"{mode!r} is no mode of PX4: choose from {', '.join(sorted(MODE_NAMES))}")
+        return modes
+
+    @field_validator("recovery")
+    @classmethod
+    def _known_law(cls, recovery: RecoveryConfig) -> RecoveryConfig:
+        check_known_law(recovery.law, RECOVERY_LAWS)
+        return recovery
+
+    def as_mission(self) -> Mission:
+        """What the parts that the guard shares with a flight read: a mission of which nothing is ever flown."""
+        return Mission.model_construct(
+            name="guard",
+            items=(MissionItem(takeoff=TakeoffItem(height_m=1.0)), MissionItem(land=LandItem())),
+            fence=self.fence,
+            limits=self.limits,
+            recovery=self.recovery,
+            companion=self.companion,
+        )

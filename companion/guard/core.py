@@ -1,0 +1,203 @@
+"""The guard's pure heart: (core, samples, now) -> messages to send and events. No bytes, no clock, no I/O."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from companion.detection.interface import Situation
+from companion.detection.watch import Watch, start_watch
+from companion.estimate.impact import ImpactEstimate
+from companion.flight.context import FlightContext, Inputs
+from companion.flight.detecting import collisions, follow_contact
+from companion.flight.hearing import hear
+from companion.flight.limiting import Limiter
+from companion.flight.operator import status_text
+from companion.flight.outputs import Outputs, collect
+from companion.guard.config import GuardConfig
+from companion.guard.context import GuardContext, GuardInputs
+from companion.guard.machine import GuardMachine
+from companion.guard.states import HOLDING, State
+from companion.guard.watching import Connect, why_not
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
+from companion.messages import (
+    CommandAck,
+    LocalPosition,
+    OnboardHeartbeat,
+    PositionSetpoint,
+    PositionTarget,
+    Sample,
+    Sticks,
+)
+
+# MAVLink's heartbeat microservice: once a second.
+HEARTBEAT_INTERVAL_US = 1_000_000
+# All timeouts are noticed within this, when nothing arrives.
+POLL_INTERVAL_US = 50_000
+
+
+@dataclass(slots=True)
+class GuardCore:
+    """All that is remembered between steps."""
+
+    machine: GuardMachine
+    watch: Watch
+    started_at_us: int
+    now_us: int
+    heartbeat_due_us: int
+    setpoint_due_us: int
+    stop_reason: str | None = None
+    is_enabled: bool = False  # asked for, and not yet taken up
+    limiter: Limiter = field(default_factory=Limiter)
+
+    @property
+    def guard(self) -> GuardContext:
+        return self.machine.guard
+
+    @property
+    def flight(self) -> FlightContext:
+        return self.machine.guard.flight
+
+
+def start(config: GuardConfig, keeps_others_out: bool, now_us: int) -> GuardCore:
+    """A guard before its first step. `keeps_others_out`: see GuardContext."""
+    companion = config.companion
+    watching = start_watch(companion, now_us)
+    streams = StreamMonitor(companion.streams, tuple(watching.detector.losses))
+    flight = FlightContext(config.as_mission(), Vehicle(), streams)
+    machine = GuardMachine(GuardContext(config, flight, keeps_others_out), Connect(now_us))
+    return GuardCore(machine, watching, now_us, now_us, now_us, now_us)
+
+
+def advance(core: GuardCore, samples: Sequence[Sample], now_us: int) -> Outputs:
+    """One step: what was heard, whether it shows a hit, what follows, what is due to be sent."""
+    core.now_us = now_us
+    moved = react(core, samples, now_us)
+    stream_setpoint(core, moved, now_us)
+    beat(core, now_us)
+    inform(core)
+    return collect(core.flight)
+
+
+def react(core: GuardCore, samples: Sequence[Sample], now_us: int) -> bool:
+    """All that a fault in this program could be in: whatever is raised, the vehicle is given back, and it is told."""
+    try:
+        refusal = hear(core.flight, samples, now_us)
+        place_origin(core.flight, core.guard)
+        impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
+        moved = act(core, samples, impacts, refusal, now_us)
+        follow_contact(core.flight, core.watch)
+    except Exception as error:
+        return core.machine.fail(error, now_us)
+    return moved
+
+
+def place_origin(flight: FlightContext, guard: GuardContext) -> None:
+    """The fence and the heights begin where the vehicle stands until it is armed.
+
+    Of one met in the air only the zero of its own local frame is known, which is where its estimator began.
+    """
+    latest = flight.vehicle.history.latest()
+    if flight.vehicle.armed is False:
+        flight.origin_ned_m = None if latest is None else latest.position_ned_m
+        guard.hits, guard.program_elsewhere = 0, False
+    elif flight.origin_ned_m is None and latest is not None:
+        flight.origin_ned_m = (latest.position_ned_m[0], latest.position_ned_m[1], 0.0)
+
+
+def situation(core: GuardCore) -> Situation:
+    """What the guard knows, for the detector; of a stranger's setpoints it knows nothing."""
+    flight, is_ours = core.flight, core.machine.state in HOLDING
+    latest, target = flight.vehicle.history.latest(), flight.target if is_ours else None
+    height_m = None
+    if latest is not None and flight.origin_ned_m is not None:
+        height_m = flight.origin_ned_m[2] - latest.position_ned_m[2]
+    return Situation(
+        off_reason=why_not_detecting(core, height_m),
+        armed=flight.vehicle.armed,
+        landed_state=flight.vehicle.landed,
+        height_m=height_m,
+        setpoint_position_ned_m=None if target is None else target.position_ned_m,
+        setpoint_velocity_ned_m_s=None if target is None else target.velocity_ned_m_s,
+    )
+
+
+def why_not_detecting(core: GuardCore, height_m: float | None) -> str | None:
+    """Ground, take-off and landing shake a vehicle as a hit does."""
+    state = core.machine.state
+    if state is not State.WATCHING and state not in HOLDING:
+        return why_not(core.guard) or state.value
+    least_m = core.guard.config.companion.min_detection_height_m
+    return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
+
+
+def act(
+    core: GuardCore, samples: Sequence[Sample], impacts: Sequence[ImpactEstimate], refusal: str | None, now_us: int
+) -> bool:
+    """Let the state machine act; whether it moved."""
+    sticks = [sample for sample in samples if isinstance(sample, Sticks)]
+    if sticks and core.machine.state not in HOLDING:
+        core.guard.sticks = sticks[-1]
+    inputs = GuardInputs(
+        Inputs(
+            acks=[sample for sample in samples if isinstance(sample, CommandAck)],
+            positions=[sample for sample in samples if isinstance(sample, LocalPosition)],
+            impacts=impacts,
+            stop_reason=core.stop_reason,
+            refusal=refusal,
+        ),
+        echoes=[sample for sample in samples if isinstance(sample, PositionTarget)],
+        sticks=sticks,
+        is_enabled=core.is_enabled,
+    )
+    core.is_enabled = False
+    return core.machine.step(inputs, now_us)
+
+
+def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
+    """The one place setpoints leave from: at their rate, and at once when the guard has moved on."""
+    if not moved and now_us < core.setpoint_due_us:
+        return
+    config, is_ours = core.guard.config, core.machine.holds
+    rate_hz = config.companion.flight.setpoint_hz if is_ours else config.lead_hz
+    core.setpoint_due_us = now_us + round(1e6 / rate_hz)
+    try:
+        wanted = core.machine.activity.target(now_us)
+    except Exception as error:
+        core.machine.fail(error, now_us)
+        wanted = core.flight.target
+    if wanted is None:
+        return
+    if is_ours:
+        wanted = core.flight.target = core.limiter.passed(core.flight, wanted, True, moved, now_us)
+        core.guard.sent_ned_m.append((now_us, wanted.position_ned_m))
+    time_us = now_us - core.started_at_us
+    core.flight.outbox.append(
+        PositionSetpoint(
+            time_us, wanted.position_ned_m, wanted.yaw_rad, wanted.velocity_ned_m_s, wanted.acceleration_ned_m_s2
+        )
+    )
+
+
+def beat(core: GuardCore, now_us: int) -> None:
+    """Our own HEARTBEAT, for as long as there is anything to do."""
+    if now_us < core.heartbeat_due_us or core.machine.state is State.ENDED:
+        return
+    core.heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
+    core.flight.outbox.append(OnboardHeartbeat(core.machine.state is not State.CONNECTING))
+
+
+def inform(core: GuardCore) -> None:
+    """The operator's texts, as things happen; once there is somebody to tell."""
+    flight = core.flight
+    if flight.vehicle.identity is None or not core.guard.config.companion.operator.status_texts:
+        return
+    texts = [status_text(event, flight.mission.name, len(flight.collisions)) for event in flight.events]
+    flight.outbox += [text for text in texts if text is not None]
+
+
+def next_deadline_us(core: GuardCore) -> int:
+    """When the next step is due if nothing arrives."""
+    if core.stop_reason is not None and core.machine.state is not State.ENDED:
+        return min(core.now_us + POLL_INTERVAL_US, core.setpoint_due_us)
+    due_us = min(core.heartbeat_due_us, core.now_us + POLL_INTERVAL_US)
+    return min(due_us, core.setpoint_due_us) if core.setpoint_due_us > core.now_us else due_us

@@ -1,0 +1,7 @@
+"""A guard for programs on MAVSDK (version 4): `from companion.mavsdk import CollisionGuard`; see docs/guard.md."""
+
+from companion.guard.config import GuardConfig
+from companion.guard.states import State
+from companion.shell.mavsdk_guard import CollisionGuard, GuardError
+
+__all__ = ["CollisionGuard", "GuardConfig", "GuardError", "State"]

@@ -1,0 +1,199 @@
+"""`CollisionGuard`: the guard attached to a program's own MAVSDK, with a thread and a clock."""
+
+import asyncio
+import json
+import logging
+import threading
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from types import TracebackType
+from typing import Any, Self
+
+from companion.guard.attached import AttachedGuard, AttachedStep
+from companion.guard.config import GuardConfig
+from companion.guard.gate import SETPOINTS
+from companion.guard.guard import collisions
+from companion.guard.states import State
+from companion.mavlink.fields import HEARD
+from companion.report import CollisionReport, Event
+from companion.shell.clock import Clock
+from companion.shell.mavsdk_link import GuardError, MavsdkLink
+
+__all__ = ["CollisionGuard", "GuardError"]
+
+_LOG = logging.getLogger(__name__)
+# Heartbeat within ten seconds, ten streams asked for, two seconds of measuring.
+START_TIMEOUT_S = 20.0
+# Giving back takes 10 ms; a vehicle that refuses is asked five times, then for the next mode.
+STOP_TIMEOUT_S = 10.0
+# Events kept for a program that asks later.
+EVENTS_KEPT = 1000
+
+
+class CollisionGuard:
+    """Watches the program's vehicle through the program's own connection, and takes it over at a hit.
+
+    `on_event` is called on the guard's own thread. As a context manager, or as an asynchronous one, it starts and
+    stops by itself. Raises GuardError where MAVSDK 4 is not there, or nothing can be guarded.
+    """
+
+    def __init__(
+        self,
+        mavsdk: Any,
+        system: Any,
+        config: GuardConfig | None = None,
+        on_event: Callable[[Event], None] | None = None,
+    ) -> None:
+        self._link = MavsdkLink(mavsdk, system)
+        self._clock = Clock()
+        self._guard = AttachedGuard(config or GuardConfig(), self._link.system_id, self._clock.now_us())
+        self._on_event = on_event
+        # Guards all below. MAVSDK's I/O thread and the guard's own meet here, each for less than a millisecond.
+        self._changed = threading.Condition()
+        self._untold: deque[Event] = deque()
+        self._listeners: list[Callable[[Event], None]] = []
+        self._is_over = False
+        self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self._thread = threading.Thread(target=self._run, name="rebound-guard", daemon=True)
+
+    def start(self) -> None:
+        """Attach; returns when the vehicle's streams have been found fast enough, some 3 s later."""
+        self._link.intercept(self._incoming, self._outgoing)
+        self._thread.start()
+        with self._changed:
+            self._changed.wait_for(lambda: self.state is not State.CONNECTING, START_TIMEOUT_S)
+            state, outcome = self.state, self._guard.core.machine.outcome
+        if state in (State.CONNECTING, State.ENDED):
+            self.stop()
+            raise GuardError(f"No guard: {outcome or 'the vehicle does not answer'}.")
+
+    def stop(self) -> None:
+        """Give the vehicle back if it is held, and let go of MAVSDK."""
+        with self._changed:
+            self._guard.core.stop_reason = "stopped by the program"
+            self._changed.notify_all()
+            self._changed.wait_for(lambda: self._guard.finished or self._is_over, STOP_TIMEOUT_S)
+            self._is_over = True
+            self._changed.notify_all()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join()
+        self._link.release()
+
+    def enable(self) -> None:
+        """Watch again after the guard has stood down for a pilot."""
+        with self._changed:
+            self._guard.core.is_enabled = True
+            self._changed.notify_all()
+
+    @property
+    def state(self) -> State:
+        return self._guard.core.machine.state
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vehicle flies by the guard's setpoints; the program's are kept out meanwhile."""
+        return self._guard.core.machine.holds
+
+    @property
+    def kept_out(self) -> int:
+        """How many of the program's setpoints have been kept out so far."""
+        return self._guard.kept_out
+
+    @property
+    def collisions(self) -> tuple[CollisionReport, ...]:
+        with self._changed:
+            return collisions(self._guard.core)
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Block until the condition holds; looked at whenever something has happened."""
+        with self._changed:
+            return self._changed.wait_for(condition, timeout_s)
+
+    async def watch_events(self) -> AsyncIterator[Event]:
+        """Every event from now on, for a program on asyncio."""
+        loop = asyncio.get_running_loop()
+        queue: asyncio.Queue[Event] = asyncio.Queue()
+
+        def put(event: Event) -> None:
+            loop.call_soon_threadsafe(queue.put_nowait, event)
+
+        with self._changed:
+            self._listeners.append(put)
+        try:
+            while True:
+                yield await queue.get()
+        finally:
+            with self._changed:
+                self._listeners.remove(put)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    async def __aenter__(self) -> Self:
+        await asyncio.get_running_loop().run_in_executor(None, self.start)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await asyncio.get_running_loop().run_in_executor(None, self.stop)
+
+    def _incoming(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
+        """On MAVSDK's thread: the sample, and at once what follows from it."""
+        if name in HEARD:
+            fields = json.loads(fields_json)
+            with self._changed:
+                if not self._is_over:
+                    self._send(self._guard.hear(name, source, fields, self._clock.now_us()))
+        return True
+
+    def _outgoing(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
+        """On MAVSDK's thread, the last before the socket."""
+        if name not in SETPOINTS:
+            return True
+        fields = json.loads(fields_json)
+        with self._changed:
+            return self._is_over or self._guard.lets_pass(name, fields, self._clock.now_us())
+
+    def _send(self, step: AttachedStep) -> None:
+        try:
+            for name, fields in step.sent:
+                self._link.send(name, fields)
+        except RuntimeError as error:
+            # The program has destroyed its MAVSDK: there is no connection left to guard on.
+            _LOG.warning("the guard ends: %s", error)
+            self._is_over = True
+        if step.events:
+            self._untold.extend(step.events)
+            self._changed.notify_all()
+
+    def _run(self) -> None:
+        """What is due when nothing arrives, and telling; user code never runs on MAVSDK's thread."""
+        while True:
+            with self._changed:
+                wait_s = (self._guard.next_deadline_us() - self._clock.now_us()) * 1e-6
+                if wait_s > 0.0 and not self._untold:
+                    self._changed.wait(wait_s)
+                if self._is_over:
+                    return
+                if self._clock.now_us() >= self._guard.next_deadline_us():
+                    self._send(self._guard.step((), self._clock.now_us()))
+                told = list(self._untold)
+                self._untold.clear()
+                self.events.extend(told)
+                listeners = list(self._listeners)
+            for event in told:
+                self._tell(event, listeners)
+
+    def _tell(self, event: Event, listeners: list[Callable[[Event], None]]) -> None:
+        try:
+            for listener in [*listeners, *([self._on_event] if self._on_event is not None else [])]:
+                listener(event)
+        except Exception:
+            _LOG.exception("a listener of the guard's events failed")
