@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 
 from companion.flight.states import markdown_table, mermaid_diagram
+from companion.guard.states import markdown_table as guard_table
+from companion.guard.states import mermaid_diagram as guard_diagram
 from sim_vehicle.autopilot.failsafe_table import markdown_table as failsafe_table
 from sim_vehicle.autopilot.modes import mode_diagram
 
@@ -14,6 +16,8 @@ def with_diagrams(text: str) -> str:
     contents = {
         "flight diagram": f"```mermaid\n{mermaid_diagram()}```\n",
         "flight table": markdown_table(),
+        "guard diagram": f"```mermaid\n{guard_diagram()}```\n",
+        "guard table": guard_table(),
         "mode diagram": f"```mermaid\n{mode_diagram().rstrip()}\n```\n",
         "failsafe table": failsafe_table(),
     }

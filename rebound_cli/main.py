@@ -22,6 +22,7 @@ from rebound_cli.arguments import (
 from rebound_cli.campaign_report.arguments import add_campaign
 from rebound_cli.check.arguments import add_check
 from rebound_cli.fly_arguments import add_fly
+from rebound_cli.guard.arguments import add_guard
 from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
@@ -60,6 +61,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_fly(commands)
+    add_guard(commands)
     add_check(commands)
     add_plan(commands)
     _add_sim(commands)

@@ -16,6 +16,8 @@ CROSSED_M = 0.5
 CROSSED_TIMES = 3
 # What is echoed was sent at most this long ago: a slow echo's period of 0.1 s and the link's delays.
 ECHO_AGE_US = 400_000
+# The first echoes may still be of the mode before.
+ECHO_STALE_US = 200_000
 
 
 class TakeOver:
@@ -52,15 +54,17 @@ class TakeOver:
 class Recovering:
     """Until the vehicle rests clear of what it hit."""
 
-    def __init__(self, recover: Recover) -> None:
+    def __init__(self, recover: Recover, now_us: int) -> None:
         self._recover = recover
+        self._began_us = now_us
         self._foreign = 0
 
     def target(self, now_us: int) -> Target | None:
         return self._recover.target(now_us)
 
     def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
-        self._foreign += sum(_is_foreign(guard, echo, now_us) for echo in inputs.echoes)
+        if now_us - self._began_us > ECHO_STALE_US:
+            self._foreign += sum(_is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES:
             guard.program_elsewhere = True
             return Move(Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own")

@@ -9,8 +9,8 @@ from companion.flight.recovering import Recover, record_collision
 from companion.guard.context import Activity, GuardContext, GuardInputs, Move
 from companion.guard.holding import GiveBack, Recovering, TakeOver
 from companion.guard.override import has_moved
-from companion.guard.states import HOLDING, State, Trigger, moves, next_state
 from companion.guard.standing_down import StandDown
+from companion.guard.states import HOLDING, State, Trigger, moves, next_state
 from companion.guard.watching import Connect, End, StandBy, Watch
 from companion.px4_mode import OFFBOARD, mode_name
 
@@ -23,6 +23,7 @@ _KINDS = {
     Trigger.WORTH_GUARDING: "watching",
     Trigger.NOT_TO_GUARD: "watching",
     Trigger.ENABLED: "enabled",
+    Trigger.STREAMS_GONE: "link",
     Trigger.STOPPED: "stopped",
     Trigger.REFUSED: "ended",
 }
@@ -170,7 +171,7 @@ class GuardMachine:
                 return self._take_over(now_us)
             case State.RECOVERING:
                 recover = Recover(flight, now_us) if move.trigger is Trigger.HIT else self._recover()
-                return Recovering(recover)
+                return Recovering(recover, now_us)
             case State.GIVING_BACK:
                 self._limit_hits()
                 return GiveBack(guard, previous is not State.WATCHING, now_us)

@@ -35,6 +35,7 @@ class Trigger(Enum):
     CROSSED = "another program's setpoints reach the vehicle"
     SETTLED = "settled, or not in time"
     GIVEN_BACK = "mode confirmed"
+    STREAMS_GONE = "the vehicle speaks, its streams have ended"
     ENABLED = "person enabled it again"
 
 
@@ -48,6 +49,7 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
     State.STANDING_BY: {
         Trigger.STOPPED: State.ENDED,
         Trigger.WORTH_GUARDING: State.WATCHING,
+        Trigger.STREAMS_GONE: State.CONNECTING,
     },
     State.WATCHING: {
         Trigger.DISARMED: State.STANDING_BY,

@@ -13,6 +13,8 @@ ECHO_HZ = 50.0
 STICKS_HZ = 20.0
 # MAVSDK repeats its setpoint at 20 Hz, others at 2 Hz at least: after this somebody has stopped.
 OTHERS_STOPPED_US = 1_000_000
+# A vehicle that was restarted has forgotten what it was asked for; three of its heartbeats tell that it is up again.
+STREAMS_GONE_US = 3_000_000
 
 
 def why_not(guard: GuardContext) -> str | None:
@@ -99,6 +101,9 @@ class StandBy:
         return None
 
     def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
+        vehicle = guard.flight.vehicle
+        if vehicle.last_position_us is not None and vehicle.last_heard_us - vehicle.last_position_us > STREAMS_GONE_US:
+            return Move(Trigger.STREAMS_GONE, "streams ended, asking for them again")
         reason = why_not(guard)
         if reason is None:
             assert guard.flight.vehicle.custom_mode is not None
@@ -121,6 +126,7 @@ class Watch:
         latest = vehicle.history.latest()
         seen_us = guard.others_setpoint_us
         streams_elsewhere = seen_us is not None and now_us - seen_us < OTHERS_STOPPED_US
+        streams_elsewhere = streams_elsewhere or guard.program_elsewhere
         if latest is None or vehicle.custom_mode == OFFBOARD or streams_elsewhere:
             return None
         return Target(latest.position_ned_m, None)

@@ -1,0 +1,1 @@
+"""`rebound guard`: protection for a flight that something else commands."""

@@ -1,0 +1,73 @@
+"""`rebound guard` on a real connection and the real clock: until Ctrl-C, SIGTERM, or nothing to guard."""
+
+from argparse import Namespace
+from dataclasses import asdict
+
+from companion.errors import ConfigurationError
+from companion.guard.config import GuardConfig
+from companion.guard.guard import Guard
+from companion.shell.clock import Clock
+from companion.shell.connection import Connection, open_connection
+from rebound_cli import run_folder
+from rebound_cli.console import Console, console_for, timeline
+from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.run_folder import FlightRecorder
+
+LONGEST_WAIT_S = 0.05
+CONFIG_NAME = "guard.yaml"
+
+
+def run_guard(options: Namespace) -> int:
+    """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
+    config = guard_config(options)
+    # The address is tried before anything is written: a wrong one leaves no empty folder behind.
+    connection = open_connection(options.connect)
+    folder = run_folder.create_run_folder(options.out, "guard")
+    run_folder.write_yaml(folder / CONFIG_NAME, config.model_dump(mode="json", exclude_none=True))
+    run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
+    recorder, console, guard = FlightRecorder(folder), console_for(False), Guard(config)
+    try:
+        with Interrupts() as interrupts:
+            _run(guard, connection, recorder, console, interrupts)
+    finally:
+        connection.close()
+        recorder.close()
+        hits = [asdict(collision) for collision in guard.collisions()]
+        run_folder.write_json(folder / run_folder.SUMMARY_NAME, {"outcome": guard.outcome, "collisions": hits})
+    console.print(f"{guard.outcome}; {len(hits)} hits; log in {folder}")
+    if interrupts.reason is None:
+        raise ConfigurationError(guard.outcome[:1].upper() + guard.outcome[1:] + ".")
+    return 0
+
+
+def guard_config(options: Namespace) -> GuardConfig:
+    """The file's settings, then --set, --modes and --then. Raises DocumentError."""
+    document = load_document(options.config) if options.config is not None else empty_document("no file of settings")
+    apply_overrides(document, options.set)
+    if options.modes is not None:
+        modes = [mode.strip().upper() for mode in options.modes.split(",")]
+        apply_override(document, Override(f"--modes {options.modes}", ("modes",), modes))
+    if options.then is not None:
+        apply_override(document, Override(f"--then {options.then}", ("then",), options.then))
+    return validated(GuardConfig, document, document.data)
+
+
+def _run(
+    guard: Guard, connection: Connection, recorder: FlightRecorder, console: Console, interrupts: Interrupts
+) -> None:
+    clock = Clock()
+    started_us = clock.now_us()
+    while not guard.finished:
+        wait_s = min((guard.next_deadline_us() - clock.now_us()) / 1e6, LONGEST_WAIT_S)
+        received = connection.receive(wait_s)
+        now_us = clock.now_us()
+        result = guard.step(received, now_us)
+        for frame in result.sent_frames:
+            connection.send(frame)
+        recorder.record(now_us, result)
+        if result.events:
+            console.print(timeline(result.events, started_us))
+        if interrupts.reason is not None:
+            guard.stop(interrupts.reason)
+        console.live(guard.status, (now_us - started_us) / 1e6)
