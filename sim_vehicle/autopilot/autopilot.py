@@ -290,11 +290,6 @@ class Autopilot:
         return self.commander.sticks.channels
 
     @property
-    def sticks(self) -> StickInput | None:
-        """The pilot's, while they arrive."""
-        return self.commander.sticks.sticks
-
-    @property
     def home_set_us(self) -> int:
         """When home was set."""
         return self.navigator.home_set_us

@@ -119,7 +119,7 @@ def rc_channels(state: Telemetry) -> Message:
 
 def manual_control(state: Telemetry) -> Message:
     """The sticks that count, whoever's they are (streams/MANUAL_CONTROL.hpp)."""
-    sticks = state.autopilot.sticks
+    sticks = state.autopilot.commander.sticks.sticks
     if sticks is None:
         return dialect.MAVLink_manual_control_message(state.system, 0, 0, 500, 0, 0)
     pitch, roll, yaw = (round(1000 * value) for value in (sticks.pitch, sticks.roll, sticks.yaw))

@@ -69,7 +69,7 @@ class Topics:
         if channels is not self._channels:
             self._channels = channels
             versions[12] += 1
-        sticks = state.autopilot.sticks
+        sticks = state.autopilot.commander.sticks.sticks
         if sticks is not self._sticks and sticks is not None:
             self._sticks = sticks
             versions[13] += 1
