@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from rebound_cli.campaign.plan import Json
 from rebound_cli.campaign_report.mission_bars import (
     CLEAN_WANTED,
+    CLEAR_LEAST_M,
     LOST_MOST_M,
     LOST_UP_TO_M_S,
     OVERSHOOT_MOST_M,
@@ -16,7 +17,6 @@ from rebound_cli.detectors_report.numbers import per_cent, share
 from rebound_cli.recoveries.hits import AIRFRAMES, Case
 
 SOONER_WANTED = 0.25
-CLEAR_LEAST_M = 0.3
 # A millimetre beside the distance that is wanted is that distance.
 CLEAR_SLACK_M = 0.001
 

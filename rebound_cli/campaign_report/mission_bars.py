@@ -13,6 +13,7 @@ CLEAN_WANTED = 0.99
 OVERSHOOT_MOST_M = 0.05
 LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
 RISEN_MOST_M = 0.05
+CLEAR_LEAST_M = 0.3
 
 
 def mission_bars(missions: Missions) -> list[Bar]:
@@ -44,6 +45,14 @@ def _hits(missions: Missions) -> Iterator[Bar]:
             per_cent(clean),
             clean >= CLEAN_WANTED if judged else None,
             f"{len(answered(hits))} hits, {_reasons(answered(hits))}",
+        )
+        clear = [hit["clear_m"] for hit in hits if hit.get("clear_m") is not None]
+        yield Bar(
+            f"{airframe}, 1 to 5 m/s: guards at rest {CLEAR_LEAST_M} m clear of what was hit",
+            "",
+            per_cent(share(clear_m >= CLEAR_LEAST_M for clear_m in clear)),
+            None,
+            f"{len(clear)} hits" + (f", {100 * min(clear):.0f} cm at least" if clear else ""),
         )
         slow = level(missions.hits(airframe, 0.0, LOST_UP_TO_M_S))
         yield _worst(f"{airframe}, level, up to 2.5 m/s: height lost", slow, "lost_m", LOST_MOST_M)

@@ -1,8 +1,8 @@
 """One random mission flown in lockstep, and what is known of the flight afterwards."""
 
 import tempfile
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from companion.mission.model import Mission
@@ -14,6 +14,7 @@ from rebound_cli.random_missions.generator import MissionCase, RandomMission, ai
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.truth_match import FlightTruth, Vector3
 from sim_vehicle.scene import Scene
+from sim_vehicle.world import Obstacle
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,8 @@ class JudgedFlight:
     start_ned_m: Vector3 = (0.0, 0.0, 0.0)
     standing_m: float = 0.08
     """Height of the centre when the vehicle stands on the ground."""
+    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
+    """By name."""
 
     def boot_us(self, event: Event) -> float:
         return event.time_us - self.truth.epoch_at_boot_us
@@ -44,5 +47,5 @@ def fly(case: MissionCase, drawn: RandomMission) -> JudgedFlight:
             recorder.close()
     assert flown.truth is not None, "a lockstep flight has its truth"
     standing_m = airframe.geometry.foot_depth_m
-    start = scene.start.position_ned_m
-    return JudgedFlight(mission, flown.report, tuple(recorder.events), flown.truth, start, standing_m)
+    start, obstacles = scene.start.position_ned_m, {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
+    return JudgedFlight(mission, flown.report, tuple(recorder.events), flown.truth, start, standing_m, obstacles)

@@ -25,6 +25,8 @@ WIND_MAX_M_S = 5.0
 EVENTFUL_S = (8.0, 16.0)
 # Not where it could press the vehicle against a wall behind it.
 ROOMS_WITH_CARTS = ("free walls", "poles", "boxes")
+# Higher than where the detector is switched on, by the vehicle's own height.
+LOWEST_BEAM_M = 0.9
 # Drawn anew when the mission's ways leave its fence or something stands where it starts: one in a hundred.
 MOST_TRIES = 50
 
@@ -95,18 +97,21 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
     if draw.happens(0.06):
         items[-1:] = [{"repeat": {"times": 2, "items": [items[-1], {"hold": {"duration_s": 0.5}}]}}]
     items.append(_last(draw, room))
+    follows, interrupted, yaw_deg = policy(draw), draw.one_of(("hold", "land")), float(draw.whole(-180, 180))
+    if "land" in items[-1] and draw.happens(0.1):
+        extras.append(_block(room, draw, route))
     data = {
         "name": f"random-{case.seed}",
         "description": f"{room.kind}, {stream_hz} Hz, wind up to {wind_m_s:g} m/s, seed {case.seed}",
         "items": items,
-        "on_collision": policy(draw),
-        "on_interrupt": draw.one_of(("hold", "land")),
+        "on_collision": follows,
+        "on_interrupt": interrupted,
         "fence": room.fence,
         "companion": {"streams": {"highres_imu_hz": STREAMS_HZ[stream_hz]}},
         "sim": {
             "airframe": case.airframe,
             "seed": case.seed,
-            "start": {"yaw_deg": float(draw.whole(-180, 180))},
+            "start": {"yaw_deg": yaw_deg},
             **wind,
             **room.obstacles(),
         },
@@ -114,7 +119,7 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
     return RandomMission(data, room.kind, stream_hz, wind_m_s, tuple(extras))
 
 
-_TAKEOFF_EXTRA, _CART_EXTRA = "beam over the start", "cart"
+_TAKEOFF_EXTRA, _CART_EXTRA, _BLOCK_EXTRA = "beam over the start", "cart", "block at the landing"
 
 
 def _wind(draw: Draw) -> tuple[Part, float]:
@@ -135,12 +140,12 @@ def _wind(draw: Draw) -> tuple[Part, float]:
 
 def _over_start(room: Room, draw: Draw, height_m: float) -> bool:
     """A level beam that the climb meets off-centre. Not where a ceiling leaves no way beside it."""
-    if room.ceiling_m is not None or height_m < 1.3:
+    if room.ceiling_m is not None or height_m < LOWEST_BEAM_M + 0.5:
         return False
     way = draw.heading()
     foot = towards(towards((0.0, 0.0), way, -2.0), way + 0.5 * math.pi, draw.number(-0.25, 0.25))
     axis = [round(math.cos(way), 6), round(math.sin(way), 6), 0.0]
-    place = [*foot, -round(height_m - draw.number(0.0, 0.5), DIGITS)]
+    place = [*foot, -draw.number(LOWEST_BEAM_M, height_m - 0.4)]
     beam = {"name": "beam", "point_ned_m": place, "axis_ned": axis, "height_m": 4.0, "radius_m": draw.number(0.03, 0.1)}
     room.poles.append(beam)
     return True
@@ -170,6 +175,16 @@ def _cart(room: Room, draw: Draw, route: Route) -> str:
     }
     room.boxes.append(box | {"motion": {"path": path}})
     return _CART_EXTRA
+
+
+def _block(room: Room, draw: Draw, route: Route) -> str:
+    """A low block on the edge of which a guard comes down, by less than its half."""
+    size = [draw.number(0.4, 1.0), draw.number(0.4, 1.0), draw.number(0.2, 0.5)]
+    way = draw.heading()
+    n, e = towards(route.place_ne_m, way, 0.5 * size[0] + draw.number(0.14, 0.2))
+    centre = [n, e, round(-0.5 * size[2], DIGITS)]
+    room.boxes.append({"name": "block", "centre_ned_m": centre, "size_m": size, "yaw_deg": round(math.degrees(way), 1)})
+    return _BLOCK_EXTRA
 
 
 def _last(draw: Draw, room: Room) -> Part:

@@ -11,6 +11,8 @@ from rebound_cli.random_missions.rooms import Room
 Part = dict[str, Any]
 
 SPEEDS_M_S = (0.5, 4.0)
+# Up to PX4's own default for missions, MPC_ACC_HOR.
+ACCELERATIONS_M_S2 = (1.5, 3.0)
 # A motion item takes about so long at most: missions are many and shall be short.
 LONGEST_ITEM_S = 8.0
 # Most goals shall lead into something: that is what is to be shown.
@@ -85,7 +87,7 @@ def _speed(draw: Draw) -> float:
 def _pace(draw: Draw) -> tuple[Part, float]:
     """Speed and acceleration of an item, and the speed."""
     speed = _speed(draw)
-    return {"speed_m_s": speed, "acceleration_m_s2": draw.number(2.0, 4.0)}, speed
+    return {"speed_m_s": speed, "acceleration_m_s2": draw.number(*ACCELERATIONS_M_S2)}, speed
 
 
 def _yaw(draw: Draw, *words: str) -> Part:
@@ -113,7 +115,7 @@ def _velocity(route: Route) -> Part:
     n, e, d = route.goal(speed)
     way = (n - start[0], e - start[1], d + height_m)
     length_m = max(math.hypot(*way), 0.2)
-    acceleration = draw.number(2.0, 4.0)
+    acceleration = draw.number(*ACCELERATIONS_M_S2)
     velocity = [round(part / length_m * speed, DIGITS) for part in way]
     if math.hypot(*velocity) < 0.1:
         velocity = [speed, 0.0, 0.0]
@@ -126,7 +128,7 @@ def _velocity(route: Route) -> Part:
 def _orbit(route: Route) -> Part:
     """Round a place in the open or on an obstacle; no faster than the acceleration allows on such a circle."""
     draw = route.draw
-    radius_m, acceleration = draw.number(0.5, 1.4), draw.number(2.0, 3.0)
+    radius_m, acceleration = draw.number(0.5, 1.4), draw.number(*ACCELERATIONS_M_S2)
     speed = draw.number(0.5, min(4.0, math.sqrt(0.8 * acceleration * radius_m)))
     centre = route.goal(speed)
     turns = draw.number(0.4, max(0.5, min(1.0, LONGEST_ITEM_S * speed / (math.tau * radius_m))))
@@ -141,4 +143,6 @@ def _up(route: Route) -> Part:
         return _go_to(route)
     speed = draw.number(0.5, 2.5)
     place = [*route.place_ne_m, -round(room.ceiling_m + draw.number(0.1, 0.8), DIGITS)]
-    return {"go_to": {"position_ned_m": place, "speed_m_s": speed, "acceleration_m_s2": draw.number(2.0, 4.0)}}
+    return {
+        "go_to": {"position_ned_m": place, "speed_m_s": speed, "acceleration_m_s2": draw.number(*ACCELERATIONS_M_S2)}
+    }

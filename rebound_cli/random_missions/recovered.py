@@ -3,14 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from rebound_cli.campaign.plan import Json
 from rebound_cli.random_missions.contacts import Contact, Role
 from rebound_cli.random_missions.flight import JudgedFlight
 from rebound_cli.summary import LONGEST_RECOVERY_S
+from rebound_cli.truth_match import Vector3
+from sim_vehicle.world import Obstacle
+
+Rows = npt.NDArray[np.intp]
 
 # The vehicle is watched at rest for this long, unless it flies on earlier.
 RESTING_S = 0.5
+# A vehicle at rest moves by a millimetre in so many rows of truth.
+_LOOK_EVERY = 10
 _DIGITS = 4
 
 
@@ -45,10 +52,10 @@ def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
         detected_boot_us = collision.detected_at_us - flight.truth.epoch_at_boot_us
         found["latency_ms"] = round(1e-3 * (detected_boot_us - first.hit.contact_at_boot_us), 3)
     seen = [contact for contact in episode if contact.collision is not None]
-    return found | (_recovery(flight, seen[-1]) if seen else {})
+    return found | (_recovery(flight, seen[-1], episode) if seen else {})
 
 
-def _recovery(flight: JudgedFlight, contact: Contact) -> Json:
+def _recovery(flight: JudgedFlight, contact: Contact, episode: Sequence[Contact]) -> Json:
     """After the last hit of an episode that was seen: its setpoint is the one that is flown to."""
     assert contact.collision is not None
     collision, hit = flight.report.collisions[contact.collision], contact.hit
@@ -65,9 +72,9 @@ def _recovery(flight: JudgedFlight, contact: Contact) -> Json:
     past_m, lost_m = flight.truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, until_boot_us)
     during = (since_s >= 0.0) & (since_s <= until_s)
     resting = (since_s >= until_s - RESTING_S) & (since_s <= until_s)
-    path, touched, normal = series["position_ned_m"], np.array(hit.contact_position_ned_m), np.array(hit.normal_ned)
-    clear_m = float(((path[resting] - touched) @ normal).min()) if settled_s is not None and resting.any() else None
-    risen_m = float((touched[2] - path[during, 2]).max()) if during.any() else 0.0
+    clear_m = None if settled_s is None else _clear_m(flight, episode, np.flatnonzero(resting))
+    height_m = hit.contact_position_ned_m[2] - series["position_ned_m"][during, 2]
+    risen_m = float(height_m.max()) if during.any() else 0.0
     return {
         "settled_s": None if settled_s is None else round(settled_s, _DIGITS),
         "past_m": round(past_m, _DIGITS),
@@ -75,3 +82,25 @@ def _recovery(flight: JudgedFlight, contact: Contact) -> Json:
         "risen_m": round(max(0.0, risen_m), _DIGITS),
         "clear_m": None if clear_m is None else round(clear_m, _DIGITS),
     }
+
+
+def _clear_m(flight: JudgedFlight, episode: Sequence[Contact], resting: Rows) -> float | None:
+    """How much further from everything touched than when it was touched; the nearest while the vehicle rests."""
+    series = flight.truth.series
+    nearest = []
+    for hit in (contact.hit for contact in episode if contact.hit.obstacle in flight.obstacles):
+        obstacle = flight.obstacles[hit.obstacle]
+        touching_m = _distance_m(obstacle, hit.contact_position_ned_m, hit.contact_at_boot_us)
+        nearest += [
+            _distance_m(obstacle, series["position_ned_m"][index], series["time_boot_us"][index]) - touching_m
+            for index in resting[::_LOOK_EVERY]
+        ]
+    return min(nearest, default=None)
+
+
+def _distance_m(obstacle: Obstacle, place_ned_m: Vector3, boot_us: float) -> float:
+    """From a place to an obstacle as it stands at a time."""
+    if obstacle.motion is not None:
+        moved = obstacle.motion.offset_ned_m(1e-6 * boot_us)
+        place_ned_m = (place_ned_m[0] - moved[0], place_ned_m[1] - moved[1], place_ned_m[2] - moved[2])
+    return obstacle.distance_m(place_ned_m)

@@ -7,6 +7,7 @@ from companion.report import CollisionReport, Event, FlightReport
 from rebound_cli.random_missions.flight import JudgedFlight
 from rebound_cli.truth_match import FlightTruth
 from sim_vehicle.truth import Hit
+from sim_vehicle.world import Wall
 
 EPOCH_US = 1_000_000_000
 STANDING_M = 0.08
@@ -123,4 +124,6 @@ def flight(
     )
     truth = FlightTruth(tuple(hits), series or plain_path(), EPOCH_US)
     events = tuple(plain_events() if events is None else events)
-    return JudgedFlight(mission(**mission_changes), report, events, truth, standing_m=STANDING_M)
+    wall = Wall("wall", (2.2, 0.0, -2.0), (-1.0, 0.0, 0.0), 10.0, 10.0, 0.1)
+    told = mission(**mission_changes)
+    return JudgedFlight(told, report, events, truth, standing_m=STANDING_M, obstacles={"wall": wall})

@@ -50,7 +50,11 @@ def test_every_kind_of_room_item_policy_and_end_comes_up(drawn):
     policies = {mission.data["on_collision"]["then"] for mission in drawn.values()}
     assert policies >= {"hold", "continue", "retry", "return", "land"}
     assert {mission.stream_hz for mission in drawn.values()} == {50, 200}
-    assert {extra for mission in drawn.values() for extra in mission.extras} == {"beam over the start", "cart"}
+    assert {extra for mission in drawn.values() for extra in mission.extras} == {
+        "beam over the start",
+        "cart",
+        "block at the landing",
+    }
     assert any("on_collision" in item for mission in drawn.values() for item in mission.data["items"])
     assert any(wall["name"] == "ceiling" for m in drawn.values() for wall in m.data["sim"].get("walls", ()))
 
