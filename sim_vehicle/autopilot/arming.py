@@ -31,11 +31,11 @@ class Arming:
         self.taken_off_at_us = 0
         self._landed_since_us: int | None = None
 
-    def arm(self, now_us: int, checks_pass: bool, forced: bool) -> Result:
-        """ARM by command: refused while checks fail, unless forced; arming twice is accepted."""
+    def arm(self, now_us: int, checks_pass: bool) -> Result:
+        """ARM by command: refused while checks fail; arming twice is accepted."""
         if self.armed:
             return Result.ACCEPTED
-        if not checks_pass and not forced:
+        if not checks_pass:
             return Result.TEMPORARILY_REJECTED
         self.armed = True
         self.armed_at_us = now_us

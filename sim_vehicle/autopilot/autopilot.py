@@ -155,9 +155,9 @@ class Autopilot:
         """Say what is wrong with a command."""
         self.say(Severity.CRITICAL, why)
 
-    def arm(self, forced: bool) -> Result:
+    def arm(self) -> Result:
         """Arm as a command asks."""
-        return self.commander.arm(forced)
+        return self.commander.arm()
 
     def disarm(self, forced: bool) -> Result:
         """Disarm as a command asks."""

@@ -75,14 +75,14 @@ class Commander:
         self._judge()
         return Result.ACCEPTED
 
-    def arm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
+    def arm(self, reason: Reason = Reason.COMMAND) -> Result:
         """Arm as a command or a gesture asks."""
         was_armed = self.arming.armed
-        refusal = None if was_armed or forced else self._stick_refusal(reason)
+        refusal = None if was_armed else self._stick_refusal(reason)
         if refusal is not None:
             self._say(Severity.CRITICAL, f"Arming denied: {refusal}")
             return Result.TEMPORARILY_REJECTED
-        result = self.arming.arm(self._now_us, self.checks_pass, forced)
+        result = self.arming.arm(self._now_us, self.checks_pass)
         if result is not Result.ACCEPTED:
             self.texts += [problem for problem in self._problems if problem.text]
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
@@ -154,7 +154,7 @@ class Commander:
 
     def _obey_sticks(self) -> None:
         if self.sticks.gesture is Gesture.ARM:
-            self.arm(False, Reason.GESTURE)
+            self.arm(Reason.GESTURE)
         elif self.sticks.gesture is Gesture.DISARM:
             self.disarm(False, Reason.GESTURE)
         if self.sticks.sticks is None:

@@ -27,7 +27,8 @@ ANY_COMPONENT = (REQUEST_PROTOCOL_VERSION, REQUEST_AUTOPILOT_CAPABILITIES)
 """Answered whichever component they are for."""
 
 FORCE = 21196
-"""Param 2 of COMPONENT_ARM_DISARM that skips all checks."""
+"""Param 2 of COMPONENT_ARM_DISARM: disarms in the air, too. It arms nothing that could not be armed without it:
+Commander::handle_command runs the checks for every command from outside, as a SITL was seen to do."""
 # The commands from before REQUEST_MESSAGE, each for one message: AUTOPILOT_VERSION, PROTOCOL_VERSION, HOME_POSITION,
 # FLIGHT_INFORMATION, STORAGE_INFORMATION.
 REQUESTS = {REQUEST_AUTOPILOT_CAPABILITIES: 148, REQUEST_PROTOCOL_VERSION: 300, 410: 242, 528: 264, 525: 261}
@@ -64,7 +65,7 @@ class Flight(Protocol):
     def complain(self, why: str) -> None:
         """Say what is wrong with a command."""
 
-    def arm(self, forced: bool) -> Result:
+    def arm(self) -> Result:
         """Arm."""
 
     def disarm(self, forced: bool) -> Result:
@@ -153,7 +154,7 @@ def _arm_disarm(command: Command, flight: Flight) -> Result | None:
     if action not in (0, 1):
         flight.complain(f"Unsupported ARM_DISARM param: {command.param1:.3f}")
         return None
-    return flight.arm(forced) if action == 1 else flight.disarm(forced)
+    return flight.arm() if action == 1 else flight.disarm(forced)
 
 
 def _land(command: Command, flight: Flight) -> Result:

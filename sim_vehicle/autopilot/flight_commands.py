@@ -133,7 +133,7 @@ def _start_mission(command: Command, flight: SteeredFlight) -> Result:
     if first >= 0:
         missions.choose(int(first))
     result = flight.request_mode(Mode.MISSION)
-    return flight.commander.arm(False, Reason.MISSION) if result is Result.ACCEPTED else result
+    return flight.commander.arm(Reason.MISSION) if result is Result.ACCEPTED else result
 
 
 def _terminate(command: Command, flight: SteeredFlight) -> Result:
