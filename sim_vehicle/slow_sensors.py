@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.hil.earth import HOME
-from sim_vehicle.hil.messages import Air, HilGps
+from sim_vehicle.hil.messages import Air, HilGps, Place
 from sim_vehicle.hil.sensors import BAROMETER_NOISE_PA, Gps, Magnetometer
 from sim_vehicle.world import Vector3
 
@@ -33,9 +32,11 @@ def air_at(altitude_m: float, noise_pa: float = 0.0) -> Air:
 class SlowSensors:
     """Newest samples; each is a new object when it is renewed."""
 
-    def __init__(self, airframe: Airframe, seed: int) -> None:
+    def __init__(self, airframe: Airframe, seed: int, origin: Place) -> None:
+        """``origin``: where local NED (0, 0, 0) lies."""
         rng = random.Random(seed)
-        self._magnetometer, self._gps, self._rng = Magnetometer(rng), Gps(airframe, rng), rng
+        self._magnetometer, self._gps, self._rng = Magnetometer(rng, origin), Gps(airframe, rng, origin), rng
+        self._altitude_m = origin.altitude_m
         self._due_us = [0, 0, 0]
         self._next_us = 0
         self.magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
@@ -55,7 +56,7 @@ class SlowSensors:
             self.magnetic_field_frd_gauss = self._magnetometer.sample((w, x, y, z))
         if now_us >= due_us[1]:
             due_us[1] = now_us + BAROMETER_PERIOD_US
-            self.air = air_at(HOME.altitude_m - down, self._rng.gauss(0, BAROMETER_NOISE_PA))
+            self.air = air_at(self._altitude_m - down, self._rng.gauss(0, BAROMETER_NOISE_PA))
         if now_us >= due_us[2]:
             due_us[2] = now_us + GPS_PERIOD_US
             fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))

@@ -80,7 +80,7 @@ class SimulatedVehicle:
             epoch_at_boot_us=self._epoch_at_boot_us,
             system=identity.system,
         )
-        self._slow = SlowSensors(airframe, self._seed)
+        self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin.place)
         self.interval_us = self._plant.interval_us
         self.time_boot_us = first.time_boot_us
         self._topics = Topics(self._telemetry)

@@ -23,11 +23,14 @@ from sim_vehicle.autopilot.offboard_control import OffboardControl
 from sim_vehicle.autopilot.takeoff import Takeoff, wants_takeoff
 from sim_vehicle.autopilot.target import Kind, View
 from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
 POSITION_PERIOD_US = 8_000
+# Where the world's origin lies, as for PX4's own simulator: latitude, longitude, height.
+PLACE_OF_ORIGIN = ("SIH_LOC_LAT0", "SIH_LOC_LON0", "SIH_LOC_H0")
 
 
 class LandedState(IntEnum):
@@ -51,7 +54,7 @@ class Autopilot:
     ) -> None:
         """``missions`` is handed in by whoever keeps them over a reboot."""
         self.parameters = parameters
-        self.origin = Origin()
+        self.origin = Origin(Place(*(parameters[name] for name in PLACE_OF_ORIGIN)))
         self.missions = missions or MissionStore()
         self.detector = LandDetector(hover_thrust_fraction, parameters)
         view = View(
@@ -66,7 +69,7 @@ class Autopilot:
         self.commander = Commander(parameters, self.navigator, self.detector)
         self.modes, self.arming = self.commander.modes, self.commander.arming
         self.signal, self.battery = self.commander.signal, self.commander.battery
-        self.ground = Ground(parameters, self.origin, self.arming, self.battery, self.navigator)
+        self.ground = Ground(parameters, self.origin, self.commander, self.navigator)
         self._offboard = OffboardControl(self.signal, self.origin)
         self.applied: Setpoint | None = None
         self.texts: list[StatusText] = []

@@ -3,17 +3,17 @@
 Source: PX4's commander/Commander.cpp.
 """
 
-import math
 from enum import IntEnum
-from functools import cache
 
 from sim_vehicle.autopilot import preflight
 from sim_vehicle.autopilot.arming import Arming, Reason
+from sim_vehicle.autopilot.available import available, cannot_run
 from sim_vehicle.autopilot.battery import Battery
 from sim_vehicle.autopilot.battery import Warning as BatteryWarning
-from sim_vehicle.autopilot.estimate import Quaternion, roll_pitch_of
+from sim_vehicle.autopilot.estimate import Quaternion
 from sim_vehicle.autopilot.failsafe import Failsafe
 from sim_vehicle.autopilot.failsafe_table import Action, Situation
+from sim_vehicle.autopilot.failure_detector import TippingDetector
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.links_heard import GroundStation
 from sim_vehicle.autopilot.manual_input import Gesture, ManualInput
@@ -21,6 +21,7 @@ from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.modes import NEEDS, NOT_ARMABLE, Conditions, Event, Mode, ModeState, Need, missing
 from sim_vehicle.autopilot.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardSignal
+from sim_vehicle.autopilot.positioning import Positioning
 from sim_vehicle.parameters.store import Parameters
 
 # How often the failsafes look when nothing calls for it: PX4's commander runs every 10 ms, its checks every 100.
@@ -52,7 +53,7 @@ class Commander:
         self.sticks = ManualInput(parameters)
         self.ground_station = GroundStation(parameters)
         self.battery = Battery(parameters)
-        self.has_global_position = True
+        self.positioning = Positioning(parameters)
         self.texts: list[StatusText] = []
         self._parameters = parameters
         self._navigator = navigator
@@ -62,7 +63,7 @@ class Commander:
         self._battery_at_arming = BatteryWarning.NONE
         self._sticks_lost_at_arming = True
         self._ever_requested = False
-        self._tipped_since_us: int | None = None
+        self._tipping = TippingDetector(parameters)
         self._taken_off_us: int | None = None
 
     # --- requests --------------------------------------------------------------------------------------------
@@ -111,9 +112,12 @@ class Commander:
     def disarm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
         """Disarm as a command, a gesture or a failsafe asks."""
         was_armed = self.arming.armed
-        result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced)
+        by_gesture = reason is Reason.GESTURE
+        may_fall = by_gesture and self.modes.flown in _BY_THRUST and bool(self._parameters["COM_DISARM_MAN"])
+        result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced or may_fall)
         if result is not Result.ACCEPTED:
-            self._say(Severity.CRITICAL, "Disarming denied: not landed")
+            if not by_gesture:
+                self._say(Severity.CRITICAL, "Disarming denied: not landed")
         elif was_armed:
             self._disarmed(reason)
         return result
@@ -191,15 +195,10 @@ class Commander:
             self._disarmed(reason)
 
     def _watch(self, attitude_wxyz: Quaternion) -> None:
-        """The ground station, and whether the vehicle lies on its side (FailureDetector::updateAttitudeStatus)."""
+        """The ground station, where the vehicle is, and whether it lies on its side."""
         self.texts += self.ground_station.update(self._now_us)
-        roll, pitch = roll_pitch_of(attitude_wxyz)
-        most_roll, most_pitch = self._parameters["FD_FAIL_R"], self._parameters["FD_FAIL_P"]
-        tips = (0.0 < most_roll < abs(math.degrees(roll))) or (0.0 < most_pitch < abs(math.degrees(pitch)))
-        if not tips:
-            self._tipped_since_us = None
-        elif self._tipped_since_us is None:
-            self._tipped_since_us = self._now_us
+        self.positioning.update(self._now_us)
+        self._tipping.update(self._now_us, attitude_wxyz)
 
     def _judge(self) -> None:
         """Let the failsafes say what flies."""
@@ -219,8 +218,7 @@ class Commander:
 
     def _situation(self) -> Situation:
         armed, progress = self.arming.armed, self._navigator.progress
-        tipped_us = 0 if self._tipped_since_us is None else self._now_us - self._tipped_since_us
-        back = self.signal.is_back if self.failsafe.acts else self.signal.arrives
+        back = self._flies_setpoints and (self.signal.is_back or not self.failsafe.acts)
         return Situation(
             armed=armed,
             intended=self.modes.intended,
@@ -236,8 +234,8 @@ class Commander:
             battery_at_arming=self._battery_at_arming,
             mission_finished=progress.finished,
             flight_time_over=self._flight_time_is_over,
-            tipped_over=tipped_us > 1e6 * self._parameters["FD_FAIL_R_TTRI"],
-            cannot_run=_cannot_run(self._available, back),
+            tipped_over=self._tipping.tipped_over,
+            cannot_run=cannot_run(self._available, back),
         )
 
     def _were_sticks_lost_at_arming(self) -> bool:
@@ -262,11 +260,16 @@ class Commander:
         return Conditions(self.arming.armed, self._available)
 
     @property
+    def _flies_setpoints(self) -> bool:
+        return self.signal.arrives and (self.positioning.has_local or not self.signal.needs_place)
+
+    @property
     def _available(self) -> frozenset[Need]:
-        return _available(
-            self.has_global_position,
+        return available(
+            self.positioning.has_local,
+            self.positioning.has_global,
             self.sticks.sticks is not None,
-            self.signal.arrives,
+            self._flies_setpoints,
             self._navigator.progress.valid,
         )
 
@@ -278,7 +281,9 @@ class Commander:
 
     @property
     def _problems(self) -> list[StatusText]:
-        return preflight.problems(self._parameters, self.ground_station, self.battery, self._navigator)
+        return preflight.problems(
+            self._parameters, self.ground_station, self.battery, self._navigator, self.positioning
+        )
 
     @property
     def system_status(self) -> SystemStatus:
@@ -294,25 +299,5 @@ class Commander:
 
 
 _CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL, Mode.POSITION_SLOW)
-
-
-@cache
-def _available(has_global: bool, has_sticks: bool, has_setpoints: bool, has_mission: bool) -> frozenset[Need]:
-    there = {
-        Need.LOCAL_POSITION: True,
-        Need.HOME: True,
-        Need.GLOBAL_POSITION: has_global,
-        Need.STICKS: has_sticks,
-        Need.SETPOINTS: has_setpoints,
-        Need.MISSION: has_mission,
-    }
-    return frozenset(need for need, is_there in there.items() if is_there)
-
-
-@cache
-def _cannot_run(available: frozenset[Need], has_setpoints: bool) -> frozenset[Mode]:
-    """As the failsafes count: lost sticks have a row of their own."""
-    there = (
-        available | {Need.STICKS, Need.SETPOINTS} if has_setpoints else (available | {Need.STICKS}) - {Need.SETPOINTS}
-    )
-    return frozenset(mode for mode in Mode if missing(mode, there))
+# Modes in which the pilot's throttle is the thrust: there COM_DISARM_MAN lets him disarm in the air.
+_BY_THRUST = (Mode.MANUAL, Mode.STABILIZED, Mode.ACRO)

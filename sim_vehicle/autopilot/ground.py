@@ -2,8 +2,7 @@
 
 import math
 
-from sim_vehicle.autopilot.arming import Arming
-from sim_vehicle.autopilot.battery import Battery
+from sim_vehicle.autopilot.commander import Commander
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.navigator import Navigator
 from sim_vehicle.geography import Origin
@@ -14,17 +13,19 @@ from sim_vehicle.parameters.store import Parameters
 class Ground:
     """Refuses what a PX4 refuses while it is armed."""
 
-    def __init__(
-        self, parameters: Parameters, origin: Origin, arming: Arming, battery: Battery, navigator: Navigator
-    ) -> None:
+    def __init__(self, parameters: Parameters, origin: Origin, commander: Commander, navigator: Navigator) -> None:
         self._parameters = parameters
         self._origin = origin
-        self._arming = arming
-        self._battery = battery
+        self._arming, self._battery = commander.arming, commander.battery
+        self._positioning = commander.positioning
         self._navigator = navigator
         self.wants_reboot = False
         """To be done by whoever switches the software on and off, once the answer is out."""
-        self.gps_is_off = False
+
+    @property
+    def gps_is_off(self) -> bool:
+        """INJECT_FAILURE has silenced the receiver."""
+        return self._positioning.gps_is_off
 
     def set_home(self, place: Place | None, yaw_rad: float) -> Result:
         """DO_SET_HOME: to a place, or to where the vehicle is; a heading that is not a number is north."""
@@ -58,7 +59,7 @@ class Ground:
         """INJECT_FAILURE: no fix any more, or again one."""
         if not self._parameters["SYS_FAILURE_EN"]:
             return Result.DENIED
-        self.gps_is_off = is_off
+        self._positioning.gps_is_off = is_off
         return Result.ACCEPTED
 
     def empty_battery(self, is_off: bool) -> Result:

@@ -88,7 +88,7 @@ class ManualFlight:
         parameters = self._parameters
         most_m_s = share * parameters["MPC_VEL_MANUAL"]
         scale = _DRAG_FACTOR * parameters["MPC_ACC_HOR"] * share
-        forward, right = _within_circle(self._expo(sticks.pitch), self._expo(sticks.roll))
+        forward, right = self._slowed(*_within_circle(self._expo(sticks.pitch), self._expo(sticks.roll)))
         stick_north, stick_east = _turned(forward, right, self._yaw_rad if self._yaw_rad is not None else view.yaw_rad)
         is_free = forward == 0.0 and right == 0.0
         boost = max(2.0, math.sqrt(parameters["MPC_VEL_MANUAL"])) if is_free else 1.0
@@ -103,6 +103,17 @@ class ManualFlight:
         north, east = self._velocity_m_s
         self._velocity_m_s = (north + a_north * step_s, east + a_east * step_s)
         self._keep_place(is_free, view)
+
+    def _slowed(self, forward: float, right: float) -> tuple[float, float]:
+        """MPC_VEL_MAN_SIDE and MPC_VEL_MAN_BACK: speeds of their own to the side and backwards, unless negative."""
+        parameters = self._parameters
+        ahead_m_s, side_m_s = parameters["MPC_VEL_MANUAL"], parameters["MPC_VEL_MAN_SIDE"]
+        back_m_s = parameters["MPC_VEL_MAN_BACK"]
+        if side_m_s >= 0.0:
+            right *= side_m_s / ahead_m_s
+        if back_m_s >= 0.0 and forward < 0.0:
+            forward *= back_m_s / ahead_m_s
+        return forward, right
 
     def _keep_place(self, is_free: bool, view: View) -> None:
         moves = math.hypot(*self._velocity_m_s) > _STILL_M_S

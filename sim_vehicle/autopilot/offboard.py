@@ -37,12 +37,15 @@ class OffboardSignal:
         self.is_back = False
         """Whether it has arrived for long enough to end a failsafe."""
         self.ever_arrived = False
+        self.needs_place = False
+        """The last setpoint was one of position or velocity, which nobody flies without knowing them."""
         self._first_us = 0
         self._last_us: int | None = None
         self._next_check_us = 0
 
-    def heard(self, now_us: int) -> None:
+    def heard(self, now_us: int, needs_place: bool) -> None:
         """A valid setpoint was received."""
+        self.needs_place = needs_place
         if self._last_us is None:
             self._first_us = now_us
         self._last_us = now_us

@@ -5,7 +5,7 @@ from sim_vehicle.autopilot.flight_messages import AttitudeTarget, GlobalTarget
 from sim_vehicle.autopilot.messages import PositionTarget, StatusText
 from sim_vehicle.autopilot.target import Vector3
 from sim_vehicle.geography import Origin
-from sim_vehicle.setpoint import Quaternion, Setpoint
+from sim_vehicle.setpoint import FREE, Quaternion, Setpoint
 
 
 class OffboardControl:
@@ -35,7 +35,7 @@ class OffboardControl:
             local = offboard.refusal(target) or target
         if not isinstance(local, PositionTarget):
             return local
-        self._signal.heard(now_us)
+        self._signal.heard(now_us, needs_place=(local.position_m, local.velocity_m_s) != (FREE, FREE))
         if is_flown:
             self.demand = offboard.trajectory_setpoint(local, attitude_wxyz)
         return None
@@ -45,6 +45,6 @@ class OffboardControl:
         demand = offboard.attitude_setpoint(target)
         if demand is None:
             return
-        self._signal.heard(now_us)
+        self._signal.heard(now_us, needs_place=False)
         if is_flown:
             self.demand = demand

@@ -1,6 +1,7 @@
 """What forbids arming beside what the mode needs, and what PX4 says about it when somebody tries.
 
-Source: PX4's commander/HealthAndArmingChecks (rcAndDataLinkCheck, batteryCheck, geofenceCheck, modeCheck).
+Source: PX4's commander/HealthAndArmingChecks (rcAndDataLinkCheck, batteryCheck,
+estimatorCheck, geofenceCheck, modeCheck).
 """
 
 from sim_vehicle.autopilot.battery import Battery
@@ -8,6 +9,7 @@ from sim_vehicle.autopilot.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.links_heard import GroundStation
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.navigator import Navigator
+from sim_vehicle.autopilot.positioning import Positioning
 from sim_vehicle.parameters.store import Parameters
 
 _BATTERY_TEXTS = {
@@ -17,8 +19,16 @@ _BATTERY_TEXTS = {
 }
 
 
+# COM_ARM_WO_GPS: 0 refuses, 1 warns, 2 does not care.
+_NOT_WITHOUT_GPS = 0
+
+
 def problems(
-    parameters: Parameters, ground_station: GroundStation, battery: Battery, navigator: Navigator
+    parameters: Parameters,
+    ground_station: GroundStation,
+    battery: Battery,
+    navigator: Navigator,
+    positioning: Positioning,
 ) -> list[StatusText]:
     """Empty where the vehicle may be armed, as far as these go."""
     found = []
@@ -28,6 +38,8 @@ def problems(
     is_too_low = battery.remaining < least if least >= 0.0 else battery.warning >= BatteryWarning.CRITICAL
     if is_too_low:
         found.append(StatusText(Severity.CRITICAL, _BATTERY_TEXTS.get(battery.warning, "Low battery")))
+    if positioning.gps_is_off and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
+        found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
     if navigator.fence.breached:
         found.append(StatusText(Severity.CRITICAL, navigator.fence.breach_text))
     if parameters["COM_ARM_MIS_REQ"] and not navigator.progress.valid:

@@ -4,8 +4,8 @@ import math
 import random
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.hil.earth import StandardAir, magnetic_field_ned_gauss, place_at
-from sim_vehicle.hil.messages import Air, HilGps, MotionCapture, Quadruple
+from sim_vehicle.hil.earth import HOME, StandardAir, magnetic_field_ned_gauss, place_at
+from sim_vehicle.hil.messages import Air, HilGps, MotionCapture, Place, Quadruple
 from sim_vehicle.world import Vector3
 
 # Rates usual on flight controllers; PX4 asks for no particular ones.
@@ -44,8 +44,8 @@ class Wander:
 class Magnetometer:
     """The world's field in the body's frame."""
 
-    def __init__(self, rng: random.Random) -> None:
-        self._field_ned_gauss = magnetic_field_ned_gauss()
+    def __init__(self, rng: random.Random, home: Place = HOME) -> None:
+        self._field_ned_gauss = magnetic_field_ned_gauss(home)
         self._rng = rng
 
     def sample(self, attitude_wxyz: Quadruple) -> Vector3:
@@ -72,7 +72,8 @@ class Gps:
     That is an RTK fix: with a plain receiver's metres, no difference between two flights would mean anything.
     """
 
-    def __init__(self, airframe: Airframe, rng: random.Random) -> None:
+    def __init__(self, airframe: Airframe, rng: random.Random, home: Place = HOME) -> None:
+        self._home = home
         estimate, period_s = airframe.estimate, 1e-6 * GPS_PERIOD_US
         self._accuracy_m = estimate.position_noise_m
         self._position = Wander(estimate.position_noise_m, estimate.position_correlation_s, period_s, rng)
@@ -82,7 +83,7 @@ class Gps:
         """A fix of the moment; a real receiver's is a tenth of a second late, and PX4's SITL assumes 10 ms."""
         return HilGps(
             time_us=time_us,
-            place=place_at(_sum(position_ned_m, self._position.next())),
+            place=place_at(_sum(position_ned_m, self._position.next()), self._home),
             velocity_ned_m_s=_sum(velocity_ned_m_s, self._velocity.next()),
             accuracy_m=self._accuracy_m,
         )

@@ -1,7 +1,7 @@
 """One MAVLink connection: packets, streams, texts, services. The links of a vehicle know nothing of each other."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, PeerHeartbeat, PingRequest, SigningSetup, StatusText
 from sim_vehicle.mavlink import encode
@@ -16,6 +16,7 @@ from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams import Streams
 from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
+from sim_vehicle.parameters.store import Parameters
 
 # Of a serial line's buffer, for the streams between the packets of a long answer.
 _RESERVED_BYTES = 1_000
@@ -44,15 +45,15 @@ class Link:
 
     def boot(self, board: Board) -> None:
         """Begin as after switching on; nothing of the past is remembered."""
-        options, seed = self.options, self._seed
+        options, seed, line = self.options, self._seed, self._planned_line(board.parameters)
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
         self._decoder = Decoder(board.identity, board.signing)
         self._encoder = Encoder(board.identity)
         self._signed_with: bytes | None = None
-        self._buffer = Buffer(options.line, self.now_us)
+        self._buffer = Buffer(line, self.now_us)
         self._outbox = Outbox(self._encoder, self._buffer)
-        self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, options.line)
+        self.streams = Streams(board.telemetry, board.topics, self._outbox, options.kind, seed, line)
         self._choose_protocol()
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
@@ -66,6 +67,14 @@ class Link:
         if options.line.baud is not None:
             # Over a serial port PX4 introduces itself unasked.
             self.streams.send_now(encode.AUTOPILOT_VERSION_ID)
+
+    def _planned_line(self, parameters: Parameters) -> Line:
+        """A serial line is PX4's TELEM 1 where it serves a ground station and TELEM 2 where it serves a companion."""
+        line = self.options.line
+        if line.baud is None:
+            return line
+        name = "MAV_1_RATE" if self.options.kind is LinkKind.ONBOARD else "MAV_0_RATE"
+        return replace(line, planned_bytes_s=int(parameters[name]))
 
     def push(self, data: bytes) -> None:
         """Bytes have arrived; they are read at the vehicle's next step."""

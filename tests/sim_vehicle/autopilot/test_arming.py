@@ -9,21 +9,19 @@ SECOND = 1_000_000
 
 def armed_at_zero() -> Arming:
     arming = Arming(Parameters())
-    assert arming.arm(0, checks_pass=True, forced=False) is Result.ACCEPTED
+    assert arming.arm(0, checks_pass=True) is Result.ACCEPTED
     return arming
 
 
-def test_failing_checks_refuse_arming_and_force_overrides_them():
+def test_failing_checks_refuse_arming():
     arming = Arming(Parameters())
-    assert arming.arm(0, checks_pass=False, forced=False) is Result.TEMPORARILY_REJECTED
+    assert arming.arm(0, checks_pass=False) is Result.TEMPORARILY_REJECTED
     assert not arming.armed
-    assert arming.arm(0, checks_pass=False, forced=True) is Result.ACCEPTED
-    assert arming.armed
 
 
 def test_arming_or_disarming_twice_is_accepted():
     arming = armed_at_zero()
-    assert arming.arm(5, checks_pass=False, forced=False) is Result.ACCEPTED
+    assert arming.arm(5, checks_pass=False) is Result.ACCEPTED
     assert arming.disarm(landed=True, forced=False) is Result.ACCEPTED
     assert arming.disarm(landed=False, forced=False) is Result.ACCEPTED
 

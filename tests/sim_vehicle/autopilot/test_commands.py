@@ -117,7 +117,8 @@ def test_modes_in_which_nobody_can_arm(custom):
     assert flight.ask(DO_SET_MODE, *custom) is Result.ACCEPTED
     assert flight.autopilot.system_status == 0
     assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.TEMPORARILY_REJECTED
-    assert flight.ask(COMPONENT_ARM_DISARM, 1, 21196) is Result.ACCEPTED
+    # Force changes nothing
+    assert flight.ask(COMPONENT_ARM_DISARM, 1, 21196) is Result.TEMPORARILY_REJECTED
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from sim_vehicle.autopilot.failsafe_table import (
     responses_now,
 )
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
+from sim_vehicle.autopilot.ground_commands import INJECT_FAILURE
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
@@ -331,14 +332,37 @@ def test_killed_in_the_air_it_falls():
     assert flight.height_m == 0.0
 
 
-def test_without_a_global_position_a_hold_becomes_a_landing():
+def lose_gps(flight: Flight) -> None:
+    assert flight.ask(INJECT_FAILURE, 4, 1) is Result.ACCEPTED
+
+
+def test_without_gps_the_position_is_lost_after_a_while_and_the_vehicle_descends():
     flight = hovering(5.0)
-    flight.autopilot.commander.has_global_position = False
-    flight.fly(0.1)
+    lose_gps(flight)
+    flight.fly(4.9)
+    assert flown(flight) is Mode.LOITER
+    flight.fly(0.2)
+    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, Mode.LOITER)
+    flight.fly_until(lambda: not flight.autopilot.arming.armed, 15.0)
+    assert not flight.autopilot.checks_pass
+
+
+def test_one_that_sees_the_ground_lands_without_gps_and_holds_again_with_it():
+    flight = hovering(5.0)
+    flight.autopilot.commander.positioning.sees_ground = True
+    lose_gps(flight)
+    flight.fly(5.1)
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.LAND, Mode.LOITER)
-    flight.autopilot.commander.has_global_position = True
+    assert flight.ask(INJECT_FAILURE, 4, 0) is Result.ACCEPTED
     flight.fly(0.1)
     assert flown(flight) is Mode.LOITER
+
+
+def test_setpoints_of_a_place_do_not_fly_without_one():
+    flight = in_offboard(COM_OBL_RC_ACT=3)
+    lose_gps(flight)
+    flight.fly(5.1, UP)
+    assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, Mode.OFFBOARD)
 
 
 @pytest.mark.parametrize(("changes_a_parameter", "hold_s"), [(False, 2.4), (True, 5.0)])
