@@ -61,6 +61,8 @@ class SimulatedVehicle:
     def _boot(self) -> None:
         """Start the vehicle's software."""
         airframe, parameters = self._airframe, self.parameters
+        # Its clock begins at zero; the body's goes on, and with it what is recorded of the flight.
+        booted_at_us = self._plant.booted_at_us = int(self._plant.state.time_us)
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
         self._autopilot = Autopilot(airframe.hover_fraction, first, parameters, self._missions)
@@ -77,15 +79,23 @@ class SimulatedVehicle:
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,
             true_body=self._body,
             attitude_setpoint=self._plant.state.attitude_setpoint,
-            epoch_at_boot_us=self._epoch_at_boot_us,
+            epoch_at_boot_us=self._epoch_at_boot_us + booted_at_us,
             system=identity.system,
         )
         self._slow = SlowSensors(airframe, self._seed, self._autopilot.origin.place)
         self.interval_us = self._plant.interval_us
-        self.time_boot_us = first.time_boot_us
+        self.time_boot_us = int(self._plant.state.time_us)
+        """Since the vehicle was first switched on; its own clock begins anew with every reboot."""
         self._topics = Topics(self._telemetry)
         self._board = Board(
-            identity, self._autopilot, parameters, self._telemetry, self._topics, self._signing, self.interval_us
+            identity,
+            self._autopilot,
+            parameters,
+            self._telemetry,
+            self._topics,
+            self._signing,
+            self.interval_us,
+            booted_at_us,
         )
         for link in self._links:
             link.boot(self._board)
@@ -132,7 +142,7 @@ class SimulatedVehicle:
         texts = tuple(self._autopilot.texts)
         self._autopilot.texts.clear()
         for link in self._links:
-            link.update(self.time_boot_us, texts)
+            link.update(sample.time_boot_us, texts)
 
     def _communicate(self) -> None:
         # The commander runs beside the receivers: it answers in the interval after a command came.
@@ -149,14 +159,12 @@ class SimulatedVehicle:
             self._reboot_at_us = self.time_boot_us + REBOOT_AFTER_US
 
     def _is_rebooting(self, reboot_at_us: int) -> bool:
-        """Whether nobody is there at the moment; the body goes on in any case, without motors.
-
-        The clock goes on, too, unlike a flight controller's: what is recorded of a flight has one time.
-        """
+        """Whether nobody is there at the moment; the body goes on in any case, without motors."""
         if self.time_boot_us < reboot_at_us:
             return False
         if self.time_boot_us < reboot_at_us + BOOT_TAKES_US:
-            self.time_boot_us = self._plant.step(None, armed=False).time_boot_us
+            self._plant.step(None, armed=False)
+            self.time_boot_us = int(self._plant.state.time_us)
             for link in self._links:
                 link.discard()
             return True
@@ -175,7 +183,7 @@ class SimulatedVehicle:
         if faults is not None:
             slow.gps_is_blocked |= faults.is_lost("gps", self.time_boot_us / 1e6)
             self._autopilot.battery.supply_share = faults.voltage_share
-        slow.update(self.time_boot_us, self._body)
+        slow.update(telemetry.sample.time_boot_us, self._body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
 
@@ -187,7 +195,7 @@ class SimulatedVehicle:
     def _fly(self, setpoint: Setpoint | None) -> PlantOutput:
         sample = self._plant.step(setpoint, self._autopilot.motors_run)
         self._autopilot.observe(sample)
-        self.time_boot_us = sample.time_boot_us
+        self.time_boot_us = sample.time_boot_us + self._plant.booted_at_us
         return sample
 
     def _publish(self, sample: PlantOutput) -> bool:

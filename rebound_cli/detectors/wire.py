@@ -24,7 +24,8 @@ from companion.messages import (
 )
 from rebound_cli.detectors.recording import Recording
 from sim_vehicle.mavlink import vibration
-from sim_vehicle.mavlink.streams import KINDS, LateLoops, Stream, interval_from_request
+from sim_vehicle.mavlink.late_loops import LateLoops
+from sim_vehicle.mavlink.streams import KINDS, Stream, interval_from_request
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.mavlink.topics import Topic
 from sim_vehicle.physics.plant import PlantOutput

@@ -22,15 +22,12 @@ from sim_vehicle.autopilot.navigator import Navigator
 from sim_vehicle.autopilot.offboard_control import OffboardControl
 from sim_vehicle.autopilot.takeoff import Takeoff, wants_takeoff
 from sim_vehicle.autopilot.target import Kind, View
-from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
+from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint
 
 # PX4's estimator publishes position and velocity, and its position control runs, every 8 ms.
 POSITION_PERIOD_US = 8_000
-# Where the world's origin lies, as for PX4's own simulator: latitude, longitude, height.
-PLACE_OF_ORIGIN = ("SIH_LOC_LAT0", "SIH_LOC_LON0", "SIH_LOC_H0")
 
 
 class LandedState(IntEnum):
@@ -54,7 +51,7 @@ class Autopilot:
     ) -> None:
         """``missions`` is handed in by whoever keeps them over a reboot."""
         self.parameters = parameters
-        self.origin = Origin(Place(*(parameters[name] for name in PLACE_OF_ORIGIN)))
+        self.origin = origin_of(parameters)
         self.missions = missions or MissionStore()
         self.detector = LandDetector(hover_thrust_fraction, parameters)
         view = View(

@@ -15,7 +15,7 @@ from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.orbit import Orbit, OrbitStatus
 from sim_vehicle.autopilot.return_ import Return
 from sim_vehicle.autopilot.smoothing import stop_point
-from sim_vehicle.autopilot.target import Arrival, Kind, Target, Vector3, View, takeoff_acceptance
+from sim_vehicle.autopilot.target import Arrival, Kind, Target, Vector3, View, climbs_to, takeoff_acceptance
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
@@ -264,7 +264,10 @@ class Navigator:
     @property
     def wants_takeoff(self) -> bool:
         """Whether a vehicle on the ground is to leave it."""
-        return self._mode in _BY_TARGET and self._target_of(self._mode).kind is Kind.TAKEOFF
+        if self._mode not in _BY_TARGET:
+            return False
+        target = self._target_of(self._mode)
+        return target.kind is Kind.TAKEOFF and climbs_to(target, self.view, self._parameters)
 
     @property
     def phase(self) -> Kind | None:

@@ -9,6 +9,8 @@ from sim_vehicle.parameters.store import Parameters
 Vector3 = tuple[float, float, float]
 
 _MICROSECONDS = 1e6
+# FlightTaskAuto wants to take off where the way to its target climbs faster than this.
+_LEAST_CLIMB_M_S = 0.3
 
 
 class Kind(Enum):
@@ -74,6 +76,21 @@ def takeoff_acceptance(target: Target, view: View, parameters: Parameters) -> Ac
     height_m, vertical_m = view.home_ned_m[2] - target.position_ned_m[2], parameters["NAV_MC_ALT_RAD"]
     vertical_m = height_m / 2 if 0.0 < height_m < vertical_m else vertical_m
     return Acceptance(math.inf, vertical_m, passes_above=True)
+
+
+def climbs_to(target: Target, view: View, parameters: Parameters) -> bool:
+    """Whether PX4 leaves the ground for it: not where the way there is next to level.
+
+    Who asks for a takeoff to latitude and longitude 0 sees it: armed, the vehicle stands until it disarms itself
+    (PositionSmoothing::_generateVelocitySetpoint; a SITL stood, too).
+    """
+    away_m, up_m = view.distance_m(target.position_ned_m), view.position_ned_m[2] - target.position_ned_m[2]
+    if away_m == 0.0:
+        return True
+    way_m = math.hypot(away_m, up_m)
+    along_m_s, climb_m_s = parameters["MPC_XY_CRUISE"], parameters["MPC_Z_V_AUTO_UP"]
+    speed_m_s = min(math.hypot(along_m_s, climb_m_s), along_m_s * way_m / away_m)
+    return speed_m_s * up_m / way_m > _LEAST_CLIMB_M_S
 
 
 class Arrival:

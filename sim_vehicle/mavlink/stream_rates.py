@@ -31,6 +31,7 @@ _ONBOARD: dict[int, float] = {
     24: UNLIMITED,  # GPS_RAW_INT
     87: 10.0,  # POSITION_TARGET_GLOBAL_INT
     230: 1.0,  # ESTIMATOR_STATUS
+    360: 5.0,  # ORBIT_EXECUTION_STATUS
     49: 1.0,  # GPS_GLOBAL_ORIGIN
     242: 0.5,  # HOME_POSITION
     147: 0.5,  # BATTERY_STATUS
@@ -58,6 +59,7 @@ _NORMAL: dict[int, float] = {
     24: 5.0,
     87: 1.0,
     230: 0.5,
+    360: 2.0,
     49: 1.0,
     242: 0.5,
     147: 0.5,

@@ -5,7 +5,6 @@ mavlink_receiver.cpp (set_message_interval). Asked for 200 Hz, the rule
 sends a 250 Hz topic at 125 Hz; asked for 100 Hz, in gaps of 12 and 8 ms.
 """
 
-import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,14 +13,14 @@ import numpy as np
 
 from sim_vehicle.mavlink import aiding, condition, encode, navigation
 from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.late_loops import LateLoops
 from sim_vehicle.mavlink.line import FAST_LINE, Line
+from sim_vehicle.mavlink.on_request import ANSWERS
 from sim_vehicle.mavlink.outbox import Outbox
 from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.topics import NEVER_SENT, OPTIONAL, Topic, Topics
 
-# Now and then the link's loop comes too late and misses one sample: PX4 asked for 250 Hz sends 246.
-MISSED_LOOPS_SHARE = 0.012
 NOT_STREAMED_US = -1
 EVERY_TIME_US = 0
 
@@ -77,6 +76,7 @@ KINDS: tuple[StreamKind, ...] = (
     StreamKind(24, Topic.GPS, navigation.gps_raw_int),
     StreamKind(87, Topic.POSITION, navigation.position_target_global_int),
     StreamKind(230, Topic.POSITION, navigation.estimator_status),
+    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status),
     StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin),
     StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position),
     StreamKind(147, Topic.BATTERY, condition.battery_status),
@@ -179,20 +179,6 @@ class Stream:
         self.due_after_us = self._last_us + interval_us - self.pace.early_us
 
 
-class LateLoops:
-    """The link's loop that now and then comes too late for a sample, which then nobody receives."""
-
-    def __init__(self, seed: int) -> None:
-        self._random = random.Random(seed)
-        self._missed_last = False
-
-    def misses_this_one(self) -> bool:
-        """Never two in a row: the gaps that were measured are of one sample."""
-        missed = self._random.random() < MISSED_LOOPS_SHARE and not self._missed_last
-        self._missed_last = missed
-        return missed
-
-
 class Streams:
     """All streams of one link; their messages go to its ``outbox``."""
 
@@ -274,8 +260,14 @@ class Streams:
         interval_us = NOT_STREAMED_US if stream is None else stream.interval_us
         self._outbox.send(encode.message_interval(message_id, interval_us))
 
-    def send_now(self, message_id: int) -> bool:
+    def send_now(self, message_id: int, index: int = 0) -> bool:
         """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
+        answer = ANSWERS.get(message_id)
+        if answer is not None:
+            messages = answer(index)
+            for message in messages:
+                self._outbox.send(message)
+            return bool(messages)
         stream = self._by_id.get(message_id)
         if stream is None:
             return False

@@ -3,6 +3,7 @@
 from enum import IntEnum
 
 from sim_vehicle.autopilot.flight_messages import RadioChannels, StickInput
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Air, HilGps
 from sim_vehicle.mavlink.telemetry import Telemetry
@@ -30,10 +31,11 @@ class Topic(IntEnum):
     MAGNETIC_FIELD = 11
     RADIO = 12
     STICKS = 13
+    ORBIT = 14
 
 
 # What a vehicle may not have: nothing is sent of it before there is something.
-OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.RADIO, Topic.STICKS)
+OPTIONAL = (Topic.FLOW, Topic.RANGE, Topic.TRUTH, Topic.AIR, Topic.RADIO, Topic.STICKS, Topic.ORBIT)
 
 
 class Topics:
@@ -93,6 +95,8 @@ class Topics:
             versions[Topic.RANGE] += 1
         autopilot, now_us = state.autopilot, state.sample.time_boot_us
         status = (autopilot.modes.mode, autopilot.arming.armed, autopilot.system_status)
+        if status[0] is Mode.ORBIT:
+            versions[14] += 1
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
             self._status, self._status_us = status, now_us
             versions[3] += 1

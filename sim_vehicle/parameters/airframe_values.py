@@ -4,6 +4,8 @@ import math
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.control.gains import PositionGains
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters
 
 _MICROSECONDS = 1_000_000
@@ -57,3 +59,8 @@ def position_gains(parameters: Parameters) -> PositionGains:
         climb_max_m_s=p["MPC_Z_VEL_MAX_UP"],
         descent_max_m_s=p["MPC_Z_VEL_MAX_DN"],
     )
+
+
+def origin_of(parameters: Parameters) -> Origin:
+    """Where the world lies on the Earth, as PX4's own simulator is told."""
+    return Origin(Place(*(parameters[name] for name in ("SIH_LOC_LAT0", "SIH_LOC_LON0", "SIH_LOC_H0"))))

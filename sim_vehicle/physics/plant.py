@@ -106,6 +106,8 @@ class Plant:
         self._state_box = boxed(self.state)
         self._constants_box, self._disturbance_box = boxed(self._constants), boxed(self.disturbance)
         self._scratch_box = boxed(new_record(Scratch))
+        self.booted_at_us = 0
+        """Of the body's clock: where that of the samples begins."""
         self.truth = TruthRecorder(keeps_path)
         self.faults: Faults | None = None
         self._new_faults = partial(Faults, airframe=airframe, wind_ned_m_s=scene.wind_ned_m_s, seed=seed)
@@ -262,7 +264,7 @@ class Plant:
         ax, ay, az = row[ACCELERATION]
         m1, m2, m3, m4 = row[MOTORS]
         return PlantOutput(
-            time_boot_us=int(row[0]),
+            time_boot_us=int(row[0]) - self.booted_at_us,
             specific_force_frd_m_s2=(fx, fy, fz),
             angular_velocity_frd_rad_s=(p, q, r),
             clipping_counts=(int(clip_x), int(clip_y), int(clip_z)),

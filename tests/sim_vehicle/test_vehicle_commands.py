@@ -49,7 +49,13 @@ def client() -> Client:
         (SET_INTERVAL, (27, 100_000), [FAILED]),
         (510, (26,), [ACCEPTED]),
         (REQUEST_MESSAGE, (27,), [DENIED]),
+        (REQUEST_MESSAGE, (300,), [ACCEPTED]),
+        (519, (1,), [ACCEPTED]),
         (REQUEST_MESSAGE, (395,), [DENIED]),
+        (REQUEST_MESSAGE, (397,), [DENIED]),
+        (REQUEST_MESSAGE, (411,), [DENIED]),
+        (REQUEST_MESSAGE, (360,), [DENIED]),
+        (REQUEST_MESSAGE, (435, 99), [DENIED]),
         (REQUEST_MESSAGE, (65,), [DENIED]),
         (SET_HOME, (1,), [ACCEPTED]),
         (SET_HOME, (0, 0, 0, 0, 47.3977, 8.5456, 500), [ACCEPTED]),
@@ -162,6 +168,10 @@ def test_a_reboot_is_silent_for_a_while_and_begins_anew(client):
     assert client.received == []
     client.run(2.0)
     assert client.last("HEARTBEAT").custom_mode == 0x03040000
+    # Its clock began anew, the wall's did not
+    clock = client.last("SYSTEM_TIME")
+    assert 500 < client.all("ATTITUDE")[0].time_boot_ms + 500 < 1_000 < clock.time_boot_ms < 2_000
+    assert clock.time_unix_usec == pytest.approx(1e6 * client.time_s, abs=1e6)
     assert 50 < len(client.all("HIGHRES_IMU")) < 100
 
 

@@ -43,6 +43,17 @@ def test_a_takeoff_to_below_the_ground_stays_there():
     assert flight.height_m == 0.0
 
 
+def test_a_takeoff_to_latitude_and_longitude_0_stays_on_the_ground_until_it_disarms():
+    # As PX4: 0/0 is a place, 5000 km away, and the way there does not climb
+    flight = Flight()
+    assert flight.ask(NAV_TAKEOFF, 0, 0, 0, 0, 0.0, 0.0, SEA_LEVEL_HOME_M + 10.0) is Result.ACCEPTED
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    flight.fly(10.0)
+    assert flight.autopilot.arming.armed and flight.height_m == 0.0
+    flight.fly(1.5)
+    assert not flight.autopilot.arming.armed
+
+
 def test_reposition_flies_there_at_the_speed_asked_for_and_holds():
     flight = hovering(5.0)
     asked = (3.0, 1, 0, math.radians(90.0), *place(30.0, 0.0), SEA_LEVEL_HOME_M + 8.0)

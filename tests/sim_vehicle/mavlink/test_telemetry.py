@@ -1,10 +1,12 @@
 """What a client is told unasked on each kind of link, and whether it fits together."""
 
 import math
+import struct
 from collections import Counter
 
 import pytest
 from pymavlink.dialects.v20 import development as dialect
+from pymavlink.generator.mavcrc import x25crc
 
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.earth import StandardAir
@@ -15,8 +17,9 @@ from sim_vehicle.scene import Scene
 from sim_vehicle.slow_sensors import air_at
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
-from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, TAKEOFF, Client
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, REQUEST_MESSAGE, SET_MODE, TAKEOFF, Client
 
+NAN = math.nan
 # Measured on a running PX4 SITL over ten seconds, less what this vehicle has no equipment for.
 ONBOARD_HZ = {
     "ALTITUDE": 10,
@@ -231,3 +234,58 @@ def test_the_barometers_formula_is_the_standard_atmosphere(height_m):
     assert found.pressure_hpa == pytest.approx(expected.pressure_hpa, rel=2e-4)
     assert found.altitude_m == pytest.approx(488.0 + height_m, abs=0.01)
     assert found.temperature_c == pytest.approx(expected.temperature_c, abs=0.05)
+
+
+def test_an_orbit_shows_five_times_a_second_while_it_is_flown():
+    client = Client(system=255, component=190)
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(8.0)
+    assert client.all("ORBIT_EXECUTION_STATUS") == []
+    client.command(34, -6.0, 2.0, 0, 0, NAN, NAN, NAN)
+    client.run(2.0)
+    shown = client.all("ORBIT_EXECUTION_STATUS")
+    assert len(shown) == pytest.approx(10, abs=1)
+    assert (shown[-1].radius, shown[-1].frame) == (-6.0, 0)
+    assert (shown[-1].x, shown[-1].y) == pytest.approx((473_977_420, 85_455_940), abs=30)
+    client.command(SET_MODE, 1, 4, 3)
+    client.run(0.3)
+    client.forget()
+    client.run(1.0)
+    assert client.all("ORBIT_EXECUTION_STATUS") == []
+
+
+def requested(client: Client, *params: float) -> None:
+    client.forget()
+    client.command(REQUEST_MESSAGE, *params)
+    client.run(0.02)
+    assert client.results(REQUEST_MESSAGE) == [0]
+
+
+def test_the_modes_that_there_are_can_be_asked_for_all_at_once_or_one_by_one():
+    client = Client(system=255, component=190)
+    requested(client, 435)
+    modes = client.all("AVAILABLE_MODES")
+    assert [mode.mode_index for mode in modes] == list(range(1, modes[0].number_modes + 1))
+    # Rows of a SITL's list: standard modes have no name
+    rows = {(mode.custom_mode, mode.standard_mode, mode.properties, mode.mode_name) for mode in modes}
+    assert {
+        (0x60000, 0, 1, "Offboard"),
+        (0x30000, 1, 0, ""),
+        (0x5040000, 5, 1, ""),
+        (0xA0000, 0, 3, "Termination"),
+    } <= rows
+    requested(client, 435, 3)
+    (one,) = client.all("AVAILABLE_MODES")
+    assert one.to_dict() == modes[2].to_dict()
+
+
+def test_the_version_of_the_protocol_is_told():
+    client = Client(system=255, component=190)
+    requested(client, 300)
+    (packet,) = [raw for raw in client.sent if raw[7:10] == (300).to_bytes(3, "little")]
+    assert struct.unpack("<HHH", packet[10:-2].ljust(6, b"\0")) == (200, 100, 200)
+    # Its checksum, with the seed that MAVLink's definition of PROTOCOL_VERSION yields
+    checksum = x25crc(packet[1:-2])
+    checksum.accumulate(bytes([217]))
+    assert checksum.crc.to_bytes(2, "little") == packet[-2:]

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.mavlink import streams as module
+from sim_vehicle.mavlink import late_loops as module
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.line import Buffer, Line
 from sim_vehicle.mavlink.outbox import Outbox
