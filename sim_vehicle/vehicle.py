@@ -66,6 +66,7 @@ class SimulatedVehicle:
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
         self._autopilot = Autopilot(airframe.hover_fraction, first, parameters, self._missions)
+        self._autopilot.commander.positioning.sees_ground = self._plant.onboard is not None
         # Taken once: looking a record's field up costs microseconds.
         self._body = self._plant.state.body
         identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))

@@ -61,7 +61,7 @@ def heartbeat(state: Telemetry) -> Message:
     autopilot = state.autopilot
     mode = autopilot.modes.shown
     return dialect.MAVLink_heartbeat_message(
-        dialect.MAV_TYPE_QUADROTOR,
+        int(state.parameter("MAV_TYPE")),
         dialect.MAV_AUTOPILOT_PX4,
         base_mode(mode, autopilot.arming.armed, autopilot.signal.ever_arrived),
         NUMBERS[mode].custom_mode,

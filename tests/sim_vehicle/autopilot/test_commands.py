@@ -32,7 +32,7 @@ class StreamsThatKnow105:
     def announce_interval(self, message_id: int) -> None:
         self.asked.append(("announce", message_id, 0.0))
 
-    def send_now(self, message_id: int) -> bool:
+    def send_now(self, message_id: int, index: int = 0) -> bool:
         self.asked.append(("send", message_id, 0.0))
         return message_id == 105
 

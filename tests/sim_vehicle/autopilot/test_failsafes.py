@@ -14,6 +14,7 @@ from sim_vehicle.autopilot.failsafe_table import (
     markdown_table,
     responses_now,
 )
+from sim_vehicle.autopilot.failure_detector import TippingDetector
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.ground_commands import INJECT_FAILURE
 from sim_vehicle.autopilot.messages import Result
@@ -345,6 +346,27 @@ def test_without_gps_the_position_is_lost_after_a_while_and_the_vehicle_descends
     assert (flown(flight), flight.autopilot.modes.intended) == (Mode.DESCEND, Mode.LOITER)
     flight.fly_until(lambda: not flight.autopilot.arming.armed, 15.0)
     assert not flight.autopilot.checks_pass
+
+
+@pytest.mark.parametrize(("value", "arms"), [(0, False), (1, True)])
+def test_whether_it_arms_without_gps_is_com_arm_wo_gps(value, arms):
+    flight = Flight(None, COM_ARM_WO_GPS=value)
+    lose_gps(flight)
+    assert (flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED) is arms
+    assert ("Preflight Fail: GPS fix too low" in flight.texts()) is not arms
+
+
+@pytest.mark.parametrize(("attitude", "lasts_s"), [((0.6, 0.8, 0.0, 0.0), 0.2), ((0.8, 0.0, 0.6, 0.0), 1.0)])
+def test_rolled_over_and_pitched_over_have_times_of_their_own(attitude, lasts_s):
+    # Given a vehicle that lies on its side, or on its nose, from now on
+    detector = TippingDetector(Parameters({"FD_FAIL_R_TTRI": 0.2, "FD_FAIL_P_TTRI": 1.0}))
+    seen = []
+    for now_us in range(0, 2 * SECOND, 20_000):
+        detector.update(now_us, attitude)
+        seen.append(detector.tipped_over)
+    assert 0.02 * seen.index(True) == pytest.approx(lasts_s, abs=0.03)
+    detector.update(2 * SECOND, (1.0, 0.0, 0.0, 0.0))
+    assert not detector.tipped_over
 
 
 def test_one_that_sees_the_ground_lands_without_gps_and_holds_again_with_it():

@@ -216,6 +216,28 @@ def test_the_gestures_arm_and_disarm():
     assert not flight.autopilot.arming.armed
 
 
+@pytest.mark.parametrize(
+    ("mode", "allowed", "falls"), [(Mode.STABILIZED, 1, True), (Mode.STABILIZED, 0, False), (Mode.ALTCTL, 1, False)]
+)
+def test_in_the_air_the_gesture_disarms_where_the_throttle_is_the_thrust_and_com_disarm_man_lets_it(
+    mode, allowed, falls
+):
+    flight = flying(mode, COM_DISARM_MAN=allowed)
+    flight.autopilot.texts.clear()
+    sticks(flight, 1.2, throttle=-1.0, yaw=-1.0)
+    assert flight.autopilot.arming.armed is not falls
+    # A gesture that is refused is refused without a word
+    assert "Disarming denied: not landed" not in flight.texts()
+
+
+def test_backwards_and_to_the_side_it_may_be_slower():
+    limits = {"MPC_VEL_MANUAL": 6.0, "MPC_VEL_MAN_SIDE": 3.0, "MPC_VEL_MAN_BACK": 2.0}
+    for held, speed in (({"pitch": 1}, (6.0, 0.0)), ({"pitch": -1}, (-2.0, 0.0)), ({"roll": 1}, (0.0, 3.0))):
+        flight = flying(Mode.POSCTL, **limits)
+        sticks(flight, 8.0, **held)
+        assert flight.state.velocity_ned_m_s[:2] == pytest.approx(speed, abs=0.15)
+
+
 def test_a_gesture_does_not_arm_a_mode_that_sticks_do_not_fly():
     flight = Flight()
     set_mode(flight, Mode.LOITER)

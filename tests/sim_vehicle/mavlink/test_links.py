@@ -88,6 +88,17 @@ def test_a_serial_line_thins_the_streams_out_as_px4_does(baud, by_default_hz, as
     assert imu_hz(baud, 200)[0] == pytest.approx(asked_hz, rel=0.12)
 
 
+@pytest.mark.parametrize(("kind", "name"), [(LinkKind.ONBOARD, "MAV_1_RATE"), (LinkKind.NORMAL, "MAV_0_RATE")])
+def test_a_line_carries_what_its_parameter_plans(kind, name):
+    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, parameters={name: 2_000})
+    link = vehicle.add_link(LinkOptions(kind, Line(921_600)))
+    sent = 0
+    for _ in range(5 * 250):
+        vehicle.advance()
+        sent += sum(map(len, link.take()))
+    assert sent / 5 == pytest.approx(2_000, rel=0.15)
+
+
 def test_a_long_list_over_a_slow_line_loses_nothing():
     vehicle = Vehicle(LinkOptions(LinkKind.ONBOARD, Line(57_600)))
     (end,) = vehicle.ends

@@ -8,6 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 from pymavlink.generator.mavcrc import x25crc
 
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.earth import StandardAir
 from sim_vehicle.hil.messages import Place
@@ -213,6 +214,19 @@ def test_a_hundred_metres_east_is_as_many_degrees_as_the_parallel_says():
     degrees = 100.0 / (111_194.93 * math.cos(math.radians(47.397742)))
     assert place.longitude_deg - 8.545594 == pytest.approx(degrees, rel=1e-5)
     assert place.altitude_m == 500.0
+
+
+def test_the_world_lies_where_the_parameters_say():
+    there = {"SIH_LOC_LAT0": -33.9, "SIH_LOC_LON0": 151.2, "SIH_LOC_H0": 20.0}
+    vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, parameters=there)
+    link, parser, last = vehicle.add_link(LinkOptions(LinkKind.ONBOARD)), dialect.MAVLink(None), {}
+    for _ in range(500):
+        vehicle.advance()
+        last.update((message.get_type(), message) for message in map(parser.decode, map(bytearray, link.take())))
+    for name in ("GLOBAL_POSITION_INT", "GPS_RAW_INT"):
+        assert (last[name].lat, last[name].lon) == pytest.approx((-339_000_000, 1_512_000_000), abs=100)
+        assert last[name].alt == pytest.approx(20_000, abs=500)
+    assert last["ALTITUDE"].altitude_monotonic == pytest.approx(20.0, abs=3.0)
 
 
 def test_radio_channels_show_once_somebody_sends_them():
