@@ -23,3 +23,15 @@ class LinkAddressError(SimulationError):
 
 class NotInLockstep(SimulationError):  # noqa: N818 - reads as the sentence it is
     """A PX4 that keeps its own time instead of the simulator's."""
+
+
+class FaultError(SimulationError):
+    """A fault that cannot be injected as asked."""
+
+
+class VehicleEnded(SimulationError):  # noqa: N818 - reads as the sentence it is
+    """A vehicle that is asked something after it was stopped or came to grief."""
+
+
+class ConditionNotMet(SimulationError, AssertionError):  # noqa: N818 - reads as the sentence it is
+    """What a test waited for did not happen in time."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
-from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.autopilot.messages import Identity, StatusText
 from sim_vehicle.autopilot.mission_store import MissionStore
 from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
@@ -51,6 +51,7 @@ class SimulatedVehicle:
         self._airframe, self._scene, self._seed, self._keeps_path = airframe, scene, seed, keeps_path
         self._epoch_at_boot_us = epoch_at_boot_us
         self._links: list[Link] = []
+        self.texts: tuple[StatusText, ...] = ()
         self._links_so_far = 0
         self._companion_link: Link | None = None
         self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
@@ -111,13 +112,15 @@ class SimulatedVehicle:
     def add_link(self, options: LinkOptions) -> Link:
         """One more connection, from now on."""
         number, seed = self._links_so_far % _LINK_NUMBERS, self._seed + self._links_so_far
-        if needs_faulty_link(self._scene.faults):
-            link: Link = FaultyLink(options, self._board, number, seed, self._scene.faults)
-        else:
-            link = Link(options, self._board, number, seed)
+        link = self._new_link(options, number, seed)
         self._links_so_far += 1
         self._links.append(link)
         return link
+
+    def _new_link(self, options: LinkOptions, number: int, seed: int) -> Link:
+        if needs_faulty_link(self._scene.faults):
+            return FaultyLink(options, self._board, number, seed, self._scene.faults)
+        return Link(options, self._board, number, seed)
 
     def remove_link(self, link: Link) -> None:
         """The connection has ended."""
@@ -140,7 +143,7 @@ class SimulatedVehicle:
         self._tune()
         sample = self._fly(self._autopilot.run_control())
         self._topics.count(new_position=self._publish(sample))
-        texts = tuple(self._autopilot.texts)
+        texts = self.texts = tuple(self._autopilot.texts)
         self._autopilot.texts.clear()
         for link in self._links:
             link.update(sample.time_boot_us, texts)

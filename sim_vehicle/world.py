@@ -6,7 +6,7 @@ that its edges round off completely, so two rectangles and four rounds.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -49,6 +49,10 @@ class Motion:
         """Offset at a time; before the first and after the last time that of the first and last."""
         x, y, z = (float(np.interp(time_s, self.times_s, axis)) for axis in zip(*self.offsets_ned_m, strict=True))
         return x, y, z
+
+    def later(self, seconds: float) -> "Motion":
+        """The same motion, begun later."""
+        return replace(self, times_s=tuple(time_s + seconds for time_s in self.times_s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,12 +20,33 @@ class FaultyLink(Link):
 
     def __init__(self, options: LinkOptions, board: Board, number: int, seed: int, faults: Sequence[Fault]) -> None:
         super().__init__(options, board, number, seed)
-        out, into = _wire_faults(faults, "to_companion"), _wire_faults(faults, "to_vehicle")
-        self._outbound = Wire(out, seed, message_number)
-        self._inbound = Wire(into, seed ^ _INBOUND_SEED, message_number)
-        self._jumps = [fault for fault in faults if isinstance(fault, ClockJump)]
+        self._outbound = Wire((), seed, message_number)
+        self._inbound = Wire((), seed ^ _INBOUND_SEED, message_number)
+        self._on_wire: list[tuple[Fault, Wire, WireFault]] = []
+        self._jumps: list[ClockJump] = []
         self._restamper = Restamper()
         self._arriving = b""
+        for fault in faults:
+            self.add(fault)
+
+    def add(self, fault: Fault) -> None:
+        """One more fault; what is none of the wire changes nothing here."""
+        for direction, wire in (("to_companion", self._outbound), ("to_vehicle", self._inbound)):
+            wire_fault = _as_wire_fault(fault, direction)
+            if wire_fault is not None:
+                wire.add(wire_fault)
+                self._on_wire.append((fault, wire, wire_fault))
+        if isinstance(fault, ClockJump):
+            self._jumps.append(fault)
+
+    def remove(self, fault: Fault) -> None:
+        """The very fault that was added is over; a clock that has jumped stays where it is."""
+        for added, wire, wire_fault in self._on_wire:
+            if added is fault:
+                wire.remove(wire_fault)
+        self._on_wire = [row for row in self._on_wire if row[0] is not fault]
+        now_s = self.now_us / 1e6
+        self._jumps = [jump for jump in self._jumps if jump is not fault or jump.window_s[0] < now_s]
 
     @property
     def _world_us(self) -> int:
@@ -55,12 +76,10 @@ def needs_faulty_link(faults: Sequence[Fault]) -> bool:
     return any(isinstance(fault, WireFault | ImuDropout | ClockJump) for fault in faults)
 
 
-def _wire_faults(faults: Sequence[Fault], direction: str) -> list[WireFault]:
-    found = [fault for fault in faults if isinstance(fault, WireFault) and fault.direction in (direction, "both")]
-    if direction == "to_companion":
-        found += [
-            WireFault(kind="wire", between_s=fault.window_s, loss=1.0, messages=_INERTIAL)
-            for fault in faults
-            if isinstance(fault, ImuDropout)
-        ]
-    return found
+def _as_wire_fault(fault: Fault, direction: str) -> WireFault | None:
+    """What a fault does to packets in one direction, if anything."""
+    if isinstance(fault, WireFault) and fault.direction in (direction, "both"):
+        return fault
+    if isinstance(fault, ImuDropout) and direction == "to_companion":
+        return WireFault(kind="wire", between_s=fault.window_s, loss=1.0, messages=_INERTIAL)
+    return None

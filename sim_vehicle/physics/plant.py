@@ -22,7 +22,7 @@ from sim_vehicle.physics.interval import (
     MOTORS_OFF,
     advance_boxed,
 )
-from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Scratch, calm, constants_from, initial_state
+from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import Floats, boxed, new_record
 from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
@@ -136,6 +136,11 @@ class Plant:
             self.onboard.look_at(self.seen_faces)
             self.onboard.lose_as(other.onboard)
             self.onboard.start(self.state.body, self.state.time_us)
+
+    @property
+    def constants(self) -> Constants:
+        """What does not change in a flight."""
+        return self._constants
 
     @property
     def world(self) -> World:

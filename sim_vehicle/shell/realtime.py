@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from sim_vehicle.shell.control import Control
 from sim_vehicle.shell.port import Port
 from sim_vehicle.shell.truth_file import save_truth
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -11,6 +12,8 @@ from sim_vehicle.vehicle import SimulatedVehicle
 # Lateness up to this is caught up by stepping faster, as a busy machine needs. A longer stop (a
 # suspended laptop) would end in a burst of old telemetry: there the vehicle's clock stands still instead.
 MOST_CAUGHT_UP_NS = 500_000_000
+# A pause is over as soon as somebody says so; whether to stop altogether is asked this often.
+_LOOK_WHILE_PAUSED_S = 0.05
 
 
 def serve(
@@ -19,18 +22,30 @@ def serve(
     truth_path: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
     speed: float = 1.0,
+    control: Control | None = None,
+    advance: Callable[[], None] | None = None,
 ) -> None:
     """Fly until ``stop()`` is true; then close the ports and write the truth, if a path is given.
 
     ``speed``: how many times faster than the clock, at most; 0 for as fast as the machine allows.
+    ``control``: in place of a speed, from where it is changed, paused and given other orders.
+    ``advance``: in place of the vehicle's own, what one interval consists of.
     """
-    pace = Pace(vehicle.time_boot_us, speed)
+    control, advance = control or Control(speed), advance or vehicle.advance
+    pace = Pace(vehicle.time_boot_us, control.speed)
     try:
         while not stop():
+            control.carry_out()
+            if control.is_paused:
+                control.carry_out(_LOOK_WHILE_PAUSED_S)
+                pace.restart(control.speed)
+                continue
+            if control.speed != pace.speed:
+                pace.restart(control.speed)
             pace.wait_until(vehicle.time_boot_us + vehicle.interval_us)
             for port in ports:
                 port.receive()
-            vehicle.advance()
+            advance()
             for port in ports:
                 port.send()
     finally:
@@ -52,9 +67,14 @@ class Pace:
     ) -> None:
         self._monotonic_ns = monotonic_ns
         self._sleep_s = sleep_s
-        self._ns_per_us = 1000 / speed if speed > 0 else 0.0
-        self._boot_ns = monotonic_ns() - round(self._ns_per_us * time_boot_us)
         self._time_boot_us = time_boot_us
+        self.restart(speed)
+
+    def restart(self, speed: float) -> None:
+        """Go on from here at a speed, after another one or a pause."""
+        self.speed = speed
+        self._ns_per_us = 1000 / speed if speed > 0 else 0.0
+        self._boot_ns = self._monotonic_ns() - round(self._ns_per_us * self._time_boot_us)
 
     def wait_until(self, time_boot_us: int) -> None:
         """Return when the vehicle's clock may show that; at once when it is late."""

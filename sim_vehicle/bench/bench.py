@@ -1,0 +1,175 @@
+"""A vehicle under test: what may be done to it between two intervals, and what a test may read. No clock, no socket."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+from pydantic import ValidationError
+
+from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.bench.changeable import ChangeableVehicle
+from sim_vehicle.bench.faults import FaultRequest, opposite
+from sim_vehicle.bench.strike import DURATION_S, strike
+from sim_vehicle.bench.timeline import Timeline
+from sim_vehicle.bench.truth import Truth, truth_of
+from sim_vehicle.errors import FaultError, SceneError
+from sim_vehicle.faults.spec import Fault
+from sim_vehicle.obstacles import BoxSpec, PoleSpec, WallSpec
+from sim_vehicle.scene import Scene, Start
+from sim_vehicle.world import Obstacle
+
+ObstacleSpec = WallSpec | PoleSpec | BoxSpec
+Condition = Callable[[Truth], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """With what a vehicle begins; every part has a default."""
+
+    airframe: str | Airframe = "foldable"
+    """A built-in one's name, or one of your own."""
+    obstacles: Sequence[ObstacleSpec] = ()
+    seed: int = 1
+    wind_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    faults: Sequence[Mapping[str, Any]] = ()
+    """As a mission file's `sim.faults`: with `at_s` or `between_s` by the vehicle's clock."""
+    yaw_deg: float = 0.0
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """In place of PX4's defaults and the airframe's."""
+
+    def scene(self) -> Scene:
+        """The world as a mission file would state it. Raises SceneError."""
+        of_kind = {kind: tuple(spec for spec in self.obstacles if isinstance(spec, kind)) for kind in _KINDS}
+        try:
+            return Scene.model_validate(
+                {
+                    "seed": self.seed,
+                    "start": Start(yaw_deg=self.yaw_deg),
+                    "wind_ned_m_s": self.wind_ned_m_s,
+                    "walls": of_kind[WallSpec],
+                    "poles": of_kind[PoleSpec],
+                    "boxes": of_kind[BoxSpec],
+                    "faults": tuple(self.faults),
+                }
+            )
+        except ValidationError as problem:
+            first = problem.errors()[0]
+            raise SceneError(f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}.") from problem
+
+    def airframe_loaded(self) -> Airframe:
+        """Raises AirframeError for a name that there is not."""
+        return self.airframe if isinstance(self.airframe, Airframe) else load_built_in(self.airframe)
+
+
+_KINDS: tuple[type[ObstacleSpec], ...] = (WallSpec, PoleSpec, BoxSpec)
+
+
+class Handle:
+    """Something that was placed or injected: `remove()` takes it back, and so does the end of a `with` block."""
+
+    def __init__(self, take_back: Callable[[], None]) -> None:
+        self._take_back: Callable[[], None] | None = take_back
+
+    def remove(self) -> None:
+        """From now on it is not there; once is enough, more do no harm."""
+        take_back, self._take_back = self._take_back, None
+        if take_back is not None:
+            take_back()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.remove()
+
+
+class Bench:
+    """A vehicle, its changes and its timeline. The same calls between the same intervals give the same bits."""
+
+    def __init__(self, setup: Setup, epoch_at_boot_us: int = 0) -> None:
+        """Raises AirframeError and SceneError."""
+        self.setup = setup
+        self.vehicle = ChangeableVehicle(
+            setup.airframe_loaded(), setup.scene(), setup.seed, epoch_at_boot_us, dict(setup.parameters)
+        )
+        self.timeline = Timeline(self.vehicle)
+        self._placed = len(setup.obstacles)
+        self._strikes = 0
+        self._due: list[tuple[int, Callable[[], None]]] = []
+
+    @property
+    def truth(self) -> Truth:
+        return truth_of(self.vehicle)
+
+    def advance(self) -> None:
+        """One interval."""
+        while self._due and self._due[0][0] <= self.vehicle.time_boot_us:
+            self._due.pop(0)[1]()
+        self.vehicle.advance()
+        self.timeline.look()
+
+    def place(self, *specs: ObstacleSpec) -> Handle:
+        """Put obstacles into the world; the times of a motion count from now. Raises SceneError."""
+        obstacles = tuple(self._built(spec, self._placed + number) for number, spec in enumerate(specs, start=1))
+        self.vehicle.place(obstacles)
+        self._placed += len(obstacles)
+        names = ", ".join(f"'{obstacle.name}'" for obstacle in obstacles)
+        self.timeline.note(f"placed {names}")
+        return Handle(lambda: self._take_away(obstacles, names))
+
+    def hit(self, speed_m_s: float, bearing_deg: float = 0.0, elevation_deg: float = 0.0) -> str:
+        """Swing a plate at the vehicle; it touches 20 ms from now. Returns the plate's name.
+
+        ``speed_m_s``: against the vehicle as it moves now; ``bearing_deg``: where the plate comes from, clockwise
+        from the nose; ``elevation_deg``: 90 from above. Raises SceneError for no speed.
+        """
+        if not speed_m_s > 0.0:
+            raise SceneError(f"a hit needs a speed of more than 0 m/s, not {speed_m_s:g}.")
+        self._strikes += 1
+        name, vehicle = f"strike {self._strikes}", self.vehicle
+        plate = strike(vehicle.state, vehicle.constants, speed_m_s, bearing_deg, elevation_deg, name)
+        vehicle.put((plate,))
+        above = f", {elevation_deg:g} deg up" if elevation_deg else ""
+        self.timeline.note(f"{name} swung: {speed_m_s:g} m/s from {bearing_deg:g} deg{above}")
+        self._due.append((vehicle.time_boot_us + round(1e6 * DURATION_S), lambda: vehicle.remove((plate,))))
+        return name
+
+    def inject(self, request: FaultRequest, for_s: float | None = None, after_s: float = 0.0) -> Handle:
+        """Let something go wrong from now (or ``after_s`` later) on, for a while or until it is removed.
+
+        Raises FaultError.
+        """
+        if not after_s >= 0.0:
+            raise FaultError(f"{request.kind}: after_s must not be less than 0.")
+        faults = request.timed(self.vehicle.time_boot_us / 1e6 + after_s, for_s)
+        for fault in faults:
+            self.vehicle.add_fault(fault)
+        return Handle(lambda: self._end(faults))
+
+    def _end(self, faults: tuple[Fault, ...]) -> None:
+        """End faults; what has already jumped jumps back."""
+        vehicle = self.vehicle
+        now_s = vehicle.time_boot_us / 1e6
+        # One that happened once, and, where it was to be undone by itself, its opposite.
+        happened = sum(fault.window_s[0] < now_s for fault in faults)
+        undoing = opposite(faults[0], now_s) if happened == 1 else None
+        for fault in faults:
+            vehicle.remove_fault(fault)
+        if undoing is not None:
+            vehicle.add_fault(undoing)
+
+    def _take_away(self, obstacles: tuple[Obstacle, ...], names: str) -> None:
+        self.vehicle.remove(obstacles)
+        self.timeline.note(f"removed {names}")
+
+    def _built(self, spec: ObstacleSpec, number: int) -> Obstacle:
+        obstacle: Obstacle
+        if isinstance(spec, WallSpec):
+            obstacle = spec.wall(number)
+        elif isinstance(spec, PoleSpec):
+            obstacle = spec.pole(number)
+        else:
+            obstacle = spec.box(number)
+        if obstacle.motion is None:
+            return obstacle
+        return replace(obstacle, motion=obstacle.motion.later(self.vehicle.time_boot_us / 1e6))

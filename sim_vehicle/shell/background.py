@@ -1,0 +1,248 @@
+"""A vehicle under test on real sockets, flown by a thread of its own, which always ends."""
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from sim_vehicle.bench.bench import Bench, Condition, Handle, ObstacleSpec, Setup
+from sim_vehicle.bench.faults import FaultRequest
+from sim_vehicle.bench.timeline import Event
+from sim_vehicle.bench.truth import Truth
+from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
+from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.shell.addresses import open_port
+from sim_vehicle.shell.control import Control
+from sim_vehicle.shell.port import Port
+from sim_vehicle.shell.realtime import serve
+from sim_vehicle.shell.tcp_port import TcpServerPort
+from sim_vehicle.shell.truth_file import save_truth
+from sim_vehicle.shell.udp_ports import UdpServerPort
+from sim_vehicle.truth import TruthRecorder
+
+Answer = TypeVar("Answer")
+
+_HERE = "127.0.0.1"
+# How long an order may be late to notice that the vehicle has just ended.
+_LOOK_S = 0.1
+# Slower than this an order would wait for seconds until the next interval.
+_SLOWEST = 0.01
+
+
+def start_vehicle(
+    speed: float = 1.0, streams: str = "onboard", links: tuple[str, ...] = (), **setup: Any
+) -> "RunningVehicle":
+    """A vehicle on free ports of this machine, in the air of nobody else; it ends with `stop()` or its `with` block.
+
+    ``speed``: how many times real time, at most; 0 for as fast as it goes. ``streams``: onboard, normal or ground,
+    PX4's sets for a link. ``links``: more addresses, as `rebound sim --link` takes. ``setup``: the fields of `Setup`.
+    Raises AirframeError, SceneError, LinkAddressError and PortInUse.
+    """
+    _check(speed)
+    bench = Bench(Setup(**setup), time.time_ns() // 1000)
+    options = LinkOptions(LinkKind(streams))
+    ports: list[Port] = []
+    try:
+        udp = UdpServerPort(bench.vehicle, options, _HERE, 0)
+        ports.append(udp)
+        tcp = TcpServerPort(bench.vehicle, options, _HERE, 0)
+        ports.append(tcp)
+        ports += [open_port(bench.vehicle, address) for address in links]
+    except BaseException:
+        for port in ports:
+            port.close()
+        raise
+    return RunningVehicle(bench, ports, udp.local_port, tcp.local_port, speed)
+
+
+def _check(speed: float) -> None:
+    if speed != 0.0 and not _SLOWEST <= speed <= 1000.0:
+        raise SimulationError(f"a speed is 0 or from {_SLOWEST:g} to 1000, and not {speed:g}.")
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """Somebody who waits for a condition."""
+
+    condition: Condition
+    until_us: int
+    refusal: Exception
+    future: "Future[Truth]"
+
+    def is_over(self, truth: Truth, now_us: int) -> bool:
+        """Look; whether the waiting is over, one way or another."""
+        try:
+            if self.condition(truth):
+                self.future.set_result(truth)
+            elif now_us >= self.until_us:
+                self.future.set_exception(self.refusal)
+        except Exception as problem:
+            self.future.set_exception(problem)
+        return self.future.done()
+
+
+class RunningVehicle:
+    """What `start_vehicle` gives. Every method may be called from any thread; all wait for the interval's end."""
+
+    def __init__(self, bench: Bench, ports: list[Port], udp_port: int, tcp_port: int, speed: float) -> None:
+        self.address = f"udpout://{_HERE}:{udp_port}"
+        """For MAVSDK."""
+        self.tcp_address = f"tcpout://{_HERE}:{tcp_port}"
+        """For MAVSDK over TCP."""
+        self.mavutil_address = f"tcp:{_HERE}:{tcp_port}"
+        """For pymavlink's `mavutil.mavlink_connection`, MAVProxy and DroneKit."""
+        self.udp_port, self.tcp_port = udp_port, tcp_port
+        self._bench, self._control = bench, Control(speed)
+        self._waiting: list[_Waiting] = []
+        self._stopped = threading.Event()
+        self._problem: Exception | None = None
+        self._reported = False
+        self._thread = threading.Thread(target=self._fly, args=(ports,), name="simulated vehicle", daemon=True)
+        self._thread.start()
+
+    # --- what a test does --------------------------------------------------------------------------------
+
+    def place(self, *obstacles: ObstacleSpec) -> Handle:
+        """Put obstacles into the world; the times of a motion count from now.
+
+        Raises SceneError for one that would be in the vehicle.
+        """
+        return self._from_here(self._ask(lambda: self._bench.place(*obstacles)))
+
+    def hit(self, speed_m_s: float, bearing_deg: float = 0.0, elevation_deg: float = 0.0) -> str:
+        """Swing a plate at the vehicle: it touches at that speed 20 ms from now, coming from there,
+        clockwise from the nose (90 is the right) or from above (elevation 90). Returns the name the hit will have."""
+        return self._ask(lambda: self._bench.hit(speed_m_s, bearing_deg, elevation_deg))
+
+    def inject(self, fault: FaultRequest, for_s: float | None = None, after_s: float = 0.0) -> Handle:
+        """Let something of `sim_vehicle.testing.faults` go wrong now, for a while or until it is removed."""
+        return self._from_here(self._ask(lambda: self._bench.inject(fault, for_s, after_s)))
+
+    def pause(self) -> None:
+        """Let the vehicle's time and its telemetry stand still, as a paused simulator of PX4's does."""
+        self._ask(lambda: setattr(self._control, "is_paused", True))
+
+    def resume(self) -> None:
+        """Go on where it stood."""
+        self._ask(lambda: setattr(self._control, "is_paused", False))
+
+    @property
+    def is_paused(self) -> bool:
+        return self._control.is_paused
+
+    @property
+    def speed(self) -> float:
+        """How many times real time, at most; 0 for as fast as it goes. May be set at any time."""
+        return self._control.speed
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        _check(speed)
+        self._ask(lambda: setattr(self._control, "speed", speed))
+
+    def wait_until(self, condition: Condition, within_s: float) -> Truth:
+        """Wait until a condition on the truth holds, looked at after each interval; return the truth of that moment.
+
+        ``within_s`` is the vehicle's time. Raises ConditionNotMet. In an asynchronous test:
+        `await asyncio.to_thread(vehicle.wait_until, ...)`.
+        """
+        if self.is_paused:
+            raise SimulationError("a paused vehicle waits for nothing: resume it first.")
+        future: Future[Truth] = Future()
+
+        def begin() -> None:
+            until_us = self._bench.vehicle.time_boot_us + round(1e6 * within_s)
+            refusal = f"the condition did not hold within {within_s:g} s (seed {self.setup.seed})."
+            self._waiting.append(_Waiting(condition, until_us, ConditionNotMet(refusal), future))
+
+        self._ask(begin)
+        return future.result()
+
+    # --- what a test reads -------------------------------------------------------------------------------
+
+    @property
+    def setup(self) -> Setup:
+        """With what it began."""
+        return self._bench.setup
+
+    @property
+    def truth(self) -> Truth:
+        """What is really so at the end of the last interval."""
+        return self._read(lambda: self._bench.truth)
+
+    @property
+    def recorded(self) -> TruthRecorder:
+        """The whole flight: its path as arrays, all hits, all faults. It goes on growing until the vehicle stops."""
+        return self._bench.vehicle.truth
+
+    @property
+    def timeline(self) -> tuple[Event, ...]:
+        """What has happened so far."""
+        return self._read(lambda: self._bench.timeline.events)
+
+    def save_truth(self, path: Path) -> None:
+        """Write hits, faults and path as `.npz`, as `rebound sim --truth` does."""
+        epoch_us = time.time_ns() // 1000 - self._bench.vehicle.time_boot_us
+        self._read(lambda: save_truth(path, self._bench.vehicle.truth, epoch_us))
+
+    # --- beginning and end -------------------------------------------------------------------------------
+
+    def stop(self) -> None:
+        """End the thread and give the ports back. Raises VehicleEnded if it had come to grief before."""
+        self._stopped.set()
+        self._thread.join()
+        problem, self._reported = self._problem if not self._reported else None, True
+        if problem is not None:
+            raise self._ended() from problem
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def _fly(self, ports: list[Port]) -> None:
+        bench = self._bench
+        try:
+            serve(bench.vehicle, ports, None, self._stopped.is_set, control=self._control, advance=self._advance)
+        except Exception as problem:
+            self._problem = problem
+        finally:
+            self._stopped.set()
+            for waiting in self._waiting:
+                waiting.future.set_exception(self._ended())
+            self._control.refuse(self._ended())
+
+    def _advance(self) -> None:
+        self._bench.advance()
+        if self._waiting:
+            truth, now_us = self._bench.truth, self._bench.vehicle.time_boot_us
+            self._waiting = [waiting for waiting in self._waiting if not waiting.is_over(truth, now_us)]
+
+    def _ask(self, order: Callable[[], Answer]) -> Answer:
+        """Let the vehicle's thread do it between two intervals."""
+        if self._stopped.is_set():
+            raise self._ended()
+        future = self._control.ask(order)
+        while not future.done():
+            # A thread that has just ended looks at nothing any more.
+            if not self._thread.is_alive():
+                self._control.refuse(self._ended())
+            wait([future], _LOOK_S)
+        return future.result()
+
+    def _read(self, order: Callable[[], Answer]) -> Answer:
+        """The same for what may be read after the end, too."""
+        return self._ask(order) if self._thread.is_alive() and not self._stopped.is_set() else order()
+
+    def _ended(self) -> VehicleEnded:
+        if self._problem is not None:
+            return VehicleEnded(f"the simulated vehicle came to grief: {self._problem!r}.")
+        return VehicleEnded("the simulated vehicle has been stopped.")
+
+    def _from_here(self, handle: Handle) -> Handle:
+        return Handle(lambda: self._ask(handle.remove))

@@ -1,0 +1,329 @@
+"""Every fault that can be injected while the vehicle flies: it acts from now on, for a while, and can be taken back."""
+
+import hashlib
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim_vehicle.airframe import Airframe, load_built_in, with_base
+from sim_vehicle.errors import FaultError
+from sim_vehicle.testing import FaultRequest, LockstepVehicle, Truth, faults
+from tests.sim_vehicle.bench.pilot import Pilot
+
+
+def standing(**setup: Any) -> Pilot:
+    """On the ground, a second after boot."""
+    pilot = Pilot(LockstepVehicle(**setup))
+    pilot.fly(1.0)
+    pilot.heard.clear()
+    return pilot
+
+
+def hovering(**setup: Any) -> Pilot:
+    pilot = Pilot(LockstepVehicle(**setup))
+    pilot.take_off()
+    return pilot
+
+
+def gap_s(pilot: Pilot, kind: str) -> float:
+    return float(np.diff(pilot.times(kind)).max())
+
+
+def test_an_imu_drops_out_for_a_while_and_nothing_else() -> None:
+    pilot = standing()
+    pilot.fly(0.5)
+    pilot.vehicle.inject(faults.sensor_dropout(), for_s=1.0)
+    pilot.fly(2.0)
+    assert gap_s(pilot, "HIGHRES_IMU") == pytest.approx(1.0, abs=0.03)
+    assert gap_s(pilot, "ATTITUDE") < 0.03
+
+
+def test_what_is_removed_early_ends_early_and_only_once() -> None:
+    pilot = standing()
+    dropout = pilot.vehicle.inject(faults.sensor_dropout(), for_s=10.0)
+    pilot.fly(0.3)
+    dropout.remove()
+    dropout.remove()
+    pilot.fly(0.2)
+    assert pilot.times("HIGHRES_IMU")[0] == pytest.approx(1.3, abs=0.03)
+    (span,) = pilot.vehicle.truth.faults
+    assert (span.began_at_boot_us, span.ended_at_boot_us) == (1_004_000, 1_304_000)
+
+
+def test_a_fault_may_begin_later() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.sensor_dropout(), for_s=0.5, after_s=0.5)
+    pilot.fly(2.0)
+    times = np.array(pilot.times("HIGHRES_IMU"))
+    assert not np.any((times > 1.51) & (times < 2.0)) and np.any(times < 1.5)
+
+
+def test_the_share_of_packets_that_is_lost_is_the_one_asked() -> None:
+    pilot = standing()
+    pilot.fly(4.0)
+    undisturbed = len(pilot.heard)
+    pilot.heard.clear()
+    with pilot.vehicle.inject(faults.packet_loss(0.3)):
+        pilot.fly(4.0)
+    assert len(pilot.heard) / undisturbed == pytest.approx(0.7, abs=0.05)
+    pilot.heard.clear()
+    pilot.fly(4.0)
+    assert len(pilot.heard) == pytest.approx(undisturbed, rel=0.02)
+
+
+def test_a_loss_may_be_of_one_message_and_one_direction() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.packet_loss(1.0, messages=("ATTITUDE",), direction="to_companion"))
+    pilot.fly(1.0)
+    assert not pilot.of("ATTITUDE") and pilot.of("HIGHRES_IMU")
+
+
+def test_a_link_that_is_cut_carries_nothing_either_way() -> None:
+    pilot = standing()
+    cut = pilot.vehicle.inject(faults.link_cut())
+    pilot.command(400, 1, 0)
+    pilot.fly(1.0)
+    assert not pilot.heard and not pilot.vehicle.truth.is_armed
+    cut.remove()
+    pilot.command(400, 1, 0)
+    pilot.fly(0.1)
+    assert pilot.heard and pilot.vehicle.truth.is_armed
+
+
+def test_setpoints_lost_on_a_cut_link_make_the_vehicle_fail_safe() -> None:
+    """What test authors cut links for: PX4's answer to lost setpoints, 1.0 to 1.1 s later."""
+    pilot = hovering(parameters={"COM_OBL_RC_ACT": 5})
+    for _ in range(20):
+        setpoint(pilot)
+        pilot.fly(0.05)
+    pilot.command(176, 1, 6)
+    pilot.fly(0.1)
+    assert pilot.vehicle.truth.mode == "Offboard"
+    begun_s = pilot.vehicle.time_s
+    with pilot.vehicle.inject(faults.link_cut("to_vehicle")):
+        while pilot.vehicle.truth.mode == "Offboard":
+            setpoint(pilot)
+            pilot.fly(0.05)
+            assert pilot.vehicle.time_s < begun_s + 2.0
+    assert pilot.vehicle.time_s - begun_s == pytest.approx(1.05, abs=0.12)
+
+
+def setpoint(pilot: Pilot) -> None:
+    from pymavlink.dialects.v20 import development as dialect
+
+    fields = (0.0, 0.0, -2.5, *[0.0] * 6, 0.0, 0.0)
+    pilot.send(dialect.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0xDF8, *fields))
+
+
+def test_packets_come_later() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.delay(0.2))
+    pilot.fly(1.0)
+    late_s = [time_s - message.time_usec / 1e6 for time_s, message in pilot.heard if hasattr(message, "time_usec")]
+    assert min(late_s) == pytest.approx(0.2, abs=0.005)
+
+
+def test_packets_overtake_each_other() -> None:
+    pilot = standing()
+    pilot.fly(1.0)
+    assert np.all(np.diff(stamps(pilot)) > 0)
+    pilot.vehicle.inject(faults.reordering(0.3, by_s=0.05))
+    pilot.fly(2.0)
+    assert np.any(np.diff(stamps(pilot)) < 0)
+
+
+def stamps(pilot: Pilot) -> np.ndarray:
+    return np.array([message.time_usec for message in pilot.of("HIGHRES_IMU")])
+
+
+def test_packets_come_twice() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.duplication(1.0))
+    pilot.fly(1.0)
+    assert len(stamps(pilot)) == pytest.approx(2 * len(set(stamps(pilot))), abs=1)
+
+
+def test_packets_are_damaged() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.corruption(0.2))
+    pilot.fly(2.0)
+    damaged = len(pilot.of("BAD_DATA"))
+    assert damaged > 0.1 * len(pilot.heard)
+
+
+def test_a_clock_jumps_and_jumps_back() -> None:
+    pilot = standing()
+    pilot.fly(0.5)
+    pilot.vehicle.inject(faults.clock_jump(100.0), for_s=0.5)
+    pilot.fly(1.0)
+    jumps = np.diff(stamps(pilot)) / 1e6
+    assert jumps.max() == pytest.approx(100.0, abs=0.03) and jumps.min() == pytest.approx(-100.0, abs=0.03)
+    pilot.heard.clear()
+    jumped = pilot.vehicle.inject(faults.clock_jump(7.0))
+    pilot.fly(0.5)
+    jumped.remove()
+    pilot.fly(0.5)
+    late_s = pilot.vehicle.time_s - stamps(pilot)[-1] / 1e6
+    assert abs(late_s) < 0.03 and np.diff(stamps(pilot)).min() == pytest.approx(-7e6, abs=0.03e6)
+
+
+def test_a_motor_that_fails_turns_the_vehicle_over() -> None:
+    pilot = hovering()
+    pilot.vehicle.inject(faults.motor_failure(motor=0))
+    pilot.vehicle.advance_until(lambda truth: upright(truth) < 0.5, 2.0)
+
+
+def test_a_motor_that_recovers_leaves_it_flying() -> None:
+    pilot = hovering()
+    pilot.vehicle.inject(faults.motor_failure(motor=0, thrust_share=0.7), for_s=0.2)
+    pilot.fly(3.0)
+    assert upright(pilot.vehicle.truth) > 0.99 and pilot.vehicle.truth.height_m > 2.0
+
+
+def upright(truth: Truth) -> float:
+    """Cosine of the tilt."""
+    _, x, y, _ = truth.attitude_wxyz
+    return 1 - 2 * (x * x + y * y)
+
+
+def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -> None:
+    pilot = hovering()
+    loss = pilot.vehicle.inject(faults.gps_loss(drift_m_s2=0.5))
+    pilot.fly(4.0)
+    assert pilot.of("GPS_RAW_INT")[-1].fix_type < 3
+    assert astray_m(pilot) > 0.2
+    loss.remove()
+    pilot.fly(1.0)
+    assert pilot.of("GPS_RAW_INT")[-1].fix_type >= 3
+    assert astray_m(pilot) < 0.1
+
+
+def astray_m(pilot: Pilot) -> float:
+    message, truth = pilot.of("LOCAL_POSITION_NED")[-1], pilot.vehicle.truth
+    return math.dist((message.x, message.y), truth.position_ned_m[:2])
+
+
+def test_an_estimate_is_reset_and_says_so() -> None:
+    pilot = standing()
+    pilot.fly(0.2)
+    before = pilot.of("ODOMETRY")[-1]
+    reset = pilot.vehicle.inject(faults.ekf_reset(position_jump_ned_m=(1.0, 0.0, 0.0)))
+    pilot.fly(0.5)
+    after = pilot.of("ODOMETRY")[-1]
+    assert after.reset_counter == before.reset_counter + 1
+    assert after.x - before.x == pytest.approx(1.0, abs=0.1)
+    reset.remove()
+    pilot.fly(0.5)
+    back = pilot.of("ODOMETRY")[-1]
+    assert back.reset_counter == before.reset_counter + 2
+    assert back.x == pytest.approx(before.x, abs=0.1)
+
+
+def test_a_reset_that_is_taken_back_before_it_happens_never_does() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.ekf_reset((1.0, 0.0, 0.0)), after_s=1.0, for_s=1.0).remove()
+    pilot.fly(3.0)
+    assert {message.reset_counter for message in pilot.of("ODOMETRY")} == {0}
+
+
+def test_a_camera_that_is_lost_is_missed_by_the_vehicles_own_filter() -> None:
+    pilot = hovering(airframe=with_filter())
+    lost = pilot.vehicle.inject(faults.sensor_dropout("optical_flow"))
+    pilot.fly(1.0)
+    assert pilot.of("OPTICAL_FLOW_RAD")[-1].quality == 0
+    lost.remove()
+    pilot.fly(1.0)
+    assert pilot.of("OPTICAL_FLOW_RAD")[-1].quality > 0
+
+
+def test_a_sensors_zero_moves_and_moves_back() -> None:
+    pilot = standing()
+    pilot.vehicle.inject(faults.other("imu_bias", gyroscope_frd_rad_s=(0.5, 0, 0)), for_s=0.5)
+    pilot.fly(0.4)
+    assert pilot.of("HIGHRES_IMU")[-1].xgyro == pytest.approx(0.5, abs=0.05)
+    pilot.fly(0.4)
+    assert pilot.of("HIGHRES_IMU")[-1].xgyro == pytest.approx(0.0, abs=0.05)
+
+
+def with_filter() -> Airframe:
+    return Airframe.model_validate(with_base({"based_on": "foldable", "estimate": {"kind": "ekf"}}))
+
+
+def acts(truth: Truth) -> bool:
+    return bool(truth.faults)
+
+
+@pytest.mark.parametrize(
+    ("request_", "for_s", "shows"),
+    [
+        (faults.other("gust", velocity_ned_m_s=(6, 0, 0)), 2.0, lambda truth: truth.speed_m_s > 0.1),
+        (faults.other("push", force_ned_n=(0, 4, 0)), 0.5, lambda truth: truth.velocity_ned_m_s[1] > 0.3),
+        (faults.other("free_fall"), 0.3, lambda truth: truth.velocity_ned_m_s[2] > 1.5),
+        (faults.other("turbulence", wind_20ft_m_s=20), 3.0, lambda truth: truth.speed_m_s > 0.05),
+        (faults.other("hand_catch"), 1.0, acts),
+        (faults.other("battery_sag", voltage_share=0.8), 1.0, lambda truth: truth.height_m < 2.5),
+        (faults.other("payload_drop", mass_kg=0.2), None, acts),
+        (faults.other("vibration", accelerometer_rms_m_s2=5.0), None, acts),
+        (faults.other("imu_stuck", axis="gyroscope_x"), 0.5, acts),
+    ],
+)
+def test_every_other_kind_of_a_mission_file(
+    request_: FaultRequest, for_s: float | None, shows: Callable[[Truth], bool]
+) -> None:
+    pilot = hovering()
+    pilot.vehicle.inject(request_, for_s=for_s)
+    pilot.vehicle.advance_until(shows, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("request_", "for_s", "words"),
+    [
+        (faults.packet_loss(2.0), None, "wire, loss: Input should be less than or equal to 1"),
+        (faults.motor_failure(7), None, "motor_failure, motor: Input should be less than or equal to 3"),
+        (faults.packet_loss(0.1, messages=("HIGHRES",)), None, "no MAVLink message is called 'HIGHRES'"),
+        (faults.other("gust", velocity_ned_m_s=(1, 0, 0)), None, "gust has to end"),
+        (faults.other("payload_drop", mass_kg=0.1), 2.0, "payload_drop cannot be undone"),
+        (faults.link_cut(), 0.0, "for_s must be more than 0"),
+        (faults.other("gremlins"), None, "gremlins"),
+    ],
+)
+def test_what_cannot_be_injected_is_one_sentence(request_: FaultRequest, for_s: float | None, words: str) -> None:
+    vehicle = LockstepVehicle()
+    with pytest.raises(FaultError, match=words):
+        vehicle.inject(request_, for_s=for_s)
+    vehicle.advance(0.1)
+    assert vehicle.truth.faults == ()
+
+
+def test_two_hands_at_once_are_refused() -> None:
+    vehicle = LockstepVehicle()
+    vehicle.inject(faults.other("push", force_ned_n=(1, 0, 0)), for_s=2.0)
+    vehicle.advance(0.5)
+    with pytest.raises(FaultError, match="two faults of kind push"):
+        vehicle.inject(faults.other("push", force_ned_n=(1, 0, 0)), for_s=2.0)
+
+
+def test_the_same_injections_give_the_same_bytes() -> None:
+    def flown(seed: int) -> str:
+        pilot, digest = Pilot(LockstepVehicle(seed=seed)), hashlib.sha256()
+        for request_ in (faults.packet_loss(0.2), faults.corruption(0.1), faults.other("turbulence", wind_20ft_m_s=10)):
+            digest.update(pilot.vehicle.advance(0.4))
+            pilot.vehicle.inject(request_, for_s=1.0)
+        digest.update(pilot.vehicle.advance(2.0))
+        return digest.hexdigest()
+
+    assert flown(1) == flown(1)
+    assert flown(1) != flown(2)
+
+
+def test_a_vehicle_that_is_not_changed_is_the_one_of_a_mission_file() -> None:
+    from sim_vehicle.scene import Scene
+    from sim_vehicle.vehicle import SimulatedVehicle
+
+    plain = SimulatedVehicle(load_built_in("foldable"), Scene(), 5)
+    sent = b"".join(packet for _ in range(250) for packet in plain.step(b""))
+    vehicle = LockstepVehicle(seed=5)
+    assert vehicle.advance(1.0) == sent

@@ -1,0 +1,235 @@
+"""Obstacles that come and go, plates that strike, and the truth of it, in lockstep."""
+
+import hashlib
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sim_vehicle.errors import AirframeError, ConditionNotMet, SceneError
+from sim_vehicle.testing import Box, LockstepVehicle, Motion, Pole, Wall, faults
+from tests.sim_vehicle.bench.pilot import Pilot
+
+HOVER_M = 2.5
+
+
+def hovering(**setup: Any) -> Pilot:
+    pilot = Pilot(LockstepVehicle(**setup))
+    pilot.take_off()
+    return pilot
+
+
+def pushed_north(pilot: Pilot) -> None:
+    """Shove the vehicle away at more than 2 m/s."""
+    pilot.vehicle.inject(faults.other("push", force_ned_n=(9, 0, 0), rise_s=0.0), for_s=0.3)
+
+
+def approaching(point_north_m: float, down_m: float = -HOVER_M) -> Wall:
+    return Wall(point_ned_m=(point_north_m, 0, down_m), normal_ned=(-1, 0, 0))
+
+
+def test_a_wall_placed_in_flight_is_hit() -> None:
+    pilot = hovering()
+    pilot.vehicle.place(approaching(0.6))
+    pushed_north(pilot)
+    pilot.vehicle.advance_until(lambda truth: truth.hits, 3.0)
+    (hit,) = pilot.vehicle.truth.hits
+    assert (hit.obstacle, hit.kind) == ("wall 1", "wall")
+    assert hit.normal_ned == pytest.approx((-1, 0, 0))
+    assert hit.contact_position_ned_m[0] == pytest.approx(0.6 - 0.18, abs=0.02)
+
+
+def test_a_wall_that_was_removed_is_flown_through() -> None:
+    pilot = hovering()
+    wall = pilot.vehicle.place(approaching(0.6))
+    pilot.fly(0.5)
+    wall.remove()
+    pushed_north(pilot)
+    pilot.vehicle.advance_until(lambda truth: truth.position_ned_m[0] > 0.6, 3.0)
+    assert pilot.vehicle.truth.hits == ()
+
+
+@pytest.mark.parametrize(
+    "obstacle", [Pole(point_ned_m=(0.6, 0, 0)), Box(centre_ned_m=(0.9, 0, -HOVER_M), size_m=(0.4, 1, 1))]
+)
+def test_poles_and_boxes_too(obstacle: Pole | Box) -> None:
+    pilot = hovering()
+    with pilot.vehicle.place(obstacle):
+        pushed_north(pilot)
+        pilot.vehicle.advance_until(lambda truth: truth.hits, 3.0)
+
+
+def test_a_second_obstacle_during_a_contact_leaves_the_contact_what_it_is() -> None:
+    """The pole's row in the world moves on when a wall comes before it."""
+
+    def hit(places_more: bool) -> Any:
+        pilot = hovering(obstacles=[Pole(point_ned_m=(0.6, 0.0, 0), name="mast")])
+        pushed_north(pilot)
+        pilot.vehicle.advance_until(lambda truth: max(truth.arm_fold_m) > 0.003, 3.0)
+        if places_more:
+            pilot.vehicle.place(Wall(point_ned_m=(-5, 0, 0), normal_ned=(1, 0, 0), name="far"))
+        pilot.vehicle.advance_until(lambda truth: truth.hits, 1.0)
+        return pilot.vehicle.truth.hits[0]
+
+    assert hit(True) == hit(False)
+
+
+def test_an_obstacle_removed_during_a_contact_ends_it() -> None:
+    pilot = hovering()
+    wall = pilot.vehicle.place(approaching(0.6))
+    pushed_north(pilot)
+    pilot.vehicle.advance_until(lambda truth: max(truth.arm_fold_m) > 0.003, 3.0)
+    wall.remove()
+    (hit,) = pilot.vehicle.truth.hits
+    assert hit.obstacle == "wall 1"
+    pilot.vehicle.advance_until(lambda truth: truth.position_ned_m[0] > 0.6, 1.0)
+
+
+def test_a_motion_counts_from_the_moment_of_placing() -> None:
+    pilot = hovering()
+    pilot.vehicle.place(
+        Wall(
+            point_ned_m=(1.2, 0, -HOVER_M),
+            normal_ned=(-1, 0, 0),
+            motion=Motion(velocity_ned_m_s=(-1.0, 0, 0), from_s=0.5, until_s=1.6),
+        )
+    )
+    placed_s = pilot.vehicle.time_s
+    pilot.vehicle.advance_until(lambda truth: truth.hits, 4.0)
+    (hit,) = pilot.vehicle.truth.hits
+    assert hit.surface_velocity_ned_m_s == pytest.approx((-1, 0, 0), abs=1e-6)
+    assert hit.contact_at_boot_us / 1e6 - placed_s == pytest.approx(0.5 + 1.2 - 0.1825, abs=0.1)
+
+
+def test_nothing_can_be_placed_in_the_vehicle() -> None:
+    pilot = hovering()
+    with pytest.raises(SceneError, match="'wall 1' would pass through the vehicle, which is at"):
+        pilot.vehicle.place(approaching(0.1))
+    pilot.vehicle.place(approaching(2.0)).remove()
+
+
+@pytest.mark.parametrize("bearing_deg", [0.0, 90.0, 180.0, -45.0])
+@pytest.mark.parametrize("airframe", ["foldable", "rigid"])
+def test_a_strike_comes_from_where_and_as_fast_as_asked(airframe: str, bearing_deg: float) -> None:
+    pilot = hovering(airframe=airframe, yaw_deg=30.0)
+    begun_s = pilot.vehicle.time_s
+    name = pilot.vehicle.hit(1.5, bearing_deg=bearing_deg)
+    pilot.fly(1.0)
+    (hit,) = pilot.vehicle.truth.hits
+    assert hit.obstacle == name == "strike 1"
+    heading = math.radians(30.0 + bearing_deg)
+    assert hit.normal_ned == pytest.approx((-math.cos(heading), -math.sin(heading), 0), abs=0.03)
+    closing_m_s = -np.dot(np.subtract(hit.impact_velocity_ned_m_s, hit.surface_velocity_ned_m_s), hit.normal_ned)
+    assert closing_m_s == pytest.approx(1.5, abs=0.05)
+    assert hit.contact_at_boot_us / 1e6 - begun_s == pytest.approx(0.02, abs=0.01)
+    # Kicked away from where the plate came from, and nothing is left of that plate
+    assert np.dot(hit.rebound_velocity_ned_m_s, hit.normal_ned) > 1.5
+    pilot.fly(4.0)
+    assert len(pilot.vehicle.truth.hits) == 1
+
+
+def test_a_strike_from_above_presses_down() -> None:
+    pilot = hovering()
+    pilot.vehicle.hit(1.0, elevation_deg=90.0)
+    pilot.fly(0.4)
+    (hit,) = pilot.vehicle.truth.hits
+    assert hit.kind == "ceiling" and hit.rebound_velocity_ned_m_s[2] > 1.0
+
+
+def test_a_vehicle_in_flight_is_met_at_the_speed_asked() -> None:
+    pilot = hovering()
+    pushed_north(pilot)
+    pilot.fly(0.3)
+    assert pilot.vehicle.truth.velocity_ned_m_s[0] > 0.8
+    flown_m_s = pilot.vehicle.truth.velocity_ned_m_s[0]
+    pilot.vehicle.hit(1.0)
+    pilot.fly(0.5)
+    (hit,) = pilot.vehicle.truth.hits
+    # It was aimed at a vehicle that flies on; this one brakes
+    assert hit.surface_velocity_ned_m_s[0] == pytest.approx(flown_m_s - 1.0, abs=0.01)
+    assert hit.impact_velocity_ned_m_s[0] == pytest.approx(flown_m_s, abs=0.2)
+
+
+def test_a_strike_without_speed_is_refused() -> None:
+    with pytest.raises(SceneError, match="more than 0 m/s"):
+        LockstepVehicle().hit(0.0)
+
+
+def test_the_truth_is_neither_late_nor_noisy() -> None:
+    """A standing vehicle's estimate wanders; the truth does not."""
+    pilot = Pilot(LockstepVehicle(yaw_deg=90.0))
+    pilot.fly(1.0)
+    truth = pilot.vehicle.truth
+    assert truth.time_boot_s == pilot.vehicle.time_s
+    assert truth.position_ned_m[:2] == pytest.approx((0, 0), abs=1e-6) and truth.speed_m_s < 1e-6
+    assert truth.attitude_wxyz == pytest.approx((math.sqrt(0.5), 0, 0, math.sqrt(0.5)), abs=1e-6)
+    assert not truth.is_armed and truth.mode == "Hold" and truth.height_m == pytest.approx(0.08, abs=0.01)
+    path = pilot.vehicle.recorded.series()
+    assert path["time_boot_us"][-1] == round(1e6 * truth.time_boot_s)
+
+
+def test_the_timeline_tells_the_flight_in_order() -> None:
+    pilot = hovering()
+    pilot.vehicle.place(Wall(point_ned_m=(9, 0, -1), normal_ned=(-1, 0, 0), name="gate"))
+    pilot.vehicle.inject(faults.gps_loss(), for_s=0.2)
+    pilot.vehicle.hit(1.0)
+    pilot.fly(1.0)
+    lines = [event.text for event in pilot.vehicle.timeline]
+    words = ["armed", "mode Takeoff", "mode Hold", "placed 'gate'", "strike 1 swung", "hits 'strike 1' at 1.0"]
+    found = [next(number for number, line in enumerate(lines) if line.startswith(word)) for word in words]
+    assert found == sorted(found)
+    assert any("aiding_loss (sensor: gps" in line for line in lines) and "fault aiding_loss is over" in lines
+    assert any(line.startswith("says (info): Armed by external command") for line in lines)
+    times = [event.time_boot_s for event in pilot.vehicle.timeline]
+    assert times == sorted(times)
+
+
+def test_what_was_changed_outlives_a_reboot_with_another_inertial_sensor() -> None:
+    pilot = Pilot(LockstepVehicle())
+    pilot.vehicle.place(Wall(point_ned_m=(0.6, 0, 0), normal_ned=(-1, 0, 0), name="gate"))
+    pilot.vehicle.inject(faults.sensor_dropout())
+    pilot.vehicle.advance(0.5)
+    from pymavlink.dialects.v20 import development as dialect
+
+    rate = np.array([200], np.int32).view(np.float32)[0]
+    pilot.send(dialect.MAVLink_param_set_message(1, 1, b"IMU_INTEG_RATE", float(rate), 6))
+    pilot.command(246, 1)
+    pilot.fly(4.0)
+    pilot.heard.clear()
+    pilot.fly(1.0)
+    assert not pilot.of("HIGHRES_IMU") and pilot.of("ATTITUDE")
+    pilot.take_off()
+    pushed_north(pilot)
+    pilot.vehicle.advance_until(lambda truth: truth.hits, 4.0)
+
+
+def test_a_condition_that_never_holds_is_an_assertion_with_the_seed() -> None:
+    with pytest.raises(ConditionNotMet, match=r"within 0.1 s \(seed 9\)") as raised:
+        LockstepVehicle(seed=9).advance_until(lambda truth: truth.hits, 0.1)
+    assert isinstance(raised.value, AssertionError)
+
+
+def test_bad_setups_are_one_sentence() -> None:
+    with pytest.raises(AirframeError, match="no airframe is called 'paper'"):
+        LockstepVehicle(airframe="paper")
+    with pytest.raises(SceneError, match="passes through the vehicle's start position"):
+        LockstepVehicle(obstacles=[approaching(0.1, 0.0)])
+    with pytest.raises(SceneError, match=r"faults\.0\.motor_failure"):
+        LockstepVehicle(faults=[{"kind": "motor_failure", "at_s": 1, "motor": 9}])
+
+
+def test_time_goes_by_whole_intervals_and_the_same_calls_give_the_same_bytes() -> None:
+    def flown() -> tuple[float, str]:
+        vehicle, digest = LockstepVehicle(seed=4), hashlib.sha256()
+        for seconds in (0.001, 0.0, 0.5):
+            digest.update(vehicle.advance(seconds))
+        vehicle.place(approaching(3.0))
+        vehicle.hit(1.0)
+        digest.update(vehicle.advance(1.0))
+        digest.update(repr(vehicle.truth).encode())
+        return vehicle.time_s, digest.hexdigest()
+
+    time_s, digest = flown()
+    assert time_s == pytest.approx(0.004 + 0.004 + 0.004 + 0.5 + 1.0)
+    assert (time_s, digest) == flown()
