@@ -14,6 +14,7 @@ from sim_vehicle.obstacles import MotionSpec as Motion
 from sim_vehicle.obstacles import PoleSpec as Pole
 from sim_vehicle.obstacles import WallSpec as Wall
 from sim_vehicle.shell.background import RunningVehicle, start_vehicle
+from sim_vehicle.shell.truth_file import load_truth, save_truth
 from sim_vehicle.truth import FaultSpan, Hit
 
 __all__ = [
@@ -31,5 +32,7 @@ __all__ = [
     "Truth",
     "Wall",
     "faults",
+    "load_truth",
+    "save_truth",
     "start_vehicle",
 ]

@@ -1,0 +1,184 @@
+"""A vehicle under test on real sockets: it can be reached, changed from outside, paused, hurried, and always ends."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+import pytest
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
+from sim_vehicle.shell.truth_file import load_faults, load_truth
+from sim_vehicle.testing import RunningVehicle, Wall, faults, start_vehicle
+
+TIMEOUT_S = 10.0
+HERE = "127.0.0.1"
+
+
+def connected(vehicle: RunningVehicle) -> socket.socket:
+    client = socket.create_connection((HERE, vehicle.tcp_port), TIMEOUT_S)
+    client.settimeout(TIMEOUT_S)
+    return client
+
+
+def kinds(client: socket.socket, wanted: set[str]) -> list[str]:
+    """What comes until all that is wanted has come."""
+    parser, heard = dialect.MAVLink(None), []
+    parser.robust_parsing = True
+    while not wanted <= set(heard):
+        heard += [message.get_type() for message in parser.parse_buffer(client.recv(65_536)) or []]
+    return heard
+
+
+def command(number: int, *params: float) -> bytes:
+    message = dialect.MAVLink_command_long_message(1, 1, number, 0, *params, *[float("nan")] * (7 - len(params)))
+    return message.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190))
+
+
+def vehicle_threads() -> int:
+    return sum(thread.name == "simulated vehicle" for thread in threading.enumerate())
+
+
+def is_free(kind: int, port: int) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        try:
+            probe.bind((HERE, port))
+        except OSError:
+            return False
+        return True
+
+
+def test_it_is_there_at_its_addresses_and_gone_afterwards() -> None:
+    with start_vehicle() as vehicle, connected(vehicle) as client:
+        assert vehicle.address == f"udpout://{HERE}:{vehicle.udp_port}"
+        assert vehicle.mavutil_address == f"tcp:{HERE}:{vehicle.tcp_port}"
+        kinds(client, {"HEARTBEAT", "HIGHRES_IMU"})
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second:
+            second.settimeout(TIMEOUT_S)
+            second.sendto(command(512, 148), (HERE, vehicle.udp_port))
+            kinds(second, {"AUTOPILOT_VERSION", "HEARTBEAT"})
+    assert vehicle_threads() == 0
+    assert is_free(socket.SOCK_DGRAM, vehicle.udp_port)
+    with pytest.raises(VehicleEnded, match="has been stopped"):
+        vehicle.hit(1.0)
+    # What happened may be read afterwards, too
+    assert vehicle.truth.time_boot_s > 0
+
+
+def test_it_ends_with_an_error_in_the_test() -> None:
+    with pytest.raises(ZeroDivisionError), start_vehicle():
+        _ = 1 / 0
+    assert vehicle_threads() == 0
+
+
+def test_a_setup_that_cannot_be_leaves_nothing_behind() -> None:
+    with pytest.raises(SceneError):
+        start_vehicle(obstacles=[Wall(point_ned_m=(0.1, 0, 0), normal_ned=(-1, 0, 0))])
+    with pytest.raises(SimulationError, match="is not an address"):
+        start_vehicle(links=("nonsense",))
+    with pytest.raises(SimulationError, match="a speed is 0 or from"):
+        start_vehicle(speed=-1.0)
+    assert vehicle_threads() == 0
+
+
+def test_walls_strikes_faults_and_truth_while_it_flies() -> None:
+    with start_vehicle(speed=20.0, seed=3) as vehicle, connected(vehicle) as client:
+        client.sendall(command(400, 1) + command(22))
+        vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2.2, within_s=30)
+        wall = vehicle.place(Wall(point_ned_m=(2, 0, -2), normal_ned=(-1, 0, 0), name="gate"))
+        with pytest.raises(SceneError, match="would pass through the vehicle"):
+            vehicle.place(Wall(point_ned_m=(0.1, 0, -2.5), normal_ned=(-1, 0, 0)))
+        name = vehicle.hit(1.5, bearing_deg=90.0)
+        truth = vehicle.wait_until(lambda truth: truth.hits, within_s=2)
+        assert truth.hits[0].obstacle == name and truth.hits[0].normal_ned[1] < -0.99
+        wall.remove()
+        with vehicle.inject(faults.motor_failure(0)):
+            vehicle.wait_until(lambda truth: truth.height_m < 0.5, within_s=10)
+    texts = [event.text for event in vehicle.timeline]
+    assert "placed 'gate'" in texts and "removed 'gate'" in texts
+    assert any(text.startswith("fault motor_failure") for text in texts)
+
+
+def test_a_pause_stands_still_and_goes_on_where_it_stood() -> None:
+    with start_vehicle() as vehicle, connected(vehicle) as client:
+        kinds(client, {"HEARTBEAT"})
+        vehicle.pause()
+        paused_s = vehicle.truth.time_boot_s
+        with pytest.raises(SimulationError, match="paused"):
+            vehicle.wait_until(lambda truth: True, 1.0)
+        # Longer than the lateness that a busy machine may catch up
+        time.sleep(0.7)
+        assert vehicle.is_paused and vehicle.truth.time_boot_s == paused_s
+        vehicle.inject(faults.clock_jump(5.0))
+        resumed_s = time.monotonic()
+        vehicle.resume()
+        vehicle.wait_until(lambda truth: truth.time_boot_s > paused_s + 0.2, within_s=1)
+        assert time.monotonic() - resumed_s > 0.19
+
+
+def test_its_speed_can_be_changed() -> None:
+    with start_vehicle(speed=1.0) as vehicle:
+        assert took_s(lambda: passes(vehicle, 0.2)) > 0.19
+        vehicle.speed = 0
+        assert took_s(lambda: passes(vehicle, 5.0)) < 4.0
+        vehicle.speed = 2.0
+        assert vehicle.speed == 2.0
+        assert took_s(lambda: passes(vehicle, 0.4)) > 0.19
+        with pytest.raises(SimulationError, match="and not -3"):
+            vehicle.speed = -3
+
+
+def passes(vehicle: RunningVehicle, seconds: float) -> None:
+    until_s = vehicle.truth.time_boot_s + seconds
+    vehicle.wait_until(lambda truth: truth.time_boot_s >= until_s, within_s=seconds + 1)
+
+
+def took_s(what: Callable[[], None]) -> float:
+    begun_s = time.monotonic()
+    what()
+    return time.monotonic() - begun_s
+
+
+def test_waiting_in_vain_is_an_assertion_and_a_broken_condition_the_callers_problem() -> None:
+    with start_vehicle(speed=0.0, seed=11) as vehicle:
+        with pytest.raises(ConditionNotMet, match=r"within 0.5 s \(seed 11\)"):
+            vehicle.wait_until(lambda truth: truth.hits, within_s=0.5)
+        with pytest.raises(ZeroDivisionError):
+            vehicle.wait_until(lambda truth: 1 / 0, within_s=0.5)
+        passes(vehicle, 0.1)
+
+
+def test_whoever_waits_when_it_is_stopped_is_told() -> None:
+    vehicle = start_vehicle()
+    threading.Timer(0.2, vehicle.stop).start()
+    with pytest.raises(VehicleEnded):
+        vehicle.wait_until(lambda truth: truth.hits, within_s=60)
+    vehicle.stop()
+
+
+def test_a_vehicle_that_comes_to_grief_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    vehicle = start_vehicle()
+
+    def broken() -> None:
+        raise RuntimeError("bent")
+
+    monkeypatch.setattr(vehicle._bench, "advance", broken)
+    with pytest.raises(VehicleEnded, match="came to grief: RuntimeError\\('bent'\\)"):
+        while True:
+            vehicle.pause()
+            vehicle.resume()
+    with pytest.raises(VehicleEnded, match="came to grief"):
+        vehicle.stop()
+    vehicle.stop()
+    assert vehicle_threads() == 0
+
+
+def test_the_truth_in_a_file(tmp_path) -> None:
+    with start_vehicle(speed=0.0) as vehicle:
+        vehicle.inject(faults.gps_loss(), for_s=0.1)
+        passes(vehicle, 0.5)
+        vehicle.save_truth(tmp_path / "truth.npz")
+    hits, series, _ = load_truth(tmp_path / "truth.npz")
+    assert hits == [] and series["time_boot_us"][-1] > 400_000
+    assert [span.kind for span in load_faults(tmp_path / "truth.npz")] == ["aiding_loss"]
