@@ -104,7 +104,8 @@ def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirm
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:
     connection = UdpInConnection("127.0.0.1", 0)
-    options = ["--port", "0", "--remote", f"127.0.0.1:{connection.local_port}"]
+    # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
+    options = ["--port", "0", "--remote", f"127.0.0.1:{connection.local_port}", "--speed", "1"]
     with VehicleProcess(flight.folder, options) as vehicle:
         vehicle.wait_until_ready(flight.interrupts, flight.console)
         flown = _fly_connected(flight, connection, ConfirmAtOnce())

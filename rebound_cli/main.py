@@ -101,9 +101,9 @@ def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     sim.add_argument(
         "--speed",
         type=speed,
-        default=1.0,
+        default=os.environ.get("PX4_SIM_SPEED_FACTOR", "1"),
         metavar="N",
-        help="at most N times real time, 0 for as fast as it goes (default 1)",
+        help="at most N times real time, 0 for as fast as it goes (default: $PX4_SIM_SPEED_FACTOR, else 1)",
     )
     sim.add_argument(
         "--sensor-rate",

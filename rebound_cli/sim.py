@@ -10,6 +10,7 @@ from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
 from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
+from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import COMPANION_PORT, open_port, px4_ports
 from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
 from sim_vehicle.shell.realtime import serve
@@ -37,7 +38,7 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
         world.scene,
         world.seed,
         epoch_at_boot_us=time.time_ns() // 1000,
-        parameters={"MAV_SYS_ID": options.instance + 1},
+        parameters={"MAV_SYS_ID": options.instance + 1, **time_outs_at(options.speed)},
     )
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)

@@ -13,6 +13,10 @@ class SceneError(SimulationError):
     """A simulated world in which the vehicle cannot start."""
 
 
+class ParameterError(SimulationError):
+    """A parameter that the vehicle does not have."""
+
+
 class PortInUse(SimulationError):  # noqa: N818 - reads as the sentence it is
     """The port on which the vehicle listens cannot be had."""
 

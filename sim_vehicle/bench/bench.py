@@ -12,9 +12,10 @@ from sim_vehicle.bench.faults import FaultRequest, opposite
 from sim_vehicle.bench.strike import DURATION_S, strike
 from sim_vehicle.bench.timeline import Timeline
 from sim_vehicle.bench.truth import Truth, truth_of
-from sim_vehicle.errors import FaultError, SceneError
+from sim_vehicle.errors import FaultError, ParameterError, SceneError
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.obstacles import BoxSpec, PoleSpec, WallSpec
+from sim_vehicle.parameters.definitions import definitions
 from sim_vehicle.scene import Scene, Start
 from sim_vehicle.world import Obstacle
 
@@ -56,6 +57,13 @@ class Setup:
             first = problem.errors()[0]
             raise SceneError(f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}.") from problem
 
+    def parameters_checked(self) -> dict[str, float]:
+        """Raises ParameterError for a name that there is not."""
+        unknown = [name for name in self.parameters if name not in definitions()]
+        if unknown:
+            raise ParameterError(f"the vehicle has no parameter {unknown[0]!r}; see sim_vehicle/parameters/px4.csv.")
+        return {name: int(v) if definitions()[name].is_whole else float(v) for name, v in self.parameters.items()}
+
     def airframe_loaded(self) -> Airframe:
         """Raises AirframeError for a name that there is not."""
         return self.airframe if isinstance(self.airframe, Airframe) else load_built_in(self.airframe)
@@ -87,10 +95,10 @@ class Bench:
     """A vehicle, its changes and its timeline. The same calls between the same intervals give the same bits."""
 
     def __init__(self, setup: Setup, epoch_at_boot_us: int = 0) -> None:
-        """Raises AirframeError and SceneError."""
+        """Raises AirframeError, SceneError and ParameterError."""
         self.setup = setup
         self.vehicle = ChangeableVehicle(
-            setup.airframe_loaded(), setup.scene(), setup.seed, epoch_at_boot_us, dict(setup.parameters)
+            setup.airframe_loaded(), setup.scene(), setup.seed, epoch_at_boot_us, setup.parameters_checked()
         )
         self.timeline = Timeline(self.vehicle)
         self._placed = len(setup.obstacles)

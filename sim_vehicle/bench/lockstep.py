@@ -18,7 +18,7 @@ class LockstepVehicle:
     def __init__(self, streams: str = "onboard", **setup: Any) -> None:
         """``setup``: the fields of `Setup`. ``streams``: onboard, normal or ground, PX4's sets for a link.
 
-        Raises AirframeError and SceneError.
+        Raises AirframeError, SceneError and ParameterError.
         """
         self._bench = Bench(Setup(**setup))
         self._link = self._bench.vehicle.add_link(LinkOptions(LinkKind(streams)))

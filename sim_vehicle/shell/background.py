@@ -15,6 +15,7 @@ from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
 from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import open_port
 from sim_vehicle.shell.control import Control
 from sim_vehicle.shell.port import Port
@@ -38,12 +39,14 @@ def start_vehicle(
 ) -> "RunningVehicle":
     """A vehicle on free ports of this machine, in the air of nobody else; it ends with `stop()` or its `with` block.
 
-    ``speed``: how many times real time, at most; 0 for as fast as it goes. ``streams``: onboard, normal or ground,
+    ``speed``: how many times real time, at most; 0 for as fast as it goes. At another than these two the time-outs
+    that wait for clients are stretched with it, as PX4's simulators do. ``streams``: onboard, normal or ground,
     PX4's sets for a link. ``links``: more addresses, as `rebound sim --link` takes. ``setup``: the fields of `Setup`.
-    Raises AirframeError, SceneError, LinkAddressError and PortInUse.
+    Raises AirframeError, SceneError, ParameterError, LinkAddressError and PortInUse.
     """
     _check(speed)
-    bench = Bench(Setup(**setup), time.time_ns() // 1000)
+    parameters = {**time_outs_at(speed), **setup.pop("parameters", {})}
+    bench = Bench(Setup(parameters=parameters, **setup), time.time_ns() // 1000)
     options = LinkOptions(LinkKind(streams))
     ports: list[Port] = []
     try:

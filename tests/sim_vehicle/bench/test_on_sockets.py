@@ -129,6 +129,14 @@ def test_its_speed_can_be_changed() -> None:
             vehicle.speed = -3
 
 
+def test_time_outs_are_stretched_with_the_speed_unless_stated() -> None:
+    with start_vehicle(speed=5.0, parameters={"COM_OF_LOSS_T": 0.5}) as vehicle:
+        parameters = vehicle.setup.parameters
+        assert parameters == {"COM_DL_LOSS_T": 50.0, "COM_RC_LOSS_T": 5.0, "COM_OF_LOSS_T": 0.5}
+    with start_vehicle() as vehicle:
+        assert vehicle.setup.parameters == {}
+
+
 def passes(vehicle: RunningVehicle, seconds: float) -> None:
     until_s = vehicle.truth.time_boot_s + seconds
     vehicle.wait_until(lambda truth: truth.time_boot_s >= until_s, within_s=seconds + 1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sim_vehicle.errors import AirframeError, ConditionNotMet, SceneError
+from sim_vehicle.errors import AirframeError, ConditionNotMet, ParameterError, SceneError
 from sim_vehicle.testing import Box, LockstepVehicle, Motion, Pole, Wall, faults
 from tests.sim_vehicle.bench.pilot import Pilot
 
@@ -215,6 +215,8 @@ def test_bad_setups_are_one_sentence() -> None:
         LockstepVehicle(airframe="paper")
     with pytest.raises(SceneError, match="passes through the vehicle's start position"):
         LockstepVehicle(obstacles=[approaching(0.1, 0.0)])
+    with pytest.raises(ParameterError, match="no parameter 'MPC_XY_CRUSE'"):
+        LockstepVehicle(parameters={"MPC_XY_CRUSE": 3})
     with pytest.raises(SceneError, match=r"faults\.0\.motor_failure"):
         LockstepVehicle(faults=[{"kind": "motor_failure", "at_s": 1, "motor": 9}])
 

@@ -23,7 +23,7 @@ def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.
 
 
 def run(suite: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    return suite.runpytest_subprocess("-p", "sim_vehicle.pytest_plugin", "-p", "no:cacheprovider", *arguments)
+    return suite.runpytest_subprocess("-p", "sim_vehicle.shell.pytest_plugin", "-p", "no:cacheprovider", *arguments)
 
 
 def test_installing_the_package_installs_the_fixture() -> None:
@@ -111,7 +111,7 @@ def test_who_does_not_use_it_does_not_load_it(suite: pytest.Pytester) -> None:
             loaded = {name.split(".")[0] for name in sys.modules}
             assert not loaded & {"numpy", "numba", "pymavlink", "scipy", "pydantic"}
             assert [name for name in sys.modules if name.startswith("sim_vehicle")] == [
-                "sim_vehicle", "sim_vehicle.pytest_plugin",
+                "sim_vehicle", "sim_vehicle.shell", "sim_vehicle.shell.pytest_plugin",
             ]
         """
     )

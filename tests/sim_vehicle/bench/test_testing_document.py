@@ -1,0 +1,43 @@
+"""The examples of docs/testing.md, run as a reader would run them."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = "pytester"
+
+ROOT = Path(__file__).parents[3]
+
+
+def examples() -> list[str]:
+    return re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/testing.md").read_text(), re.DOTALL | re.MULTILINE)
+
+
+def test_every_example_passes(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    tests, scripts = [], []
+    for number, example in enumerate(examples()):
+        (tests if "def test_" in example else scripts).append(example)
+        pytester.makepyfile(**{f"test_example_{number}" if "def test_" in example else f"script_{number}": example})
+    assert (len(tests), len(scripts)) == (4, 1)
+    for path in sorted(pytester.path.glob("script_*.py")):
+        assert pytester.runpython(path).ret == 0
+    result = pytester.runpytest_subprocess(
+        "-p", "sim_vehicle.shell.pytest_plugin", "-p", "no:cacheprovider", "--strict-markers"
+    )
+    result.assert_outcomes(passed=len(tests))
+
+
+def test_the_tables_name_every_fault_and_setting() -> None:
+    from dataclasses import fields
+
+    from sim_vehicle.bench import faults
+    from sim_vehicle.bench.bench import Setup
+
+    text = (ROOT / "docs/testing.md").read_text()
+    functions = [name for name, value in vars(faults).items() if getattr(value, "__module__", "") == faults.__name__]
+    offered = {name for name in functions if name.islower() and name != "opposite"}
+    assert all(f"`{name}(" in text or f"`{name}`" in text for name in offered)
+    assert all(f"`{field.name}`" in text for field in fields(Setup))
