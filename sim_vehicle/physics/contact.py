@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GUARDS, HUB, Contact, Scratch, State
 from sim_vehicle.physics.meeting import meet
-from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, points_at
+from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, NEAR, points_at
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.world import FACE_RADIUS, FACE_VELOCITY
 
@@ -61,11 +61,15 @@ def contact_wrench(
     scratch: Scratch,
     normal_forces: Floats,
 ) -> None:
-    """Add the contacts' force (NED, N) and moment (FRD, N m) to the scratch's and list every normal force."""
+    """Add the contacts' force (NED, N) and moment (FRD, N m) to the scratch's and list the normal forces of the faces
+    within reach.
+    """
     lever, speed, rates_ned = scratch.lever, scratch.speed, scratch.rates_ned
     for i in range(3):
         rates_ned[i] = rotation[i, 0] * body[10] + rotation[i, 1] * body[11] + rotation[i, 2] * body[12]
     for face in range(near.shape[0]):
+        if near[face] < NEAR:
+            continue
         normal_forces[:, face] = 0.0
         for point in range(*points_at(face, near, faces)):
             if behind[point, face] != IN_FRONT:

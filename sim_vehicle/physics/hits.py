@@ -28,9 +28,11 @@ from sim_vehicle.physics.layout import (
     State,
 )
 from sim_vehicle.physics.meeting import meet
+from sim_vehicle.physics.proximity import NEAR
 from sim_vehicle.world import FACE_VELOCITY
 
 Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 
 @njit
@@ -38,6 +40,7 @@ def note_contact(
     state: State,
     offset_us: float,
     step_s: float,
+    near: Ints,
     normal_forces: Floats,
     contact: Contact,
     faces: Floats,
@@ -49,7 +52,9 @@ def note_contact(
     Called at the end of each step; the hit's beginning is the first step with a force in it.
     """
     total_n, most_n, hardest, first_point = 0.0, 0.0, 0, 0
-    for face in range(1, normal_forces.shape[1]):
+    for face in range(1, near.shape[0]):
+        if near[face] < NEAR:
+            continue
         on_face, most_on_face, point_on_face = 0.0, 0.0, 0
         for point in range(normal_forces.shape[0]):
             on_face += normal_forces[point, face]

@@ -17,7 +17,7 @@ from sim_vehicle.physics.contact import relax_arms, settle_arms
 from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import borrowed, njit
 from sim_vehicle.physics.layout import (
     ASKED_ATTITUDE,
     ASKED_RATES,
@@ -129,15 +129,15 @@ def advance_boxed(
         states[0],
         asked[0],
         motors,
-        noise,
+        borrowed(noise),
         fine_steps,
         constants[0],
         disturbances[0],
-        faces,
-        moving,
-        behind,
-        near,
-        forces,
+        borrowed(faces),
+        borrowed(moving),
+        borrowed(behind),
+        borrowed(near),
+        borrowed(forces),
         scratches[0],
         errors,
         report,
@@ -225,7 +225,7 @@ def move_body(
         settle_arms(state, behind, near, touches, step_s, contact, faces, scratch)
         if touches:
             mass_kg = constants.mass_kg + disturbance.carried_kg
-            note_contact(state, 1e6 * step * step_s, step_s, forces[0], contact, faces, mass_kg, scratch)
+            note_contact(state, 1e6 * step * step_s, step_s, near, forces[0], contact, faces, mass_kg, scratch)
 
 
 @njit

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -22,6 +24,21 @@ def njit(function: Kernel) -> Kernel:
     same seed has to give the same bytes.
     """
     return cast(Kernel, numba.njit(cache=True, fastmath=False)(function))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def borrowed(_typing: Any, array: Any) -> Any:
+    """The same array, in a kernel, without a count of who uses it: whoever called the kernel keeps it alive.
+
+    Counting is an atomic operation at every call of a function that gets the array.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        view = make_array(signature.return_type)(context, builder, arguments[0])
+        view.meminfo = view.meminfo.type(None)  # LLVM's null pointer
+        return view._getvalue()
+
+    return array(array), codegen
 
 
 def _keep_code_by_content() -> None:
