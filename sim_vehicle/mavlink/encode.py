@@ -72,41 +72,32 @@ def heartbeat(state: Telemetry) -> Message:
 
 def highres_imu(state: Telemetry) -> Message:
     sample, air = state.sample, state.air
-    ax, ay, az = sample.specific_force_frd_m_s2
-    p, q, r = sample.angular_velocity_frd_rad_s
-    mx, my, mz = state.magnetic_field_frd_gauss
     fields = _INERTIAL_FIELDS
     field_is_new, air_is_new = state.renewed
     if field_is_new:
         fields |= _MAGNETIC_FIELDS
-    if air is None:
-        return framing.HighresImu(sample.time_boot_us, ax, ay, az, p, q, r, mx, my, mz, 0.0, 0.0, 0.0, 0.0, fields)
-    if air_is_new:
-        fields |= _AIR_FIELDS
-    return framing.HighresImu(
+    pressure_hpa = altitude_m = temperature_c = 0.0
+    if air is not None:
+        pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
+        if air_is_new:
+            fields |= _AIR_FIELDS
+    return framing.HIGHRES_IMU(
         sample.time_boot_us,
-        ax,
-        ay,
-        az,
-        p,
-        q,
-        r,
-        mx,
-        my,
-        mz,
-        air.pressure_hpa,
+        *sample.specific_force_frd_m_s2,
+        *sample.angular_velocity_frd_rad_s,
+        *state.magnetic_field_frd_gauss,
+        pressure_hpa,
         0.0,
-        air.altitude_m,
-        air.temperature_c,
+        altitude_m,
+        temperature_c,
         fields,
+        0,
     )
 
 
 def local_position_ned(state: Telemetry) -> Message:
     estimate = state.published
-    x, y, z = estimate.position_ned_m
-    vx, vy, vz = estimate.velocity_ned_m_s
-    return framing.LocalPositionNed(boot_ms(estimate), x, y, z, vx, vy, vz)
+    return framing.LOCAL_POSITION_NED(boot_ms(estimate), *estimate.position_ned_m, *estimate.velocity_ned_m_s)
 
 
 def attitude(state: Telemetry) -> Message:
@@ -115,39 +106,29 @@ def attitude(state: Telemetry) -> Message:
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    p, q, r = sample.angular_velocity_frd_rad_s
-    return framing.Attitude(boot_ms(sample), roll, pitch, yaw, p, q, r)
+    return framing.ATTITUDE(boot_ms(sample), roll, pitch, yaw, *sample.angular_velocity_frd_rad_s)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
     sample = state.sample
-    w, x, y, z = sample.attitude_wxyz
-    p, q, r = sample.angular_velocity_frd_rad_s
-    return framing.AttitudeQuaternion(boot_ms(sample), w, x, y, z, p, q, r, _NO_OFFSET)
+    return framing.ATTITUDE_QUATERNION(
+        boot_ms(sample), *sample.attitude_wxyz, *sample.angular_velocity_frd_rad_s, *_NO_OFFSET
+    )
 
 
 def odometry(state: Telemetry) -> Message:
     """Velocity is NED too (child frame 1), unlike what the message's definition suggests."""
     estimate = state.published
-    x, y, z = estimate.position_ned_m
-    vx, vy, vz = estimate.velocity_ned_m_s
-    p, q, r = estimate.angular_velocity_frd_rad_s
-    return framing.Odometry(
+    return framing.ODOMETRY(
         estimate.time_boot_us,
+        *estimate.position_ned_m,
+        *estimate.attitude_wxyz,
+        *estimate.velocity_ned_m_s,
+        *estimate.angular_velocity_frd_rad_s,
+        *_covariance(state.position_variance_m2, state.attitude_variance_rad2),
+        *_covariance(state.velocity_variance_m2_s2, 0.0),
         dialect.MAV_FRAME_LOCAL_NED,
         dialect.MAV_FRAME_LOCAL_NED,
-        x,
-        y,
-        z,
-        estimate.attitude_wxyz,
-        vx,
-        vy,
-        vz,
-        p,
-        q,
-        r,
-        _covariance(state.position_variance_m2, state.attitude_variance_rad2),
-        _covariance(state.velocity_variance_m2_s2, 0.0),
         estimate.reset_counter & 0xFF,
         dialect.MAV_ESTIMATOR_TYPE_AUTOPILOT,
         0,

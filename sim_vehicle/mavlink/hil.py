@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
-from sim_vehicle.mavlink import aiding, framing
+from sim_vehicle.mavlink import aiding
 
 Message: TypeAlias = Any
 
@@ -126,7 +126,7 @@ def _gps(fix: HilGps) -> Message:
 
 
 def _motion_capture(seen: MotionCapture) -> Message:
-    return framing.Odometry(
+    return dialect.MAVLink_odometry_message(
         seen.time_us,
         dialect.MAV_FRAME_LOCAL_NED,
         dialect.MAV_FRAME_LOCAL_NED,
