@@ -47,8 +47,11 @@ FLOW_NAME, RANGE_NAME, HEADING_NAME, CAPTURE_NAME, REST_NAME = "flow", "range", 
 class ErrorFilter(ExtendedKalmanFilter):  # type: ignore[misc]  # filterpy has no types
     """filterpy's filter over an error that is put into the nominal state as soon as it is known."""
 
-    def predict_x(self, u: float = 0) -> None:
-        """The error expected before a measurement is zero."""
+    def predict(self, u: float = 0) -> None:
+        """filterpy's own F P F' + Q. The error expected before a measurement stays zero; nobody reads the copies that
+        filterpy keeps of both.
+        """
+        self.P: Floats = np.dot(self.F, self.P).dot(self.F.T) + self.Q
 
 
 class NavigationFilter:
@@ -86,7 +89,6 @@ class NavigationFilter:
         first[D_GYROSCOPE : D_GYROSCOPE + 3] = imu.gyroscope_bias_rad_s
         first[D_ACCELEROMETER : D_ACCELEROMETER + 3] = imu.accelerometer_bias_m_s2
         ekf.P = np.diag(first**2)
-        self._nothing = {size: np.zeros(size) for size in (1, 2, 3)}
         self.innovations: dict[str, Innovations] = {}
 
     @property
@@ -106,7 +108,7 @@ class NavigationFilter:
     def fuse_flow(self, flow_rad: tuple[float, float], noise_rad: float, gate: float) -> bool:
         """Angle by which the ground has moved past, turns taken out, since `begin_flow`."""
         innovation = np.array(flow_rad) - self.nominal[FLOW : FLOW + 2]
-        return self._fuse(FLOW_NAME, innovation, _PICK_FLOW, np.full(2, noise_rad**2), gate)
+        return self._fuse(FLOW_NAME, innovation, _PICK_FLOW, noise_rad**2, gate)
 
     def begin_flow(self) -> None:
         """Begin the integral of a new flow sample."""
@@ -117,40 +119,41 @@ class NavigationFilter:
         """Distance along the down axis to the ground."""
         row = np.empty((1, ERROR_ROWS))
         innovation = np.array([distance_m - down_range(self.nominal, row[0])])
-        return self._fuse(RANGE_NAME, innovation, row, np.array([noise_m**2]), gate)
+        return self._fuse(RANGE_NAME, innovation, row, noise_m**2, gate)
 
     def fuse_heading(self, yaw_rad: float, noise_rad: float, gate: float) -> bool:
         """Heading of the nose."""
         row = np.empty((1, ERROR_ROWS))
         innovation = np.array([wrapped(yaw_rad - heading(self.nominal, row[0]))])
-        return self._fuse(HEADING_NAME, innovation, row, np.array([noise_rad**2]), gate)
+        return self._fuse(HEADING_NAME, innovation, row, noise_rad**2, gate)
 
     def fuse_position(self, position_ned_m: Vector3, noise_m: float, gate: float) -> bool:
         """Position as motion capture sees it."""
         innovation = np.array(position_ned_m) - self.nominal[POSITION : POSITION + 3]
-        return self._fuse(CAPTURE_NAME, innovation, _PICK_POSITION, np.full(3, noise_m**2), gate)
+        return self._fuse(CAPTURE_NAME, innovation, _PICK_POSITION, noise_m**2, gate)
 
     def fuse_rest(self, mean_rates_frd_rad_s: Floats, speed_noise_m_s: float, rate_noise_rad_s: float) -> None:
         """The vehicle stands still: no velocity, and what the gyroscope shows is its bias."""
         still = -self.nominal[VELOCITY : VELOCITY + 3]
-        self._fuse(REST_NAME, still, _PICK_VELOCITY, np.full(3, speed_noise_m_s**2), np.inf)
+        self._fuse(REST_NAME, still, _PICK_VELOCITY, speed_noise_m_s**2, np.inf)
         bias = mean_rates_frd_rad_s - self.nominal[GYROSCOPE_BIAS : GYROSCOPE_BIAS + 3]
-        self._fuse(REST_NAME, bias, _PICK_GYROSCOPE, np.full(3, rate_noise_rad_s**2), np.inf)
+        self._fuse(REST_NAME, bias, _PICK_GYROSCOPE, rate_noise_rad_s**2, np.inf)
 
-    def _fuse(self, name: str, innovation: Floats, h: Floats, variances: Floats, gate: float) -> bool:
+    def _fuse(self, name: str, innovation: Floats, h: Floats, variance: float, gate: float) -> bool:
         """Correct by ``innovation`` = h error + noise, unless one of its values lies beyond the gate."""
-        ekf = self._ekf
-        r = np.diag(variances)
+        ekf, size = self._ekf, len(innovation)
+        r = variance * _UNIT[size]
         s = h @ ekf.P @ h.T + r
-        accepted = bool((innovation**2 <= gate**2 * np.diagonal(s)).all())
+        farthest = [gate**2 * expected for expected in s.diagonal().tolist()]
+        accepted = all(value * value <= most for value, most in zip(innovation.tolist(), farthest, strict=True))
+        if accepted:
+            ekf.update(innovation, lambda _: h, lambda _: _NOTHING[size], R=r)
+            correct(self.nominal, ekf.x)
+        weight = ekf.SI if accepted else np.linalg.inv(s)
         statistics = self.innovations.get(name)
         if statistics is None:
-            statistics = self.innovations[name] = Innovations(len(innovation))
-        statistics.add(float(innovation @ np.linalg.solve(s, innovation)), accepted)
-        if accepted:
-            nothing = self._nothing[len(innovation)]
-            ekf.update(innovation, lambda _: h, lambda _: nothing, R=r)
-            correct(self.nominal, ekf.x)
+            statistics = self.innovations[name] = Innovations(size)
+        statistics.add(float(innovation @ weight @ innovation), accepted)
         return accepted
 
     # --- resets ---------------------------------------------------------------------------------------------
@@ -192,6 +195,9 @@ def _pick(start: int, size: int) -> Floats:
     return np.eye(ERROR_ROWS)[start : start + size].copy()
 
 
+# What is expected of a measurement of 1 to 3 values, and the shape of its noise.
+_NOTHING = {size: np.zeros(size) for size in (1, 2, 3)}
+_UNIT = {size: np.eye(size) for size in (1, 2, 3)}
 _PICK_FLOW = _pick(D_FLOW, 2)
 _PICK_POSITION = _pick(D_POSITION, 3)
 _PICK_VELOCITY = _pick(D_VELOCITY, 3)

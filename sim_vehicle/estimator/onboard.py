@@ -21,14 +21,15 @@ from sim_vehicle.estimator.samples import (
 )
 from sim_vehicle.estimator.sensors import CaptureSensor, CompassSensor, FlowSensor, RangeSensor
 from sim_vehicle.estimator.strapdown import (
-    CLIPPED,
     D_ATTITUDE,
     D_POSITION,
     D_VELOCITY,
     FORCE,
     NOMINAL_ROWS,
     SAMPLE_COLUMNS,
+    keep_sample,
     predict_now,
+    show,
 )
 from sim_vehicle.physics.estimate import SLOPE_TIME_CONSTANT_S
 from sim_vehicle.physics.layout import GRAVITY_M_S2
@@ -128,10 +129,7 @@ class OnboardEstimator:
         """
         self._sense(time_us, body)
         head = self._head = (self._head + 1) % self._slots
-        row = self._samples[head]
-        row[:] = sensed
-        row[CLIPPED:] -= self._clipped
-        self._clipped[:] = sensed[CLIPPED:]
+        keep_sample(self._samples, head, sensed, self._clipped)
         oldest = (head + 1) % self._slots
         self.filter.predict(self._samples[oldest])
         horizon_us = time_us - (self._slots - 1) * self._interval_us
@@ -139,8 +137,7 @@ class OnboardEstimator:
         while self._waiting and self._waiting[0].time_us <= horizon_us:
             self._fuse(self._waiting.popleft())
         predict_now(self.filter.nominal, self._samples, oldest, self._step_s, self._now)
-        estimate[:] = self._now[:10]
-        acceleration_ned_m_s2 += self._share * (self._now[NOMINAL_ROWS:] - acceleration_ned_m_s2)
+        show(self._now, self._share, estimate, acceleration_ned_m_s2)
 
     def variances(self) -> tuple[float, float, float]:
         """Of position (m2), velocity (m2/s2) and attitude (rad2), each on its worst axis."""

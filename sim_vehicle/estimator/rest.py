@@ -32,10 +32,12 @@ class RestDetector:
 
     def update(self, sample: Floats, flies: bool) -> Floats | None:
         """Take one inertial sample; the mean rates of the window that it completes, if any."""
+        if flies:
+            self._count = 0
+            return None
         x, y, z, p, q, r = sample[FORCE : RATES + 3].tolist()
         force = (x * x + y * y + z * z) ** 0.5
-        moves = flies or abs(force - GRAVITY_M_S2) > STILL_FORCE_M_S2
-        if moves or p * p + q * q + r * r > STILL_RATE_RAD_S**2:
+        if abs(force - GRAVITY_M_S2) > STILL_FORCE_M_S2 or p * p + q * q + r * r > STILL_RATE_RAD_S**2:
             self._count = 0
             return None
         if self._count == 0:

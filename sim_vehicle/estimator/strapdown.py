@@ -180,6 +180,25 @@ def predict_now(nominal: Floats, samples: Floats, oldest: int, step_s: float, no
 
 
 @njit
+def keep_sample(samples: Floats, row: int, sensed: Floats, clipped: Floats) -> None:
+    """Write a sample into a row of the ring. What it says of clipping is counted since boot, as ``clipped`` (3,) is."""
+    for i in range(CLIPPED):
+        samples[row, i] = sensed[i]
+    for i in range(3):
+        samples[row, CLIPPED + i] = sensed[CLIPPED + i] - clipped[i]
+        clipped[i] = sensed[CLIPPED + i]
+
+
+@njit
+def show(now: Floats, share: float, estimate: Floats, acceleration: Floats) -> None:
+    """Hand on what `predict_now` says: position, velocity and attitude as they are, the acceleration low-passed."""
+    for i in range(GYROSCOPE_BIAS):
+        estimate[i] = now[i]
+    for i in range(3):
+        acceleration[i] += share * (now[NOMINAL_ROWS + i] - acceleration[i])
+
+
+@njit
 def correct(nominal: Floats, error: Floats) -> None:
     """Move ``nominal`` by the estimated ``error`` and take that from the error."""
     turn(nominal, error[0], error[1], error[2], nominal)

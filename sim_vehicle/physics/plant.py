@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,7 +24,16 @@ from sim_vehicle.physics.interval import (
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import Floats, boxed, new_record
-from sim_vehicle.physics.report import ACCELERATION, ESTIMATE, HITS_ENDED, MOTORS, REPORT_COLUMNS, SENSED, TRUTH
+from sim_vehicle.physics.report import (
+    ACCELERATION,
+    ESTIMATE,
+    HITS_ENDED,
+    MOTORS,
+    REPORT_COLUMNS,
+    SENSED,
+    TRUTH,
+    report_estimate,
+)
 from sim_vehicle.physics.surroundings import Surroundings
 from sim_vehicle.physics.trim import trim
 from sim_vehicle.scene import Scene
@@ -39,9 +47,8 @@ if TYPE_CHECKING:
 Quadruple = tuple[float, float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class PlantOutput:
-    """What the vehicle's own software may know at the end of an interval."""
+class PlantOutput(NamedTuple):
+    """What the vehicle's own software may know at the end of an interval. A tuple: one is made every 4 ms."""
 
     time_boot_us: int
     specific_force_frd_m_s2: Vector3
@@ -99,6 +106,7 @@ class Plant:
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
         self._body = self.state.body
         self._report = np.zeros(REPORT_COLUMNS)
+        self._true_columns, self._sensed_columns = self._report[TRUTH], self._report[SENSED]
         self._asked = AskedSetpoint()
         self._motor_command_n = self.state.motor_command_n
         self._motor_max_n = airframe.motors.max_thrust_n
@@ -246,20 +254,19 @@ class Plant:
     def _estimate_state(self, onboard: "OnboardEstimator", flies: bool) -> None:
         """Let the vehicle's own filter renew what the loops and the telemetry of the next interval go by."""
         estimate, acceleration = self._estimate, self._acceleration_ned_m_s2
-        onboard.update(int(self._report[0]), self._report[SENSED], flies, self._body, estimate, acceleration)
+        onboard.update(int(self._report[0]), self._sensed_columns, flies, self._body, estimate, acceleration)
         if self.faults is not None:
             estimate[0:6] += self.disturbance.estimate_jump
-        np.subtract(estimate[:3], self._body[:3], out=self._frame_offset_ned_m)
-        self._report[ESTIMATE] = estimate
-        self._report[ACCELERATION] = acceleration
+        report_estimate(self._body, estimate, acceleration, self._frame_offset_ned_m, self._report)
 
     def _reset_counter(self) -> int:
         own = 0 if self.onboard is None else self.onboard.reset_counter
         return own if self.faults is None else own + self.faults.reset_counter
 
     def _record_truth(self) -> None:
-        self.truth.record(self._report[TRUTH])
-        for row in self._finished_hits[: int(self._report[HITS_ENDED])]:
+        self.truth.record(self._true_columns)
+        ended = int(self._report[HITS_ENDED])
+        for row in self._finished_hits[:ended] if ended else ():
             self.truth.add_hit(row, self.world)
 
     def _output(self) -> PlantOutput:
@@ -269,15 +276,15 @@ class Plant:
         ax, ay, az = row[ACCELERATION]
         m1, m2, m3, m4 = row[MOTORS]
         return PlantOutput(
-            time_boot_us=int(row[0]) - self.booted_at_us,
-            specific_force_frd_m_s2=(fx, fy, fz),
-            angular_velocity_frd_rad_s=(p, q, r),
-            clipping_counts=(int(clip_x), int(clip_y), int(clip_z)),
-            position_ned_m=(px, py, pz),
-            velocity_ned_m_s=(vx, vy, vz),
-            acceleration_ned_m_s2=(ax, ay, az),
-            attitude_wxyz=(qw, qx, qy, qz),
-            thrust_fraction=(m1 + m2 + m3 + m4) / 4,
-            motor_fractions=(m1, m2, m3, m4),
-            reset_counter=self._reset_counter(),
+            int(row[0]) - self.booted_at_us,
+            (fx, fy, fz),
+            (p, q, r),
+            (int(clip_x), int(clip_y), int(clip_z)),
+            (px, py, pz),
+            (vx, vy, vz),
+            (ax, ay, az),
+            (qw, qx, qy, qz),
+            (m1 + m2 + m3 + m4) / 4,
+            (m1, m2, m3, m4),
+            self._reset_counter(),
         )

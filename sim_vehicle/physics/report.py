@@ -31,3 +31,17 @@ def write_report(state: State, constants: Constants, row: Floats) -> None:
         row[19 + i] = state.rate_sum[i] / constants.raw_per_interval
         row[22 + i] = state.clip_counts[i]
         row[35 + i] = state.acceleration_ned_m_s2[i]
+
+
+@njit
+def report_estimate(
+    body: Floats, estimate: Floats, acceleration: Floats, frame_offset_ned_m: Floats, row: Floats
+) -> None:
+    """Put another estimate of position, velocity, attitude and acceleration into ``row``, and into the offset how far
+    it is from where the body is.
+    """
+    for i in range(3):
+        frame_offset_ned_m[i] = estimate[i] - body[i]
+        row[35 + i] = acceleration[i]
+    for i in range(10):
+        row[25 + i] = estimate[i]
