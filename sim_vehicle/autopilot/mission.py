@@ -12,7 +12,7 @@ from sim_vehicle.autopilot import mission_items as kinds
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_messages import MissionItem
 from sim_vehicle.autopilot.mission_store import MissionStore
-from sim_vehicle.autopilot.return_ import place_of
+from sim_vehicle.autopilot.return_path import place_of
 from sim_vehicle.autopilot.smoothing import stop_point
 from sim_vehicle.autopilot.target import Acceptance, Arrival, Kind, Target, Vector3, View, takeoff_acceptance
 from sim_vehicle.geography import Origin

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from sim_vehicle.autopilot import mission_items as kinds
 from sim_vehicle.autopilot.geofence import Geofence
 from sim_vehicle.autopilot.mission_messages import MissionItem
-from sim_vehicle.autopilot.return_ import place_of
+from sim_vehicle.autopilot.return_path import place_of
 from sim_vehicle.autopilot.target import View
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters

@@ -119,7 +119,7 @@ class Navigator:
         elif mode is Mode.TAKEOFF:
             self._begin_takeoff()
         elif mode is Mode.RETURN:
-            self._return.begin(self.view, self._missions.rally.items)
+            self._return.begin(self.view, self._missions, previous is Mode.MISSION)
         elif mode in LANDING_MODES or mode is Mode.DESCEND:
             self._target = Target(Kind.LAND, self.stop_place_ned_m())
         elif mode is Mode.MISSION:

@@ -1,24 +1,42 @@
-"""RETURN: climb, fly to where it is best to land, and land. Source: PX4's navigator rtl.cpp and rtl_direct.cpp.
+"""RETURN: climb, fly to where it is best to land, and land; or along the mission, as RTL_TYPE has it.
 
-RTL_TYPE 0 and 5 choose among home and the rally points as PX4 does. Its other types fly back along a mission; here
-they choose like 0.
+Source: PX4's navigator rtl.cpp and rtl_direct.cpp.
 """
 
 import math
-from enum import Enum, auto
+from enum import Enum, IntEnum, auto
 
 from sim_vehicle.autopilot import mission_items
 from sim_vehicle.autopilot.messages import Severity, StatusText
-from sim_vehicle.autopilot.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_store import MissionStore
+from sim_vehicle.autopilot.return_path import Items, Landing, PathPlanner, Stop, landing_of, place_of
 from sim_vehicle.autopilot.target import Acceptance, Arrival, Kind, Target, Vector3, View
 from sim_vehicle.geography import Origin
-from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters
 
 # RTL::findClosestSafePoint: rally points this near to home are home, and one must be nearer by this much.
 _SAME_AS_HOME_M = 10.0
 _NEARER_BY_M = 2.0
-_ONLY_RALLY_POINTS = 5
+
+
+class Type(IntEnum):
+    """RTL_TYPE; a number that has no name here chooses as NEAREST does."""
+
+    NEAREST = 0
+    """Home or a rally point."""
+    NOT_HOME = 1
+    """The mission's landing or a rally point; home where there is neither."""
+    MISSION = 2
+    """On along the mission to its landing, or back along it."""
+    NEAREST_OR_LANDING = 3
+    """Home, a rally point or the mission's landing."""
+    SHORTER_MISSION = 4
+    """As MISSION, whichever way has fewer items."""
+    RALLY_POINT = 5
+    """A rally point, or here."""
+
+
+_ALONG_THE_MISSION = (Type.MISSION, Type.SHORTER_MISSION)
 
 
 class Leg(Enum):
@@ -44,31 +62,80 @@ class Return:
         self._place_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self._place_yaw_rad: float | None = None
         self._down_m = 0.0
+        self._missions = MissionStore()
+        self._stop: Stop | None = None
+        self._stops: list[Stop] = []
+        """What is left of a way along the mission."""
         self.target = Target(Kind.IDLE, self._place_ned_m)
         self.texts: list[StatusText] = []
 
-    def begin(self, view: View, rally: tuple[MissionItem, ...]) -> None:
-        """Choose where to and how high, and start."""
-        self._choose_place(view, rally)
+    def begin(self, view: View, missions: MissionStore, from_mission: bool) -> None:
+        """Choose where to and how high, and start; ``from_mission``: a mission was flown until now."""
+        self._missions = missions
+        items = missions.mission.items if missions.progress.valid else ()
+        landing, planner = landing_of(items), PathPlanner(items, self._origin, self._parameters, view)
+        self._stops = []
+        current = missions.current if from_mission else None
+        if self._parameters["RTL_TYPE"] in _ALONG_THE_MISSION:
+            self._place_ned_m, self._place_yaw_rad = view.home_ned_m, view.home_yaw_rad
+            if landing is not None and self._leads_onwards(landing):
+                self._stops = planner.onwards(landing, current)
+            elif items:
+                self._stops = planner.backwards(current)
+        elif self._chooses_landing(view, landing, items):
+            assert landing is not None, "chosen"
+            self._stops = planner.to_landing(landing, self._return_down_m(view))
+            if self._stops[0].item is None:
+                altitude_m = self._origin.place.altitude_m - self._stops[0].target.position_ned_m[2]
+                self._say(f"RTL Mission land: climb to {math.ceil(altitude_m)} m")
+        if self._stops and not view.landed:
+            self._enter_stop(self._stops.pop(0))
+        else:
+            self._begin_direct(view)
+
+    def _begin_direct(self, view: View) -> None:
+        self._stop = None
+        self._stops = []
         place_down_m = self._place_ned_m[2]
-        height_m = place_down_m - view.position_ned_m[2]
-        return_height_m = return_height_over(height_m, view.distance_m(self._place_ned_m), self._parameters)
-        self._down_m = place_down_m - return_height_m
+        self._down_m = self._return_down_m(view)
+        return_height_m = place_down_m - self._down_m
         if view.landed:
             self._leg = Leg.DONE
         else:
-            self._leg = Leg.CLIMB if height_m < return_height_m else Leg.GO
+            self._leg = Leg.CLIMB if place_down_m - view.position_ned_m[2] < return_height_m else Leg.GO
         altitude_m = self._origin.place.altitude_m - self._down_m
         self._say(f"RTL: start return at {math.ceil(altitude_m)} m ({math.ceil(return_height_m)} m above destination)")
         self._enter(view)
 
+    def _return_down_m(self, view: View) -> float:
+        down_m = self._place_ned_m[2]
+        distance_m = view.distance_m(self._place_ned_m)
+        return down_m - return_height_over(down_m - view.position_ned_m[2], distance_m, self._parameters)
+
     def update(self, view: View) -> None:
         """Go on to the next leg where this one is over."""
+        if self._stop is not None:
+            if self._stops and self._arrival.is_reached(self.target, self._stop.acceptance, view, self._parameters):
+                self._enter_stop(self._stops.pop(0))
+            return
         if self._leg in (Leg.DONE, Leg.LAND):
             return
         if self._arrival.is_reached(self.target, self._acceptance(), view, self._parameters):
             self._leg = self._next()
             self._enter(view)
+
+    def _enter_stop(self, stop: Stop) -> None:
+        if self._stop is not None and self._stop.item is not None:
+            self._missions.progress.reached = self._stop.item
+        self._arrival.begin()
+        self._stop, self.target = stop, stop.target
+        if stop.item is not None:
+            self._missions.current = stop.item
+
+    def _leads_onwards(self, landing: Landing) -> bool:
+        """RTL::reverseIsFurther, where that counts."""
+        current = self._missions.current
+        return self._parameters["RTL_TYPE"] == Type.MISSION or landing.start - current < current
 
     def _next(self) -> Leg:
         if self._leg is Leg.CLIMB:
@@ -110,32 +177,32 @@ class Return:
         yaw_rad = None if self._leg is Leg.CLIMB else self.target.yaw_rad
         return Acceptance(horizontal_m, vertical_m, yaw_rad=yaw_rad)
 
-    def _choose_place(self, view: View, rally: tuple[MissionItem, ...]) -> None:
-        """Home, or the rally point that is nearer."""
-        only_rally = self._parameters["RTL_TYPE"] == _ONLY_RALLY_POINTS
-        self._place_ned_m, self._place_yaw_rad = view.home_ned_m, view.home_yaw_rad
-        nearest_m = math.inf if only_rally else view.distance_m(view.home_ned_m)
+    def _chooses_landing(self, view: View, landing: Landing | None, items: Items) -> bool:
+        """Choose the place (RTL::findRtlDestination); whether it is the mission's landing."""
+        kind = self._parameters["RTL_TYPE"]
+        only_rally, home = kind == Type.RALLY_POINT, view.home_ned_m
+        self._place_ned_m, self._place_yaw_rad = home, view.home_yaw_rad
+        nearest_m = math.inf if kind in (Type.NOT_HOME, Type.RALLY_POINT) else view.distance_m(home)
         if only_rally:
             self._place_ned_m, self._place_yaw_rad = view.position_ned_m, None
-        for item in rally:
+        is_landing = False
+        if landing is not None and kind in (Type.NOT_HOME, Type.NEAREST_OR_LANDING):
+            place = place_of(items[landing.land], self._origin, home)
+            if view.distance_m(place) + _NEARER_BY_M < nearest_m:
+                is_landing, nearest_m = True, view.distance_m(place)
+                self._place_ned_m, self._place_yaw_rad = place, None
+        for item in self._missions.rally.items:
             if item.command != mission_items.RALLY_POINT:
                 continue
-            place = place_of(item, self._origin, view.home_ned_m)
-            from_home_m = math.hypot(place[0] - view.home_ned_m[0], place[1] - view.home_ned_m[1])
-            distance_m = view.distance_m(place)
-            is_another = only_rally or from_home_m > _SAME_AS_HOME_M
-            if is_another and distance_m + _NEARER_BY_M < nearest_m:
-                nearest_m = distance_m
+            place = place_of(item, self._origin, home)
+            is_another = only_rally or math.hypot(place[0] - home[0], place[1] - home[1]) > _SAME_AS_HOME_M
+            if is_another and view.distance_m(place) + _NEARER_BY_M < nearest_m:
+                is_landing, nearest_m = False, view.distance_m(place)
                 self._place_ned_m, self._place_yaw_rad = place, None
+        return is_landing
 
     def _say(self, text: str) -> None:
         self.texts.append(StatusText(Severity.INFO, text))
-
-
-def place_of(item: MissionItem, origin: Origin, home_ned_m: Vector3) -> Vector3:
-    """Where an item with a place lies."""
-    north, east, down = origin.position_of(Place(item.latitude_deg, item.longitude_deg, item.altitude_m))
-    return north, east, home_ned_m[2] - item.altitude_m if item.is_relative else down
 
 
 def return_height_over(height_m: float, distance_m: float, parameters: Parameters) -> float:

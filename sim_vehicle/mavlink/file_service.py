@@ -20,11 +20,16 @@ if TYPE_CHECKING:
 _HEADER = struct.Struct("<HBBBBBBI")
 PAYLOAD_BYTES = 251
 
-_TERMINATE, _RESET, _LIST, _OPEN, _BURST_READ = 1, 2, 3, 4, 15
+_RESET, _LIST, _OPEN, _CRC, _BURST_READ = 2, 3, 4, 14, 15
 _ACK, _NAK = 128, 129
-_NO_SESSION, _END_OF_FILE, _UNKNOWN_COMMAND, _NO_SUCH_FILE = 4, 6, 7, 10
-# Reading, checksum and size name a file or a session that cannot be there.
-_REFUSALS = {_LIST: _END_OF_FILE, _OPEN: _NO_SUCH_FILE, 5: _NO_SESSION, _BURST_READ: _NO_SESSION, 14: _NO_SUCH_FILE}
+_NO_SESSION, _END_OF_FILE, _UNKNOWN_COMMAND, _PROTECTED, _NO_SUCH_FILE = 4, 6, 7, 9, 10
+# What ends, reads or writes a session that cannot be there; what names a file that is not; what would make one.
+_REFUSALS = {
+    **dict.fromkeys((1, 5, 7, _BURST_READ), _NO_SESSION),
+    **dict.fromkeys((_LIST, _OPEN, 8, 10, 12, 13, _CRC), _NO_SUCH_FILE),
+    **dict.fromkeys((6, 9, 11), _PROTECTED),
+}
+_ROOT = (b"", b"/")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +62,17 @@ class FileService:
         """Nothing waits."""
 
     def _answer(self, request: FileRequest) -> None:
-        number, session, operation, *_ = _HEADER.unpack_from(request.payload)
+        number, session, operation, size, *_ = _HEADER.unpack_from(request.payload)
         if operation >= _ACK:
             return
         next_number = (number + 1) & 0xFFFF
-        if operation in (_TERMINATE, _RESET):
+        if operation == _RESET:
             answer = _HEADER.pack(next_number, session, _ACK, 0, operation, 0, 0, 0)
         else:
             why = _REFUSALS.get(operation, _UNKNOWN_COMMAND)
+            if operation == _LIST and request.payload[_HEADER.size :][:size].rstrip(b"\0") in _ROOT:
+                # As after the last name of a folder
+                why = _END_OF_FILE
             answer = _HEADER.pack(next_number, session, _NAK, 1, operation, 0, 0, 0) + bytes([why])
         payload = answer.ljust(PAYLOAD_BYTES, b"\0")
         target = (request.source_system, request.source_component)

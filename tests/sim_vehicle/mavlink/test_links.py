@@ -309,19 +309,24 @@ def test_a_key_is_taken_away_only_by_somebody_who_has_it(guarded):
     assert all(not raw[2] & 1 for raw in end.packets)
 
 
-def test_who_asks_for_files_is_told_that_there_are_none():
+# As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
+FILE_REQUESTS = [
+    *[(3, b"/", 6), (3, b"", 6), (3, b"/nope", 10), (4, b"/nope", 10), (14, b"/nope", 10), (10, b"/nope", 10)],
+    *[(13, b"/a\0/b", 10), (5, b"", 4), (15, b"", 4), (1, b"", 4), (99, b"", 7), (2, b"", None)],
+    # It makes folders and files; here nothing can be written
+    *[(9, b"/new", 9), (6, b"/new", 9)],
+]
+
+
+@pytest.mark.parametrize(("operation", "path", "code"), FILE_REQUESTS)
+def test_who_asks_for_files_is_told_that_there_are_none(operation, path, code):
     vehicle = Vehicle(ONBOARD)
     (end,) = vehicle.ends
-    # Opening, listing, something unknown, and giving a session up
-    for number, operation in enumerate((4, 3, 99, 1)):
-        header = struct.pack("<HBBBBBBI", number, 0, operation, 5, 0, 0, 0, 0) + b"/logs"
-        end.send(dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, header.ljust(251, b"\0")))
+    payload = struct.pack("<HBBBBBBI", 70, 0, operation, len(path), 0, 0, 0, 0) + path
+    end.send(dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, payload.ljust(251, b"\0")))
     vehicle.run(0.02)
-    answers = [bytes(message.payload) for message in end.all("FILE_TRANSFER_PROTOCOL")]
-    assert [(answer[3], answer[5], answer[12] if answer[4] else None) for answer in answers] == [
-        (129, 4, 10),
-        (129, 3, 6),
-        (129, 99, 7),
-        (128, 1, None),
-    ]
-    assert all(message.target_system == 255 for message in end.all("FILE_TRANSFER_PROTOCOL"))
+    (message,) = end.all("FILE_TRANSFER_PROTOCOL")
+    answer = bytes(message.payload)
+    assert struct.unpack_from("<HBB", answer) == (71, 0, 128 if code is None else 129) and answer[5] == operation
+    assert (answer[12] if answer[4] else None) == code
+    assert message.target_system == 255
