@@ -15,6 +15,7 @@ class Truth:
     """The vehicle's state without any sensor's or estimate's error, and what has happened so far."""
 
     time_boot_s: float
+    """Since the vehicle was first switched on."""
     position_ned_m: Vector3
     """Of the centre of mass, in the world."""
     velocity_ned_m_s: Vector3

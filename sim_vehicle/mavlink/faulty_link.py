@@ -45,7 +45,7 @@ class FaultyLink(Link):
             if added is fault:
                 wire.remove(wire_fault)
         self._on_wire = [row for row in self._on_wire if row[0] is not fault]
-        now_s = self.now_us / 1e6
+        now_s = self._world_us / 1e6
         self._jumps = [jump for jump in self._jumps if jump is not fault or jump.window_s[0] < now_s]
 
     @property
