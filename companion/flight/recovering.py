@@ -12,6 +12,7 @@ from companion.flight.context import FlightContext, Inputs, Move, Target, as_tex
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
 from companion.recovery.envelope import Envelope
+from companion.recovery.height import BRAKED_US, NO_BRAKING, brake, level
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
@@ -21,6 +22,8 @@ from companion.recovery.way import Coast, Way
 # 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
 # Waiting for 120 ms made no better recoveries.
 REBOUND_KNOWN_US = 80_000
+# A vehicle's estimate is up to 0.02 s late (see estimate.approach).
+HEIGHT_KNOWN_US = 15_000
 # A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
 REBOUND_SLACK_M_S = 0.5
 REBOUND_SLACK_M = 0.2
@@ -58,6 +61,7 @@ class Recover:
         self._is_refined = not self._law.is_refined
         self._after_ned_m_s: Vector3 | None = None  # the first velocity after the contact
         self._refined_boot_us = self._record.sample_time_boot_us
+        self._braking = NO_BRAKING
         self._take(flight, self._law.expected(self._contact), now_us)
 
     def _take(self, flight: FlightContext, motion: Moving, now_us: int) -> None:
@@ -69,12 +73,15 @@ class Recover:
 
     def target(self, now_us: int) -> Target | None:
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
+        if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
+            motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
         return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, motion.acceleration_ned_m_s2)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
         for sample in inputs.positions:
             record.follow_recovery(sample)
+            self._hold_height(flight, sample, now_us)
             self._refine(flight, sample, now_us)
             since_us = self._monitor.settled_since(sample)
             if since_us is not None:
@@ -121,6 +128,15 @@ class Recover:
         off_m_s, place = split(motion.velocity_ned_m_s, self._contact.normal_ned)[0], record.setpoint_ned_m
         text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
         flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+    def _hold_height(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
+        """From the first estimate on that can show what the hit did; the accelerometer, which it clips, cannot."""
+        record = self._record
+        since_us = sample.time_boot_us - record.sample_time_boot_us
+        if HEIGHT_KNOWN_US <= since_us <= BRAKED_US:
+            if believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6) is not None:
+                most_m_s2 = flight.mission.recovery.vertical_acceleration_m_s2
+                self._braking = brake(sample.velocity_ned_m_s[2], most_m_s2, now_us)
 
     def _coasts(self, flight: FlightContext, sample: LocalPosition, since_us: int, now_us: int) -> bool:
         """Go on as it flies, level and inside the fence, while the vehicle spins."""

@@ -24,6 +24,7 @@ class AdaptiveLaw:
 
     name = "adaptive"
     is_refined = True
+    holds_height = True
 
     def __init__(self, config: RecoveryConfig) -> None:
         self._config = config

@@ -18,13 +18,16 @@ class RecoveryConfig(Written):
     gamma: Positive | tuple[Positive, Positive] = 0.5
     # Laws `normal` and `adaptive`: what becomes of the motion along the obstacle.
     tangential: Literal["damped", "kept"] = "damped"
-    # Law `adaptive`, from here on. The guards stay 0.3 m clear; the wavering of a hover on optical flow takes 5 cm.
+    # Law `adaptive`, but for the vertical acceleration, which `normal` has too. The guards stay 0.3 m clear; the wavering of a hover on optical flow takes 5 cm.
     clearance_m: Positive = 0.35
     # More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
     # trimmed against the drag of its approach stops short by, 0.012 s times v_c in simulation.
     clearance_s: NotNegative = 0.27
     # PX4's MPC_ACC_HOR: a tilt of 17 degrees, which leaves a vehicle that hovers at 78 % of its thrust its height.
     acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 3.0
+    # Besides the vehicle's own loop, against climbing or falling after a hit. Hovering at 78 % of the thrust leaves
+    # 2.8 m/s^2 upwards. 0: none.
+    vertical_acceleration_m_s2: Annotated[NotNegative, Field(le=9.81)] = 3.0
     # Of the speed into the obstacle, until the rebound has been measured: spring arms, 0.15 to 0.3 in simulation.
     restitution: Annotated[NotNegative, Field(le=1.0)] = 0.2
 
@@ -59,6 +62,7 @@ class RecoveryLaw(Protocol):
 
     name: str
     is_refined: bool  # whether goal and way are found anew once the motion after the contact is known
+    holds_height: bool  # whether a climb or a fall after the hit is braked by an acceleration of its own
 
     def expected(self, contact: Contact) -> Moving:
         """The motion after the contact as far as it can be known before it has been measured."""

@@ -16,6 +16,7 @@ class NormalLaw:
 
     name = "normal"
     is_refined = True
+    holds_height = True
 
     def __init__(self, config: RecoveryConfig) -> None:
         self._gamma_s = config.gamma_per_axis[0]

@@ -16,6 +16,7 @@ class PaperLaw:
 
     name = "paper"
     is_refined = False
+    holds_height = False
 
     def __init__(self, config: RecoveryConfig) -> None:
         self._gamma_1_s, self._gamma_2_s = config.gamma_per_axis
