@@ -25,7 +25,6 @@ from companion.messages import (
     CommandAck,
     LocalPosition,
     OnboardHeartbeat,
-    PositionSetpoint,
     Sample,
 )
 from companion.mission.model import Mission
@@ -159,11 +158,7 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
     has_floor = core.machine.state in ON_THE_WAY
     target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)
     time_us = now_us - core.started_at_us
-    core.flight.outbox.append(
-        PositionSetpoint(
-            time_us, target.position_ned_m, target.yaw_rad, target.velocity_ned_m_s, target.acceleration_ned_m_s2
-        )
-    )
+    core.flight.outbox.append(target.setpoint(time_us))
 
 
 def beat(core: Core, now_us: int) -> None:

@@ -41,7 +41,8 @@ class ImpactEstimate:
     it, and `velocity_error_m_s` its standard deviation on an axis. `normal_ned` is the unit direction out of the
     obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
     IMU sample. `is_lower_bound`: the sensor clipped, or part of the contact was not seen, and both may be larger.
-    `is_final`: the contact is over.
+    `may_be_clipped`: the sensor's range may not have been enough, and then the vehicle's own estimate lacks what it did
+    not show. `is_final`: the contact is over.
     """
 
     impact: Impact
@@ -54,6 +55,7 @@ class ImpactEstimate:
     peak_specific_force_m_s2: float
     impulse_m_s: float
     is_lower_bound: bool
+    may_be_clipped: bool
     kind: ImpactKind
     confidence: float
     is_final: bool
@@ -140,6 +142,7 @@ class ImpactEstimator:
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
+            may_be_clipped=self.push is not None,
             kind=impact.kind,
             confidence=impact.confidence,
             is_final=False,
@@ -198,6 +201,7 @@ class ImpactEstimator:
             peak_specific_force_m_s2=push.peak_m_s2,
             impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
             is_lower_bound=push.is_lower_bound,
+            may_be_clipped=push.may_be_clipped,
             kind=kind,
         )
 

@@ -98,8 +98,12 @@ class Push:
             self.begun_boot_us = self.time_boot_us - round(share * self.averaging_us)
 
     @property
+    def may_be_clipped(self) -> bool:
+        return self.clipped or self.samples <= SHORT
+
+    @property
     def is_lower_bound(self) -> bool:
-        return self.clipped or self.gap or self.samples <= SHORT
+        return self.gap or self.may_be_clipped
 
     def turn_rad_s(self) -> float:
         """How much the contact has changed the rates by since its first sample."""

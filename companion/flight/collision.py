@@ -1,9 +1,11 @@
 """One collision's record: what was known at the hit, and what telemetry has shown since."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.detection.interface import DetectorState
+from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from
@@ -39,13 +41,21 @@ class CollisionRecord:
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     impulse_m_s: float
+    doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
+    inherits_doubt: bool = False  # from an earlier hit
+    may_be_clipped: bool = True
+    is_believed: bool = False  # the estimate has been found right since
+    fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
-    def follow_contact(self, state: DetectorState, estimate: ImpactEstimate | None) -> None:
+    def follow_contact(
+        self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
+    ) -> None:
         """While the contact lasts: its largest force and its end; the normal as it is known by now."""
+        self.fixes = fixes
         if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
             return
         if estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
@@ -54,6 +64,7 @@ class CollisionRecord:
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         self.normal_ned = away_from(estimate.normal_ned)
         self.impulse_m_s = estimate.impulse_m_s
+        self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""

@@ -11,7 +11,7 @@ from companion.flight.course import Pace
 from companion.flight.states import Trigger
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import CommandAck, LocalPosition, Outgoing, Vector3
+from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
 from companion.mission.expectations import ExpectItem
 from companion.mission.items import ReturnItem
 from companion.mission.itinerary import steps_to_fly
@@ -22,12 +22,21 @@ from companion.report import Event, JsonValue, Outcome
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position."""
+    """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
+
+    `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity.
+    """
 
     position_ned_m: Vector3
     yaw_rad: float | None
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
+    leans_only: bool = False
+
+    def setpoint(self, time_us: int) -> PositionSetpoint:
+        """As it is sent."""
+        velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2
+        return PositionSetpoint(time_us, self.position_ned_m, self.yaw_rad, velocity, acceleration, self.leans_only)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ def collisions(
 def follow_contact(flight: FlightContext, watching: Watch) -> None:
     """Let the latest collision's record see the contact's course."""
     if flight.collisions:
-        flight.collisions[-1].follow_contact(watching.state, watching.estimate)
+        flight.collisions[-1].follow_contact(watching.state, watching.estimate, watching.estimator.fixes)
 
 
 def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

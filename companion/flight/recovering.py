@@ -5,18 +5,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
+from companion.flight.doubt import half_way, is_believed
+from companion.flight.rebound import agreed_normal, believable, spin_rad_s, way_back
 from companion.messages import LocalPosition, Vector3
-from companion.recovery.direction import away_from, plus, split
+from companion.recovery.direction import away_from, split
 from companion.recovery.envelope import Envelope
-from companion.recovery.height import BRAKED_US, NO_BRAKING, brake, level
+from companion.recovery.height import BRAKED_US, NO_BRAKING, THROWN_US, brake, level, thrown_down_m_s
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
-from companion.recovery.way import Coast, Way
+from companion.recovery.way import REST, Coast, Way
 
 # The motion after the contact is read this long after the hit's first sample. Head-on, spring arms push for 15 ms at
 # 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
@@ -24,13 +27,6 @@ from companion.recovery.way import Coast, Way
 REBOUND_KNOWN_US = 80_000
 # A vehicle's estimate is up to 0.02 s late (see estimate.approach).
 HEIGHT_KNOWN_US = 15_000
-# A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
-REBOUND_SLACK_M_S = 0.5
-REBOUND_SLACK_M = 0.2
-# A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
-TELLING_CHANGE_M_S = 1.0
-# Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
-AGREEING = 0.87
 # A glancing hit on one guard spins the vehicle, at 5 m/s with up to 16 rad/s. What it leans to is then turned away from
 # what was asked by rate times lag: 6 rad/s times 0.2 s are 70 degrees. Braking so would throw it about and let it fall
 # by metres; it coasts until it spins slower, which takes up to a second.
@@ -62,6 +58,9 @@ class Recover:
         self._after_ned_m_s: Vector3 | None = None  # the first velocity after the contact
         self._refined_boot_us = self._record.sample_time_boot_us
         self._braking = NO_BRAKING
+        self._is_believed = not self._law.is_refined
+        self._spins = False
+        self._thrown_m_s = 0.0
         self._take(flight, self._law.expected(self._contact), now_us)
 
     def _take(self, flight: FlightContext, motion: Moving, now_us: int) -> None:
@@ -73,6 +72,11 @@ class Recover:
 
     def target(self, now_us: int) -> Target | None:
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
+        velocity, acceleration = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2
+        if not self._is_believed:
+            a, b, _ = REST if acceleration is None or self._spins else acceleration
+            leant = (a, b, self._braking.at(now_us))
+            return Target(motion.position_ned_m, self._yaw_rad, velocity or REST, leant, leans_only=True)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
         return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, motion.acceleration_ned_m_s2)
@@ -80,6 +84,8 @@ class Recover:
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
         for sample in inputs.positions:
+            if not self._believes(flight, sample):
+                continue
             record.follow_recovery(sample)
             self._hold_height(flight, sample, now_us)
             self._refine(flight, sample, now_us)
@@ -101,6 +107,21 @@ class Recover:
         """What follows begins at rest at the setpoint."""
         flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
         return afterwards(flight)
+
+    def _believes(self, flight: FlightContext, sample: LocalPosition) -> bool:
+        """Whether the estimate is the vehicle's again; until then the motion expected is flown by its lean alone."""
+        record = self._record
+        if not self._law.is_refined or record.is_believed:
+            return True
+        if record.may_be_clipped:
+            self._brake_unseen(flight, sample)
+            since_us = sample.time_boot_us - record.doubted_since_boot_us
+            normals = (self._contact.normal_ned, record.normal_ned)
+            record.is_believed = since_us >= HEIGHT_KNOWN_US and is_believed(
+                sample, self._contact.velocity_ned_m_s, normals, record.fixes, since_us
+            )
+        self._is_believed = record.is_believed or not record.may_be_clipped
+        return self._is_believed
 
     def _refine(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
         """With the motion after the contact, once; while something goes on pushing, again and again."""
@@ -129,22 +150,36 @@ class Recover:
         text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
         flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
 
+    def _brake_unseen(self, flight: FlightContext, sample: LocalPosition) -> None:
+        """By what the gyroscopes show of the hit: they do not clip."""
+        attitude = flight.vehicle.attitude
+        if attitude is None or attitude.angular_velocity_frd_rad_s is None:
+            return
+        rates_ned = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)
+        self._spins = abs(rates_ned[2]) > SPINNING_RAD_S
+        since_us = attitude.time_boot_us - self._record.sample_time_boot_us
+        climb = thrown_down_m_s(rates_ned, self._contact.normal_ned, flight.mission.companion.estimate.reach_m)
+        if 0 < since_us <= THROWN_US and abs(climb) > abs(self._thrown_m_s):
+            self._thrown_m_s = climb
+            self._braking = brake(climb, flight.mission.recovery.vertical_acceleration_m_s2, self._started_us, 0.0)
+
     def _hold_height(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
         """From the first estimate on that can show what the hit did; the accelerometer, which it clips, cannot."""
         record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
-        if HEIGHT_KNOWN_US <= since_us <= BRAKED_US:
-            if believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6) is not None:
-                most_m_s2 = flight.mission.recovery.vertical_acceleration_m_s2
-                self._braking = brake(sample.velocity_ned_m_s[2], most_m_s2, now_us)
+        if not HEIGHT_KNOWN_US <= since_us <= BRAKED_US:
+            return
+        if believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6) is not None:
+            most_m_s2 = flight.mission.recovery.vertical_acceleration_m_s2
+            self._braking = brake(sample.velocity_ned_m_s[2], most_m_s2, now_us)
 
     def _coasts(self, flight: FlightContext, sample: LocalPosition, since_us: int, now_us: int) -> bool:
         """Go on as it flies, level and inside the fence, while the vehicle spins."""
-        attitude, origin = flight.vehicle.attitude, flight.origin_ned_m
-        if attitude is None or attitude.angular_velocity_frd_rad_s is None or since_us >= SPINNING_MOST_US:
+        origin = flight.origin_ned_m
+        if spin_rad_s(flight) < SPINNING_RAD_S or since_us >= SPINNING_MOST_US or origin is None:
             return False
         motion = believable(sample, self._contact, self._record.impulse_m_s, since_us * 1e-6)
-        if abs(attitude.angular_velocity_frd_rad_s[2]) < SPINNING_RAD_S or motion is None or origin is None:
+        if motion is None:
             return False
         (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
         start, velocity = (n, e, self._contact.position_ned_m[2]), (u, v, 0.0)
@@ -165,41 +200,18 @@ class Recover:
         )
 
 
-def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
-    """The normal by the push, or by what it did to the velocity where the two do not agree.
-
-    The push of a contact of a millisecond is one sample, shaken and clipped; the change of velocity is all of it.
-    """
-    change = tuple(b - a for a, b in zip(before_ned_m_s, after_ned_m_s, strict=True))
-    size = math.hypot(*change)
-    moved = away_from((change[0], change[1], change[2]))
-    if size < TELLING_CHANGE_M_S or sum(p * m for p, m in zip(pushed_ned, moved, strict=True)) > AGREEING:
-        return pushed_ned
-    return moved
-
-
-def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, since_s: float) -> Moving | None:
-    """The motion measured after a contact; None where the hit cannot have caused it.
-
-    A contact changes the velocity by its impulse (of which a clipped sensor shows a part), and where the obstacle
-    stands still by no more than twice the speed of the approach. What estimators say after a stiff hit can be anything.
-    """
-    change_m_s = math.dist(sample.velocity_ned_m_s, contact.velocity_ned_m_s)
-    most_m_s = max(2.0 * math.hypot(*contact.velocity_ned_m_s), impulse_m_s) + REBOUND_SLACK_M_S
-    most_m = (math.hypot(*contact.velocity_ned_m_s) + most_m_s) * since_s + REBOUND_SLACK_M
-    if change_m_s > most_m_s or math.dist(sample.position_ned_m, contact.position_ned_m) > most_m:
-        return None
-    off_m_s, along = split(sample.velocity_ned_m_s, contact.normal_ned)
-    # Still in contact, or the estimate is late: towards the obstacle is never asked for.
-    return Moving(sample.position_ned_m, plus(along, max(0.0, off_m_s), contact.normal_ned))
-
-
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """A new collision: what was known just before it, and from that the setpoint."""
     mission, impact = flight.mission, estimate.impact
     normal = away_from(estimate.normal_ned)
-    contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
     law = _law(flight)
+    contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
+    doubted = _doubted(flight)
+    if law.is_refined:
+        contact = replace(contact, normal_ned=half_way(normal, way_back(contact.velocity_ned_m_s)))
+        if doubted is not None:
+            # Place and velocity now are as wrong as the estimate.
+            contact = replace(doubted.contact, time_boot_us=estimate.time_boot_us)
     record = CollisionRecord(
         detected_at_us=now_us,
         sample_time_boot_us=impact.sample_time_boot_us,
@@ -210,9 +222,19 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
         impulse_m_s=estimate.impulse_m_s,
+        doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
+        inherits_doubt=doubted is not None,
     )
     flight.collisions.append(record)
     _tell_detection(flight, record, now_us)
+
+
+def _doubted(flight: FlightContext) -> CollisionRecord | None:
+    """The hit before, where the vehicle still recovers from it and its estimate is not to be believed."""
+    if not flight.collisions:
+        return None
+    before = flight.collisions[-1]
+    return before if before.may_be_clipped and not before.is_believed and not before.is_over else None
 
 
 def _law(flight: FlightContext) -> RecoveryLaw:

@@ -23,7 +23,6 @@ from companion.messages import (
     CommandAck,
     LocalPosition,
     OnboardHeartbeat,
-    PositionSetpoint,
     PositionTarget,
     Sample,
     Sticks,
@@ -171,11 +170,7 @@ def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
         wanted = core.flight.target = core.limiter.passed(core.flight, wanted, True, moved, now_us)
         core.guard.sent_ned_m.append((now_us, wanted.position_ned_m))
     time_us = now_us - core.started_at_us
-    core.flight.outbox.append(
-        PositionSetpoint(
-            time_us, wanted.position_ned_m, wanted.yaw_rad, wanted.velocity_ned_m_s, wanted.acceleration_ned_m_s2
-        )
-    )
+    core.flight.outbox.append(wanted.setpoint(time_us))
 
 
 def beat(core: GuardCore, now_us: int) -> None:

@@ -1,5 +1,6 @@
 """Where all that is sent passes through the guard: its own setpoints go on, others' wait until it has given back."""
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from typing import TypeAlias
@@ -41,6 +42,9 @@ class Gate:
 
 
 def _mark(fields: Mapping[str, object]) -> Mark:
-    """Time, mask and place; two setpoints with the same of these are the same."""
-    place = tuple(round(value, 3) if isinstance(value, float | int) else None for value in map(fields.get, "xyz"))
+    """Time, mask and place, which may be NaN; two setpoints with the same of these are the same."""
+    place = tuple(
+        round(value, 3) if isinstance(value, float | int) and math.isfinite(value) else None
+        for value in map(fields.get, "xyz")
+    )
     return (fields.get("time_boot_ms"), fields.get("type_mask"), *place)

@@ -30,6 +30,7 @@ DEFAULT_SYSTEM_ID = 1
 
 # POSITION_TARGET_TYPEMASK: a set bit tells the vehicle to ignore the part.
 IGNORE_VELOCITY = 0x038
+IGNORE_PLACE = 0x007
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
@@ -131,6 +132,10 @@ class Encoder:
         if acceleration is None:
             type_mask |= IGNORE_ACCELERATION
             acceleration = (NAN, NAN, NAN)
+        place = setpoint.position_ned_m
+        if setpoint.leans_only:
+            type_mask |= IGNORE_PLACE | IGNORE_VELOCITY
+            place = velocity = (NAN, NAN, NAN)
         yaw = setpoint.yaw_rad
         if yaw is None:
             type_mask |= IGNORE_YAW
@@ -140,7 +145,7 @@ class Encoder:
             *self._target,
             dialect.MAV_FRAME_LOCAL_NED,
             type_mask,
-            *setpoint.position_ned_m,
+            *place,
             *velocity,
             *acceleration,
             yaw,

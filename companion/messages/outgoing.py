@@ -52,13 +52,17 @@ class SendCommand:
 
 @dataclass(frozen=True, slots=True)
 class PositionSetpoint:
-    """Setpoint in the vehicle's local NED; a None part is left to the vehicle."""
+    """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
+
+    `leans_only`: the acceleration alone is asked for, whatever place and velocity are given.
+    """
 
     time_us: int
     position_ned_m: Vector3
     yaw_rad: float | None
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
+    leans_only: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ asked for nothing but its height, brakes that as w' = -k w and rises w / k. With
 import math
 from dataclasses import dataclass
 
+from companion.messages import Vector3
 from companion.recovery.way import REST, Motion
 
 # PX4's MPC_Z_VEL_P_ACC.
@@ -18,6 +19,8 @@ VELOCITY_GAIN_PER_S = 4.0
 LEAST_M_S = 0.1
 # The estimate is 0.02 s late and the motors follow with 0.02 s: what is asked for must end by so much sooner.
 LATE_S = 0.04
+# The attitude's loop takes the turn of a hit away within 0.1 s.
+THROWN_US = 50_000
 # Later than this it is no longer the hit's doing.
 BRAKED_US = 300_000
 
@@ -36,15 +39,27 @@ class Braking:
 NO_BRAKING = Braking()
 
 
-def brake(speed_down_m_s: float, acceleration_m_s2: float, now_us: int) -> Braking:
-    """What stops a vehicle that rises (negative) or falls with the speed, besides what its own loop does."""
+def brake(
+    speed_down_m_s: float, acceleration_m_s2: float, now_us: int, gain_per_s: float = VELOCITY_GAIN_PER_S
+) -> Braking:
+    """What stops a vehicle that rises (negative) or falls with the speed, besides what a loop of the gain does."""
     speed_m_s = abs(speed_down_m_s)
     if speed_m_s < LEAST_M_S or acceleration_m_s2 <= 0.0:
         return NO_BRAKING
-    lasts_s = math.log(1.0 + VELOCITY_GAIN_PER_S * speed_m_s / acceleration_m_s2) / VELOCITY_GAIN_PER_S - LATE_S
+    lasts_s = speed_m_s / acceleration_m_s2
+    if gain_per_s > 0.0:
+        lasts_s = math.log(1.0 + gain_per_s * lasts_s) / gain_per_s - LATE_S
     if lasts_s <= 0.0:
         return NO_BRAKING
     return Braking(-math.copysign(acceleration_m_s2, speed_down_m_s), now_us + round(lasts_s * 1e6))
+
+
+def thrown_down_m_s(rates_ned_rad_s: Vector3, normal_ned: Vector3, reach_m: float) -> float:
+    """How fast a vehicle is thrown, down positive, whose guard sticks to an obstacle while the hit turns it.
+
+    The guard is at -reach n and does not move up or down: w = -(rates x (-reach n))_z.
+    """
+    return reach_m * (rates_ned_rad_s[0] * normal_ned[1] - rates_ned_rad_s[1] * normal_ned[0])
 
 
 def level(motion: Motion, down_m: float, braking_down_m_s2: float) -> Motion:

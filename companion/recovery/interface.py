@@ -18,7 +18,8 @@ class RecoveryConfig(Written):
     gamma: Positive | tuple[Positive, Positive] = 0.5
     # Laws `normal` and `adaptive`: what becomes of the motion along the obstacle.
     tangential: Literal["damped", "kept"] = "damped"
-    # Law `adaptive`, but for the vertical acceleration, which `normal` has too. The guards stay 0.3 m clear; the wavering of a hover on optical flow takes 5 cm.
+    # Law `adaptive`, but for the vertical acceleration, which `normal` has too. The guards stay 0.3 m clear; the
+    # wavering of a hover on optical flow takes 5 cm.
     clearance_m: Positive = 0.35
     # More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
     # trimmed against the drag of its approach stops short by, 0.012 s times v_c in simulation.

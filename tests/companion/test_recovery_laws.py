@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.flight.recovering import agreed_normal, believable
+from companion.flight.rebound import agreed_normal, believable
 from companion.messages import LocalPosition
 from companion.mission.fence import Fence
 from companion.recovery.adaptive import AdaptiveLaw

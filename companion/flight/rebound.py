@@ -1,0 +1,59 @@
+"""The motion that follows a contact: what of it can be the hit's doing, and what it says of the obstacle."""
+
+import math
+
+from companion.detection.classify import HOVER_M_S
+from companion.flight.collision import horizontal_unit
+from companion.flight.context import FlightContext
+from companion.messages import LocalPosition, Vector3
+from companion.recovery.direction import away_from, plus, split
+from companion.recovery.interface import Contact, Moving
+
+# A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
+REBOUND_SLACK_M_S = 0.5
+REBOUND_SLACK_M = 0.2
+# A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
+TELLING_CHANGE_M_S = 1.0
+# Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
+AGREEING = 0.87
+
+
+def spin_rad_s(flight: FlightContext) -> float:
+    attitude = flight.vehicle.attitude
+    rates = None if attitude is None else attitude.angular_velocity_frd_rad_s
+    return 0.0 if rates is None else abs(rates[2])
+
+
+def way_back(velocity_ned_m_s: Vector3) -> Vector3:
+    """Where a vehicle that flew with this velocity came from; zero for one that hovered."""
+    n, e, _ = velocity_ned_m_s
+    return horizontal_unit((-n, -e, 0.0)) if math.hypot(n, e) >= HOVER_M_S else (0.0, 0.0, 0.0)
+
+
+def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
+    """The normal by the push, or by what it did to the velocity where the two do not agree.
+
+    The push of a contact of a millisecond is one sample, shaken and clipped; the change of velocity is all of it.
+    """
+    change = tuple(b - a for a, b in zip(before_ned_m_s, after_ned_m_s, strict=True))
+    size = math.hypot(*change)
+    moved = away_from((change[0], change[1], change[2]))
+    if size < TELLING_CHANGE_M_S or sum(p * m for p, m in zip(pushed_ned, moved, strict=True)) > AGREEING:
+        return pushed_ned
+    return moved
+
+
+def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, since_s: float) -> Moving | None:
+    """The motion measured after a contact; None where the hit cannot have caused it.
+
+    A contact changes the velocity by its impulse (of which a clipped sensor shows a part), and where the obstacle
+    stands still by no more than twice the speed of the approach. What estimators say after a stiff hit can be anything.
+    """
+    change_m_s = math.dist(sample.velocity_ned_m_s, contact.velocity_ned_m_s)
+    most_m_s = max(2.0 * math.hypot(*contact.velocity_ned_m_s), impulse_m_s) + REBOUND_SLACK_M_S
+    most_m = (math.hypot(*contact.velocity_ned_m_s) + most_m_s) * since_s + REBOUND_SLACK_M
+    if change_m_s > most_m_s or math.dist(sample.position_ned_m, contact.position_ned_m) > most_m:
+        return None
+    off_m_s, along = split(sample.velocity_ned_m_s, contact.normal_ned)
+    # Still in contact, or the estimate is late: towards the obstacle is never asked for.
+    return Moving(sample.position_ned_m, plus(along, max(0.0, off_m_s), contact.normal_ned))
