@@ -1,0 +1,91 @@
+"""A hit that the accelerometer could not show whole: what is believed of the estimate, and when."""
+
+import math
+
+import pytest
+
+from companion.estimate.approach import VelocityFix
+from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
+from companion.messages import LocalPosition
+from companion.recovery.height import NO_BRAKING, brake, level, thrown_down_m_s
+from companion.recovery.way import Motion
+
+NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
+ZERO = (0.0, 0.0, 0.0)
+
+
+def said(north_m_s, at_us=0):
+    return LocalPosition(at_us, ZERO, (north_m_s, 0.0, 0.0))
+
+
+def fixes(missing_m_s, until_us, every_us=33_000):
+    """Velocities that lack what `missing_m_s(t)` says, beside a sum that knows all."""
+    times = range(until_us - 300_000, until_us + 1, every_us)
+    return [VelocityFix(t, (missing_m_s(t * 1e-6), 0.0, 0.0), ZERO, ZERO) for t in times]
+
+
+def test_an_estimate_that_shows_the_rebound_is_believed_at_once_and_one_that_flies_into_the_wall_is_not():
+    assert is_believed(said(-0.6), (2.0, 0.0, 0.0), [SOUTH], (), 60_000)
+    assert not is_believed(said(2.0), (2.0, 0.0, 0.0), [SOUTH], (), 60_000)
+    assert not is_believed(said(-0.1), (2.0, 0.0, 0.0), [SOUTH], (), 60_000), "less than arms give back"
+
+
+def test_while_the_estimate_is_put_right_it_is_not_believed_whatever_it_says():
+    """A real PX4's error: 3.6 m/s, flat for 0.14 s, then a second-order system of 4.45 rad/s, damped by 0.59."""
+
+    def missing(t_s):
+        s = max(0.0, t_s - 0.14)
+        return 3.6 * math.exp(-2.6 * s) * math.cos(3.6 * s)
+
+    believed_us = next(
+        us
+        for us in range(20_000, 2_000_000, 20_000)
+        if is_believed(said(1.0), (2.0, 0.0, 0.0), [SOUTH], fixes(missing, us), us)
+    )
+    assert EARLIEST_US <= believed_us <= LATEST_US + 20_000
+    assert abs(missing(believed_us * 1e-6)) < 0.2 * 3.6
+
+
+def test_steady_is_what_goes_along_with_the_accelerometer():
+    assert is_steady(fixes(lambda t: 0.5, 1_000_000), 1_000_000), "a lasting error is not a change"
+    assert not is_steady(fixes(lambda t: 2.0 * t, 1_000_000), 1_000_000)
+    assert not is_steady((), 1_000_000), "nothing heard, nothing known"
+
+
+def test_the_way_out_lies_between_a_clipped_push_and_the_way_back():
+    turned = (-math.cos(0.5), -math.sin(0.5), 0.0)
+    n, e, d = half_way(turned, SOUTH)
+    assert (n, e, d) == pytest.approx((-math.cos(0.25), -math.sin(0.25), 0.0))
+    assert half_way((-0.17, 0.985, 0.0), SOUTH) == SOUTH, "80 degrees off: the push is wrong"
+    assert half_way(turned, ZERO) == turned, "a vehicle that hovered has no way back"
+
+
+@pytest.mark.parametrize("speed_m_s", [-0.6, -0.3, 0.4])
+def test_braking_ends_when_the_vehicle_has_stopped(speed_m_s):
+    """Given the vehicle's own loop, w' = -4 w, and a motor's and the estimate's 0.04 s before it acts."""
+    braking = brake(speed_m_s, 3.0, 0)
+    assert math.copysign(1.0, braking.acceleration_down_m_s2) == -math.copysign(1.0, speed_m_s)
+    w, way = speed_m_s, 0.0
+    for step in range(200):
+        late = step * 0.002 >= 0.04
+        w += 0.002 * (-4.0 * w + (braking.at(round(1e6 * (step * 0.002 - 0.04))) if late else 0.0))
+        way += 0.002 * w
+    assert abs(w) < 0.1, "neither on nor back"
+    assert abs(way) < abs(speed_m_s) / 4.0, "less than without"
+
+
+def test_nothing_is_braked_that_is_slow_or_unwanted():
+    assert brake(0.05, 3.0, 0) == NO_BRAKING
+    assert brake(1.0, 0.0, 0) == NO_BRAKING
+
+
+def test_a_nose_thrown_down_at_a_wall_ahead_throws_the_vehicle_up():
+    assert thrown_down_m_s((0.0, -3.5, 0.0), SOUTH, 0.2) == pytest.approx(-0.7)
+    # the same hit flown east: nose down is a turn about south
+    assert thrown_down_m_s((3.5, 0.0, 0.0), (0.0, -1.0, 0.0), 0.2) == pytest.approx(-0.7)
+
+
+def test_height_is_the_only_thing_that_levelling_changes():
+    motion = Motion((1.0, 2.0, -3.0), (0.5, 0.6, 0.7), (0.1, 0.2, 0.3))
+    assert level(motion, -2.0, 1.5) == Motion((1.0, 2.0, -2.0), (0.5, 0.6, 0.0), (0.1, 0.2, 1.5))
+    assert level(Motion((1.0, 2.0, -3.0)), -2.0, 0.0) == Motion((1.0, 2.0, -2.0))
