@@ -1,0 +1,165 @@
+"""The guard attached to MAVSDK 4, in real time: what reaches the vehicle, and who flies it afterwards."""
+
+import asyncio
+import itertools
+import math
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mavsdk import ComponentType, Configuration, Mavsdk
+from mavsdk import asyncio as asynchronous
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.plugins.action.action import Action
+from mavsdk.plugins.offboard.offboard import Offboard, VelocityNedYaw
+from mavsdk.plugins.telemetry.telemetry import Telemetry
+from simulator import ROOT, Simulator, free_port, simulator, wait_until
+from tap import messages, tapped
+
+from companion.mavsdk import CollisionGuard, GuardConfig, GuardError, State
+from companion.px4_mode import OFFBOARD
+
+WALL = ("--mission", str(ROOT / "missions" / "wall.yaml"), "--set", "sim.walls.0.height_m=20")
+# The program flies by velocity, the guard by place and velocity.
+PLACE_IGNORED, HOLD = 0x7, 3
+
+
+@contextmanager
+def connected(simulated: Simulator, port: int | None = None) -> Iterator[tuple[Mavsdk, object]]:
+    mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+    try:
+        mavsdk.add_any_connection(f"udpin://127.0.0.1:{port or simulated.companion_port}")
+        system = mavsdk.first_autopilot(15.0)
+        assert system is not None
+        yield mavsdk, system
+    finally:
+        mavsdk.destroy()
+
+
+def in_hold(guard: CollisionGuard, system: object) -> tuple[Action, Telemetry]:
+    """Taken off by the program, and watched."""
+    action, telemetry = Action(system), Telemetry(system)
+    wait_until(telemetry.health_all_ok, 20.0, "healthy")
+    action.arm()
+    action.takeoff()
+    assert guard.wait_for(lambda: guard.state is State.WATCHING, 20.0)
+    wait_until(lambda: int(telemetry.flight_mode()) == HOLD, 20.0, "take-off over")
+    return action, telemetry
+
+
+def test_not_one_setpoint_of_the_program_reaches_the_vehicle_while_the_guard_holds(tmp_path):
+    record, port = tmp_path / "wire", free_port()
+    with (
+        simulator(*WALL) as simulated,
+        tapped(record, simulated.companion_port, port),
+        connected(simulated, port) as (mavsdk, system),
+        CollisionGuard(mavsdk, system) as guard,
+    ):
+        _, telemetry = in_hold(guard, system)
+        offboard = Offboard(system)
+        offboard.set_velocity_ned(VelocityNedYaw(1.5, 0.0, 0.0, 0.0))
+        offboard.start()
+        assert guard.wait_for(lambda: guard.holds, 20.0)
+        # A program that goes on commanding is kept out too, not only what MAVSDK repeats by itself.
+        until_s = time.monotonic() + 0.5
+        while time.monotonic() < until_s:
+            offboard.set_velocity_ned(VelocityNedYaw(3.0, 0.0, 0.0, 0.0))
+            time.sleep(0.02)
+        assert guard.wait_for(lambda: not guard.holds, 20.0)
+        wait_until(lambda: int(telemetry.flight_mode()) == HOLD, 5.0, "given back to hold")
+        hit, kept_out = guard.collisions[0], guard.kept_out
+        place = telemetry.position_velocity_ned().position
+    assert kept_out > 10
+    assert hit.impact_speed_m_s == pytest.approx(1.5, abs=0.2)
+    assert place.north_m < 3.75
+    wire = list(messages(record))
+    setpoints = [(at, m) for at, inward, m in wire if not inward and m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
+    theirs = [at for at, m in setpoints if m.type_mask & PLACE_IGNORED]
+    own = [at for at, m in setpoints if not m.type_mask & PLACE_IGNORED and at > theirs[0]]
+    modes = [(at, m.custom_mode) for at, inward, m in wire if inward and m.get_type() == "CURRENT_MODE"]
+    hold_s = next(at for at, mode in modes if at > own[0] and mode != OFFBOARD)
+    assert [at for at in theirs if own[0] <= at < hold_s] == []
+    assert any(at < own[0] for at in theirs)
+    # from the first recovery setpoint on they come without a gap, until the vehicle holds by itself
+    held = [at for at in own if at < hold_s]
+    assert len(held) > 20
+    assert max(b - a for a, b in itertools.pairwise(held)) < 0.5
+
+
+def test_from_a_mode_of_px4s_own_offboard_is_confirmed_and_given_back_and_asyncio_hears_of_it():
+    async def main(simulated: Simulator) -> list[str]:
+        kinds: list[str] = []
+        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+        async with asynchronous.Mavsdk(configuration) as mavsdk:
+            await mavsdk.add_any_connection(f"udpin://127.0.0.1:{simulated.companion_port}")
+            system = await mavsdk.first_autopilot(timeout_s=15.0)
+            async with CollisionGuard(mavsdk, system, GuardConfig(then="previous")) as guard:
+
+                async def listen() -> None:
+                    async for event in guard.watch_events():
+                        kinds.append(event.kind)
+
+                listener = asyncio.create_task(listen())
+                action, telemetry = ActionAsync(system), TelemetryAsync(system)
+                async for healthy in telemetry.subscribe_health_all_ok():
+                    if healthy:
+                        break
+                await action.arm()
+                await action.takeoff()
+                while guard.state is not State.WATCHING:
+                    await asyncio.sleep(0.1)
+                await asyncio.sleep(5.0)
+                start = await anext(telemetry.subscribe_position())
+                north_deg = start.latitude_deg + math.degrees(8.0 / 6_371_000.0)
+                await action.goto_location(north_deg, start.longitude_deg, start.absolute_altitude_m, 0.0)
+                async with asyncio.timeout(30.0):
+                    while "given_back" not in kinds:
+                        await asyncio.sleep(0.1)
+                confirmed_ms = next(event for event in guard.events if event.kind == "confirmed").data["after_ms"]
+                assert confirmed_ms < 1e3 * GuardConfig().confirm_within_s
+                listener.cancel()
+        return kinds
+
+    with simulator(*WALL) as simulated:
+        kinds = asyncio.run(main(simulated))
+    order = [kind for kind in kinds if kind in ("take_over", "confirmed", "recovered", "given_back")]
+    assert order[:4] == ["take_over", "confirmed", "recovered", "given_back"]
+
+
+def test_the_three_lines_of_the_document_are_enough():
+    text = (ROOT / "docs" / "guard.md").read_text()
+    lines = re.search(r"<!-- three lines -->\n```python\n(.*?)```", text, re.DOTALL)[1]
+    assert len([line for line in lines.splitlines() if line]) == 3
+    with simulator(*WALL) as simulated, connected(simulated) as (mavsdk, system):
+        names = {"mavsdk": mavsdk, "system": system}
+        exec(lines, names)
+        guard = names["guard"]
+        in_hold(guard, system)
+        assert guard.state is State.WATCHING
+        # Whichever end comes first.
+        mavsdk.destroy()
+        guard.stop()
+
+
+def test_the_example_flies_into_the_wall_and_lands():
+    with simulator(*WALL) as simulated:
+        command = [sys.executable, str(ROOT / "examples" / "guarded_offboard.py")]
+        command.append(f"udpin://127.0.0.1:{simulated.companion_port}")
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=120, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}
+        )
+    assert done.returncode == 0, done.stderr
+    assert "taking over from OFFBOARD" in done.stdout
+    assert "given back to AUTO.LOITER" in done.stdout
+    assert "program: flew into something at 1." in done.stdout
+
+
+def test_what_is_no_mavsdk_is_said_in_a_sentence():
+    with pytest.raises(GuardError, match="wants MAVSDK's Mavsdk object"):
+        CollisionGuard(Path("/"), object())
