@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from companion.messages import (
     CommandAck,
     CommandResult,
+    Reposition,
     RequestMessage,
     SendCommand,
     SetArmed,
@@ -60,6 +61,8 @@ def describe(command: VehicleCommand) -> str:
             return f"message {message_id} every {interval_us / 1000:g} ms"
         case RequestMessage(message_id):
             return f"message {message_id}"
+        case Reposition():
+            return "reposition"
 
 
 def needs_confirmation(command: VehicleCommand) -> bool:

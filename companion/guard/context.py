@@ -8,7 +8,7 @@ from typing import Protocol
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.guard.config import GuardConfig
 from companion.guard.states import Trigger
-from companion.messages import PositionTarget, Sticks, Vector3
+from companion.messages import GlobalPosition, PositionTarget, Sticks, Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +46,7 @@ class GuardContext:
     hits: int = 0  # since it was armed
     others_setpoint_us: int | None = None  # when one was last seen on its way
     sticks: Sticks | None = None
+    global_position: GlobalPosition | None = None
     sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
 
 

@@ -21,6 +21,7 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
+    GlobalPosition,
     LocalPosition,
     OnboardHeartbeat,
     PositionTarget,
@@ -136,6 +137,9 @@ def act(
     sticks = [sample for sample in samples if isinstance(sample, Sticks)]
     if sticks and core.machine.state not in HOLDING:
         core.guard.sticks = sticks[-1]
+    places = [sample for sample in samples if isinstance(sample, GlobalPosition)]
+    if places:
+        core.guard.global_position = places[-1]
     inputs = GuardInputs(
         Inputs(
             acks=[sample for sample in samples if isinstance(sample, CommandAck)],

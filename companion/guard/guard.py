@@ -6,7 +6,7 @@ from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore, advance, next_deadline_us, start
 from companion.guard.states import State
-from companion.mavlink.decode import GUARD_CONVERTERS, Decoder
+from companion.mavlink.decode import LONE_GUARD_CONVERTERS, Decoder
 from companion.mavlink.encode import Encoder
 from companion.px4_mode import mode_name
 from companion.report import CollisionReport, Status
@@ -20,7 +20,7 @@ class Guard:
 
     def __init__(self, config: GuardConfig) -> None:
         self._config = config
-        self._decoder = Decoder(GUARD_CONVERTERS)
+        self._decoder = Decoder(LONE_GUARD_CONVERTERS)
         self._encoder = Encoder()
         self._addressed = False
         self._core: GuardCore | None = None

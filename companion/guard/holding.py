@@ -4,6 +4,7 @@ import math
 
 from companion.flight.context import Inputs, Target
 from companion.flight.recovering import Recover
+from companion.guard.aside import StepAside
 from companion.guard.context import GuardContext, GuardInputs, Move
 from companion.guard.states import Trigger
 from companion.messages import PositionTarget, SetMode
@@ -82,21 +83,25 @@ def _is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
 class GiveBack:
     """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
 
-    A program's own OFFBOARD needs no asking: its setpoints are let through again. When nothing is taken the setpoints
-    stop, and PX4's action for lost setpoints follows.
+    A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on
+    another link nothing is streamed; the vehicle is asked to hold clear of what it hit. When no mode is taken the
+    setpoints stop, and PX4's action for lost setpoints follows.
     """
 
-    def __init__(self, guard: GuardContext, streams: bool, now_us: int) -> None:
+    def __init__(self, guard: GuardContext, beside_program: bool, now_us: int) -> None:
         flight, previous = guard.flight, guard.previous_mode
         self._wishes: list[int] = []
         if guard.config.then == "previous" and not guard.then_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [AUTO_LOITER, AUTO_LAND]
         self._target = Target(flight.target.position_ned_m, flight.target.yaw_rad) if flight.target else None
-        if not streams:
+        self._aside: StepAside | None = None
+        if beside_program:
             self._target = None
+            self._aside = StepAside(guard)
         self._began_us = now_us
-        self._ask(guard)
+        if self._aside is None or self._aside.is_over:
+            self._ask(guard)
 
     def target(self, now_us: int) -> Target | None:
         return self._target
@@ -111,6 +116,11 @@ class GiveBack:
 
     def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
         flight = guard.flight
+        if self._aside is not None and not self._aside.is_over:
+            if self._aside.step(guard, inputs, now_us) is None:
+                return None
+            self._ask(guard)
+            inputs = GuardInputs()
         is_seen = flight.vehicle.custom_mode == self.wish
         outcome = flight.command_outcome(inputs.flight, is_seen, now_us)
         if is_seen:

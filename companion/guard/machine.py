@@ -28,6 +28,8 @@ _KINDS = {
     Trigger.REFUSED: "ended",
 }
 STICKS = "the pilot moved the sticks"
+# In these cases a program sends setpoints on a link of its own.
+_BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 # After these the vehicle is given back to hold whatever is configured.
 _TO_HOLD = (Trigger.STOPPED, Trigger.HIT_BESIDE_PROGRAM, Trigger.NOT_CONFIRMED, Trigger.BLIND, Trigger.CROSSED)
 
@@ -145,15 +147,15 @@ class GuardMachine:
     def _take(self, move: Move | None, now_us: int) -> None:
         if move is None or not moves(self.state, move.trigger):
             return
-        previous, self.state = self.state, next_state(self.state, move.trigger)
+        self.state = next_state(self.state, move.trigger)
         guard = self.guard
         if move.text:
             guard.flight.tell(now_us, _KINDS.get(move.trigger, "guard"), move.text)
         if move.trigger in _TO_HOLD:
             guard.then_hold = move.text or move.trigger.value
-        self.activity = self._begin(previous, move, now_us)
+        self.activity = self._begin(move, now_us)
 
-    def _begin(self, previous: State, move: Move, now_us: int) -> Activity:
+    def _begin(self, move: Move, now_us: int) -> Activity:
         guard, flight = self.guard, self.guard.flight
         if self.state not in HOLDING:
             flight.commander.cancel()
@@ -174,7 +176,7 @@ class GuardMachine:
                 return Recovering(recover, now_us)
             case State.GIVING_BACK:
                 self._limit_hits()
-                return GiveBack(guard, previous is not State.WATCHING, now_us)
+                return GiveBack(guard, move.trigger in _BESIDE_PROGRAM, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, move.text.startswith(STICKS), now_us)
             case State.ENDED:

@@ -24,6 +24,7 @@ from companion.messages import (
     CurrentMode,
     EstimatorStatus,
     ExtendedState,
+    GlobalPosition,
     Heartbeat,
     ImuSample,
     LandedState,
@@ -139,6 +140,10 @@ def _position_target(m: Any) -> PositionTarget:
     return PositionTarget((m.x, m.y, m.z) if known else None)
 
 
+def _global_position(m: Any) -> GlobalPosition:
+    return GlobalPosition(m.lat * 1e-7, m.lon * 1e-7, m.alt * 1e-3)
+
+
 def _sticks(m: Any) -> Sticks:
     # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp).
     return Sticks((m.x / 1000.0, m.y / 1000.0, m.z / 500.0 - 1.0, m.r / 1000.0))
@@ -149,6 +154,12 @@ GUARD_CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
     **CONVERTERS,
     dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: _position_target,
     dialect.MAVLINK_MSG_ID_MANUAL_CONTROL: _sticks,
+}
+
+# And one on a link of its own, which cannot always send setpoints: where on earth that is.
+LONE_GUARD_CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
+    **GUARD_CONVERTERS,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position,
 }
 
 

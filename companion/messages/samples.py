@@ -123,6 +123,15 @@ class PositionTarget:
 
 
 @dataclass(frozen=True, slots=True)
+class GlobalPosition:
+    """GLOBAL_POSITION_INT; altitude above mean sea level."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Sticks:
     """MANUAL_CONTROL as PX4 tells it: the pilot's pitch, roll, throttle and yaw sticks, -1 to 1, 0 in the middle."""
 
@@ -213,6 +222,7 @@ Sample: TypeAlias = (
     | Attitude
     | AttitudeTarget
     | PositionTarget
+    | GlobalPosition
     | Sticks
     | Vibration
     | Battery

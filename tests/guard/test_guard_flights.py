@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
-from tests.guard.flying import ARM, HOLD, LAND, MANUAL_POSITION, MISSION, OFFBOARD, Air
+from tests.guard.flying import ARM, LAND, MANUAL_POSITION, MISSION, OFFBOARD, Air
 
 # From the wall's face to the centre of a vehicle that touches it with guards unfolded: 0.24 m.
 FACE_NORTH_M = 4.0
@@ -236,9 +236,15 @@ def test_beside_a_program_on_another_link_the_guard_never_fights_it_asks_for_hol
     offboard_asked = [
         m for at, who, m in air.on_wire if who == "guard" and at >= hit_s and m.get_type() == "COMMAND_LONG"
     ]
-    assert [(m.param2, m.param3) for m in offboard_asked] == [HOLD]
+    assert offboard_asked == []
     assert air.setpoints("guard", hit_s - 0.5) == []
+    # by one command, which a program's setpoints do not undo, it is led away from the wall
+    assert [m.command for _, who, m in air.on_wire if who == "guard" and m.get_type() == "COMMAND_INT"] == [192]
+    air.run(5.0)
     stop()
+    assert air.vehicle_mode() == "AUTO.LOITER"
+    assert air.position()[0] < FACE_NORTH_M - CLEAR_M
+    assert air.position()[2] < -2.0
 
 
 def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_fought():
