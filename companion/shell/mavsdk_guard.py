@@ -29,7 +29,7 @@ START_TIMEOUT_S = 20.0
 STOP_TIMEOUT_S = 10.0
 # How long a thread of the program's that computes may keep Python from MAVSDK's: between the datagram that shows a hit
 # and the setpoint it is waited for up to three times. Python's own 5 ms would be 15; this costs such a thread some 1 %.
-SWITCH_INTERVAL_S = 0.0005
+SWITCH_INTERVAL_S = 0.0001
 # Events kept for a program that asks later.
 EVENTS_KEPT = 1000
 

@@ -1,0 +1,77 @@
+"""`rebound guard` as a person or a service runs it."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from companion.guard.config import GuardConfig
+from tests.rebound_cli.command import ROOT, events_of, run, start, wait_for_event
+
+QUICK = ("--set", "companion.streams.window_s=0.5", "--set", "companion.link.heartbeat_wait_s=30")
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--connect", "nowhere"), "'nowhere' is not a connection address"),
+        (("--connect", "udpin://127.0.0.1:0", "--modes", "POSCTL,WARP"), "'WARP' is no mode of PX4"),
+        (("--connect", "udpin://127.0.0.1:0", "--set", "max_hits=0"), "max_hits"),
+        (("--connect", "udpin://127.0.0.1:0", "--config", "no.yaml"), "no.yaml"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(arguments, says):
+    done = run("guard", *arguments)
+    assert done.returncode == 1
+    assert says in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_faulty_file_is_named_with_its_line(tmp_path):
+    file = tmp_path / "guard.yaml"
+    file.write_text("then: hold\nmax_hit: 3\n")
+    done = run("guard", "--connect", "udpin://127.0.0.1:0", "--config", file)
+    assert done.returncode == 1
+    assert f"{file}:2" in done.stderr and "max_hit" in done.stderr
+
+
+def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
+    quick = ("--set", "companion.link.heartbeat_wait_s=0.3")
+    done = run("guard", "--connect", "udpin://127.0.0.1:0", "--out", tmp_path, *quick)
+    assert done.returncode == 1
+    assert "No HEARTBEAT from an autopilot within 0.3 s" in done.stderr
+    assert json.loads((tmp_path / "summary.json").read_text())["collisions"] == []
+
+
+def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path):
+    port = free_port()
+    simulator = [sys.executable, "-m", "rebound_cli", "sim", "--port", "0", "--remote", f"127.0.0.1:{port}"]
+    vehicle = subprocess.Popen(
+        [*simulator, "--stop-with-stdin"], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL
+    )
+    guard = start("guard", "--connect", f"udpin://127.0.0.1:{port}", "--out", tmp_path, "--then", "previous", *QUICK)
+    try:
+        wait_for_event(tmp_path, "standing_by")
+        guard.send_signal(signal.SIGTERM)
+        stdout, stderr = guard.communicate(timeout=20)
+    finally:
+        guard.kill()
+        vehicle.stdin.close()
+        vehicle.wait(20)
+    assert guard.returncode == 0, stderr
+    assert "stopped by a terminate signal; 0 hits" in stdout
+    assert [event["kind"] for event in events_of(tmp_path)][-1] == "stopped"
+    assert (tmp_path / "flight.tlog").stat().st_size > 10_000
+    written = GuardConfig.model_validate(yaml.safe_load((tmp_path / "guard.yaml").read_text()))
+    assert written.then == "previous"
+    assert written.companion.streams.window_s == 0.5
