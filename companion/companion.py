@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 from companion.core import Core, advance, next_deadline_us, start
 from companion.flight.plan import plan_text
+from companion.flight.remembering import all_known
 from companion.flight.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.memory.patch import Patch
 from companion.mission.model import Mission
 from companion.px4_mode import mode_name
 from companion.report import Event, ExpectationReport, FlightReport, Status
@@ -129,6 +131,10 @@ class Companion:
             detector=self._core.watch.describe(),
         )
 
+    def obstacles(self) -> tuple[Patch, ...]:
+        """What is known of the surroundings by now: from before, and from this flight's hits. Mission coordinates."""
+        return self._mission.obstacles.patches() if self._core is None else all_known(self._core.flight)
+
     def report(self) -> FlightReport:
         """The flight so far, or the whole of it once `finished`."""
         if self._core is None:
@@ -147,4 +153,6 @@ class Companion:
             expectations=tuple(
                 [ExpectationReport(wish.label, wish.text, wish.met, wish.detail) for wish in flight.expectations]
             ),
+            obstacles=all_known(flight),
+            unreachable=tuple(flight.unreachable),
         )

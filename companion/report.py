@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from companion.memory.patch import Patch
 from companion.messages import Vector3
 
 JsonValue: TypeAlias = "bool | int | float | str | Sequence[JsonValue] | Mapping[str, JsonValue] | None"
@@ -78,6 +79,8 @@ class FlightReport:
     should but not as the mission expected (`expectations`).
     `aborted`: it began, or was stopped by the person, and ended before the mission did.
     `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission coordinates.
+    `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits, in mission
+    coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
     """
 
     outcome: Outcome
@@ -90,3 +93,5 @@ class FlightReport:
     ended_at_us: int
     armed_at_us: int | None
     expectations: tuple[ExpectationReport, ...] = ()
+    obstacles: tuple[Patch, ...] = ()
+    unreachable: tuple[str, ...] = ()

@@ -90,6 +90,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     parts = [_headline(summary)]
     for number, collision in enumerate(summary["collisions"], start=1):
         parts.append(_collision_text(number, collision))
+    if summary["obstacles"] or summary["unreachable"]:
+        parts.append(_surroundings(summary))
     counts = _counts(summary)
     if counts:
         parts.append(counts)
@@ -102,6 +104,15 @@ def _headline(summary: Mapping[str, Any]) -> str:
     reason = "" if summary["outcome"] == "completed" else f": {summary['reason']}"
     pace = f"{summary['duration_s']:.1f} s of flight in {summary['wall_clock_s']:.1f} s"
     return f"{summary['mission']} {summary['outcome']}{reason} ({pace}{vehicle})"
+
+
+def _surroundings(summary: Mapping[str, Any]) -> str:
+    """What is known at the end, and what could not be reached for it."""
+    from companion.memory.stored import KnownPatch, describe
+
+    lines = [f"  remembered: {describe(KnownPatch.model_validate(data).patch())}" for data in summary["obstacles"]]
+    lines += [f"  out of reach: {name if name == 'home' else f'item {name}'}" for name in summary["unreachable"]]
+    return "\n".join(lines)
 
 
 def _counts(summary: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from rebound_cli.documents import Override, apply_override
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
-from rebound_cli.resume import resume_of
+from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.truth_match import FlightTruth
@@ -46,11 +46,17 @@ def run_fly(options: Namespace) -> int:
     if not is_simulated and (options.airframe is not None or options.seed is not None):
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     document = load_mission_document(options.mission, options.set, options.airframe, options.seed, options.companion)
+    if options.obstacles is not None:
+        apply_override(
+            document, Override(f"--obstacles {options.obstacles}", ("obstacles", "file"), str(options.obstacles))
+        )
     mission = mission_from(document)
     if options.resume is not None:
         apply_override(
             document, Override(f"--resume {options.resume}", ("resume",), resume_of(options.resume, mission))
         )
+        if options.obstacles is None:
+            remember_from(options.resume, document)
         mission = mission_from(document)
     world = world_from(document) if is_simulated else None
     console = console_for(options.json)

@@ -39,6 +39,12 @@ def add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         metavar="RUN",
         help="go on with the mission where the flight in this folder was interrupted",
     )
+    fly.add_argument(
+        "--obstacles",
+        type=Path,
+        metavar="FILE",
+        help="what is known beforehand, e.g. another run's obstacles.json",
+    )
     fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
     fly.set_defaults(run=_fly)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from companion.memory.stored import ObstacleFile
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from rebound_cli.documents import (
@@ -62,8 +63,26 @@ def _apply_options(document: Document, sets: Sequence[str], airframe: str | None
 
 
 def mission_from(document: Document) -> Mission:
-    """Raises DocumentError."""
+    """Raises DocumentError, also for a file of known obstacles that cannot be read."""
+    read_obstacles(document)
     return validated(Mission, document, document.data)
+
+
+def read_obstacles(document: Document) -> None:
+    """Put what the mission's `obstacles.file` holds in its place; with that a mission is whole without the file."""
+    obstacles = document.data.get("obstacles")
+    file = obstacles.get("file") if isinstance(obstacles, dict) else None
+    if not isinstance(obstacles, dict) or not isinstance(file, str) or not file:
+        return
+    given = document.override_of(("obstacles", "file"))
+    folder = Path(document.name).parent if given is None else Path()
+    try:
+        stored = load_document(folder / file)
+    except DocumentError as error:
+        raise DocumentError(f"{document.place_of(('obstacles', 'file'))}: {error}") from error
+    validated(ObstacleFile, stored, stored.data)
+    known = [*(obstacles.get("known") or ()), *stored.data["patches"]]
+    document.data["obstacles"] = {key: value for key, value in obstacles.items() if key != "file"} | {"known": known}
 
 
 def world_from(document: Document) -> SimulatedWorld:

@@ -90,6 +90,8 @@ def run_lockstep(
         result = companion_step(b"".join(frames), now_us)
         pending = b"".join(result.sent_frames)
         record(now_us, result)
+        if result.events:
+            recorder.record_obstacles(companion.obstacles())
         if not is_confirmed and companion.plan_is_ready():
             is_confirmed = True
             companion.confirm_plan()

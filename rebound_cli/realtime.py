@@ -105,6 +105,8 @@ def fly_realtime(
         for frame in result.sent_frames:
             connection.send(frame)
         recorder.record(now_us, result)
+        if result.events:
+            recorder.record_obstacles(companion.obstacles())
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
         if interrupts.reason is not None and not is_stopped:

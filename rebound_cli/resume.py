@@ -7,9 +7,9 @@ from typing import Any
 
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
-from rebound_cli.documents import load_document
+from rebound_cli.documents import Document, Override, apply_override, load_document
 from rebound_cli.inputs import mission_from
-from rebound_cli.run_folder import EVENTS_NAME, RESOLVED_NAME
+from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME
 
 
 class ResumeError(ConfigurationError):
@@ -35,6 +35,14 @@ def resume_of(run: Path, mission: Mission) -> dict[str, Any]:
         "armed_at_us": armed["time_us"],
         "armed_boot_us": armed["data"]["time_boot_us"],
     }
+
+
+def remember_from(run: Path, document: Document) -> None:
+    """What the interrupted flight knew of its surroundings takes the place of what the mission says is known."""
+    stored = run / OBSTACLES_NAME
+    if stored.exists():
+        apply_override(document, Override(f"--resume {run}", ("obstacles", "known"), []))
+        apply_override(document, Override(f"--resume {run}", ("obstacles", "file"), str(stored)))
 
 
 def _events(path: Path) -> Sequence[dict[str, Any]]:

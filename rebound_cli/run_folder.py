@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from companion.errors import ReboundError
+from companion.memory.stored import file_data
 from companion.shell.tlog import TlogWriter, is_packet
 from rebound_cli import __version__
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from companion.companion import StepResult
+    from companion.memory.patch import Patch
     from companion.report import Event
 
 RUNS_FOLDER = Path("runs")
@@ -31,6 +35,7 @@ RESOLVED_NAME = "resolved.yaml"
 AIRFRAME_NAME = "airframe.yaml"
 VERSIONS_NAME = "versions.json"
 VEHICLE_LOG_NAME = "vehicle.log"
+OBSTACLES_NAME = "obstacles.json"
 
 # The packages whose version can change the bytes or the figures of a flight.
 _VERSIONED_PACKAGES = (
@@ -39,6 +44,7 @@ _VERSIONED_PACKAGES = (
     "numpy",
     "numba",
     "filterpy",
+    "shapely",
     "pydantic",
     "pyserial",
     "matplotlib",
@@ -81,6 +87,8 @@ class FlightRecorder:
     """
 
     def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._obstacles: Sequence[Patch] | None = None
         self._tlog = TlogWriter(folder / TLOG_NAME)
         # Line-buffered: events are few, and the last one before a kill is the one that matters.
         self._events_file = (folder / EVENTS_NAME).open("w", encoding="utf-8", buffering=1)
@@ -112,6 +120,16 @@ class FlightRecorder:
     def record_file(self, now_us: int) -> None:
         """The companion was told, after its step at `now_us`, that the file it waits for exists."""
         self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "file"}}\n')
+
+    def record_obstacles(self, patches: "Sequence[Patch]") -> None:
+        """The memory as it is by now. Whenever the program ends, the file is whole: the old one or the new one."""
+        if patches == self._obstacles:
+            return
+        self._obstacles = patches
+        path = self._folder / OBSTACLES_NAME
+        half_written = path.with_suffix(".part")
+        write_json(half_written, file_data(patches))
+        half_written.replace(path)
 
     def close(self) -> None:
         self._tlog.close()

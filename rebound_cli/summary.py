@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from companion.memory.stored import as_data
 from companion.report import FlightReport
 from rebound_cli.truth_match import FlightTruth, match_contacts
 
@@ -68,6 +69,8 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
             {"item": wish.label, "expected": wish.text, "met": wish.met, "was": wish.detail}
             for wish in report.expectations
         ],
+        "obstacles": [as_data(patch) for patch in report.obstacles],
+        "unreachable": list(report.unreachable),
         "collisions": [
             {
                 **_collision(report, number),

@@ -2,18 +2,22 @@
 
 from companion.flight.context import AfterRecovery, FlightContext, Move
 from companion.flight.states import State, Trigger
+from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.policy import OnCollision
 
 _TRIGGERS = {
     "hold": Trigger.RECOVERED_TO_HOLD,
     "continue": Trigger.RECOVERED_TO_CONTINUE,
     "retry": Trigger.RECOVERED_TO_RETRY,
+    "detour": Trigger.RECOVERED_TO_DETOUR,
     "return": Trigger.RECOVERED_TO_RETURN,
     "land": Trigger.RECOVERED_TO_LAND,
     "abort": Trigger.RECOVERED_TO_ABORT,
 }
 # Of these the interrupted step is over.
 _STEP_LEFT = ("hold", "continue")
+# These have somewhere to be, to which there may be another way; of all others nothing is left after a detour's hit.
+_WITH_A_GOAL = (GoToItem, PathItem, OrbitItem)
 
 
 def decide(flight: FlightContext, state: State, now_us: int) -> None:
@@ -27,9 +31,14 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
         flight.tally.pace_factor *= policy.retry_speed_factor
     flight.after_recovery = AfterRecovery(_TRIGGERS[then], policy.hold_s, reason)
     # What an interrupted flight resumes with.
-    flight.step_index = flight.tally.index + (1 if then in _STEP_LEFT else 0)
+    is_left = then in _STEP_LEFT or (then == "detour" and not _has_goal(flight))
+    flight.step_index = flight.tally.index + (1 if is_left else 0)
     if reason:
         flight.tell(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)
+
+
+def _has_goal(flight: FlightContext) -> bool:
+    return isinstance(flight.steps[flight.tally.index].action, _WITH_A_GOAL)
 
 
 def _policy_and_hits(flight: FlightContext) -> tuple[OnCollision, int]:

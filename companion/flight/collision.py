@@ -46,6 +46,7 @@ class CollisionRecord:
     may_be_clipped: bool = True
     is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
+    is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
@@ -65,6 +66,7 @@ class CollisionRecord:
         self.normal_ned = away_from(estimate.normal_ned)
         self.impulse_m_s = estimate.impulse_m_s
         self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
+        self.is_clipped = estimate.is_lower_bound
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""

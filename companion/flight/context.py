@@ -11,6 +11,7 @@ from companion.flight.course import Pace
 from companion.flight.states import Trigger
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
+from companion.memory.patch import Patch
 from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
 from companion.mission.expectations import ExpectItem
 from companion.mission.items import ReturnItem
@@ -67,6 +68,7 @@ class StepTally:
     began_us: int | None = None
     hits: int = 0
     pace_factor: float = 1.0
+    points_passed: int = 0  # of a path, when it was interrupted
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,9 @@ class FlightContext:
     file_is_there: bool = False
     expectations: list[Expectation] = field(default_factory=list)
     collisions: list[CollisionRecord] = field(default_factory=list)
+    patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
+    hits_remembered: int = 0  # so many of the collisions are in it
+    unreachable: list[str] = field(default_factory=list)
     plan_confirmed: bool = False
     outcome: Outcome | None = None
     reason: str = ""
@@ -129,6 +134,7 @@ class FlightContext:
         config = self.mission.companion.flight
         self.pace = Pace(config.cruise_speed_m_s, config.cruise_acceleration_m_s2)
         self.steps = self.steps or steps_to_fly(self.mission)
+        self.patches = self.mission.obstacles.patches()
         last = self.steps[-1].action
         if isinstance(last, ReturnItem):
             self.returning_as = last

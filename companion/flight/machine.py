@@ -12,6 +12,7 @@ from companion.flight.handover import HandOver, LetGo
 from companion.flight.landing import Land
 from companion.flight.progress import FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
+from companion.flight.remembering import remember
 from companion.flight.returning import FlyHome
 from companion.flight.states import FINAL_STATES, State, Trigger, moves, next_state
 from companion.flight.takeoff import TakeOff
@@ -38,6 +39,8 @@ class Machine:
             self._take(guard(self.flight, self.state, inputs, now_us), now_us)
         for estimate in inputs.impacts:
             if moves(self.state, Trigger.COLLISION):
+                if isinstance(self.activity, FlyItems):
+                    self.activity.interrupt(now_us)
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)
                 self._take(Move(Trigger.COLLISION), now_us)
@@ -71,6 +74,9 @@ class Machine:
 
     def _begin(self, previous: State, move: Move, now_us: int) -> Activity:
         flight = self.flight
+        if previous is State.RECOVERING:
+            # Of a hit that has just come nothing is known yet but its first sample.
+            remember(flight, len(flight.collisions) - (self.state is State.RECOVERING), now_us)
         match self.state:
             case State.CONNECT:
                 return Connect(now_us)

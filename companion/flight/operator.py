@@ -70,6 +70,7 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "detection": _hit,
     "recovered": _recovered,
     "policy": _as_it_stands,
+    "unreachable": _as_it_stands,
     "timeout": _as_it_stands,
     "envelope": _as_it_stands,
     "link": _as_it_stands,

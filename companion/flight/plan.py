@@ -2,6 +2,8 @@
 
 from companion.flight.context import FlightContext, as_text
 from companion.flight.expecting import describe
+from companion.memory.stored import ObstaclesConfig
+from companion.memory.stored import describe as describe_patch
 from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
 from companion.mission.items import (
@@ -83,6 +85,8 @@ def describe_after_recovery(on_collision: OnCollision) -> str:
             return "go on with the next item at once"
         case "retry":
             return f"try the item again at {on_collision.retry_speed_factor:.0%} of the speed"
+        case "detour":
+            return "fly round what is known by now"
         case "return":
             return "return to above the start and land"
         case "land":
@@ -136,12 +140,19 @@ def mission_lines(mission: Mission) -> list[str]:
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
         f"On a hit   detector {mission.companion.detector}, recovery law {law}; "
         f"then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
+        *_obstacle_lines(mission.obstacles),
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
     ]
     if has_gamma and max(gamma_1, gamma_2) > LARGE_GAMMA_S:
         lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
     return lines
+
+
+def _obstacle_lines(obstacles: ObstaclesConfig) -> list[str]:
+    after = {"land": "land", "return": "return and land", "continue": "the next item", "abort": "abort"}
+    lines = [f"Obstacles  keep {obstacles.margin_m:g} m off what is known; no way: {after[obstacles.on_unreachable]}"]
+    return lines + [f"Known      {describe_patch(patch)}" for patch in obstacles.patches()]
 
 
 def _item_lines(number: str, item: MissionItem, lead: str = "") -> list[str]:

@@ -4,18 +4,22 @@ import math
 from dataclasses import replace
 
 from companion.flight import expecting
+from companion.flight.around import passed, way_around
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.course import climb, stay, way_of
+from companion.flight.course import climb, stay
 from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
+from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
 from companion.flight.trajectory import Trajectory
 from companion.flight.waiting import Waiting
+from companion.messages import Vector3
 from companion.mission.expectations import ExpectItem
 from companion.mission.items import (
     GoToItem,
     HoldItem,
     LandItem,
+    Motion,
     OrbitItem,
     PathItem,
     ReturnItem,
@@ -25,9 +29,9 @@ from companion.mission.items import (
     VelocityItem,
     WaitForItem,
 )
-from companion.mission.policy import OnTimeout
 
-_ON_TIMEOUT: dict[OnTimeout, Trigger] = {
+# Of a time-out, and of a goal out of reach; "continue" is no move.
+_TRIGGERS = {
     "abort": Trigger.INTERRUPTED,
     "return": Trigger.RETURN_DUE,
     "land": Trigger.LAND_DUE,
@@ -52,9 +56,8 @@ class FlyItems:
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
         self._waiting = Waiting(self._action, flight) if isinstance(self._action, WaitForItem) else None
         self._way: Trajectory = stay(start)
+        self._out_of_reach = ""
         match self._action:
-            case GoToItem() | VelocityItem() | PathItem() | OrbitItem():
-                self._way = way_of(self._action, start, replace(flight.pace, factor=flight.tally.pace_factor))
             case TakeoffItem():
                 # tried again after a hit in the climb
                 self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
@@ -66,6 +69,35 @@ class FlyItems:
         flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
         if isinstance(self._action, ExpectItem):
             expecting.begin(flight, step.label, self._action, now_us)
+        elif isinstance(self._action, GoToItem | VelocityItem | PathItem | OrbitItem):
+            self._plan(self._action, start, now_us)
+
+    def _plan(self, action: Motion, start_m: Vector3, now_us: int) -> None:
+        """The item's own way, or one round what is known; what is left of a path that was interrupted."""
+        flight = self._flight
+        behind = flight.tally.points_passed if flight.after_recovery.trigger is Trigger.RECOVERED_TO_DETOUR else 0
+        if isinstance(action, PathItem) and 0 < behind < len(action.points_ned_m):
+            action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
+        known = surroundings(flight)
+        planned = way_around(action, start_m, replace(flight.pace, factor=flight.tally.pace_factor), known)
+        if planned.way is None:
+            self._out_of_reach = f"{describe_item(action)}: no way round what is known"
+            flight.unreachable.append(flight.step.label)
+            policy = flight.mission.obstacles.on_unreachable
+            text = f"item {flight.step.label} out of reach: {self._out_of_reach}; then: {policy}"
+            flight.tell(now_us, "unreachable", text, item=flight.step.label, then=policy)
+            return
+        self._way = planned.way
+        if planned.is_detour:
+            left_out = f", {planned.left_out} points left out" if planned.left_out else ""
+            text = f"round what is known: {planned.way.distance_m:.1f} m{left_out}"
+            flight.tell(now_us, "detour", text, distance_m=planned.way.distance_m, left_out=planned.left_out)
+
+    def interrupt(self, now_us: int) -> None:
+        """A hit ends the present way: how much of a path has been flown?"""
+        if isinstance(self._action, PathItem):
+            tally, elapsed_s = self._flight.tally, (now_us - self._started_us) * 1e-6
+            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, elapsed_s))
 
     def target(self, now_us: int) -> Target | None:
         elapsed_s = (now_us - self._started_us) * 1e-6
@@ -84,7 +116,11 @@ class FlyItems:
                 return Move(Trigger.RETURN_DUE)
             if isinstance(self._action, LandItem):
                 return Move(Trigger.LAND_DUE)
-            if not self._is_done(flight, now_us):
+            if self._out_of_reach:
+                trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
+                if trigger is not None:
+                    return Move(trigger, self._out_of_reach, hand_over=trigger is Trigger.INTERRUPTED)
+            elif not self._is_done(flight, now_us):
                 return self._overdue(flight, now_us)
             self._leave(flight, now_us)
 
@@ -135,7 +171,7 @@ class FlyItems:
             if item.on_timeout == "continue":
                 self._leave(flight, now_us)
                 return self.step(flight, Inputs(), now_us)
-            trigger = _ON_TIMEOUT[item.on_timeout]
+            trigger = _TRIGGERS[item.on_timeout]
             return Move(trigger, text, hand_over=trigger is Trigger.INTERRUPTED)
         patience_s = flight.mission.companion.flight.arrival_timeout_s
         if self._over_since_us is not None and now_us - self._over_since_us > patience_s * 1e6:

@@ -12,6 +12,7 @@ from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
 from companion.flight.rebound import agreed_normal, believable, spin_rad_s, way_back
+from companion.flight.remembering import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, split
 from companion.recovery.envelope import Envelope
@@ -246,7 +247,8 @@ def _setpoint(
 ) -> Vector3:
     """The law's goal, as what is around lets it be."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), _surfaces(law, earlier))
+    surfaces = [*_surfaces(law, earlier), *remembered_surfaces(flight, contact)]
+    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), surfaces)
     return room.goal(contact.position_ned_m, contact.normal_ned, law.goal_ned_m(contact, motion))
 
 

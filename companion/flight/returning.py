@@ -3,9 +3,12 @@
 import math
 from dataclasses import replace
 
+from companion.flight.around import home_around
 from companion.flight.context import FlightContext, Inputs, Move, Target
-from companion.flight.course import way_home
+from companion.flight.course import stay
+from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
+from companion.flight.trajectory import Trajectory
 
 
 class FlyHome:
@@ -18,8 +21,16 @@ class FlyHome:
         flight.going_home = True
         flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
-        self._way = way_home(start, flight.returning_as, replace(flight.pace, factor=1.0), flight.mission.fence)
-        flight.tell(now_us, "return", f"returning over {self._way.distance_m:.1f} m", distance_m=self._way.distance_m)
+        planned = home_around(start, flight.returning_as, replace(flight.pace, factor=1.0), surroundings(flight))
+        self._is_cut_off = planned.way is None
+        self._way: Trajectory = planned.way or stay(start)
+        if self._is_cut_off:
+            flight.unreachable.append("home")
+            flight.tell(now_us, "unreachable", "home out of reach: no way round what is known; landing here")
+            return
+        round_it = " round what is known" if planned.is_detour else ""
+        text = f"returning over {self._way.distance_m:.1f} m{round_it}"
+        flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
 
     def target(self, now_us: int) -> Target | None:
         elapsed_s = (now_us - self._started_us) * 1e-6
@@ -30,6 +41,8 @@ class FlyHome:
         return Target(place, self._flight.yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if self._is_cut_off:
+            return Move(Trigger.LAND_DUE)
         overdue_s = (now_us - self._started_us) * 1e-6 - self._way.duration_s
         if overdue_s < 0.0:
             return None

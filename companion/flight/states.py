@@ -32,12 +32,13 @@ class Trigger(Enum):
     RECOVERED_TO_HOLD = "settled, then: hold"
     RECOVERED_TO_CONTINUE = "settled, then: continue"
     RECOVERED_TO_RETRY = "settled, then: retry"
+    RECOVERED_TO_DETOUR = "settled, then: detour"
     RECOVERED_TO_RETURN = "settled, then: return"
     RECOVERED_TO_LAND = "settled, then: land"
     RECOVERED_TO_ABORT = "settled, then: abort"
     HOLD_ENDED = "hold time over"
-    RETURN_DUE = "next item is return, or a time-out says so"
-    LAND_DUE = "next item is land, or a time-out says so"
+    RETURN_DUE = "next item is return, or a time-out or a goal out of reach says so"
+    LAND_DUE = "next item is land, or a time-out or a goal out of reach says so"
     HOME_REACHED = "above the arming position"
     DISARMED = "vehicle disarmed itself"
 
@@ -75,6 +76,7 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
         Trigger.RECOVERED_TO_HOLD: State.HOLDING,
         Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
         Trigger.RECOVERED_TO_RETRY: State.MISSION,
+        Trigger.RECOVERED_TO_DETOUR: State.MISSION,
         Trigger.RECOVERED_TO_RETURN: State.RETURNING,
         Trigger.RECOVERED_TO_LAND: State.LANDING,
         Trigger.RECOVERED_TO_ABORT: State.ABORTED,
@@ -90,6 +92,7 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
         Trigger.INTERRUPTED: State.ABORTED,
         Trigger.COLLISION: State.RECOVERING,
         Trigger.HOME_REACHED: State.LANDING,
+        Trigger.LAND_DUE: State.LANDING,
     },
     State.LANDING: {
         Trigger.CONTROL_LOST: State.ABORTED,

@@ -4,8 +4,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from companion.flight.course import Pace, climb, way_home, way_of
+from companion.flight.around import Planned, home_around, way_around
+from companion.flight.course import Pace, climb
 from companion.flight.trajectory import Chain, LineProfile, Trajectory
+from companion.memory.patch import Patch
+from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
 from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
@@ -34,12 +37,17 @@ LANDING_EXTRA_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One step in mission coordinates. `lasts_s` is None for a wait without a known end."""
+    """One step in mission coordinates. `lasts_s` is None for a wait without a known end.
+
+    `is_cut_off`: what is known beforehand leaves no way there; `is_detour`: the way leads round it.
+    """
 
     step: Step
     start_ned_m: Vector3
     way: Trajectory | None
     lasts_s: float | None
+    is_cut_off: bool = False
+    is_detour: bool = False
 
     @property
     def end_ned_m(self) -> Vector3:
@@ -47,8 +55,8 @@ class Leg:
 
 
 def itinerary(mission: Mission) -> tuple[Leg, ...]:
-    """The mission when nothing is hit."""
-    return tuple(_legs(mission))
+    """The mission when nothing is hit, round what is known beforehand."""
+    return tuple(_legs(mission, mission.obstacles.patches()))
 
 
 def steps_to_fly(mission: Mission) -> tuple[Step, ...]:
@@ -62,21 +70,23 @@ def steps_to_fly(mission: Mission) -> tuple[Step, ...]:
     at = mission.resume.at_step
     if at >= len(steps):
         raise ValueError(f"resume.at_step: the mission has {len(steps)} steps, counted from 0; there is no {at}")
-    begin = itinerary(mission)[at]
+    begin = tuple(_legs(mission))[at]
     there = GoToItem(position_ned_m=begin.start_ned_m)
     back = Step(at, begin.step.label, MissionItem(go_to=there), there)
     paces = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, SetSpeedItem)]
     return (steps[0], *paces[-1:], back, *steps[at:])
 
 
-def _legs(mission: Mission) -> Iterator[Leg]:
+def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
+    known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
     pace = Pace(flight.cruise_speed_m_s, flight.cruise_acceleration_m_s2)
     for step in program(mission):
         action = step.action
         way: Trajectory | None = None
         lasts_s: float | None = 0.0
+        planned: Planned | None = None
         match action:
             case TakeoffItem():
                 way = climb(place, action.height_m, flight)
@@ -91,16 +101,18 @@ def _legs(mission: Mission) -> Iterator[Leg]:
             case ExpectItem():
                 pass
             case ReturnItem():
-                way = way_home(place, action, pace, mission.fence)
-                lasts_s = _landing_s(way.target_m)
+                planned = home_around(place, action, pace, known)
+                lasts_s = _landing_s(place if planned.way is None else planned.way.target_m)
             case LandItem():
                 lasts_s = _landing_s(place)
             case _:
-                way = way_of(action, place, pace)
+                planned = way_around(action, place, pace, known)
+        way = way if planned is None else planned.way
         if way is not None:
             assert lasts_s is not None
             lasts_s += way.duration_s
-        leg = Leg(step, place, way, lasts_s)
+        is_cut_off = planned is not None and planned.way is None
+        leg = Leg(step, place, way, lasts_s, is_cut_off, planned is not None and planned.is_detour)
         yield leg
         place = leg.end_ned_m
 

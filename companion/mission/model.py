@@ -5,6 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
+from companion.memory.stored import ObstaclesConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
@@ -110,6 +111,7 @@ class Mission(Written):
     items: Annotated[tuple[MissionItem, ...], Field(min_length=2)]
     on_collision: OnCollision = OnCollision()
     recovery: RecoveryConfig = RecoveryConfig()
+    obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
     on_interrupt: Handover = "hold"
     companion: CompanionConfig = CompanionConfig()

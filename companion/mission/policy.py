@@ -13,8 +13,9 @@ OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
 class OnCollision(Written):
     """After the recovery. `max_hits` counts the hits of the flight; in an item's own policy, those of the item."""
 
-    # hold: for `hold_s`, then the next item; continue: the next item at once; retry: the same item again, slower.
-    then: Literal["hold", "continue", "retry", "return", "land"] = "hold"
+    # hold: for `hold_s`, then the next item; continue: the next item at once; retry: the same item again, slower;
+    # detour: the same item again, round what is known by now.
+    then: Literal["hold", "continue", "retry", "detour", "return", "land"] = "hold"
     hold_s: NotNegative = 3.0
     # Half the speed is a quarter of the energy: the second hit is harmless where the first was bearable.
     retry_speed_factor: Annotated[Positive, Field(le=1.0)] = 0.5

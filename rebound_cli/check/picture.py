@@ -13,6 +13,7 @@ from companion.mission.fence import Fence
 from companion.mission.model import Mission
 from rebound_cli.check.ways import Way
 from rebound_cli.figure.outline import footprint
+from rebound_cli.figure.overview import draw_patches
 from sim_vehicle.scene import Scene
 
 _WAY = "tab:orange"
@@ -41,6 +42,7 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
         label = "obstacles (simulated)" if number == 0 else None
         axis.add_patch(Polygon(corners[:, ::-1], facecolor=_OBSTACLE, edgecolor=_OBSTACLE, alpha=0.7, label=label))
         axis.annotate(obstacle.name, corners.mean(axis=0)[::-1], fontsize=7, color=_OBSTACLE)
+    draw_patches(axis, mission.obstacles.patches())
     _draw_fence(axis, mission.fence)
     for number, way in enumerate(ways):
         points = way.points_ned_m

@@ -32,7 +32,8 @@ def _rows(way: Way, width: int, text_width: int) -> list[str]:
     begins = "?" if way.begins_s is None else f"{way.begins_s:.1f} s"
     lasts = "?" if leg.lasts_s is None else f"{leg.lasts_s:.1f} s"
     lines = [f"  {step.label:<{width}}{text:<{text_width}}{length:>9}{lasts:>9}{begins:>9}"]
-    notes = [_meeting(way.meets, way)] if way.meets else []
+    notes = ["no way round what is known"] if leg.is_cut_off else ["round what is known"] if leg.is_detour else []
+    notes += [_meeting(way.meets, way)] if way.meets else []
     notes += [describe_modifiers(step.item)] if describe_modifiers(step.item) else []
     return lines + [f"  {'':<{width + 2}}{note}" for note in notes]
 

@@ -1,13 +1,16 @@
 """The whole flight: from above, its height, its speed, what its accelerometer felt."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.patches import Polygon
 
+from companion.memory.patch import Patch
+from companion.memory.shape import outline
 from companion.report import FlightReport
 from rebound_cli.figure.outline import footprint
-from rebound_cli.figure.style import ASKED, DETECTED, MEASURED, OBSTACLE, finish, seconds_since_start
+from rebound_cli.figure.style import ASKED, DETECTED, MEASURED, OBSTACLE, REMEMBERED, finish, seconds_since_start
 from rebound_cli.flight_log import FlightLog
 from sim_vehicle.scene import Scene
 
@@ -23,6 +26,7 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
         corners = footprint(obstacle) - origin[:2]
         label = "obstacles" if number == 0 else None
         axis.add_patch(Polygon(corners[:, ::-1], facecolor=OBSTACLE, edgecolor=OBSTACLE, alpha=0.6, label=label))
+    draw_patches(axis, report.obstacles)
     for number, collision in enumerate(report.collisions):
         north, east = collision.position_ned_m[0] - origin[0], collision.position_ned_m[1] - origin[1]
         axis.plot([east], [north], "o", color=DETECTED, label="hit detected" if number == 0 else None)
@@ -32,6 +36,16 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
         (north, east), half_m = 0.5 * (least + most), 0.5 * float((most - least).max()) + 1.0
         axis.set(xlim=(east - half_m, east + half_m), ylim=(north - half_m, north + half_m), aspect="equal")
     finish(axis, "From above", "east of the take-off point [m]", "north of the take-off point [m]")
+
+
+def draw_patches(axis: Any, patches: Sequence[Patch]) -> None:
+    """What is believed of the surroundings, and where it was touched; mission coordinates."""
+    for number, patch in enumerate(patches):
+        label = "remembered" if number == 0 else None
+        corners = np.array(outline(patch))[:, ::-1]
+        axis.add_patch(Polygon(corners, fill=False, hatch="////", edgecolor=REMEMBERED, linewidth=1.0, label=label))
+        touched = np.array(patch.touches_ned_m)
+        axis.plot(touched[:, 1], touched[:, 0], ".", color=REMEMBERED, markersize=5)
 
 
 def draw_height(axis: Any, log: FlightLog, report: FlightReport) -> None:

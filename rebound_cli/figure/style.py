@@ -15,9 +15,10 @@ MEASURED = {"color": "tab:blue", "linewidth": 1.8}
 ASKED = {"color": "tab:orange", "linewidth": 1.4, "linestyle": "--"}
 TRUE = {"color": "0.55", "linewidth": 1.0}
 OBSTACLE = "tab:brown"
+REMEMBERED = "tab:purple"
 DETECTED = "tab:red"
 RECOVERED = "tab:green"
-_FAULT = "tab:purple"
+_FAULT = "tab:pink"
 
 
 def seconds_since_start(times_us: Floats, report: FlightReport) -> Floats:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from companion.memory.stored import ObstaclesConfig
 from tests.companion.fake_vehicle import LOITER, FakeVehicle, Flight, flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
@@ -117,6 +118,81 @@ def test_a_softer_hit_than_the_limit_is_no_reason_to_give_up():
     f = at_wall(INTO_WALL, abort_when={"hit_above_m_s": 2.5})
     f.run_to_end()
     assert f.companion.report().outcome == "completed"
+
+
+# --- detour: the wall of these flights has no end, the fence leaves 4.2 m of it
+
+ROOM = {"polygon_ne_m": [[-1, -2.1], [8, -2.1], [8, 2.1], [-1, 2.1]], "max_height_m": 2.4}
+ROUND = {"then": "detour"}
+
+
+def in_room(*items, **changes) -> Flight:
+    return at_wall(*items, fence=ROOM, **changes)
+
+
+def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
+    f = in_room(INTO_WALL, on_collision=ROUND)
+    f.run_to_end(200)
+    report = f.companion.report()
+    assert report.unreachable == ("2",) and len(report.collisions) <= 4
+    assert "no way round what is known; then: land" in f.event("unreachable").text
+    assert f.vehicle.position[0] < 3.0 and report.outcome == "completed"
+    assert "not flown from item 2 on" in report.reason
+    places = [hit.position_ned_m[1] for hit in report.collisions]
+    assert all(abs(a - b) > 0.5 for number, a in enumerate(places) for b in places[:number])
+
+
+@pytest.mark.parametrize(
+    ("then", "ends"),
+    [("return", "completed"), ("continue", "completed"), ("abort", "aborted"), ("land", "completed")],
+)
+def test_what_follows_a_goal_out_of_reach_is_the_missions_to_say(then, ends):
+    f = in_room(INTO_WALL, ASIDE, on_collision=ROUND, obstacles={"on_unreachable": then})
+    f.run_to_end(200)
+    report = f.companion.report()
+    assert report.outcome == ends
+    assert ("return" in f.kinds()) is (then == "return")
+    assert (3 in items_flown(f)) is (then == "continue")
+    if then == "abort":
+        assert "no way round what is known" in report.reason and f.vehicle.mode == LOITER
+
+
+def test_after_a_detours_hit_an_item_without_a_goal_is_left_behind():
+    f = in_room({"hold": {"duration_s": 20}}, ASIDE, on_collision=ROUND)
+    f.run_to("mission")
+    f.run_for(1.0)
+    strike(f)
+    f.run_to_end(60)
+    assert items_flown(f) == [2, 3, 4]
+
+
+def test_the_next_item_too_is_flown_round_what_is_known():
+    """Behind the place where the first item was hit lies the second's goal."""
+    f = in_room(INTO_WALL, INTO_WALL, on_collision={"then": "continue"})
+    f.run_to("recovering")
+    f.run_until(lambda: "detour" in f.kinds(), 20)
+    assert f.event("obstacle").data["normal_ned"][0] == pytest.approx(-1.0, abs=0.05)
+
+
+def test_a_wall_known_beforehand_is_not_touched():
+    known = [{"touches_ned_m": [[3.2, -1.9, -1.5], [3.2, 1.9, -1.5]], "normal_ned": [-1, 0, 0]}]
+    f = in_room(INTO_WALL, on_collision=ROUND, obstacles={"known": known})
+    f.run_to_end(60)
+    report = f.companion.report()
+    assert report.collisions == () and report.unreachable == ("2",)
+
+
+def test_a_way_home_that_is_cut_off_ends_where_it_is():
+    known = [{"touches_ned_m": [[1.0, -1.9, -1.5], [1.0, 1.9, -1.5]], "normal_ned": [1, 0, 0]}]
+    beside = {"go_to": {"position_ned_m": [2, 0, -1.5], "speed_m_s": 2.0}}
+    # Given a wall that is found only behind the vehicle, as a door that has closed
+    f = flight(FakeVehicle(), items=[TAKEOFF, beside, {"return": {}}], fence=ROOM, obstacles={"known": []})
+    f.run_to("mission")
+    f.run_until(lambda: f.vehicle.position[0] > 1.8)
+    f.companion.core.flight.patches = ObstaclesConfig(known=known).patches()
+    f.run_to_end(60)
+    assert f.companion.report().unreachable == ("home",)
+    assert f.vehicle.position[0] == pytest.approx(2.0, abs=0.3)
 
 
 def test_waiting_to_be_hit():

@@ -81,7 +81,7 @@ def test_the_least_mission_has_defaults_for_the_rest():
         (
             ["on_collision", "then"],
             "panic",
-            "'continue', 'retry', 'return' or 'land'",
+            "'retry', 'detour', 'return' or 'land'",
             ("on_collision", "then"),
         ),
         (["on_interrupt"], "dance", "'hold' or 'land'", ("on_interrupt",)),

@@ -1,5 +1,7 @@
 """The missions that ship, flown in lockstep: each does what its file says."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -143,6 +145,38 @@ def test_the_rooms_fence_holds_the_vehicle_inside(fly):
     path = fly("room").truth.series["position_ned_m"]
     assert path[:, 0].min() > -1.9 and path[:, 0].max() < 4.1
     assert path[:, 1].min() > -2.3 and path[:, 1].max() < 2.7
+
+
+def test_the_wall_is_found_by_touch_and_no_place_of_it_touched_twice(fly):
+    """The first two touches show the wall so far that the way round its nearer end is free, there and back."""
+    flown = fly("detour")
+    assert 2 <= len(flown.truth.hits) <= 3
+    (patch,) = flown.report.obstacles
+    assert patch.hits == len(flown.truth.hits) and patch.normal_ned == pytest.approx((-1, 0, 0), abs=0.05)
+    touched = [(hit.contact_position_ned_m[1], hit.contact_position_ned_m[2]) for hit in flown.truth.hits]
+    assert all(math.dist(a, b) > 0.5 for number, a in enumerate(touched) for b in touched[:number])
+    # what is believed covers the 3 m that stand there from -0.7 to 2.3 as far as they were touched, within 0.2 m
+    for place in patch.touches_ned_m:
+        assert place[0] == pytest.approx(4.0, abs=0.2) and -0.9 < place[1] < 2.5
+    path = flown.truth.series["position_ned_m"]
+    assert np.hypot(*(path[:, :2] - [7, 0.6]).T).min() < 0.5, "the goal was reached"
+    assert np.hypot(*path[-1, :2]) < 0.5
+
+
+def test_a_goal_behind_a_closed_wall_is_given_up_on(fly):
+    flown = fly("blocked")
+    assert flown.report.unreachable == ("4",) and "not flown from item 4 on" in flown.report.reason
+    assert len(flown.truth.hits) <= 4
+    path = flown.truth.series["position_ned_m"]
+    assert path[:, 0].max() < 3.5 and np.hypot(*path[-1, :2]) < 0.5
+
+
+def test_the_mast_is_hit_in_the_first_round_and_flown_round_in_the_second(fly):
+    flown = fly("patrol")
+    series, (hit,) = flown.truth.series, flown.truth.hits
+    after = series["time_boot_us"] > hit.contact_at_boot_us + 20_000_000
+    beyond = series["position_ned_m"][after][:, 0] > 3.5
+    assert beyond.any(), "the second round's first corner is reached"
 
 
 def test_the_cart_pushes_the_hovering_vehicle_out_of_its_way(fly):

@@ -19,6 +19,7 @@ FILES = {
     "airframe.yaml",
     "events.jsonl",
     "flight.png",
+    "obstacles.json",
     "flight.tlog",
     "inputs.jsonl",
     "mission.yaml",

@@ -1,0 +1,87 @@
+"""The flight's part of the obstacle memory: what its hits have added, and what that means for ways and recoveries."""
+
+from collections.abc import Sequence
+
+from companion.flight.collision import CollisionRecord
+from companion.flight.context import FlightContext
+from companion.flight.states import Trigger
+from companion.memory.merging import is_same, remembered
+from companion.memory.patch import Patch, Touch
+from companion.memory.stored import as_data, describe
+from companion.memory.surroundings import Surroundings
+from companion.memory.touching import touch_of
+from companion.recovery.direction import plus
+from companion.recovery.interface import Contact
+from companion.recovery.room import Surface
+
+
+def remember(flight: FlightContext, hits: int, now_us: int) -> None:
+    """Take in the first so many hits, as they are known by now; what is new is told."""
+    before = flight.patches
+    flight.patches, flight.hits_remembered = _with_hits(flight, hits), hits
+    for patch in flight.patches:
+        if patch not in before:
+            flight.tell(now_us, "obstacle", f"remembered: {describe(patch)}", **as_data(patch))
+
+
+def all_known(flight: FlightContext) -> tuple[Patch, ...]:
+    """With the hit that is being recovered from, as far as it is known: what is to be kept if the program ends now."""
+    new = flight.collisions[flight.hits_remembered :]
+    return remembered(flight.patches, _touches(flight, new), _clearance_m(flight)) if new else flight.patches
+
+
+def surroundings(flight: FlightContext) -> Surroundings:
+    """What the flight plans its ways around.
+
+    An item that is tried again is to meet what stopped it: that is left out, and nothing else.
+    """
+    patches, tally = flight.patches, flight.tally
+    is_retry = flight.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY and tally.index == flight.step_index
+    if is_retry and tally.hits:
+        patches = _with_hits(flight, len(flight.collisions) - tally.hits)
+    return surroundings_of(flight, patches)
+
+
+def surroundings_of(flight: FlightContext, patches: tuple[Patch, ...]) -> Surroundings:
+    mission = flight.mission
+    return Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+
+
+def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:
+    """What is known in front of a vehicle that has just been hit, besides what hit it. Local NED.
+
+    Of each patch what counts is where the vehicle's centre would touch it, and that the margin is kept.
+    """
+    if not flight.patches:
+        return []
+    place, clearance_m = flight.mission_ned_m(contact.position_ned_m), _clearance_m(flight)
+    reach_m = flight.mission.companion.estimate.reach_m
+    touch = touch_of(place, contact.velocity_ned_m_s, contact.normal_ned, False, reach_m, 0)
+    return [
+        Surface(
+            flight.local_ned_m(plus(patch.centre_ned_m, reach_m, patch.normal_ned)),
+            patch.normal_ned,
+            flight.mission.obstacles.margin_m,
+        )
+        for patch in flight.patches
+        if patch.faces(place, clearance_m) and not (touch is not None and is_same(patch, touch, clearance_m))
+    ]
+
+
+def _with_hits(flight: FlightContext, hits: int) -> tuple[Patch, ...]:
+    touches = _touches(flight, flight.collisions[:hits])
+    return remembered(flight.mission.obstacles.patches(), touches, _clearance_m(flight))
+
+
+def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Touch]:
+    reach_m = flight.mission.companion.estimate.reach_m
+    touches = []
+    for record in records:
+        centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
+        touch = touch_of(centre, velocity, record.normal_ned, record.is_clipped, reach_m, record.detected_at_us)
+        touches += [] if touch is None else [touch]
+    return touches
+
+
+def _clearance_m(flight: FlightContext) -> float:
+    return flight.mission.companion.estimate.reach_m + flight.mission.obstacles.margin_m

@@ -1,0 +1,112 @@
+"""Obstacle memory as people and files have it: the mission's `obstacles:` part and `obstacles.json`."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+from pydantic import Field, model_validator
+
+from companion.memory.patch import REACHES_M, Patch
+from companion.recovery.direction import STEEP, away_from
+from companion.written import NotNegative, PositionNed, Positive, Written
+
+OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]
+
+# To a tenth of a millimetre, and without the exponents that YAML takes for text.
+_DIGITS = 4
+
+
+class KnownPatch(Written):
+    """A surface: where it was touched, and the direction out of it. NED from the arming position, metres."""
+
+    touches_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1)]
+    # Of any length; a wall's counts as horizontal, see recovery.direction.
+    normal_ned: PositionNed
+    # One standard deviation; the normal of one whole contact.
+    normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
+    # How far it is believed to reach beyond its touches, at least.
+    reaches_m: NotNegative = REACHES_M
+    # When it was first touched, by the clock of the flight that did.
+    found_at_us: Annotated[int, Field(strict=True, ge=0)] = 0
+
+    @model_validator(mode="after")
+    def _has_direction(self) -> Self:
+        if not any(self.normal_ned):
+            raise ValueError("normal_ned: has no direction; it points out of the surface, such as [-1, 0, 0]")
+        return self
+
+    def patch(self) -> Patch:
+        return Patch(
+            self.touches_ned_m,
+            away_from(self.normal_ned),
+            math.radians(self.normal_error_deg),
+            self.reaches_m,
+            self.found_at_us,
+        )
+
+
+class ObstacleFile(Written):
+    """The whole of an `obstacles.json`."""
+
+    patches: tuple[KnownPatch, ...]
+
+
+class ObstaclesConfig(Written):
+    """The mission's `obstacles:` part: what is known beforehand, and what follows where that leaves no way."""
+
+    # A file of them, such as the obstacles.json of an earlier run; beside the mission file, or an absolute path.
+    file: Annotated[str, Field(min_length=1)] | None = None
+    known: tuple[KnownPatch, ...] = ()
+    # Between the guards and what is known. As recovery.clearance_m: guards 0.3 m clear, and 5 cm for the wavering of
+    # a hover on optical flow.
+    margin_m: Positive = 0.35
+    # continue: with the next item; abort: hand the vehicle over as `on_interrupt` says.
+    on_unreachable: OnUnreachable = "land"
+
+    @model_validator(mode="after")
+    def _is_read(self) -> Self:
+        if self.file is not None:
+            raise ValueError(f"file: {self.file} was not read; load the mission with rebound, or give `known`")
+        return self
+
+    def patches(self) -> tuple[Patch, ...]:
+        return tuple(known.patch() for known in self.known)
+
+
+def as_data(patch: Patch) -> dict[str, Any]:
+    """A patch as files have it; `KnownPatch` reads it back."""
+    return {
+        "touches_ned_m": [_rounded(place) for place in patch.touches_ned_m],
+        "normal_ned": _rounded(patch.normal_ned),
+        "normal_error_deg": round(math.degrees(patch.normal_error_rad), 2),
+        "reaches_m": round(patch.reaches_m, _DIGITS),
+        "found_at_us": patch.found_at_us,
+    }
+
+
+def file_data(patches: Sequence[Patch]) -> Mapping[str, Any]:
+    """What an `obstacles.json` holds."""
+    return {"patches": [as_data(patch) for patch in patches]}
+
+
+def _rounded(vector: Sequence[float]) -> list[float]:
+    # adding 0.0 turns a rounded -0.0 into 0.0
+    return [round(component, _DIGITS) + 0.0 for component in vector]
+
+
+def describe(patch: Patch) -> str:
+    """For people: what, where, how much of it."""
+    n, e, d = patch.centre_ned_m
+    hits = "touched once" if patch.hits == 1 else f"touched {patch.hits} times"
+    size = ""
+    if not patch.is_steep:
+        low_m, high_m = patch.believed_along_m()
+        size = f", believed {high_m - low_m:.1f} m wide"
+    return f"{_what(patch)} at [{n:.2f}, {e:.2f}, {d:.2f}], {hits}{size}"
+
+
+def _what(patch: Patch) -> str:
+    north, east, down = patch.normal_ned
+    if abs(down) > STEEP:
+        return "surface above" if down > 0.0 else "surface below"
+    return f"surface facing {math.degrees(math.atan2(east, north)) % 360.0:.0f} deg"

@@ -1,0 +1,136 @@
+"""What is known, as one vehicle sees it: which patches are in its way at a height, and how near it may come."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import shapely
+from shapely import LineString, Point
+from shapely.geometry.base import BaseGeometry
+
+from companion.memory.patch import Patch
+from companion.memory.shape import believed, core
+from companion.messages import Vector3
+from companion.mission.fence import Fence
+
+Place = tuple[float, float]
+
+# Ways planned along the clearance may waver by so much before they are planned anew: what a place estimate moves
+# between two hits, and the merging of one more touch.
+SLACK_M = 0.05
+# Corners and ends, computed, and what a vehicle at rest is beside its setpoint.
+ROUNDING_M = 0.02
+# A goal may lie nearer to a surface than the clearance, but a place is good to 0.1 m (see merging): with so much and
+# 5 cm between guards and surface it can be flown to without a touch.
+LEAST_FREE_M = 0.15
+# A level this near to the bound of a patch's heights is beside it.
+LEVEL_SLACK_M = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Walls:
+    """What is in the way at some height: what is believed of each patch, and its core (see shape)."""
+
+    believed: Sequence[BaseGeometry]
+    cores: Sequence[BaseGeometry]
+    reach_m: float
+    clearance_m: float
+
+    @property
+    def least_m(self) -> float:
+        """How near a vehicle's centre may come to a core."""
+        return min(self.reach_m + LEAST_FREE_M, self.clearance_m - SLACK_M)
+
+    def holds(self, place: Place) -> bool:
+        """Whether a place lies in one of them, for a vehicle that has a size."""
+        return any(distance_m < self.least_m for distance_m in _distances_m(Point(place), self.cores))
+
+    def let_pass(self, way: BaseGeometry, start: Place | None, goal: Place | None) -> bool:
+        """Whether a way stays off by the clearance, or by what its ends leave of it, and off the cores.
+
+        An end that is None leaves it whole.
+        """
+        return _keeps(way, start, goal, self.believed, self.clearance_m - SLACK_M) and _keeps(
+            way, start, goal, self.cores, self.least_m
+        )
+
+    def grown(self, by_m: float) -> list[BaseGeometry]:
+        """What is believed, and so much more on every side."""
+        return [shape.buffer(by_m, join_style="mitre") for shape in self.believed]
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """All patches for one vehicle: `reach_m` from its centre to the guards' rim, `margin_m` from there to surfaces."""
+
+    patches: tuple[Patch, ...]
+    fence: Fence
+    reach_m: float
+    margin_m: float
+
+    @property
+    def clearance_m(self) -> float:
+        return self.reach_m + self.margin_m
+
+    def walls(self, from_m: float, to_m: float, start_ned_m: Vector3) -> Walls:
+        """Between two heights, for a vehicle that starts there."""
+        low_m, high_m = min(from_m, to_m), max(from_m, to_m)
+        here = [patch for patch in self.patches if self._meets(patch, low_m, high_m)]
+        there = [patch for patch in here if not _is_within(patch, start_ned_m)]
+        return Walls([*map(believed, there)], [*map(core, there)], self.reach_m, self.clearance_m)
+
+    def is_clear(self, place_ned_m: Vector3, start_ned_m: Vector3) -> bool:
+        """Whether a place keeps the whole clearance."""
+        walls = self.walls(-place_ned_m[2], -place_ned_m[2], start_ned_m)
+        return walls.let_pass(Point(place_ned_m[:2]), None, None)
+
+    def _meets(self, patch: Patch, low_m: float, high_m: float) -> bool:
+        bottom_m, top_m = patch.believed_heights_m()
+        off_m = self.clearance_m - LEVEL_SLACK_M
+        return low_m < top_m + off_m and high_m > bottom_m - off_m
+
+    def levels_m(self) -> list[float]:
+        """Heights just above walls and floors and just below ceilings, inside the fence."""
+        levels = set[float]()
+        for patch in self.patches:
+            bottom_m, top_m = patch.believed_heights_m()
+            is_ceiling = patch.is_steep and patch.normal_ned[2] > 0.0
+            levels.add(bottom_m - self.clearance_m if is_ceiling else top_m + self.clearance_m)
+        return sorted(level for level in levels if self.fence.min_height_m <= level <= self.fence.max_height_m)
+
+    def is_capped(self, start: Place, from_m: float, to_m: float) -> bool:
+        """Whether a ceiling, or a floor, is between the vehicle and another height."""
+        low_m, high_m = min(from_m, to_m), max(from_m, to_m)
+        steep = [patch for patch in self.patches if patch.is_steep and self._meets(patch, low_m, high_m)]
+        return any(core(patch).distance(Point(start)) < self.reach_m for patch in steep)
+
+    def block(self, points_ned_m: Sequence[Vector3]) -> bool:
+        """Whether a way through these points, one near the other, comes too near to what is known."""
+        if not self.patches:
+            return False
+        heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
+        start, goal = places[0], places[-1]
+        walls = self.walls(min(heights), max(heights), points_ned_m[0])
+        way = LineString(places) if any(place != start for place in places) else Point(start)
+        return bool(walls.cores) and (walls.holds(goal) or not walls.let_pass(way, start, goal))
+
+
+def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
+    """A patch in which the vehicle itself is cannot be there, or not any more."""
+    bottom_m, top_m = patch.believed_heights_m()
+    return bottom_m <= -place_ned_m[2] <= top_m and core(patch).distance(Point(place_ned_m[:2])) < 2.0 * ROUNDING_M
+
+
+def _keeps(
+    way: BaseGeometry, start: Place | None, goal: Place | None, shapes: Sequence[BaseGeometry], off_m: float
+) -> bool:
+    """Off every shape by so much, or as far as both ends are; never through one outside of which both are."""
+    needs_m = [off_m] * len(shapes)
+    for end in (start, goal):
+        if end is not None:
+            ends_m = _distances_m(Point(end), shapes)
+            needs_m = [min(need_m, end_m - ROUNDING_M) for need_m, end_m in zip(needs_m, ends_m, strict=True)]
+    return all(distance_m >= need_m for distance_m, need_m in zip(_distances_m(way, shapes), needs_m, strict=True))
+
+
+def _distances_m(geometry: BaseGeometry, shapes: Sequence[BaseGeometry]) -> list[float]:
+    return [float(distance_m) for distance_m in shapely.distance(geometry, shapes)] if shapes else []

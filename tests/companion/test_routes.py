@@ -1,0 +1,256 @@
+"""Ways round what is known: clear of it, inside the fence, the shortest, or none."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from shapely import LineString, Point
+
+from companion.flight.around import home_around, passed, way_around
+from companion.flight.course import Pace
+from companion.flight.curve import CurveProfile
+from companion.memory.merging import remembered
+from companion.memory.patch import REACHES_M, Patch, Touch
+from companion.memory.route import route
+from companion.memory.shape import believed, core
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings
+from companion.memory.touching import touch_of
+from companion.mission.fence import Fence
+from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
+
+REACH_M, MARGIN_M = 0.2, 0.35
+CLEARANCE_M = REACH_M + MARGIN_M
+ERROR_RAD = math.radians(15.0)
+PACE = Pace(1.5, 2.0)
+START, GOAL = (0.0, 0.0, -1.5), (7.0, 0.0, -1.5)
+
+
+def wall(*easts_m: float, north_m: float = 4.0, error_rad: float = ERROR_RAD, height_m: float = 1.5) -> Patch:
+    places = tuple((north_m, east_m, -height_m) for east_m in easts_m)
+    return Patch(places, (-1.0, 0.0, 0.0), error_rad, REACHES_M, 0)
+
+
+def ceiling(height_m: float, north_m: float = 0.0) -> Patch:
+    return Patch(((north_m, 0.0, -height_m),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
+
+
+def around(*patches: Patch, fence: Fence | None = None) -> Surroundings:
+    return Surroundings(patches, fence or Fence(radius_m=9, max_height_m=2.4), REACH_M, MARGIN_M)
+
+
+def length_m(start, places) -> float:
+    return sum(math.dist(a, b) for a, b in pairwise([start, *places]))
+
+
+def test_without_anything_known_the_way_is_straight():
+    assert route(around(), START, GOAL) == (GOAL,)
+    assert not around().block((START, GOAL))
+
+
+def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
+    known = around(wall(0.2))
+    assert known.block((START, GOAL))
+    places = route(known, START, GOAL)
+    way = LineString([START[:2], *[place[:2] for place in places]])
+    assert way.distance(believed(known.patches[0])) >= CLEARANCE_M - SLACK_M
+    # round the nearer end, which is the western one
+    assert all(place[1] < 0.0 for place in places[:-1])
+    least_m = math.hypot(4.0, 0.3 + CLEARANCE_M) + math.hypot(3.0, 0.3 + CLEARANCE_M)
+    assert least_m < length_m(START, places) < least_m + 0.3
+
+
+def test_an_unsure_normal_is_passed_in_a_wider_bow():
+    sure, unsure = (route(around(wall(0.0, error_rad=math.radians(e))), START, GOAL) for e in (5.0, 40.0))
+    assert unsure[0][0] < sure[0][0] - 0.2
+    # a wall that is turned by 40 degrees against what is believed is within it
+    turned_end = Point(4.0 - REACHES_M * math.sin(math.radians(40)), REACHES_M * math.cos(math.radians(40)))
+    assert believed(wall(0.0, error_rad=math.radians(40.0))).buffer(1e-9).covers(turned_end)
+
+
+def test_from_a_recoverys_setpoint_near_the_wall_the_way_leads_off_and_round():
+    near = (4.0 - 0.45, 0.0, -1.5)
+    known = around(wall(0.0))
+    places = route(known, near, GOAL)
+    way = LineString([near[:2], *[place[:2] for place in places]])
+    assert way.distance(core(known.patches[0])) >= 0.45 - 0.03
+    assert not known.block((near, (0.0, 0.0, -1.5))), "straight away from the wall is always free"
+
+
+def test_from_beside_the_wall_no_way_leads_through_it():
+    """However near the vehicle is, and whatever the normal's error: the wall itself is never crossed."""
+    known = around(wall(0.0, 1.0, 2.0, error_rad=math.radians(40.0)))
+    for off_m in (0.08, 0.2, 0.3, 0.5):
+        start = (4.0 - off_m, 1.0, -1.5)
+        places = route(known, start, GOAL)
+        assert not LineString([start[:2], *[place[:2] for place in places]]).intersects(core(known.patches[0]))
+
+
+def test_a_vehicle_inside_what_is_remembered_knows_that_it_is_not_there():
+    """A door that was opened, or a place estimate that has drifted."""
+    known = around(wall(0.0))
+    assert route(known, (4.05, 0.0, -1.5), GOAL) == (GOAL,)
+
+
+def test_a_goal_in_the_wall_cannot_be_reached_one_beside_it_can():
+    known = around(wall(0.0))
+    assert route(known, START, (3.85, 0.0, -1.5)) is None
+    assert route(known, START, (4.0 - REACH_M - LEAST_FREE_M - 0.05, 0.0, -1.5)) is not None
+
+
+def test_a_goal_behind_a_wall_across_the_fence_cannot_be_reached():
+    room = Fence(polygon_ne_m=((-2, -2), (8, -2), (8, 2), (-2, 2)), max_height_m=2.4)
+    assert route(around(wall(-1.0, 0.0, 1.0), fence=room), START, GOAL) is None
+    assert route(around(wall(0.0), fence=room), START, GOAL) is not None
+
+
+def test_where_the_fence_is_high_enough_the_way_leads_over_it():
+    room = Fence(polygon_ne_m=((-2, -2), (8, -2), (8, 2), (-2, 2)), max_height_m=6)
+    known = around(wall(-1.0, 0.0, 1.0), fence=room)
+    places = route(known, START, GOAL)
+    over_m = -places[0][2]
+    assert over_m == pytest.approx(known.patches[0].believed_heights_m()[1] + CLEARANCE_M)
+    assert places[0][:2] == START[:2] and places[-2][:2] == GOAL[:2] and places[-1] == GOAL
+    # and not through a ceiling above the start
+    assert route(around(wall(-1.0, 0.0, 1.0), ceiling(2.2), fence=room), START, GOAL) is None
+
+
+def test_a_wall_is_no_matter_high_above_it():
+    known = around(wall(0.0), fence=Fence(radius_m=9, max_height_m=5))
+    high, far = (0.0, 0.0, -4.0), (7.0, 0.0, -4.0)
+    assert not known.block((high, far)) and route(known, high, far) == (far,)
+
+
+def test_a_known_ceiling_limits_the_height():
+    known = around(ceiling(2.0, north_m=3.0))
+    assert known.block(((0.0, 0.0, -1.8), (6.0, 0.0, -1.8)))
+    assert not known.block(((0.0, 0.0, -1.2), (6.0, 0.0, -1.2)))
+    assert route(known, START, (3.0, 0.0, -1.8)) is None
+
+
+def test_ways_stay_inside_a_fence_with_a_bend():
+    """An L-shaped room with a pillar in its bend."""
+    room = Fence(polygon_ne_m=((-1, -1), (5, -1), (5, 5), (3, 5), (3, 1), (-1, 1)), max_height_m=3)
+    goal = (4.0, 4.5, -1.5)
+    places = route(around(fence=room), START, goal)
+    assert places == ((3.0, 1.0, -1.5), goal)
+    assert length_m(START, places) < length_m(START, [(4.0, 0.0, -1.5), goal])
+
+
+def test_a_route_is_found_soon_also_among_many_patches():
+    patches = [
+        wall(0.7 * (row % 2) - 3.0 + 1.9 * column, north_m=1.5 + 1.3 * row) for row in range(4) for column in range(4)
+    ]
+    places = route(around(*patches), START, (7.5, 0.0, -1.5))
+    way = LineString([START[:2], *[place[:2] for place in places]])
+    assert min(way.distance(core(patch)) for patch in patches) >= CLEARANCE_M - SLACK_M
+
+
+# --- items
+
+
+def test_a_line_that_is_free_is_flown_as_it_is():
+    planned = way_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(3.0)))
+    assert not planned.is_detour and planned.way.distance_m == pytest.approx(7.0)
+
+
+def test_a_line_in_whose_way_something_stands_is_led_round_it():
+    planned = way_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(0.0)))
+    assert planned.is_detour and planned.way.target_m == GOAL and 7.0 < planned.way.distance_m < 8.0
+
+
+def test_a_velocity_is_flown_as_it_is():
+    """It asks for a motion: so a wall is felt for."""
+    item = VelocityItem(velocity_ned_m_s=(1.0, 0.0, 0.0), duration_s=5.0)
+    assert not way_around(item, START, PACE, around(wall(0.0))).is_detour
+
+
+def test_a_paths_point_in_a_wall_is_left_out_but_not_its_last():
+    through = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5), (6.0, 0.0, -1.5)))
+    planned = way_around(through, START, PACE, around(wall(0.0)))
+    assert planned.left_out == 1 and planned.way.target_m == (6.0, 0.0, -1.5)
+    into = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5)))
+    assert way_around(into, START, PACE, around(wall(0.0))).way is None
+
+
+def test_an_orbit_is_flown_round_what_stands_in_it():
+    item = OrbitItem(centre_ned_m=(4.0, 3.0, -1.5), radius_m=3.0)
+    known = around(wall(0.0, north_m=4.0), fence=Fence(radius_m=12))
+    planned = way_around(item, START, PACE, known)
+    assert planned.is_detour and planned.left_out >= 1
+    places = [planned.way.at(planned.way.duration_s * n / 400)[0] for n in range(401)]
+    assert min(Point(place[:2]).distance(core(known.patches[0])) for place in places) > REACH_M + LEAST_FREE_M
+    assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
+
+
+def test_home_is_led_round_what_stands_in_the_way():
+    planned = home_around((7.0, 0.0, -1.5), ReturnItem(), PACE, around(wall(0.0)))
+    assert planned.is_detour and planned.way.target_m[:2] == (0.0, 0.0)
+
+
+def test_home_below_a_ceiling_leaves_out_the_climb():
+    planned = home_around((7.0, 0.0, -1.5), ReturnItem(height_m=2.3), PACE, around(ceiling(2.3, north_m=7.0)))
+    heights = [-planned.way.at(planned.way.duration_s * n / 50)[0][2] for n in range(20)]
+    assert planned.is_detour and max(heights) < 2.3 - REACH_M
+
+
+def test_what_has_been_flown_of_a_path_is_not_flown_again():
+    path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), (6.0, 0.0, -1.5)))
+    way = CurveProfile((START, *path.points_ned_m), 1.5, 2.0)
+    assert [passed(path, way, way.duration_s * part) for part in (0.1, 0.5, 1.0)] == [0, 1, 3]
+
+
+# --- touch after touch
+
+
+def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) -> tuple[list[Touch], bool]:
+    """A point with the vehicle's reach, a wall 4 m north, and a memory; touches until it is through or gives up."""
+    fence, touches, start = Fence(radius_m=11, max_height_m=2.4), [], START
+    while len(touches) < limit:
+        known = around(*remembered((), touches, CLEARANCE_M), fence=fence)
+        places = route(known, start, GOAL)
+        if places is None:
+            return touches, False
+        hit = next((hit for a, b in pairwise([start, *places]) if (hit := first_hit(a, b, width_m, offset_m))), None)
+        if hit is None:
+            return touches, True
+        place, velocity, normal = hit
+        lean = math.radians(error_deg) * (-1) ** len(touches)
+        n, e, _ = normal
+        seen = (n * math.cos(lean) - e * math.sin(lean), n * math.sin(lean) + e * math.cos(lean), 0.0)
+        touch = touch_of(place, velocity, seen, error_deg > 25.0, REACH_M, 0)
+        # Then no touch is made where a wall is remembered
+        for patch in known.patches:
+            assert core(patch).distance(Point(touch.place_ned_m[:2])) > 0.1
+        touches.append(touch)
+        start = tuple(p + 0.4 * x for p, x in zip(place, normal, strict=True))
+    return touches, False
+
+
+def first_hit(a, b, width_m, offset_m):
+    steps = max(2, math.ceil(math.dist(a, b) / 0.01))
+    velocity = tuple(y - x for x, y in zip(a, b, strict=True))
+    for step in range(steps + 1):
+        place = tuple(x + v * step / steps for x, v in zip(a, velocity, strict=True))
+        beside_m = abs(place[1] - offset_m) - 0.5 * width_m
+        if 4.0 - REACH_M <= place[0] <= 4.1 + REACH_M and beside_m < REACH_M:
+            normal = SOUTH if place[0] < 3.85 else (0.0, math.copysign(1.0, place[1] - offset_m), 0.0)
+            return place, tuple(v / math.dist(a, b) for v in velocity), normal
+    return None
+
+
+SOUTH = (-1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("error_deg", [0.0, 15.0, 35.0])
+@pytest.mark.parametrize("offset_m", [0.0, 0.4, -0.9])
+@pytest.mark.parametrize(("width_m", "most"), [(0.3, 2), (1.0, 3), (3.0, 4), (6.0, 6), (10.0, 8)])
+def test_a_wall_of_any_width_is_passed_after_a_few_touches_none_where_it_is_remembered(
+    width_m, most, offset_m, error_deg
+):
+    touches, is_through = explore(width_m, offset_m, error_deg)
+    assert is_through and len(touches) <= most
+
+
+def test_a_wall_as_wide_as_the_fence_is_given_up_on():
+    touches, is_through = explore(24.0, 0.0, 0.0)
+    assert not is_through and len(touches) < 12
