@@ -67,7 +67,8 @@ class SimulatedVehicle:
         # A first interval at rest: a vehicle that can be talked to has already seen its sensors.
         first = self._plant.step(None, armed=False)
         self._autopilot = Autopilot(airframe.hover_fraction, first, parameters, self._missions)
-        self._autopilot.commander.positioning.sees_ground = self._plant.onboard is not None
+        self._positioning = self._autopilot.commander.positioning
+        self._positioning.sees_ground = self._plant.onboard is not None
         # Taken once: looking a record's field up costs microseconds.
         self._body = self._plant.state.body
         identity = Identity(int(parameters["MAV_SYS_ID"]), int(parameters["MAV_COMP_ID"]))
@@ -183,10 +184,11 @@ class SimulatedVehicle:
 
     def _sense(self, telemetry: Telemetry) -> None:
         slow, faults = self._slow, self._plant.faults
-        slow.gps_is_blocked = self._autopilot.ground.gps_is_off
+        positioning = self._positioning
         if faults is not None:
-            slow.gps_is_blocked |= faults.is_lost("gps", self.time_boot_us / 1e6)
+            positioning.gps_is_jammed = faults.is_lost("gps", self.time_boot_us / 1e6)
             self._autopilot.battery.supply_share = faults.voltage_share
+        slow.gps_is_blocked = positioning.gps_is_off or positioning.gps_is_jammed
         slow.update(telemetry.sample.time_boot_us, self._body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss

@@ -22,11 +22,6 @@ class Ground:
         self.wants_reboot = False
         """To be done by whoever switches the software on and off, once the answer is out."""
 
-    @property
-    def gps_is_off(self) -> bool:
-        """INJECT_FAILURE has silenced the receiver."""
-        return self._positioning.gps_is_off
-
     def set_home(self, place: Place | None, yaw_rad: float) -> Result:
         """DO_SET_HOME: to a place, or to where the vehicle is; a heading that is not a number is north."""
         if not self._parameters["COM_HOME_EN"]:

@@ -38,7 +38,7 @@ def problems(
     is_too_low = battery.remaining < least if least >= 0.0 else battery.warning >= BatteryWarning.CRITICAL
     if is_too_low:
         found.append(StatusText(Severity.CRITICAL, _BATTERY_TEXTS.get(battery.warning, "Low battery")))
-    if positioning.gps_is_off and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
+    if positioning.is_without_gps and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
         found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
     if navigator.fence.breached:
         found.append(StatusText(Severity.CRITICAL, navigator.fence.breach_text))

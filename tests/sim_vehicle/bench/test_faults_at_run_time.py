@@ -201,6 +201,15 @@ def test_a_lost_gps_has_no_fix_and_the_estimate_goes_astray_until_it_is_back() -
     assert astray_m(pilot) < 0.1
 
 
+def test_without_gps_for_long_the_position_is_lost_and_the_vehicle_descends() -> None:
+    """As a PX4 SITL does 5.1 s after its GPS was switched off."""
+    pilot = hovering()
+    begun_s = pilot.vehicle.time_s
+    with pilot.vehicle.inject(faults.gps_loss()):
+        pilot.vehicle.advance_until(lambda truth: truth.mode == "Descend", 8.0)
+    assert pilot.vehicle.time_s - begun_s == pytest.approx(5.0, abs=0.2)
+
+
 def astray_m(pilot: Pilot) -> float:
     message, truth = pilot.of("LOCAL_POSITION_NED")[-1], pilot.vehicle.truth
     return math.dist((message.x, message.y), truth.position_ned_m[:2])
