@@ -1,4 +1,4 @@
-"""`rebound campaign`: flies everything that must be shown and writes the tables of docs/campaign.md."""
+"""`rebound campaign`: flies everything that must be shown and writes docs/campaign.md, and docs/recovery.md's table."""
 
 import re
 import time
@@ -17,9 +17,10 @@ from rebound_cli.campaign_report.picture import missions_figure
 from rebound_cli.campaign_report.reading import HOW_TO_READ
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.random_missions.campaign import missions_campaign
+from rebound_cli.recoveries.command import write_table
 from rebound_cli.recoveries.hits import recoveries_campaign
 
-DOCUMENT_NAME, PICTURE = "campaign.md", Path("images") / "campaign" / "missions.png"
+DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
 START_MARK, END_MARK = "<!-- generated: campaign -->", "<!-- end -->"
 
 
@@ -38,6 +39,8 @@ def run_campaign_command(options: Namespace) -> int:
     missions = Missions(flown.cases, missions_results.results)
     bars = mission_bars(missions) + law_bars(hits.cases, hits_results.results)
     _write(out, missions, _text(options, missions, bars, worked_out))
+    if (out / RECOVERY_NAME).exists():
+        write_table(out / RECOVERY_NAME, hits, hits_results, options.hits)
     print(summary_text(bars))
     for text in failed:
         print(text)

@@ -98,6 +98,7 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
         items[-1:] = [{"repeat": {"times": 2, "items": [items[-1], {"hold": {"duration_s": 0.5}}]}}]
     items.append(_last(draw, room))
     follows, interrupted, yaw_deg = policy(draw), draw.one_of(("hold", "land")), float(draw.whole(-180, 180))
+    out_of_reach = draw.one_of(("land", "return", "continue", "abort"), (3.0, 3.0, 3.0, 1.0))
     if "land" in items[-1] and draw.happens(0.1):
         extras.append(_block(room, draw, route))
     data = {
@@ -105,6 +106,7 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
         "description": f"{room.kind}, {stream_hz} Hz, wind up to {wind_m_s:g} m/s, seed {case.seed}",
         "items": items,
         "on_collision": follows,
+        "obstacles": {"on_unreachable": out_of_reach},
         "on_interrupt": interrupted,
         "fence": room.fence,
         "companion": {"streams": {"highres_imu_hz": STREAMS_HZ[stream_hz]}},

@@ -71,7 +71,7 @@ def quiet_item(route: Route) -> Part | None:
 
 def policy(draw: Draw) -> Part:
     """What follows a hit."""
-    then = draw.one_of(("hold", "continue", "retry", "return", "land"), (3.0, 3.0, 2.0, 1.5, 1.5))
+    then = draw.one_of(("detour", "hold", "continue", "retry", "return", "land"), (3.0, 2.0, 2.0, 2.0, 1.5, 1.5))
     found: Part = {"then": then, "max_hits": draw.whole(1, 5)}
     if then == "hold":
         found["hold_s"] = draw.number(0.5, 1.5)

@@ -13,6 +13,7 @@ from companion.report import Event
 from rebound_cli.random_missions.contacts import Contact, Role, contacts_of, without_contact
 from rebound_cli.random_missions.crashes import crashes
 from rebound_cli.random_missions.flight import JudgedFlight
+from rebound_cli.random_missions.memory import given_up, repeated
 from rebound_cli.random_missions.obedience import disobediences
 
 Floats = npt.NDArray[np.float64]
@@ -44,6 +45,8 @@ def failures(flight: JudgedFlight) -> list[Failure]:
     found += _noticing(flight, contacts)
     found += [Failure("not as the mission says", text) for text in disobediences(flight)]
     found += [Failure("not where the mission says", text) for text in _places(flight, contacts)]
+    found += [Failure("flew into a known surface", text) for text in repeated(flight, contacts)]
+    found += [Failure("gave up a goal in the open", text) for text in given_up(flight)]
     return found
 
 
@@ -60,7 +63,7 @@ def _places(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[str]:
     """Goals, holds, home and landings, where the vehicle really was."""
     steps = program(flight.mission)
     goes_home = False
-    told = [event for event in flight.events if event.kind in _TELLING]
+    told = [event for event in flight.events if event.kind in _TELLING or event.data.get("left_out")]
     for event, following in pairwise(told):
         goes_home |= event.kind == "return"
         if event.kind == "hold":
@@ -85,8 +88,8 @@ def _places(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[str]:
             yield f"stands {home_m:.2f} m from home"
 
 
-# A time-out, a hit and the like stand between two items that were not flown one after the other.
-_TELLING = ("armed", "item", "detection", "timeout", "hold", "return", "landing", "done", "aborted")
+# A time-out, a hit, a goal out of reach, points left out: such items were not flown one after the other.
+_TELLING = ("armed", "item", "detection", "unreachable", "timeout", "hold", "return", "landing", "done", "aborted")
 
 
 def _goal(action: object) -> Floats | None:

@@ -9,6 +9,9 @@ from companion.mission.program import Step, program
 from companion.report import Event, FlightReport
 from rebound_cli.random_missions.flight import JudgedFlight
 
+# To these there may be another way; a detour of anything else is over with the hit.
+_WITH_A_GOAL = ("go_to", "path", "orbit")
+
 
 @dataclass(slots=True)
 class _Course:
@@ -21,9 +24,8 @@ class _Course:
     hits_of_step: int = 0
     going_home: bool = False
     due: str | None = None
-    """What the latest hit's policy says follows the recovery."""
+    """What the latest hit's policy says follows the recovery, or the mission of a goal out of reach."""
     held: bool = False
-    timed_out: str | None = None
     complaints: list[str] = field(default_factory=list)
 
     def policy(self) -> tuple[OnCollision, int]:
@@ -34,8 +36,12 @@ class _Course:
         match event.kind:
             case "detection":
                 self._hit()
-            case "timeout":
-                self.timed_out = self.steps[self.index].item.on_timeout
+            case "unreachable":
+                # Home has no item to go on with: the vehicle lands where it is.
+                is_home = "then" not in event.data
+                if is_home:
+                    self.going_home = True
+                self.due = "land" if is_home else str(event.data["then"])
             case "hold":
                 self._expect(self.due == "hold", "held")
                 self.held = True
@@ -62,7 +68,9 @@ class _Course:
             self.due = "return" if self.going_home else policy.then
 
     def _item(self, step: int) -> None:
-        after = {"continue": self.index + 1, "hold": self.index + 1 if self.held else -1, "retry": self.index}
+        again = self.index if self.steps[self.index].name in _WITH_A_GOAL else self.index + 1
+        held = self.index + 1 if self.held else -1
+        after = {"continue": self.index + 1, "hold": held, "retry": self.index, "detour": again}
         wanted = self.index + 1 if self.due is None else after.get(self.due, -1)
         self._expect(step == wanted, f"began step {step}")
         if step != self.index:
@@ -71,8 +79,8 @@ class _Course:
 
     def _expect(self, is_so: bool, what: str) -> None:
         if not is_so:
-            instead = f"after the hit: {self.due}" if self.due else "to go on"
-            self.complaints.append(f"{what} at step {self.index} instead of {instead}")
+            instead = self.due or "to go on"
+            self.complaints.append(f"{what} at step {self.index} instead of: {instead}")
 
 
 def disobediences(flight: JudgedFlight) -> list[str]:

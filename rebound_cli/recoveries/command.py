@@ -4,10 +4,11 @@ import re
 import statistics
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from companion.errors import ReboundError
-from rebound_cli.campaign.plan import Json
-from rebound_cli.campaign.run import Workers, failures_text, run_campaign
+from rebound_cli.campaign.plan import Campaign, Json
+from rebound_cli.campaign.run import Results, Workers, failures_text, run_campaign
 from rebound_cli.recoveries.hits import AIRFRAMES, LAWS, SLANTS_DEG, SPEEDS_M_S, Case, of, recoveries_campaign
 
 MARK = re.compile(r"(<!-- generated: recoveries -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -21,16 +22,18 @@ def run_recoveries(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
     campaign = recoveries_campaign(options.seeds)
     results = run_campaign(campaign, Workers(options.jobs))
-    text = options.out.read_text(encoding="utf-8") if options.out.exists() else ""
+    write_table(options.out, campaign, results, options.seeds)
+    return 1 if results.failures else 0
+
+
+def write_table(path: Path, campaign: Campaign, results: Results, seeds: int) -> None:
+    """Make what stands between the document's marks anew. Raises DocumentError where there are none."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
     if not MARK.search(text):
-        raise DocumentError(
-            f"{options.out} has no line `<!-- generated: recoveries -->` with an `<!-- end -->` after it"
-        )
-    failures = failures_text(campaign, results)
-    body = "\n".join([*_lines(campaign.cases, results.results, options.seeds), failures, ""])
-    options.out.write_text(MARK.sub(lambda found: found[1] + body + found[2], text), encoding="utf-8")
-    print(f"Written to {options.out}.")
-    return 1 if failures else 0
+        raise DocumentError(f"{path} has no line `<!-- generated: recoveries -->` with an `<!-- end -->` after it")
+    body = "\n".join([*_lines(campaign.cases, results.results, seeds), failures_text(campaign, results), ""])
+    path.write_text(MARK.sub(lambda found: found[1] + body + found[2], text), encoding="utf-8")
+    print(f"Written to {path}.")
 
 
 def _lines(cases: Sequence[Case], results: dict[int, Json], seeds: int) -> Iterator[str]:

@@ -41,7 +41,7 @@ def plain_events():
 
 def events_with_hit(*after, hit_s=10.0):
     """The same with a hit on the way; `after` is what the companion did then."""
-    return [*plain_events()[:2], event(hit_s, "detection"), event(hit_s + 2.0, "recovered"), *after]
+    return [*plain_events()[:2], event(hit_s + 0.004, "detection"), event(hit_s + 2.0, "recovered"), *after]
 
 
 def path(*points, step_s=0.02):

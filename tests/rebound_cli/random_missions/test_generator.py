@@ -48,7 +48,7 @@ def test_every_kind_of_room_item_policy_and_end_comes_up(drawn):
     wanted = {"takeoff", "go_to", "velocity", "path", "orbit", "hold", "set_yaw", "set_speed", "wait_for", "repeat"}
     assert set(items) == wanted | {"land", "return"}
     policies = {mission.data["on_collision"]["then"] for mission in drawn.values()}
-    assert policies >= {"hold", "continue", "retry", "return", "land"}
+    assert policies >= {"detour", "hold", "continue", "retry", "return", "land"}
     assert {mission.stream_hz for mission in drawn.values()} == {50, 200}
     assert {extra for mission in drawn.values() for extra in mission.extras} == {
         "beam over the start",

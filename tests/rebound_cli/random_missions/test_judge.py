@@ -1,6 +1,7 @@
 """The judge on flights made up by hand: each cause of a failure is found, and a good flight has none."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ BOUNCED = path(
     (17, 1.5, 0, 0),
 )
 LANDS_THERE = [event(12.0, "landing"), event(DONE_S, "done")]
-LAND = {"then": "land"}
+LANDS_LATER = [event(13.6, "landing"), event(DONE_S, "done")]
+LAND, DETOUR = {"then": "land"}, {"then": "detour"}
 
 
 def causes(judged):
@@ -166,6 +168,36 @@ def test_home_is_where_it_started():
     )
     assert causes(flight(home, there, items=items)) == []
     assert causes(flight(home, beside, items=items)) == ["not where the mission says"]
+
+
+def test_the_same_place_hit_twice_is_a_failure_unless_it_was_tried_again_on_purpose():
+    touched = (2.2, 0.1, -2.0)
+    twice = [replace(hit(), contact_point_ned_m=touched), replace(hit(at_s=12.6), contact_point_ned_m=touched)]
+    seen = [collision(), collision(at_s=12.604)]
+    again = [event(12, "item", step=2), event(12.61, "detection"), event(13.6, "recovered"), *LANDS_LATER]
+    items = [{"takeoff": {"height_m": 2}}, *[{"go_to": {"position_ned_m": [4, 0, -2]}}] * 2, {"land": {}}]
+    policy = {"then": "continue", "max_hits": 2}
+    judged = bounced(*again, policy=policy, items=items, hits=twice, collisions=seen)
+    assert causes(judged) == ["flew into a known surface"]
+    # half a metre beside is not known
+    beside = [twice[0], replace(twice[1], contact_point_ned_m=(2.2, 0.6, -2.0))]
+    assert causes(bounced(*again, policy=policy, items=items, hits=beside, collisions=seen)) == []
+    retried = [event(12, "item", step=1), *again[1:]]
+    retry = {"then": "retry", "max_hits": 2}
+    assert causes(bounced(*retried, policy=retry, hits=twice, collisions=seen)) == []
+
+
+def test_a_goal_called_out_of_reach_is_one_behind_something():
+    told = [event(12, "item", step=1), event(12, "unreachable", item="2", then="land"), *LANDS_THERE]
+    assert causes(bounced(*told, policy=DETOUR)) == []
+    nothing = bounced(*told, policy=DETOUR)
+    nothing = replace(nothing, obstacles={})
+    assert causes(nothing) == ["gave up a goal in the open"]
+
+
+def test_what_follows_a_goal_out_of_reach_is_what_the_mission_says():
+    told = [event(12, "item", step=1), event(12, "unreachable", item="2", then="return"), *LANDS_THERE]
+    assert causes(bounced(*told, policy=DETOUR)) == ["not as the mission says"]
 
 
 def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
