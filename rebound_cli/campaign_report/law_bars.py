@@ -67,7 +67,7 @@ def _of_airframe(airframe: str, found: list[Pair]) -> Iterator[Bar]:
     yield Bar(
         f"{airframe}: neither 5 cm of overshoot nor the wall again",
         f"≥ {100 * CLEAN_WANTED:g} %" if judged else "",
-        per_cent(clean),
+        f"{per_cent(clean)} %",
         clean >= CLEAN_WANTED if judged else None,
         of,
     )
@@ -75,7 +75,7 @@ def _of_airframe(airframe: str, found: list[Pair]) -> Iterator[Bar]:
     yield Bar(
         f"{airframe}: guards at rest clear by 0.3 m, or by half of `paper`'s distance if that is more",
         "100 %",
-        per_cent(share(clear)),
+        f"{per_cent(share(clear))} %",
         all(clear),
         f"{len(clear)} hits, {clear.count(False)} nearer",
     )

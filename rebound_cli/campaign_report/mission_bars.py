@@ -28,10 +28,13 @@ def _endings(missions: Missions) -> Iterator[Bar]:
         yield Bar(
             f"{airframe}: missions that end as they say, without a crash",
             f"≥ {100 * wanted:g} %",
-            per_cent(good, 2),
+            f"{per_cent(good, 2)} %",
             good >= wanted,
             f"{len(flown)} missions, {failed} not",
         )
+        detours, given_up = (sum(one.result[key] for one in flown) for key in ("detours", "unreachable"))
+        yield Bar(f"{airframe}: ways flown round what was known", "", str(detours), None)
+        yield Bar(f"{airframe}: goals reported as out of reach", "", str(given_up), None)
 
 
 def _hits(missions: Missions) -> Iterator[Bar]:
@@ -42,7 +45,7 @@ def _hits(missions: Missions) -> Iterator[Bar]:
         yield Bar(
             f"{airframe}, 1 to 5 m/s: hits without 5 cm of overshoot and without touching the surface again",
             f"≥ {100 * CLEAN_WANTED:g} %" if judged else "",
-            per_cent(clean),
+            f"{per_cent(clean)} %",
             clean >= CLEAN_WANTED if judged else None,
             f"{len(answered(hits))} hits, {_reasons(answered(hits))}",
         )
@@ -50,9 +53,9 @@ def _hits(missions: Missions) -> Iterator[Bar]:
         yield Bar(
             f"{airframe}, 1 to 5 m/s: guards at rest {CLEAR_LEAST_M} m clear of what was hit",
             "",
-            per_cent(share(clear_m >= CLEAR_LEAST_M for clear_m in clear)),
+            f"{per_cent(share(clear_m >= CLEAR_LEAST_M for clear_m in clear))} %",
             None,
-            f"{len(clear)} hits" + (f", {100 * min(clear):.0f} cm at least" if clear else ""),
+            f"{len(clear)} hits" + (f", the nearest {100 * min(clear):.0f} cm" if clear else ""),
         )
         slow = level(missions.hits(airframe, 0.0, LOST_UP_TO_M_S))
         yield _worst(f"{airframe}, level, up to 2.5 m/s: height lost", slow, "lost_m", LOST_MOST_M)
@@ -61,7 +64,11 @@ def _hits(missions: Missions) -> Iterator[Bar]:
         )
         every = missions.hits(airframe, 0.5, 99.0)
         yield Bar(
-            f"{airframe}, from 0.5 m/s: hits noticed", "", per_cent(share(h["seen"] for h in every)), None, _of(every)
+            f"{airframe}, from 0.5 m/s: hits noticed",
+            "",
+            f"{per_cent(share(h['seen'] for h in every))} %",
+            None,
+            _of(every),
         )
 
 

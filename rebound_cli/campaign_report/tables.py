@@ -69,7 +69,7 @@ def _speed_cells(hits: list[Json]) -> Sequence[str]:
     flat = level(hits)
     return (
         str(len(hits)),
-        per_cent(share(hit["seen"] for hit in hits)),
+        f"{per_cent(share(hit['seen'] for hit in hits))} %",
         f"{statistics.median(settled):.2f} s" if settled else "-",
         str(sum(hit["past_m"] > OVERSHOOT_MOST_M for hit in seen)),
         _metres([hit["past_m"] for hit in seen]),

@@ -35,6 +35,8 @@ def work_out_mission(case: MissionCase) -> Json:
         "outcome": flight.report.outcome,
         "seconds": round(1e-6 * (flight.report.ended_at_us - flight.report.started_at_us), 3),
         "failures": [[failure.cause, failure.details] for failure in failures(flight)],
+        "detours": sum(event.kind == "detour" for event in flight.events),
+        "unreachable": sum(event.kind == "unreachable" for event in flight.events),
         "hits": recoveries(flight, contacts),
     }
     return found | ({"path_ned_m": _path(flight)} if case.seed <= PICTURED else {})

@@ -42,10 +42,6 @@ class Phases:
         index = bisect_right(self.begins_us, boot_us) - 1
         return self.phases[index] if index >= 0 else Phase.GROUND
 
-    def first(self, phase: Phase) -> float | None:
-        """When it began for the first time."""
-        return next((at for at, what in zip(self.begins_us, self.phases, strict=True) if what is phase), None)
-
     def end_of(self, boot_us: float) -> float | None:
         """When the phase of this moment ended; None if it did not."""
         index = bisect_right(self.begins_us, boot_us) - 1

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from rebound_cli.campaign.plan import Json
 from rebound_cli.random_missions.contacts import Contact, Role
 from rebound_cli.random_missions.flight import JudgedFlight
+from rebound_cli.random_missions.phases import phases_of
 from rebound_cli.summary import LONGEST_RECOVERY_S
 from rebound_cli.truth_match import Vector3
 from sim_vehicle.world import Obstacle
@@ -65,6 +66,11 @@ def _recovery(flight: JudgedFlight, contact: Contact, episode: Sequence[Contact]
     if settled_s is not None:
         settled_s += 1e-6 * (collision.sample_time_boot_us - hit.contact_at_boot_us)
     until_s = LONGEST_RECOVERY_S if settled_s is None else settled_s + flight.mission.companion.settled.duration_s
+    # A recovery that was given up, or that the mission's end cut short, is over when something else begins.
+    detected_boot_us = collision.detected_at_us - flight.truth.epoch_at_boot_us
+    ended_us = phases_of(flight.events, flight.truth.epoch_at_boot_us).end_of(detected_boot_us + 1.0)
+    if ended_us is not None:
+        until_s = min(until_s, 1e-6 * (ended_us - hit.contact_at_boot_us))
     later = [other.contact_at_boot_us for other in flight.truth.hits if other.contact_at_boot_us > hit.ended_at_boot_us]
     if later:
         until_s = min(until_s, 1e-6 * (later[0] - hit.contact_at_boot_us))

@@ -50,6 +50,8 @@ def made_up(count=200, failing=(), **changes):
             "stream_hz": 50,
             "wind_m_s": 3.0,
             "extras": [],
+            "detours": 1,
+            "unreachable": 0,
             "failures": [["fell", "at 3.00 s"]] if case.seed in failing else [],
             "hits": [{**HIT, **changes} if case.seed == 1 else dict(HIT)],
         }
