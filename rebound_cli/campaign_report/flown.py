@@ -35,8 +35,20 @@ class Missions:
         return [
             Flown(self.cases[number], result)
             for number, result in sorted(self.results.items())
-            if self.cases[number].airframe == airframe and which(result)
+            if self.cases[number] == MissionCase(self.cases[number].seed, airframe) and which(result)
         ]
+
+    def first_hits_compared(self, airframe: str) -> list[tuple[Json, Json]]:
+        """The first hit without the feed-forward of the height, and the same with it; level ones."""
+        with_it = {one.case.seed: one.result["hits"] for one in self.of(airframe)}
+        pairs = [
+            (result["hits"][0], with_it[self.cases[number].seed][0])
+            for number, result in sorted(self.results.items())
+            if self.cases[number] == MissionCase(self.cases[number].seed, airframe, False)
+            and result["hits"]
+            and with_it.get(self.cases[number].seed)
+        ]
+        return [(without, with_it) for without, with_it in pairs if len(level([without, with_it])) == 2]
 
     def hits(self, airframe: str, low_m_s: float, high_m_s: float) -> list[Json]:
         """First contacts by the speed against the obstacle."""
@@ -46,7 +58,7 @@ class Missions:
 
     def failed(self) -> Iterator[Flown]:
         for number, result in sorted(self.results.items()):
-            if result["failures"]:
+            if result["failures"] and self.cases[number].feed_forward:
                 yield Flown(self.cases[number], result)
 
 

@@ -13,6 +13,7 @@ CLEAN_WANTED = 0.99
 OVERSHOOT_MOST_M = 0.05
 LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
 RISEN_MOST_M = 0.05
+LOSING_M, LEFT_MOST = 0.05, 0.5
 CLEAR_LEAST_M = 0.3
 
 
@@ -62,6 +63,7 @@ def _hits(missions: Missions) -> Iterator[Bar]:
         yield _worst(
             f"{airframe}, level: height gained", level(missions.hits(airframe, 0.0, 99.0)), "risen_m", RISEN_MOST_M
         )
+        yield _halved(airframe, missions.first_hits_compared(airframe))
         every = missions.hits(airframe, 0.5, 99.0)
         yield Bar(
             f"{airframe}, from 0.5 m/s: hits noticed",
@@ -88,6 +90,19 @@ def _worst(what: str, hits: list[Json], key: str, most_m: float) -> Bar:
     over = sum(value > most_m for value in values)
     measured = f"{100 * max(values):.1f} cm at most, {100 * statistics.median(values):.1f} in the median"
     return Bar(what, f"≤ {100 * most_m:g} cm", measured, over == 0, f"{len(hits)} hits, {over} beyond")
+
+
+def _halved(airframe: str, pairs: list[tuple[Json, Json]]) -> Bar:
+    """Over the hits that lose much without the feed-forward: what is left of it with it."""
+    losing = [(without["lost_m"], with_it["lost_m"]) for without, with_it in pairs if without["lost_m"] > LOSING_M]
+    left = sum(after for _, after in losing) / sum(before for before, _ in losing) if losing else None
+    return Bar(
+        f"{airframe}, level, hits that lose 5 cm and more without the feed-forward: what is left of it with it",
+        f"≤ {100 * LEFT_MOST:g} %",
+        "-" if left is None else f"{100 * left:.0f} %",
+        None if left is None else left <= LEFT_MOST,
+        f"{len(losing)} of {len(pairs)} hits",
+    )
 
 
 def _of(hits: list[Json]) -> str:

@@ -41,6 +41,8 @@ class MissionCase:
 
     seed: int
     airframe: str
+    feed_forward: bool = True
+    """Whether a climb or a fall after a hit is braked by an acceleration of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,11 +103,12 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
     out_of_reach = draw.one_of(("land", "return", "continue", "abort"), (3.0, 3.0, 3.0, 1.0))
     if "land" in items[-1] and draw.happens(0.1):
         extras.append(_block(room, draw, route))
-    data = {
+    data: Part = {
         "name": f"random-{case.seed}",
         "description": f"{room.kind}, {stream_hz} Hz, wind up to {wind_m_s:g} m/s, seed {case.seed}",
         "items": items,
         "on_collision": follows,
+        **({} if case.feed_forward else {"recovery": {"vertical_acceleration_m_s2": 0.0}}),
         "obstacles": {"on_unreachable": out_of_reach},
         "on_interrupt": interrupted,
         "fence": room.fence,
