@@ -22,6 +22,8 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
     axis.plot(asked[:, 1], asked[:, 0], label="setpoints sent", **ASKED)
     axis.plot(flown[:, 1], flown[:, 0], label="path measured", **MEASURED)
     shown = np.concatenate([asked[:, :2], flown[:, :2]])
+    # A setpoint that asks for an acceleration alone has no place.
+    shown = shown[np.isfinite(shown).all(axis=1)]
     for number, (_, obstacle) in enumerate(scene.obstacles() if scene else ()):
         corners = footprint(obstacle) - origin[:2]
         label = "obstacles" if number == 0 else None
