@@ -97,7 +97,7 @@ class RunningVehicle:
         self.tcp_address = f"tcpout://{_HERE}:{tcp_port}"
         """For MAVSDK over TCP."""
         self.mavutil_address = f"tcp:{_HERE}:{tcp_port}"
-        """For pymavlink's `mavutil.mavlink_connection`, MAVProxy and DroneKit."""
+        """For pymavlink's `mavutil.mavlink_connection` and MAVProxy."""
         self.udp_port, self.tcp_port = udp_port, tcp_port
         self._bench, self._control = bench, Control(speed)
         self._waiting: list[_Waiting] = []
@@ -153,8 +153,8 @@ class RunningVehicle:
         ``within_s`` is the vehicle's time. Raises ConditionNotMet. In an asynchronous test:
         `await asyncio.to_thread(vehicle.wait_until, ...)`.
         """
-        if self.is_paused:
-            raise SimulationError("a paused vehicle waits for nothing: resume it first.")
+        if self.is_paused or self._is_in_thread:
+            raise SimulationError("a vehicle that stands still waits for nothing: resume it, or leave its condition.")
         future: Future[Truth] = Future()
 
         def begin() -> None:
@@ -228,6 +228,9 @@ class RunningVehicle:
 
     def _ask(self, order: Callable[[], Answer]) -> Answer:
         """Let the vehicle's thread do it between two intervals."""
+        if self._is_in_thread:
+            # A condition that somebody waits for is looked at there.
+            return order()
         if self._stopped.is_set():
             raise self._ended()
         future = self._control.ask(order)
@@ -237,6 +240,10 @@ class RunningVehicle:
                 self._control.refuse(self._ended())
             wait([future], _LOOK_S)
         return future.result()
+
+    @property
+    def _is_in_thread(self) -> bool:
+        return threading.current_thread() is self._thread
 
     def _read(self, order: Callable[[], Answer]) -> Answer:
         """The same for what may be read after the end, too."""

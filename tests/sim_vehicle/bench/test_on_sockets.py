@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.errors import ConditionNotMet, SceneError, SimulationError, VehicleEnded
 from sim_vehicle.shell.truth_file import load_faults, load_truth
-from sim_vehicle.testing import RunningVehicle, Wall, faults, start_vehicle
+from sim_vehicle.testing import RunningVehicle, Truth, Wall, faults, start_vehicle
 
 TIMEOUT_S = 10.0
 HERE = "127.0.0.1"
@@ -114,7 +114,7 @@ def test_a_pause_stands_still_and_goes_on_where_it_stood() -> None:
         kinds(client, {"HEARTBEAT"})
         vehicle.pause()
         paused_s = vehicle.truth.time_boot_s
-        with pytest.raises(SimulationError, match="paused"):
+        with pytest.raises(SimulationError, match="stands still"):
             vehicle.wait_until(lambda truth: True, 1.0)
         # Short enough to be caught up, had it been lateness
         time.sleep(0.4)
@@ -164,6 +164,20 @@ def test_waiting_in_vain_is_an_assertion_and_a_broken_condition_the_callers_prob
         with pytest.raises(ZeroDivisionError):
             vehicle.wait_until(lambda truth: 1 / 0, within_s=0.5)
         passes(vehicle, 0.1)
+
+
+def test_a_condition_may_ask_and_change_the_vehicle_but_not_wait_for_it() -> None:
+    with start_vehicle(speed=0.0) as vehicle:
+        swung: list[str] = []
+
+        def struck(truth: Truth) -> bool:
+            if not swung:
+                swung.append(vehicle.hit(1.0))
+            return bool(vehicle.truth.hits)
+
+        assert vehicle.wait_until(struck, within_s=2.0).hits[0].obstacle == swung[0]
+        with pytest.raises(SimulationError, match="stands still"):
+            vehicle.wait_until(lambda truth: vehicle.wait_until(lambda truth: True, 1.0), 1.0)
 
 
 def test_whoever_waits_when_it_is_stopped_is_told() -> None:
