@@ -34,7 +34,8 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
         axis.plot([east], [north], "o", color=DETECTED, label="hit detected" if number == 0 else None)
     if len(shown):
         # A wall may be far longer than the flight: the flight is what is looked at.
-        least, most = shown.min(axis=0), shown.max(axis=0)
+        # A setpoint that only leans the vehicle has no place.
+        least, most = np.nanmin(shown, axis=0), np.nanmax(shown, axis=0)
         (north, east), half_m = 0.5 * (least + most), 0.5 * float((most - least).max()) + 1.0
         axis.set(xlim=(east - half_m, east + half_m), ylim=(north - half_m, north + half_m), aspect="equal")
     finish(axis, "From above", "east of the take-off point [m]", "north of the take-off point [m]")
