@@ -39,7 +39,7 @@ class FlightLog:
     position_ned_m: Floats
     velocity_ned_m_s: Floats
     setpoint_at_us: Floats
-    setpoint_ned_m: Floats
+    setpoint_ned_m: Floats  # NaN where a setpoint asked for no place
 
 
 def read_flight_log(path: Path) -> FlightLog:

@@ -32,6 +32,8 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
     for number, collision in enumerate(report.collisions):
         north, east = collision.position_ned_m[0] - origin[0], collision.position_ned_m[1] - origin[1]
         axis.plot([east], [north], "o", color=DETECTED, label="hit detected" if number == 0 else None)
+    # A setpoint that only says how to lean has no place.
+    shown = shown[np.isfinite(shown).all(axis=1)]
     if len(shown):
         # A wall may be far longer than the flight: the flight is what is looked at.
         # A setpoint that only leans the vehicle has no place.
