@@ -4,13 +4,14 @@ import json
 
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import development as dialect
 
 from companion.companion import Companion
 from rebound_cli.documents import load_document
 from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import mission_from, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import run_lockstep, virtual_time_limit_s
+from rebound_cli.lockstep import EPOCH_US, run_lockstep, virtual_time_limit_s
 from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import SQUARE, WALL, events_of, run
@@ -117,6 +118,32 @@ def test_a_flight_that_hangs_is_ended(tmp_path):
     assert not run_lockstep(Companion(mission), vehicle, recorder, Interrupts(), 3.0, lambda _: None)
     recorder.close()
     assert 3e6 < vehicle.time_boot_us < 5e6
+
+
+def test_a_vehicle_that_reboots_before_the_flight_is_flown_on_its_new_clock(tmp_path):
+    # Given a companion that waits for its plan to be confirmed
+    document = load_document(WALL)
+    vehicle = SimulatedVehicle(world_from(document).airframe, world_from(document).scene, 1)
+    companion, told_us = Companion(mission_from(document)), []
+
+    def exchange(seconds: float, pending: bytes = b"") -> None:
+        for _ in range(round(250 * seconds)):
+            frames = vehicle.step(pending)
+            times = (getattr(dialect.MAVLink(None).decode(bytearray(raw)), "time_boot_ms", None) for raw in frames)
+            told_us.extend(1_000 * time for time in times if time is not None)
+            pending = b"".join(companion.step(b"".join(frames), EPOCH_US + vehicle.time_boot_us).sent_frames)
+
+    exchange(4.0)
+    # When a ground station reboots the vehicle
+    reboot = dialect.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0)
+    exchange(4.0, reboot.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=190)))
+    assert told_us[-1] < 2_000_000 < 3_500_000 < max(told_us)
+    # Then it is flown, and its hit is seen
+    recorder = FlightRecorder(tmp_path)
+    assert run_lockstep(companion, vehicle, recorder, Interrupts(), 60.0, lambda _: None)
+    recorder.close()
+    report = companion.report()
+    assert (report.outcome, len(report.collisions)) == ("completed", 1)
 
 
 def test_the_limit_of_virtual_time_leaves_room():
