@@ -28,6 +28,7 @@ class EstimateErrors(NamedTuple):
     keep: Floats  # (9,) share of an error that is left after one interval
     drive: Floats  # (9,) standard deviation of what is added in one interval
     past: Floats  # (delay in intervals + 1, 13); without rows the estimate comes from elsewhere
+    hidden_ned_m_s: Floats  # (rows of past, 3): what clipping hid in each of those intervals
     cursor: Ints  # (1,)
     velocity_before: Floats  # (3,) the estimate's, one interval ago
     missed: Floats  # (6,) position m, velocity m/s, NED: what the estimate is off by since clipping hid a hit from it
@@ -53,6 +54,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         keep=keep,
         drive=sigma * np.sqrt(1 - keep**2),
         past=np.tile(body, (slots, 1)),
+        hidden_ned_m_s=np.zeros((slots, 3)),
         cursor=np.zeros(1, np.int64),
         velocity_before=np.zeros(3),
         missed=np.zeros(6),
@@ -69,13 +71,14 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturb
     if slots == 0:
         return
     errors.past[errors.cursor[0]] = state.body
+    note_what_is_clipped(state, errors)
     errors.cursor[0] = (errors.cursor[0] + 1) % slots
     delayed = errors.past[errors.cursor[0]]
     for i in range(3):
         errors.velocity_before[i] = state.estimate[3 + i]
     for i in range(9):
         errors.error[i] = errors.keep[i] * errors.error[i] + errors.drive[i] * noise[i]
-    miss_what_was_clipped(state, errors)
+    miss_what_was_clipped(errors)
     for i in range(6):
         state.estimate[i] = delayed[i] + errors.error[i] + errors.missed[i] + disturbance.estimate_jump[i]
     for i in range(3):
@@ -84,24 +87,30 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturb
 
 
 @njit
-def miss_what_was_clipped(state: State, errors: EstimateErrors) -> None:
+def note_what_is_clipped(state: State, errors: EstimateErrors) -> None:
+    """Write what clipping hid in this interval beside the body; it shows as late as everything else does."""
+    hidden, off = errors.hidden_ned_m_s[errors.cursor[0]], state.clipped_off_m_s
+    hidden[:] = 0.0
+    if errors.clipping[2] > 0.0 and abs(off[0]) + abs(off[1]) + abs(off[2]) >= LEAST_HIDDEN_M_S:
+        matrix_from_quaternion(state.body, errors.rotation)
+        for i in range(3):
+            for j in range(3):
+                hidden[i] += errors.rotation[i, j] * off[j]
+
+
+@njit
+def miss_what_was_clipped(errors: EstimateErrors) -> None:
     """What clipping hides of a hit is missing in the velocity, until other sensors have put velocity and place right.
 
     An estimator of second order that is corrected by the error of its position, some time after the hit.
     """
     step_s, late_s, frequency, damping = errors.clipping
-    missed = errors.missed
-    hidden = abs(state.clipped_off_m_s[0]) + abs(state.clipped_off_m_s[1]) + abs(state.clipped_off_m_s[2])
-    if frequency == 0.0:
-        return
+    missed, hidden = errors.missed, errors.hidden_ned_m_s[errors.cursor[0]]
     errors.since_missed_s[0] += step_s
-    if hidden >= LEAST_HIDDEN_M_S:
-        matrix_from_quaternion(state.body, errors.rotation)
+    if hidden[0] != 0.0 or hidden[1] != 0.0 or hidden[2] != 0.0:
         errors.since_missed_s[0] = 0.0
-        for i in range(3):
-            for j in range(3):
-                missed[3 + i] -= errors.rotation[i, j] * state.clipped_off_m_s[j]
     for i in range(3):
+        missed[3 + i] -= hidden[i]
         missed[i] += step_s * missed[3 + i]
         if errors.since_missed_s[0] > late_s:
             off_m = missed[i]
