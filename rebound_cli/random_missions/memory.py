@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from companion.mission.items import GoToItem
 from companion.mission.program import program
@@ -10,6 +11,9 @@ from companion.report import Event
 from rebound_cli.random_missions.contacts import Contact, Role, same_surface
 from rebound_cli.random_missions.flight import JudgedFlight
 from rebound_cli.random_missions.phases import Phase
+from sim_vehicle.truth import Hit
+
+Floats = npt.NDArray[np.float64]
 
 # The middle of a patch of 0.5 m: whatever is made of a hit, this much of the surface is known after it.
 KNOWN_M = 0.3
@@ -49,9 +53,16 @@ def _keeps_off(flight: JudgedFlight, contact: Contact) -> bool:
 
 
 def _is_known(contact: Contact, earlier: Contact) -> bool:
-    here, there = contact.hit.contact_point_ned_m, earlier.hit.contact_point_ned_m
-    assert here is not None and there is not None, "only such contacts are looked at"
-    return same_surface(contact.hit, earlier.hit) and float(np.linalg.norm(np.subtract(here, there))) <= KNOWN_M
+    """By where the vehicle takes the places to be: one that has lost its position by a metre cannot keep off them."""
+    here, there = (_believed(touch.hit) for touch in (contact, earlier))
+    return same_surface(contact.hit, earlier.hit) and float(np.linalg.norm(here - there)) <= KNOWN_M
+
+
+def _believed(hit: Hit) -> Floats:
+    """Where the vehicle was touched, in its own frame at that time."""
+    assert hit.contact_point_ned_m is not None, "only such contacts are looked at"
+    place: Floats = np.add(hit.contact_point_ned_m, hit.frame_offset_ned_m)
+    return place
 
 
 def given_up(flight: JudgedFlight) -> Iterator[str]:

@@ -182,6 +182,9 @@ def test_the_same_place_hit_twice_is_a_failure_unless_it_was_tried_again_on_purp
     # half a metre beside is not known
     beside = [twice[0], replace(twice[1], contact_point_ned_m=(2.2, 0.6, -2.0))]
     assert causes(bounced(*again, policy=policy, items=items, hits=beside, collisions=seen)) == []
+    # nor is a place that a vehicle that has lost its position takes for another
+    drifted = [twice[0], replace(twice[1], frame_offset_ned_m=(0.0, 0.6, 0.0))]
+    assert causes(bounced(*again, policy=policy, items=items, hits=drifted, collisions=seen)) == []
     retried = [event(12, "item", step=1), *again[1:]]
     retry = {"then": "retry", "max_hits": 2}
     assert causes(bounced(*retried, policy=retry, hits=twice, collisions=seen)) == []
