@@ -17,6 +17,8 @@ Floats = npt.NDArray[np.float64]
 # A detection belongs to a contact if its sample lies in it or at most so long after: the aftermath, two velocities of
 # the slowest stream, shows a contact that fell between the samples.
 SEEN_AFTER_US = 100_000
+# A guard that bounces, before the companion has told of the first touch or while nobody has noticed it: one hit.
+FOLLOWS_WITHIN_US = 250_000
 # Cosine between normals above which two faces of an obstacle are one surface to someone who touches them.
 SAME_SURFACE = 0.5
 
@@ -63,13 +65,17 @@ def contacts_of(flight: JudgedFlight) -> list[Contact]:
         collision = None if is_landing else _seen_as(hit, flight.report.collisions)
         if is_landing:
             role = Role.LANDING
-        elif phase is not Phase.RECOVERING or not episode:
+        elif not episode or (phase is not Phase.RECOVERING and not _follows(hit, episode[-1])):
             role, episode = Role.HIT, [hit]
         else:
             role = Role.AGAIN if any(same_surface(hit, earlier) for earlier in episode) else Role.NEXT
             episode.append(hit)
         found.append(Contact(hit, role, phase, collision))
     return found
+
+
+def _follows(hit: Hit, earlier: Hit) -> bool:
+    return hit.contact_at_boot_us - earlier.ended_at_boot_us <= FOLLOWS_WITHIN_US
 
 
 def same_surface(hit: Hit, other: Hit) -> bool:

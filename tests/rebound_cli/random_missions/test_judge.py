@@ -212,6 +212,11 @@ def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
     assert (figures["again"], figures["others"]) == (1, 1)
 
 
+def test_a_bounce_before_anybody_told_of_the_hit_belongs_to_it():
+    judged = flight(hits=[hit(speed_m_s=0.6), hit(at_s=10.1, speed_m_s=0.6), hit(at_s=10.6, speed_m_s=0.6)])
+    assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.HIT]
+
+
 def test_a_recovery_is_measured_by_truth():
     # Given a vehicle that, in truth, ran 0.2 m past its setpoint and sank by 0.1 m on the way
     series = path((0, 0, 0, 0), (10, 2, 0, 2), (10.5, 1.3, 0, 1.9), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
