@@ -41,7 +41,7 @@ class Pilot:
         self.command(ARM, 1, 0)
         self.command(TAKEOFF)
         self.hear(self.vehicle.advance_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, 20))
-        self.fly(2.0)
+        self.fly(1.0)
         self.heard.clear()
 
     def of(self, kind: str) -> list[Any]:
