@@ -47,7 +47,8 @@ class GuardContext:
     others_setpoint_us: int | None = None  # when one was last seen on its way
     sticks: Sticks | None = None
     global_position: GlobalPosition | None = None
-    sent_ned_m: deque[tuple[int, Vector3]] = field(default_factory=lambda: deque(maxlen=64))
+    # When, and to where; None for a lean alone.
+    sent_ned_m: deque[tuple[int, Vector3 | None]] = field(default_factory=lambda: deque(maxlen=64))
 
 
 class Activity(Protocol):

@@ -172,7 +172,7 @@ def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
         return
     if is_ours:
         wanted = core.flight.target = core.limiter.passed(core.flight, wanted, True, moved, now_us)
-        core.guard.sent_ned_m.append((now_us, wanted.position_ned_m))
+        core.guard.sent_ned_m.append((now_us, None if wanted.leans_only else wanted.position_ned_m))
     time_us = now_us - core.started_at_us
     core.flight.outbox.append(wanted.setpoint(time_us))
 

@@ -74,10 +74,10 @@ class Recovering:
 
 def _is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
     """Whether the vehicle flies to a place, or by a velocity alone, that the guard has not lately asked for."""
-    if echo.position_ned_m is None:
-        return True
     recent = [place for sent_us, place in guard.sent_ned_m if now_us - sent_us <= ECHO_AGE_US]
-    return all(math.dist(place, echo.position_ned_m) > CROSSED_M for place in recent)
+    if echo.position_ned_m is None:
+        return None not in recent
+    return all(place is None or math.dist(place, echo.position_ned_m) > CROSSED_M for place in recent)
 
 
 class GiveBack:

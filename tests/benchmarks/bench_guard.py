@@ -25,7 +25,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "clients")]
 from simulator import free_port, simulator, wait_until  # noqa: E402
 from tap import messages, tapped  # noqa: E402
 
-PLACE_IGNORED = 0x7
+PLACE_IGNORED, VELOCITY_IGNORED = 0x7, 0x38
 BAR_MS = 5.0
 HOLD = 3
 # The vehicle follows when it is this near to the moving setpoint, and stays so.
@@ -104,18 +104,23 @@ def handover(boot_us: int, wire: list[tuple[float, bool, Any]]) -> Handover:
     )
     shown_s, rest = wire[start][0], wire[start:]
     setpoints = [(at, m) for at, inward, m in rest if not inward and m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
-    own = [(at, m) for at, m in setpoints if not m.type_mask & PLACE_IGNORED]
+    own = [(at, m) for at, m in setpoints if not is_theirs(m)]
     first_s = own[0][0]
     # The recovery's own stream, up to its end: the next is of another hit.
     last = next((i for i, (a, b) in enumerate(itertools.pairwise(own)) if b[0] - a[0] > 0.3), len(own) - 1)
     last_s, mine = own[last][0], own[: last + 1]
     echoes = [(at, m) for at, inward, m in rest if inward and m.get_type() == "POSITION_TARGET_LOCAL_NED"]
     places = [(at, m) for at, inward, m in rest if inward and m.get_type() == "LOCAL_POSITION_NED" and at <= last_s]
-    taken_up_s = next((at - shown_s for at, m in echoes if at > first_s and not m.type_mask & PLACE_IGNORED), None)
-    theirs = [at for at, m in setpoints if m.type_mask & PLACE_IGNORED]
+    taken_up_s = next((at - shown_s for at, m in echoes if at > first_s and not is_theirs(m)), None)
+    theirs = [at for at, m in setpoints if is_theirs(m)]
     back_s = next((at - last_s for at in theirs if at > last_s), None)
     slipped = sum(first_s < at < last_s for at in theirs)
     return Handover(first_s - shown_s, taken_up_s, follows_after(mine, places, shown_s), back_s, slipped)
+
+
+def is_theirs(setpoint: Any) -> bool:
+    """The program flies by velocity alone, the guard by place and velocity, or by a lean alone."""
+    return bool(setpoint.type_mask & PLACE_IGNORED and not setpoint.type_mask & VELOCITY_IGNORED)
 
 
 def follows_after(own: list[tuple[float, Any]], places: list[tuple[float, Any]], shown_s: float) -> float | None:

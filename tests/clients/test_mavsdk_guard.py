@@ -26,8 +26,12 @@ from companion.mavsdk import CollisionGuard, GuardConfig, GuardError, State
 from companion.px4_mode import OFFBOARD
 
 WALL = ("--mission", str(ROOT / "missions" / "wall.yaml"), "--set", "sim.walls.0.height_m=20")
-# The program flies by velocity, the guard by place and velocity.
-PLACE_IGNORED, HOLD = 0x7, 3
+# The program flies by velocity alone, the guard by place and velocity, or by a lean alone.
+PLACE_IGNORED, VELOCITY_IGNORED, HOLD = 0x7, 0x38, 3
+
+
+def is_theirs(setpoint) -> bool:
+    return bool(setpoint.type_mask & PLACE_IGNORED and not setpoint.type_mask & VELOCITY_IGNORED)
 
 
 @contextmanager
@@ -80,8 +84,8 @@ def test_not_one_setpoint_of_the_program_reaches_the_vehicle_while_the_guard_hol
     assert place.north_m < 3.75
     wire = list(messages(record))
     setpoints = [(at, m) for at, inward, m in wire if not inward and m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
-    theirs = [at for at, m in setpoints if m.type_mask & PLACE_IGNORED]
-    own = [at for at, m in setpoints if not m.type_mask & PLACE_IGNORED and at > theirs[0]]
+    theirs = [at for at, m in setpoints if is_theirs(m)]
+    own = [at for at, m in setpoints if not is_theirs(m) and at > theirs[0]]
     modes = [(at, m.custom_mode) for at, inward, m in wire if inward and m.get_type() == "CURRENT_MODE"]
     hold_s = next(at for at, mode in modes if at > own[0] and mode != OFFBOARD)
     assert [at for at in theirs if own[0] <= at < hold_s] == []
