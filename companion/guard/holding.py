@@ -65,14 +65,14 @@ class Recovering:
 
     def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
         if now_us - self._began_us > ECHO_STALE_US:
-            self._foreign += sum(_is_foreign(guard, echo, now_us) for echo in inputs.echoes)
+            self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES:
             guard.program_elsewhere = True
             return Move(Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own")
         return Move(Trigger.SETTLED) if self._recover.step(guard.flight, inputs.flight, now_us) is not None else None
 
 
-def _is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
+def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
     """Whether the vehicle flies to a place, or by a velocity alone, that the guard has not lately asked for."""
     recent = [place for sent_us, place in guard.sent_ned_m if now_us - sent_us <= ECHO_AGE_US]
     if echo.position_ned_m is None:

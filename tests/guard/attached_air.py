@@ -28,9 +28,9 @@ REPEATED_EVERY_S = 0.05
 class AttachedAir:
     """`on_wire` is what reaches the vehicle: (time, "guard" or "program", name, fields)."""
 
-    def __init__(self, config: GuardConfig | None = None) -> None:
+    def __init__(self, config: GuardConfig | None = None, airframe: str = "foldable") -> None:
         scene = Scene.model_validate({"walls": [WALL]})
-        self.vehicle = SimulatedVehicle(load_built_in("foldable"), scene, 1)
+        self.vehicle = SimulatedVehicle(load_built_in(airframe), scene, 1)
         self.guard = AttachedGuard(config or GuardConfig(), 1, EPOCH_US)
         self.events: list[Event] = []
         self.on_wire: list[tuple[float, str, str, dict[str, Any]]] = []
@@ -116,8 +116,8 @@ class AttachedAir:
     def event_s(self, kind: str) -> float:
         return 1e-6 * (next(event for event in self.events if event.kind == kind).time_us - EPOCH_US)
 
-    def fly_into_the_wall(self) -> None:
-        """Take off, OFFBOARD, north at 1.5 m/s until the guard holds."""
+    def fly_into_the_wall(self, speed_m_s: float = 1.5) -> None:
+        """Take off, OFFBOARD, north until the guard holds."""
         self.until(lambda: self.state is State.STANDING_BY, 10.0)
         self.run(2.0)
         self.command(ARM, 1)
@@ -125,7 +125,7 @@ class AttachedAir:
         self.command(TAKEOFF)
         self.until(lambda: self.state is State.WATCHING, 20.0)
         self.run(3.0)
-        self.set_velocity((1.5, 0.0, 0.0))
+        self.set_velocity((speed_m_s, 0.0, 0.0))
         self.run(0.3)
         self.set_mode(6)
         self.until(lambda: self.guard.core.machine.holds, 20.0)

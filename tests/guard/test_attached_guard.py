@@ -4,7 +4,9 @@ import pytest
 
 from companion.guard.config import GuardConfig
 from companion.guard.gate import Gate
+from companion.guard.holding import is_foreign
 from companion.guard.states import State
+from companion.messages import PositionTarget
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from tests.guard.attached_air import REPEATED_EVERY_S, AttachedAir
 
@@ -133,3 +135,23 @@ def test_fields_of_another_dialect_make_no_sample_and_no_error():
     assert sample_from("NO_SUCH_MESSAGE", (1, 1), {}) is None
     imu = {"time_usec": 1, "xacc": None, "yacc": 0.0, "zacc": 0.0, "xgyro": 0.0, "ygyro": 0.0, "zgyro": 0.0}
     assert sample_from("HIGHRES_IMU", (1, 1), {**imu, "fields_updated": 63}) is None
+
+
+def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():
+    guard = AttachedAir().guard.core.guard
+    there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
+    guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
+    assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]
+    guard.sent_ned_m.append((1_100_000, None))
+    assert [is_foreign(guard, echo, 1_200_000) for echo in (there, elsewhere, no_place)] == [False, True, False]
+    assert is_foreign(guard, no_place, 1_600_000)
+
+
+def test_a_stiff_hit_after_which_the_guard_leans_is_recovered_from_in_peace():
+    air = AttachedAir(airframe="rigid")
+    air.fly_into_the_wall(2.5)
+    air.until(lambda: air.state is State.WATCHING, 10.0)
+    kinds = [event.kind for event in air.events]
+    assert "recovered" in kinds and "crossed" not in kinds
+    assert any(fields["x"] is None for fields in air.setpoints("guard", air.event_s("take_over")))
+    assert air.setpoints("program", air.event_s("take_over") + 0.004, air.event_s("given_back")) == []
