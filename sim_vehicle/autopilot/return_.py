@@ -87,7 +87,7 @@ class Return:
             self._stops = planner.to_landing(landing, self._return_down_m(view))
             if self._stops[0].item is None:
                 altitude_m = self._origin.place.altitude_m - self._stops[0].target.position_ned_m[2]
-                self._say(f"RTL Mission land: climb to {math.ceil(altitude_m)} m")
+                self._say(f"RTL Mission land: climb to {_metres(altitude_m)} m")
         if self._stops and not view.landed:
             self._enter_stop(self._stops.pop(0))
         else:
@@ -104,7 +104,7 @@ class Return:
         else:
             self._leg = Leg.CLIMB if place_down_m - view.position_ned_m[2] < return_height_m else Leg.GO
         altitude_m = self._origin.place.altitude_m - self._down_m
-        self._say(f"RTL: start return at {math.ceil(altitude_m)} m ({math.ceil(return_height_m)} m above destination)")
+        self._say(f"RTL: start return at {_metres(altitude_m)} m ({_metres(return_height_m)} m above destination)")
         self._enter(view)
 
     def _return_down_m(self, view: View) -> float:
@@ -203,6 +203,11 @@ class Return:
 
     def _say(self, text: str) -> None:
         self.texts.append(StatusText(Severity.INFO, text))
+
+
+def _metres(length_m: float) -> int:
+    """As it is told: whole and rounded up; 0 for a height that is none, which a rally point may come with."""
+    return math.ceil(length_m) if math.isfinite(length_m) else 0
 
 
 def return_height_over(height_m: float, distance_m: float, parameters: Parameters) -> float:

@@ -5,6 +5,7 @@ describe the vehicle itself are laid over them by `airframe_values.py`, as PX4's
 """
 
 import csv
+import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -27,14 +28,14 @@ class Definition:
     """Whether a new value counts only after the next reboot."""
 
     def limited(self, value: float) -> float:
-        """``value`` within the range that PX4 states for it; NaN becomes the default."""
+        """``value`` within the range that PX4 states for it; NaN and what has no end become the default."""
         if value != value:
             return self.default
         if self.least is not None and value < self.least:
             return self.least
         if self.most is not None and value > self.most:
             return self.most
-        return value
+        return value if math.isfinite(value) else self.default
 
 
 @cache

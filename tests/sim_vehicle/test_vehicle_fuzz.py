@@ -105,7 +105,7 @@ def test_any_bytes_are_read_without_an_error_and_hold_nothing_up(pieces):
 
 
 COMMANDS = st.one_of(st.integers(0, 700), st.sampled_from([2000, 2001, 2500, 3000, 30001, 43003]))
-NUMBERS = st.one_of(st.floats(width=32), st.integers(-3, 300).map(float))
+NUMBERS = st.one_of(st.floats(width=32), st.integers(-3, 300).map(float), st.sampled_from([360.0, 397.0, 435.0]))
 
 
 @pytest.fixture(scope="module")

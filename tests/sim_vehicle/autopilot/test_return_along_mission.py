@@ -132,3 +132,13 @@ def test_a_negative_delay_waits_above_home_for_good():
     flight.fly(60.0)
     assert landed_at(flight, HOME) and flight.height_m == pytest.approx(6.0, abs=0.2)
     assert flight.autopilot.arming.armed
+
+
+@pytest.mark.parametrize("height_m", [math.inf, -math.inf, NAN])
+def test_places_of_no_height_break_nothing(height_m):
+    for rtl_type in range(6):
+        flight = at(20.0, 20.0, WITH_LANDING, RTL_TYPE=rtl_type)
+        upload(flight, *WITH_LANDING[:-1], item(kinds.LAND, 0.0, 45.0, height_m))
+        upload(flight, item(kinds.RALLY_POINT, 25.0, 15.0, height_m), kind=MissionType.RALLY)
+        assert flight.ask(NAV_RETURN_TO_LAUNCH) is Result.ACCEPTED
+        flight.fly(2.0)

@@ -56,3 +56,11 @@ def test_an_airframe_brings_its_own_gains_in_place_of_px4s():
     parameters.set("MPC_XY_VEL_P_ACC", 2.0)
     parameters.reset()
     assert parameters["MPC_XY_VEL_P_ACC"] == airframe.control.velocity_p_per_s
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
+def test_a_value_without_end_does_not_count_where_px4_states_no_range(value):
+    parameters = Parameters()
+    for name in ("RTL_RETURN_ALT", "BAT1_V_CHARGED"):
+        parameters.set(name, value)
+        assert math.isfinite(parameters[name])
