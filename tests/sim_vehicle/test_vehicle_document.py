@@ -10,11 +10,14 @@ DOCUMENT = (ROOT / "docs" / "vehicle.md").read_text()
 # Where the document's file names begin.
 FOLDERS = (ROOT / "tests/sim_vehicle", ROOT / "tests/sim_vehicle/autopilot", ROOT / "tests")
 _HEADINGS = ("test", "as PX4")
+# What follows is no table of what is supported.
+_LAST_SECTION = "## Clients"
 
 
 def rows() -> list[list[str]]:
     """The cells of every table's rows, without its heading."""
-    lines = [line.strip("|").split(" | ") for line in DOCUMENT.splitlines() if line.startswith("| ")]
+    supported = DOCUMENT[: DOCUMENT.index(_LAST_SECTION)]
+    lines = [line.strip("|").split(" | ") for line in supported.splitlines() if line.startswith("| ")]
     return [cells for cells in lines if cells[-1].strip() not in _HEADINGS]
 
 
