@@ -21,6 +21,8 @@ LONGEST_STEP_US = 75_000
 TRUSTED = 20
 # Steps that the spread remembers, and that a rising one does: 3 s and a third of a second at 30 Hz.
 MEMORY, RISE = 100, 10
+# Of each sample in the share of the time that is not seen: ten samples are half a second at the slowest useful rate.
+UNSEEN_SHARE = 0.1
 # A vehicle's velocity estimate lags by no more than this (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
 # A step of the rates marks the gap that the contact fell into for this long: the velocity's interval and its delay.
@@ -31,6 +33,7 @@ RATE_STEP_KEPT_US = 120_000
 class Aftermath:
     """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
+    averaging_us: int
     strapdown: Strapdown = field(default_factory=Strapdown)
     previous_imu_us: int = 0
     newest_rate_step_rad_s: float = 0.0
@@ -41,6 +44,8 @@ class Aftermath:
     residuals: list[tuple[int, float, float, float]] = field(default_factory=list)
     variance_m2_s2: float = 0.0
     known: int = 0
+    unseen_share: float = 0.0
+    """Of the time, by the samples' distances and the length of their windows."""
     unlearnt: Vector3 | None = None
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
@@ -50,6 +55,9 @@ class Aftermath:
         p_0, q_0, r_0 = strapdown.rates_frd_rad_s
         if strapdown.imu(time_us, f, w):
             p, q, r = w[0] - p_0, w[1] - q_0, w[2] - r_0
+            unseen_us = time_us - before_us - self.averaging_us
+            unseen = unseen_us / (time_us - before_us) if unseen_us > 0 else 0.0
+            self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
             step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step

@@ -43,9 +43,11 @@ SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
 # 11 m/s^2 in one sample, nothing in the next): the next one must show it, too.
 CLEAR = 1.6
-# Vibration that falls between the samples is missing in their sum: the spread, over the unseen time of each of the up
-# to eight samples that a velocity and those it is compared with are apart, with some reserve.
-SHAKEN = 10.0
+# Vibration that falls between the samples is missing in their sum. A rotor's that beats with the stream, 87 Hz with
+# samples 8 and 12 ms apart, has one sign there for tenths of a second: its amplitude (1.4 of both axes' true spreads,
+# and the floor reads half too much), over what is not seen of the 0.1 s that the velocities compared are apart, with
+# some reserve; and, with every sample seen, over what a velocity's stamp of a millisecond and a lost sample leave open.
+SHAKEN_S, STAMP_S = 0.15, 0.008
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -60,7 +62,7 @@ class FusedState(DetectorState):
 
     floor: Floor = field(default_factory=Floor)
     thrust: ThrustGain = field(default_factory=ThrustGain)
-    aftermath: Aftermath = field(default_factory=Aftermath)
+    aftermath: Aftermath = field(default_factory=lambda: Aftermath(0))
     velocity_ned_m_s: Vector3 | None = None
     odometry_boot_us: int | None = None
     reset_counter: int = 0
@@ -88,7 +90,9 @@ class FusedDetector:
         self._soft_us = round(config.soft_wait_s * 1e6)
 
     def initial(self) -> FusedState:
-        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2)
+        return FusedState(
+            threshold_m_s2=self._config.side_threshold_m_s2, aftermath=Aftermath(averaging_us=self._averaging_us)
+        )
 
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
         kind = type(sample)
@@ -272,7 +276,8 @@ class FusedDetector:
         s.velocity_ned_m_s = velocity_ned_m_s
         aftermath, config = s.aftermath, self._config
         step = aftermath.step_m_s(time_us, velocity_ned_m_s)
-        if s.phase is Phase.CONTACT or time_us - s.last_loud_boot_us < self._rest_us:
+        rests = time_us - s.last_loud_boot_us < self._rest_us or not situation.estimate_trusted
+        if s.phase is Phase.CONTACT or rests:
             aftermath.forget()
             return None
         if step is None:
@@ -283,10 +288,10 @@ class FusedDetector:
         turned = aftermath.rate_step_near(time_us) >= config.rate_step_rad_s
         least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
         p, q, _ = aftermath.strapdown.rates_frd_rad_s
-        unseen_us = aftermath.strapdown.time_boot_us - aftermath.previous_imu_us - self._averaging_us
-        shaken = SHAKEN * s.floor.side_m_s2 * max(0, unseen_us) * 1e-6
-        room = config.velocity_per_rate_m * (abs(p) + abs(q))
-        threshold = caution * max(least, config.noise_factor * spread_m_s, shaken) + room
+        shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
+        shaken = shaking * (SHAKEN_S * aftermath.unseen_share + STAMP_S)
+        room = config.velocity_per_rate_m * (abs(p) + abs(q)) + shaken
+        threshold = caution * max(least, config.noise_factor * spread_m_s) + room
         if size < threshold or s.phase is not Phase.ARMED:
             return None
         free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)

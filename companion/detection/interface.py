@@ -47,7 +47,8 @@ class Situation:
 
     `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
     one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
-    to, so that touching it is no surprise.
+    to, so that touching it is no surprise. `estimate_trusted`: False while the vehicle's velocity cannot be believed,
+    because its accelerometer did not show the whole of a hit; the watch fills it in.
     """
 
     off_reason: str | None = None
@@ -57,6 +58,7 @@ class Situation:
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
     setpoint_velocity_ned_m_s: Vector3 | None = None
+    estimate_trusted: bool = True
 
 
 @dataclass(frozen=True, slots=True)

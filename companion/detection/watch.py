@@ -4,7 +4,7 @@ A `Watch` is changed only by `advance`: the same samples at the same times give 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
@@ -46,12 +46,18 @@ class Watch:
     last_imu_boot_us: int = 0
     threshold_told: bool = False
     losses_told: bool = False
+    doubt_told: bool = False
     heard: set[MessageId] = field(default_factory=set)
 
     @property
     def blind_reason(self) -> str | None:
         """Why a hit might not be seen although the detector is on; None while it sees."""
         return self.sight.blind_reason
+
+    @property
+    def estimate_trusted(self) -> bool:
+        """False while the vehicle's velocity and position cannot be believed: part of a hit was not measured."""
+        return self.estimator.trust.is_trusted
 
     @property
     def estimate(self) -> ImpactEstimate | None:
@@ -96,14 +102,18 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
         elif not watch.losses_told and type(sample) in WISHED:
             watch.heard.add(WISHED[type(sample)])
         watch.estimator.hear(sample)
-        watch.state, impact = watch.detector.step(watch.state, sample, situation)
+        if watch.estimator.trust.is_trusted:
+            watch.state, impact = watch.detector.step(watch.state, sample, situation)
+        else:
+            doubtful = replace(situation, estimate_trusted=False)
+            watch.state, impact = watch.detector.step(watch.state, sample, doubtful)
         if impact is not None:
             impacts.append(watch.estimator.begin(impact, situation))
         elif type(sample) is ImuSample:
             final = watch.estimator.follow(watch.state)
             if final is not None:
                 finished.append(final)
-    notices = _look_after_sight(watch, imu_samples, situation, now_us)
+    notices = _look_after_sight(watch, imu_samples, situation, now_us) + _tell_doubt(watch)
     if not impacts and not finished and not notices:
         return NOTHING_SEEN
     return Seen(impacts, finished, notices)
@@ -130,3 +140,13 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
             if message not in watch.heard:
                 notices.append(Notice("loss", f"no {message.name}: {loss}", {}))
     return notices
+
+
+def _tell_doubt(watch: Watch) -> list[Notice]:
+    """That the vehicle's estimate is not believed, once the contact is over, and that it is again."""
+    doubted = not watch.estimate_trusted and watch.state.phase is not Phase.CONTACT
+    if doubted == watch.doubt_told:
+        return []
+    watch.doubt_told = doubted
+    text = "velocity not believed: part of the hit was not measured" if doubted else "velocity believed again"
+    return [Notice("estimate", text, {})]

@@ -14,6 +14,7 @@ from companion.estimate.normal import normal_of
 from companion.estimate.push import Push, unit
 from companion.estimate.rotation import body_to_ned, turned
 from companion.estimate.strapdown import Strapdown
+from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.mission.config import EstimateConfig
 
@@ -29,6 +30,11 @@ CLIPPING_TOLD_US = 2_100_000
 LATE_SAMPLES = 3
 # Sums kept to look back: a contact between samples is known 100 ms later.
 SUMS_KEPT = 64
+# An obstacle's own motion may come from any side; a vehicle faster than this ran into it.
+APPROACH_M_S = 0.5
+# Cosine of 75 degrees: a clipped push further than that from where the vehicle came from has lost its direction; one
+# that was not clipped came from something that moved.
+GLANCING = 0.26
 # What the detector leaves open or takes for soft is not classified anew.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
@@ -70,9 +76,11 @@ class ImpactEstimator:
     strapdown: Strapdown = field(default_factory=Strapdown)
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     fixes: deque[VelocityFix] = field(default_factory=deque)
+    trust: Trust = field(default_factory=Trust)
     odometry_boot_us: int | None = None
     reset_counter: int = 0
     imu: ImuSample | None = None
+    earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
     push: Push | None = None
     situation: Situation | None = None
@@ -87,8 +95,10 @@ class ImpactEstimator:
             if not strapdown.imu(now_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s):
                 self.fixes.clear()
                 self.sums.clear()
+                self.trust.errors.clear()
+            self.trust.age(now_us)
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
-            self.imu = sample
+            self.earlier_imu, self.imu = self.imu, sample
         elif isinstance(sample, LocalPosition):
             self.history.add(sample)
             told_us = self.odometry_boot_us
@@ -97,6 +107,7 @@ class ImpactEstimator:
         elif isinstance(sample, Odometry):
             if self.odometry_boot_us is None or sample.reset_counter != self.reset_counter:
                 self.fixes.clear()
+                self.trust.errors.clear()
             self.odometry_boot_us, self.reset_counter = sample.time_boot_us, sample.reset_counter
             self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
         elif isinstance(sample, Vibration):
@@ -121,6 +132,8 @@ class ImpactEstimator:
         fixes.append(VelocityFix(time_us, velocity_ned_m_s, sum_ned_m_s, self.strapdown.acceleration_ned_m_s2))
         while fixes[0].time_boot_us < time_us - BATCH_US:
             fixes.popleft()
+        v, u = velocity_ned_m_s, sum_ned_m_s
+        self.trust.hear(time_us, (v[0] - u[0], v[1] - u[1], v[2] - u[2]))
 
     def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
         """A new impact: what was known just before it, and what its first sample shows."""
@@ -131,6 +144,7 @@ class ImpactEstimator:
         self.situation = situation
         self.push = self._begin_push(impact) if impact.evidence is Evidence.FORCE else None
         self.contact_ended_boot_us = sample_us
+        self.trust.doubt(sample_us)
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
             time_boot_us=(free_until_us + sample_us) // 2,
@@ -138,7 +152,7 @@ class ImpactEstimator:
             position_ned_m=motion.position_ned_m,
             velocity_ned_m_s=motion.velocity_ned_m_s,
             velocity_error_m_s=error_m_s,
-            normal_ned=unit(force_ned),
+            normal_ned=self._pushed(unit(force_ned), motion.velocity_ned_m_s),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
@@ -166,6 +180,7 @@ class ImpactEstimator:
             averaging_us=averaging_us,
             range_m_s2=self.config.accelerometer_range_m_s2,
             started_boot_us=impact.contact_free_until_boot_us,
+            earlier=self.earlier_imu,
         )
         push.add(sample, True)
         return push
@@ -180,6 +195,8 @@ class ImpactEstimator:
         if push is not None and sample.time_boot_us > push.time_boot_us:
             loud = state.last_loud_boot_us == sample.time_boot_us
             push.add(sample, loud)
+            if push.is_whole:
+                self.trust.restore()
             if loud or is_final:
                 estimate = self._refined(estimate, push, is_final)
         self.estimate = replace(estimate, is_final=is_final) if is_final else estimate
@@ -197,13 +214,26 @@ class ImpactEstimator:
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal_ned=normal_of(push.parts, velocity, self.config.reach_m) if is_final else unit(impulse),
+            normal_ned=self._normal(push, velocity) if is_final else self._pushed(unit(impulse), velocity),
             peak_specific_force_m_s2=push.peak_m_s2,
             impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
             is_lower_bound=push.is_lower_bound,
             may_be_clipped=push.may_be_clipped,
             kind=kind,
         )
+
+    def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
+        config = self.config
+        normal = normal_of(push.parts, velocity_ned_m_s, config.guards, config.imu_averaging_interval_s)
+        back = _back(velocity_ned_m_s)
+        if push.is_whole or _is_along(normal, back):
+            return self._pushed(normal, velocity_ned_m_s)
+        return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
+
+    def _pushed(self, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+        """The normal; the way back where a push clipped, each axis by itself, or not seen went along the obstacle."""
+        push, back = self.push, _back(velocity_ned_m_s)
+        return back if (push is None or push.clipped) and _is_along(normal_ned, back) else normal_ned
 
     def _motion(self, contact_us: int) -> tuple[ContactMotion, float]:
         """From what was heard before this contact and after the one before it, and v_c's standard deviation."""
@@ -235,3 +265,14 @@ class ImpactEstimator:
         ahead_s = (contact_us - time_us) * 1e-6
         at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
         return velocity_at(fixes, contact_us, at_contact, self.config)
+
+
+def _back(velocity_ned_m_s: Vector3) -> Vector3:
+    """Where the vehicle came from, which is known to be free; zero for one that hardly moved."""
+    v = velocity_ned_m_s
+    return unit((-v[0], -v[1], -v[2])) if math.hypot(*v) > APPROACH_M_S else (0.0, 0.0, 0.0)
+
+
+def _is_along(normal_ned: Vector3, back_ned: Vector3) -> bool:
+    """Whether a vehicle that came from there would have met an obstacle with that normal along its surface."""
+    return back_ned != (0.0, 0.0, 0.0) and sum(n * b for n, b in zip(normal_ned, back_ned, strict=True)) < GLANCING

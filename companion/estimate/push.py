@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from companion.estimate.normal import Part
+from companion.estimate.normal import LOOKED_AT_S, Part
 from companion.estimate.rotation import body_to_ned, turned
 from companion.messages import ImuSample, Quaternion, Vector3
 
@@ -30,18 +30,22 @@ class Push:
     range_m_s2: float
     started_boot_us: int
     """Latest time at which there was no contact."""
+    earlier: ImuSample | None = None
+    """The sample before the contact's first."""
     time_boot_us: int = 0
+    first_boot_us: int = 0
     rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
     first_rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
     impulse_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     unconfirmed_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     parts: list[Part] = field(default_factory=list)
-    """Of the impulse, as `normal` reads them."""
+    """Of the push until it paused, as `normal` reads them."""
     last_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
     peak_m_s2: float = 0.0
     samples: int = 0
     loud_boot_us: int = 0
     closed: bool = False
+    paused: bool = False
     clipped: bool = False
     gap: bool = False
     first_size_m_s2: float = 0.0
@@ -63,27 +67,53 @@ class Push:
             mean = (0.5 * (p + w[0]), 0.5 * (q + w[1]), 0.5 * (r + w[2]))
             self.attitude_wxyz = turned(self.attitude_wxyz, mean, elapsed_us * 1e-6)
         f, free = sample.specific_force_frd_m_s2, self.free_frd_m_s2
+        before = self.rates_frd_rad_s if not first else (self.earlier or sample).angular_velocity_frd_rad_s
+        turned_by = (w[0] - before[0], w[1] - before[1], w[2] - before[2])
         frd = (f[0] - free[0], f[1] - free[1], f[2] - free[2])
         ned = body_to_ned(self.attitude_wxyz, frd)
         contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
-        before = ned if contiguous or first else self.last_ned_m_s2
+        last = ned if contiguous or first else self.last_ned_m_s2
         over_s = 0.5e-6 * (min(elapsed_us, self.averaging_us) if first else elapsed_us)
         sums = self.unconfirmed_ned_m_s
         self.unconfirmed_ned_m_s = (
-            sums[0] + over_s * (before[0] + ned[0]),
-            sums[1] + over_s * (before[1] + ned[1]),
-            sums[2] + over_s * (before[2] + ned[2]),
+            sums[0] + over_s * (last[0] + ned[0]),
+            sums[1] + over_s * (last[1] + ned[1]),
+            sums[2] + over_s * (last[2] + ned[2]),
         )
         self.rates_frd_rad_s = w
+        self.paused = self.paused or not loud
+        if not self.paused:
+            self._keep(now_us, frd, turned_by)
         if loud:
             self._confirm(now_us, f, math.sqrt(frd[0] ** 2 + frd[1] ** 2 + frd[2] ** 2), contiguous)
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
+
+    def _keep(self, now_us: int, force_frd_m_s2: Vector3, turned_frd_rad_s: Vector3) -> None:
+        """A sample for the normal, if it is of the first hundredths of a second."""
+        before_us = self.time_boot_us
+        if before_us == 0:
+            self.first_boot_us = now_us
+            before_us = self.started_boot_us if self.earlier is None else self.earlier.time_boot_us
+        since_s, over_us = (now_us - self.first_boot_us) * 1e-6, now_us - before_us
+        if since_s > LOOKED_AT_S:
+            return
+        joined = over_us <= CONTIGUOUS * self.averaging_us
+        self.parts.append(
+            Part(
+                since_s,
+                over_us * 1e-6,
+                joined,
+                force_frd_m_s2,
+                self.attitude_wxyz,
+                self.rates_frd_rad_s,
+                turned_frd_rad_s,
+            )
+        )
 
     def _confirm(self, now_us: int, f: Vector3, size_m_s2: float, contiguous: bool) -> None:
         """The sample and all since the last loud one belong to the contact."""
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
-        self.parts.append((more, body_to_ned(self.attitude_wxyz, self.rates_frd_rad_s), total))
         self.unconfirmed_ned_m_s = (0.0, 0.0, 0.0)
         self.samples += 1
         self.loud_boot_us = now_us
@@ -104,6 +134,11 @@ class Push:
     @property
     def is_lower_bound(self) -> bool:
         return self.gap or self.may_be_clipped
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
+        return not self.clipped and self.samples > SHORT
 
     def turn_rad_s(self) -> float:
         """How much the contact has changed the rates by since its first sample."""

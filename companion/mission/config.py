@@ -46,6 +46,20 @@ class StreamsConfig(Written):
     min_attitude_hz: Positive = 10.0
 
 
+class GuardsConfig(Written):
+    """Where the vehicle's guards are and how a push turns it: from the direction of a push and the turning it makes
+    follows where the vehicle was touched. The defaults are the paper's vehicle, arms out."""
+
+    # From the vehicle's middle to each guard's, a quad-x.
+    centre_m: Positive = 0.145
+    radius_m: Positive = 0.08
+    height_m: Positive = 0.03
+    # Spring arms give: up to 30 mm, a third of that in the mean of the first hundredths of a second.
+    give_m: NotNegative = 0.01
+    # Radii of gyration about body x, y, z: roots of inertia over mass, 0.0034, 0.0034 and 0.0053 kg m^2 for 1.112 kg.
+    gyration_frd_m: tuple[Positive, Positive, Positive] = (0.0553, 0.0553, 0.069)
+
+
 class EstimateConfig(Written):
     """Numbers of the estimate of a collision."""
 
@@ -54,8 +68,7 @@ class EstimateConfig(Written):
 
     # IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this.
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
-    # From the centre to the rim of a guard, the paper's vehicle: what slides along a wall when it turns.
-    reach_m: Positive = 0.2
+    guards: GuardsConfig = GuardsConfig()
     # Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated.
     velocity_noise_m_s: Positive = 0.04
     # How long its errors last: those of optical flow and of a filter behind it change within a third of a second.

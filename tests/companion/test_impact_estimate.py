@@ -2,16 +2,18 @@
 
 import math
 import random
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from companion.detection.interface import ImpactKind, Situation
 from companion.detection.watch import advance, start_watch
 from companion.estimate.approach import VelocityFix, velocity_at
-from companion.estimate.normal import normal_of
+from companion.estimate.normal import Part, normal_of
 from companion.estimate.push import Push
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vibration
-from companion.mission.config import CompanionConfig, EstimateConfig
+from companion.mission.config import CompanionConfig, EstimateConfig, GuardsConfig
 
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000
@@ -51,57 +53,76 @@ def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
     assert velocity_at([], CONTACT_US, (0.0, 0.0, 0.0), CONFIG) is None
 
 
-STILL = (0.0, 0.0, 0.0)
+GUARDS = GuardsConfig()
+WINDOW_S = 0.005
 
 
-def slide(friction, tangent_m_s, yaw_rate=0.0, samples=10):
-    """A wall to the north (normal south) that pushes ten times; the vehicle slides east, then is turned."""
-    parts, total = [], (0.0, 0.0, 0.0)
-    for k in range(samples):
-        east_m_s = tangent_m_s + total[1]
-        # Tangent east, seen from the wall: the contact point goes with v and with the turning.
-        sliding = east_m_s + 0.2 * yaw_rate * k / samples
-        push = (-0.2, -0.2 * friction * max(-1.0, min(1.0, sliding / 0.02)), 0.0)
-        parts.append((push, (0.0, 0.0, yaw_rate * k / samples), total))
-        total = (total[0] + push[0], total[1] + push[1], 0.0)
-    return parts
+def slide(slant_deg, friction, tangent_m_s, every_s=0.004, samples=6, lean_deg=0.0):
+    """Parts of a push of 25 m/s^2 by a wall ahead, on the front right guard, followed in fine steps by hand.
+
+    The vehicle is level, nose north, at 1.5 m/s; the wall is turned and leans by the angles given.
+    """
+    slant, lean = math.radians(slant_deg), math.radians(lean_deg)
+    n = np.array([-math.cos(lean) * math.cos(slant), -math.cos(lean) * math.sin(slant), math.sin(lean)])
+    against = -n
+    rim = GUARDS.radius_m / math.hypot(against[0], against[1]) - GUARDS.give_m
+    r = GUARDS.centre_m * np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0) + rim * np.array([against[0], against[1], 0.0])
+    r[2] = 0.5 * GUARDS.height_m * max(-1.0, min(1.0, against[2] / 0.1)) - GUARDS.give_m * against[2]
+    v, w = np.array([1.5, tangent_m_s, 0.0]), np.zeros(3)
+    gyration2, step_s, parts = np.square(GUARDS.gyration_frd_m), 1e-4, []
+    for sample in range(samples):
+        pushes, before = [], w.copy()
+        for _ in range(round((0.7 if sample == 0 else 1.0) * every_s / step_s)):
+            sliding = v + np.cross(w, r)
+            sliding -= (sliding @ n) * n
+            speed = np.linalg.norm(sliding)
+            push = 25.0 * step_s * (n - friction * sliding / max(speed, 0.02))
+            v, w = v + push, w + np.cross(r, push) / gyration2
+            pushes.append(push)
+        seen = np.sum(pushes[-round(min(every_s, WINDOW_S) / step_s) :], axis=0) / min(every_s, WINDOW_S)
+        joined = every_s < 0.0075
+        parts.append(Part(sample * every_s, every_s, joined, tuple(seen), LEVEL, tuple(w), tuple(w - before)))
+    return parts, tuple(n)
 
 
-def off_deg(normal):
-    return math.degrees(math.atan2(normal[1], -normal[0]))
+def off_deg(normal, true):
+    return math.degrees(math.acos(min(1.0, sum(a * b for a, b in zip(normal, true, strict=True)))))
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.2, 0.3])
-@pytest.mark.parametrize(("tangent_m_s", "most_deg"), [(0.0, 3.0), (0.5, 14.0), (-0.5, 14.0), (1.5, 9.0)])
-def test_the_normal_is_found_through_any_friction(friction, tangent_m_s, most_deg):
-    """Worst where friction leans the push straight back, as a head-on hit would be without any."""
-    normal = normal_of(slide(friction, tangent_m_s), (1.5, tangent_m_s, 0.0), 0.2)
-    assert abs(off_deg(normal)) < most_deg
+@pytest.mark.parametrize(("slant_deg", "tangent_m_s"), [(10.0, 0.0), (20.0, 0.0), (10.0, 0.5), (20.0, -0.5)])
+def test_the_normal_is_found_through_any_friction(friction, slant_deg, tangent_m_s):
+    """Also where friction leans the push straight back, as a head-on hit would be without any."""
+    parts, true = slide(slant_deg, friction, tangent_m_s)
+    normal = normal_of(parts, (1.5, tangent_m_s, 0.0), GUARDS, WINDOW_S)
+    assert off_deg(normal, true) < 9.0
     assert math.hypot(*normal) == pytest.approx(1.0)
 
 
-def test_friction_that_changes_sides_as_the_vehicle_turns_gives_itself_away():
-    """Sliding east at first and west at the end: the truth lies between, whichever way the sum leans."""
-    parts = slide(0.3, 0.6, yaw_rate=-9.0)
-    assert abs(off_deg(normal_of(parts, (1.5, 0.6, 0.0), 0.2))) < 4.0
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_two_samples_of_a_slow_stream_say_less_but_not_nothing(friction):
+    parts, true = slide(15.0, friction, 0.4, every_s=0.012, samples=2)
+    assert off_deg(normal_of(parts, (1.5, 0.4, 0.0), GUARDS, WINDOW_S), true) < 15.0
 
 
-def test_a_leaning_walls_normal_is_found_where_the_vehicle_slides_up_it():
-    """The wall leans over by 40 degrees; friction of 0.3 holds the vehicle that slides up along it."""
-    c, s = math.cos(math.radians(40.0)), math.sin(math.radians(40.0))
-    parts, total = [], STILL
-    for _ in range(10):
-        push = (-0.1 * (c + 0.3 * s), 0.0, 0.1 * (s - 0.3 * c))
-        # Up the wall is (-s, 0, -c) from the vehicle's north; it goes north and is turned up by the wall.
-        parts.append((push, STILL, total))
-        total = tuple(a + b for a, b in zip(total, push, strict=True))
-    n, _, d = normal_of(parts, (1.5, 0.0, 0.0), 0.2)
-    assert abs(math.degrees(math.atan2(d, -n)) - 40.0) < 13.0
+def test_it_is_the_turning_that_tells_friction_from_a_slant():
+    """The same pushes on a vehicle that nothing turned were not on that guard's rim."""
+    parts, true = slide(15.0, 0.3, 0.0)
+    unturned = [replace(part, turned_frd_rad_s=(0.0, 0.0, 0.0), rates_frd_rad_s=(0.0, 0.0, 0.0)) for part in parts]
+    velocity = (1.5, 0.0, 0.0)
+    with_turning = off_deg(normal_of(parts, velocity, GUARDS, WINDOW_S), true)
+    without = off_deg(normal_of(unturned, velocity, GUARDS, WINDOW_S), true)
+    assert with_turning < 6.0 < without
 
 
-def test_a_ceilings_normal_is_the_pushs_direction_and_no_push_has_none():
-    assert normal_of([((0.0, 0.1, 2.0), STILL, STILL)], (0.0, 0.0, -1.0), 0.2)[2] > 0.99
-    assert normal_of([], (0.0, 0.0, 0.0), 0.2) == (0.0, 0.0, 0.0)
+@pytest.mark.parametrize("lean_deg", [-30.0, 30.0])
+def test_a_leaning_walls_normal_is_found_though_friction_holds_what_slides_along_it(lean_deg):
+    parts, true = slide(10.0, 0.3, 0.0, lean_deg=lean_deg)
+    assert off_deg(normal_of(parts, (1.5, 0.0, 0.0), GUARDS, WINDOW_S), true) < 10.0
+
+
+def test_no_push_has_no_normal():
+    assert normal_of([], (0.0, 0.0, 0.0), GUARDS, WINDOW_S) == (0.0, 0.0, 0.0)
 
 
 def imu(t_us, push, yaw_rate=0.0):
