@@ -35,6 +35,8 @@ APPROACH_M_S = 0.5
 # Cosine of 75 degrees: a clipped push further than that from where the vehicle came from has lost its direction; one
 # that was not clipped came from something that moved.
 GLANCING = 0.26
+# A force no larger than this, found because the rates jumped, is what drag and thrust have become after the contact.
+FAINT_M_S2 = 3.0
 # What the detector leaves open or takes for soft is not classified anew.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
@@ -231,9 +233,11 @@ class ImpactEstimator:
         return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
 
     def _pushed(self, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
-        """The normal; the way back where a push clipped, each axis by itself, or not seen went along the obstacle."""
+        """The normal; the way back where a push went along the obstacle that clipped, each axis by itself, or that fell
+        between the samples."""
         push, back = self.push, _back(velocity_ned_m_s)
-        return back if (push is None or push.clipped) and _is_along(normal_ned, back) else normal_ned
+        is_lost = push is None or push.clipped or push.peak_m_s2 < FAINT_M_S2
+        return back if is_lost and _is_along(normal_ned, back) else normal_ned
 
     def _motion(self, contact_us: int) -> tuple[ContactMotion, float]:
         """From what was heard before this contact and after the one before it, and v_c's standard deviation."""

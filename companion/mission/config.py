@@ -80,6 +80,11 @@ class EstimateConfig(Written):
     # 0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s.
     jerk_density_m2_s5: Positive = 4.0
 
+    @property
+    def reach_m(self) -> float:
+        """From the vehicle's middle to the farthest place on a guard's rim."""
+        return self.guards.centre_m + self.guards.radius_m
+
 
 class SettledConfig(Written):
     """When a recovery has ended."""
