@@ -101,6 +101,11 @@ def test_one_hit_in_fifty_that_overshoots_or_touches_again_is_too_many(changes):
 def test_the_feed_forward_halves_what_is_lost_without_it():
     assert verdicts(losing(0.2, 0.09), "without the feed-forward") == [MET, MET]
     assert verdicts(losing(0.2, 0.11), "without the feed-forward") == [MISSED, MISSED]
+    # those flown again for that count in no other table
+    assert failures_text(made_up(count=5)) == ""
+    again = made_up(count=5, failing=[5])
+    assert failures_text(again).count("rebound campaign --only 5") == 2
+    assert "10 missions" not in mission_bars(again)[0].of and "5 missions, 1 not" in mission_bars(again)[0].of
     # less than 5 cm is not looked at
     assert verdicts(losing(0.04, 0.04), "without the feed-forward") == [REPORTED, REPORTED]
 

@@ -9,6 +9,7 @@ import pytest
 from rebound_cli.random_missions.contacts import Role, contacts_of
 from rebound_cli.random_missions.judge import failures
 from rebound_cli.random_missions.recovered import recoveries
+from sim_vehicle.world import Wall
 from tests.rebound_cli.random_missions.made_up import (
     DONE_S,
     collision,
@@ -192,10 +193,11 @@ def test_the_same_place_hit_twice_is_a_failure_unless_it_was_tried_again_on_purp
 
 def test_a_goal_called_out_of_reach_is_one_behind_something():
     told = [event(12, "item", step=1), event(12, "unreachable", item="2", then="land"), *LANDS_THERE]
-    assert causes(bounced(*told, policy=DETOUR)) == []
-    nothing = bounced(*told, policy=DETOUR)
-    nothing = replace(nothing, obstacles={})
-    assert causes(nothing) == ["gave up a goal in the open"]
+    judged = bounced(*told, policy=DETOUR)
+    assert causes(judged) == []
+    # with the wall 2 m beside the straight way, which is the line east = 0
+    beside = Wall("wall", (2.2, 2.0, -2.0), (0.0, -1.0, 0.0), 10.0, 10.0, 0.1)
+    assert causes(replace(judged, obstacles={"wall": beside})) == ["gave up a goal in the open"]
 
 
 def test_what_follows_a_goal_out_of_reach_is_what_the_mission_says():
@@ -215,6 +217,13 @@ def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
 def test_a_bounce_before_anybody_told_of_the_hit_belongs_to_it():
     judged = flight(hits=[hit(speed_m_s=0.6), hit(at_s=10.1, speed_m_s=0.6), hit(at_s=10.6, speed_m_s=0.6)])
     assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.HIT]
+
+
+def test_clear_is_the_nearest_of_the_last_half_second():
+    # Given a vehicle that settles 0.5 m off the wall and then drifts back to 0.2 m
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 1.5, 0, 2), (11.2, 1.8, 0, 2), (17, 1.8, 0, 2))
+    (figures,) = recoveries(bounced(series=series), contacts_of(bounced(series=series)))
+    assert figures["clear_m"] == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_recovery_is_measured_by_truth():
