@@ -2,6 +2,7 @@
 
 import pytest
 
+from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
 from tests.companion.fake_vehicle import LOITER, FakeVehicle, Flight, flight
 
@@ -136,6 +137,8 @@ def test_a_wall_without_an_end_is_given_up_on_after_a_few_places_of_it():
     report = f.companion.report()
     assert report.unreachable == ("2",) and len(report.collisions) <= 4
     assert "no way round what is known; then: land" in f.event("unreachable").text
+    told = status_text(f.event("unreachable"), "test", 3)
+    assert told is not None and told.text.startswith("Item 2 out of reach"), "the operator reads it too"
     assert f.vehicle.position[0] < 3.0 and report.outcome == "completed"
     assert "not flown from item 2 on" in report.reason
     places = [hit.position_ned_m[1] for hit in report.collisions]
