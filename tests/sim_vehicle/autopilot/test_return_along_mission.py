@@ -136,9 +136,11 @@ def test_a_negative_delay_waits_above_home_for_good():
 
 @pytest.mark.parametrize("height_m", [math.inf, -math.inf, NAN])
 def test_places_of_no_height_break_nothing(height_m):
+    flight = at(20.0, 20.0, WITH_LANDING)
+    upload(flight, *WITH_LANDING[:-1], item(kinds.LAND, 0.0, 45.0, height_m))
+    upload(flight, item(kinds.RALLY_POINT, 25.0, 15.0, height_m), kind=MissionType.RALLY)
     for rtl_type in range(6):
-        flight = at(20.0, 20.0, WITH_LANDING, RTL_TYPE=rtl_type)
-        upload(flight, *WITH_LANDING[:-1], item(kinds.LAND, 0.0, 45.0, height_m))
-        upload(flight, item(kinds.RALLY_POINT, 25.0, 15.0, height_m), kind=MissionType.RALLY)
+        flight.parameters.set("RTL_TYPE", rtl_type)
         assert flight.ask(NAV_RETURN_TO_LAUNCH) is Result.ACCEPTED
-        flight.fly(2.0)
+        flight.fly(0.5)
+        assert set_mode(flight, Mode.LOITER) is Result.ACCEPTED
