@@ -25,7 +25,8 @@ from companion.report import Event, JsonValue, Outcome
 class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
-    `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity.
+    `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; of the
+    height, too, where `is_height_free`.
     """
 
     position_ned_m: Vector3
@@ -33,11 +34,19 @@ class Target:
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
     leans_only: bool = False
+    is_height_free: bool = False
 
     def setpoint(self, time_us: int) -> PositionSetpoint:
         """As it is sent."""
-        velocity, acceleration = self.velocity_ned_m_s, self.acceleration_ned_m_s2
-        return PositionSetpoint(time_us, self.position_ned_m, self.yaw_rad, velocity, acceleration, self.leans_only)
+        return PositionSetpoint(
+            time_us,
+            self.position_ned_m,
+            self.yaw_rad,
+            self.velocity_ned_m_s,
+            self.acceleration_ned_m_s2,
+            self.leans_only,
+            self.is_height_free,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,15 @@ from companion.flight.after_hit import afterwards
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
-from companion.flight.rebound import agreed_normal, believable, spin_rad_s, way_back
+from companion.flight.rebound import (
+    STILL_PUSHING_US,
+    agreed_normal,
+    believable,
+    is_pinned,
+    let_go,
+    spin_rad_s,
+    way_back,
+)
 from companion.flight.remembering import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, split
@@ -38,8 +46,6 @@ COASTED_S = 0.5
 ROUNDING_M = 1e-3
 # A contact that still pushes this long after it began is no hit but something that carries the vehicle along.
 CARRIED_AFTER_US = 250_000
-# It pushes still when it pushed within this: a few IMU samples of the slowest stream.
-STILL_PUSHING_US = 60_000
 # The place to recover to is then found anew, ten times a second.
 CARRIED_EVERY_US = 100_000
 
@@ -61,6 +67,7 @@ class Recover:
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
+        self._is_pinned = False
         self._thrown_m_s = 0.0
         self._take(flight, self._law.expected(self._contact), now_us)
 
@@ -73,17 +80,22 @@ class Recover:
 
     def target(self, now_us: int) -> Target | None:
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
-        velocity, acceleration = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2
+        if self._is_pinned:
+            return Target(motion.position_ned_m, self._yaw_rad, REST, let_go(self._contact.normal_ned), True, True)
         if not self._is_believed:
-            a, b, _ = REST if acceleration is None or self._spins else acceleration
-            leant = (a, b, self._braking.at(now_us))
-            return Target(motion.position_ned_m, self._yaw_rad, velocity or REST, leant, leans_only=True)
+            motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
+            a, b, braking = motion.acceleration_ned_m_s2 or REST
+            leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
+            is_thrown = now_us - self._started_us < BRAKED_US
+            velocity = motion.velocity_ned_m_s or REST
+            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_thrown)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
         return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, motion.acceleration_ned_m_s2)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
+        self._is_pinned = self._law.is_refined and is_pinned(flight, self._record, self._contact.normal_ned)
         for sample in inputs.positions:
             if not self._believes(flight, sample):
                 continue

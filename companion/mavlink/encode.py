@@ -31,7 +31,8 @@ DEFAULT_SYSTEM_ID = 1
 
 # POSITION_TARGET_TYPEMASK: a set bit tells the vehicle to ignore the part.
 IGNORE_VELOCITY = 0x038
-IGNORE_PLACE = 0x007
+IGNORE_NORTH_AND_EAST = 0x01B  # place and velocity
+IGNORE_DOWN = 0x024
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
@@ -145,8 +146,11 @@ class Encoder:
             acceleration = (NAN, NAN, NAN)
         place = setpoint.position_ned_m
         if setpoint.leans_only:
-            type_mask |= IGNORE_PLACE | IGNORE_VELOCITY
-            place = velocity = (NAN, NAN, NAN)
+            type_mask |= IGNORE_NORTH_AND_EAST
+            place, velocity = (NAN, NAN, place[2]), (NAN, NAN, velocity[2])
+        if setpoint.is_height_free:
+            type_mask |= IGNORE_DOWN
+            place, velocity = (*place[:2], NAN), (*velocity[:2], NAN)
         yaw = setpoint.yaw_rad
         if yaw is None:
             type_mask |= IGNORE_YAW

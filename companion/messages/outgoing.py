@@ -64,7 +64,8 @@ class SendCommand:
 class PositionSetpoint:
     """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
 
-    `leans_only`: the acceleration alone is asked for, whatever place and velocity are given.
+    `leans_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
+    `is_height_free`: and down, too.
     """
 
     time_us: int
@@ -73,6 +74,7 @@ class PositionSetpoint:
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
     leans_only: bool = False
+    is_height_free: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,8 @@ LEAD_S = 0.15
 SHORTEST_S = 1.0
 # Braking before a fence asks for all there is; in less than the vehicle takes to lean there is nothing to be gained.
 HARDEST_S = 0.2
+# Cosine of 60 degrees: a goal further aside is not run past but turned to, which brakes cannot hasten.
+AHEAD = 0.5
 # Durations are tried in steps of a hundredth.
 STEP = 1.01
 
@@ -104,7 +106,8 @@ def glide(start_ned_m: Vector3, velocity_ned_m_s: Vector3, goal_ned_m: Vector3, 
     n, e, d = (goal - start for goal, start in zip(goal_ned_m, start_ned_m, strict=True))
     u, v, w = velocity_ned_m_s
     ahead, speed2 = n * u + e * v + d * w, u * u + v * v + w * w
-    longest_s = max(HARDEST_S, 2.0 * ahead / speed2) if ahead > 0.0 < speed2 else math.inf
+    is_ahead = ahead > AHEAD * math.sqrt(speed2 * (n * n + e * e + d * d))
+    longest_s = max(HARDEST_S, 2.0 * ahead / speed2) if is_ahead else math.inf
     duration_s = SHORTEST_S
     while duration_s < longest_s and most_of((n, e, d), velocity_ned_m_s, duration_s) > most_m_s2:
         duration_s *= STEP

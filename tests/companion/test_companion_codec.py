@@ -234,10 +234,14 @@ def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
 
 
 def test_a_setpoint_that_leans_only_asks_for_the_acceleration_alone():
-    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.0), (0.5, -0.5, 0.25), leans_only=True))
+    lean = (0.5, -0.5, 0.25)
+    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, leans_only=True))
+    assert m.type_mask == 0x81B
+    assert all(math.isnan(value) for value in (m.x, m.y, m.vx, m.vy))
+    assert (m.z, m.vz, m.afx, m.afy, m.afz, m.yaw) == (-3.0, 0.5, *lean, 1.0)
+    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, leans_only=True, is_height_free=True))
     assert m.type_mask == 0x83F
     assert all(math.isnan(value) for value in (m.x, m.y, m.z, m.vx, m.vy, m.vz))
-    assert (m.afx, m.afy, m.afz, m.yaw) == (0.5, -0.5, 0.25, 1.0)
 
 
 @pytest.mark.parametrize(
