@@ -22,18 +22,18 @@ AGREEING = 0.87
 # motors', whatever they are asked for. It comes free without thrust. Beyond 40 degrees no flight was on its way.
 PINNED_COSINE = 0.77
 PINNED_MOST_US = 1_000_000
-# It pushes still when it pushed within this: a few IMU samples of the slowest stream.
-STILL_PUSHING_US = 60_000
+# Between the touches of a guard that scrapes along.
+SCRAPING_US = 250_000
 # Down as it falls; a little to the side, so that the attitude asked for leans away.
 LET_GO_DOWN_M_S2, LET_GO_AWAY_M_S2 = 9.0, 2.0
 
 
 def is_pinned(flight: FlightContext, record: CollisionRecord, normal_ned: Vector3) -> bool:
-    """Whether a hit of just now has tipped the vehicle over towards the obstacle, and it leans on it still."""
+    """Whether a hit of just now has tipped the vehicle over towards the obstacle, and it leans and scrapes on it still."""
     attitude = flight.vehicle.attitude
     if attitude is None or attitude.time_boot_us - record.sample_time_boot_us > PINNED_MOST_US:
         return False
-    if attitude.time_boot_us - record.contact_ended_boot_us > STILL_PUSHING_US:
+    if attitude.time_boot_us - record.contact_ended_boot_us > SCRAPING_US:
         return False
     n, e, d = body_to_ned(attitude.attitude_wxyz, (0.0, 0.0, 1.0))
     return d < PINNED_COSINE and n * normal_ned[0] + e * normal_ned[1] > 0.0

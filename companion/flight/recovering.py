@@ -12,7 +12,6 @@ from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
 from companion.flight.rebound import (
-    STILL_PUSHING_US,
     agreed_normal,
     believable,
     is_pinned,
@@ -46,6 +45,8 @@ COASTED_S = 0.5
 ROUNDING_M = 1e-3
 # A contact that still pushes this long after it began is no hit but something that carries the vehicle along.
 CARRIED_AFTER_US = 250_000
+# It pushes still when it pushed within this: a few IMU samples of the slowest stream.
+STILL_PUSHING_US = 60_000
 # The place to recover to is then found anew, ten times a second.
 CARRIED_EVERY_US = 100_000
 
@@ -86,7 +87,7 @@ class Recover:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
             a, b, braking = motion.acceleration_ned_m_s2 or REST
             leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
-            is_thrown = now_us - self._started_us < BRAKED_US
+            is_thrown = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
             velocity = motion.velocity_ned_m_s or REST
             return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_thrown)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
@@ -172,7 +173,9 @@ class Recover:
         self._spins = abs(rates_ned[2]) > SPINNING_RAD_S
         since_us = attitude.time_boot_us - self._record.sample_time_boot_us
         climb = thrown_down_m_s(rates_ned, self._contact.normal_ned, flight.mission.companion.estimate.reach_m)
-        if 0 < since_us <= THROWN_US and abs(climb) > abs(self._thrown_m_s):
+        # Of a touch that follows, the turn is the first one's.
+        is_first = not self._record.inherits_doubt
+        if is_first and 0 < since_us <= THROWN_US and abs(climb) > abs(self._thrown_m_s):
             self._thrown_m_s = climb
             self._braking = brake(climb, flight.mission.recovery.vertical_acceleration_m_s2, self._started_us, 0.0)
 
