@@ -36,8 +36,8 @@ POLL_INTERVAL_US = 50_000
 
 # Between take-off and landing: the floor counts.
 ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
-# Off the ground, which is the detector's affair by height, a hit in the climb is a hit too.
-DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF}
+# Off the ground, which is the detector's affair by height, a hit in the climb or the descent is a hit too.
+DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
 
 
 @dataclass(slots=True)
@@ -120,7 +120,7 @@ def situation(core: Core) -> Situation:
 
 
 def why_not_detecting(core: Core, height_m: float | None) -> str | None:
-    """Ground, take-off and landing shake a vehicle as a hit does."""
+    """The ground shakes a vehicle as a hit does."""
     if core.machine.state not in DETECTING_STATES:
         return core.machine.state.value
     least_m = core.flight.mission.companion.min_detection_height_m

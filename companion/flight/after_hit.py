@@ -55,8 +55,16 @@ def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str
         return "abort", f"hit at {speed_m_s:.2f} m/s, above abort_when.hit_above_m_s = {limit_m_s:g}"
     if hits >= policy.max_hits:
         # A way home on which there are obstacles too is none.
-        return "land" if flight.going_home else policy.after_max_hits, f"hit {hits} of at most {policy.max_hits}"
+        then = "land" if flight.going_home or flight.is_landing else policy.after_max_hits
+        return then, f"hit {hits} of at most {policy.max_hits}"
+    if flight.is_landing:
+        return "land", ""
     return "return" if flight.going_home else policy.then, ""
+
+
+def lands_anyway(flight: FlightContext) -> bool:
+    """Whether so many hits have been met that a landing is not interrupted for another one."""
+    return flight.is_landing and len(flight.collisions) >= flight.mission.on_collision.max_hits
 
 
 def afterwards(flight: FlightContext) -> Move:

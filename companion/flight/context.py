@@ -126,6 +126,7 @@ class FlightContext:
     after_recovery: AfterRecovery = field(default_factory=AfterRecovery)
     returning_as: ReturnItem = field(default_factory=ReturnItem)
     going_home: bool = False
+    is_landing: bool = False  # ordered, and begun again after every hit on the way down
     file_awaited: str | None = None
     file_is_there: bool = False
     expectations: list[Expectation] = field(default_factory=list)

@@ -1,9 +1,9 @@
-"""State landing: PX4's own land mode, until the vehicle has disarmed itself."""
+"""State landing: PX4's own land mode, until the vehicle has disarmed itself; and out of it again after a hit."""
 
-from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.flight.context import Activity, FlightContext, Inputs, Move, Target
 from companion.flight.states import Trigger
 from companion.messages import SetMode
-from companion.px4_mode import AUTO_LAND
+from companion.px4_mode import AUTO_LAND, OFFBOARD
 
 # From 12 m at PX4's MPC_LAND_SPEED of 0.7 m/s it takes under 30 s with detection and disarming; this allows for
 # the slowest speed it can be set to (0.6 m/s) from 60 m.
@@ -17,6 +17,7 @@ class Land:
         self._started_us = now_us
         self._target = flight.target
         self._landing = False
+        flight.is_landing = True
         flight.commander.begin(SetMode(AUTO_LAND))
 
     def target(self, now_us: int) -> Target | None:
@@ -38,3 +39,35 @@ class Land:
             seconds = LANDING_TIMEOUT_US // 1_000_000
             return Move(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land")
         return None
+
+
+# Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.
+LEAD_US = 40_000
+
+
+class TakeBack:
+    """A recovery out of the land mode: its setpoints first, then OFFBOARD, in which alone they are flown.
+
+    A vehicle that does not take the mode goes on landing by itself, and is left to it.
+    """
+
+    def __init__(self, flight: FlightContext, recovery: Activity, now_us: int) -> None:
+        self._recovery = recovery
+        self._ask_us = now_us + LEAD_US
+        self._is_taken = self._is_asked = False
+        flight.commander.cancel()
+
+    def target(self, now_us: int) -> Target | None:
+        return self._recovery.target(now_us)
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if not self._is_taken and now_us >= self._ask_us:
+            if not self._is_asked:
+                self._is_asked = True
+                flight.commander.begin(SetMode(OFFBOARD))
+            outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
+            if outcome is not None and not outcome.succeeded:
+                return Move(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
+            if outcome is not None:
+                self._is_taken, flight.expected_mode = True, OFFBOARD
+        return self._recovery.step(flight, inputs, now_us)

@@ -4,12 +4,12 @@ import traceback
 from dataclasses import dataclass
 
 from companion.flight import expecting
-from companion.flight.after_hit import decide
+from companion.flight.after_hit import decide, lands_anyway
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
 from companion.flight.guards import ON_THE_GROUND, guard
 from companion.flight.handover import HandOver, LetGo
-from companion.flight.landing import Land
+from companion.flight.landing import Land, TakeBack
 from companion.flight.progress import FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.remembering import remember
@@ -17,6 +17,7 @@ from companion.flight.returning import FlyHome
 from companion.flight.states import FINAL_STATES, State, Trigger, moves, next_state
 from companion.flight.takeoff import TakeOff
 from companion.mission.items import TakeoffItem
+from companion.px4_mode import OFFBOARD
 
 
 @dataclass(slots=True)
@@ -38,7 +39,7 @@ class Machine:
         if self.state not in FINAL_STATES:
             self._take(guard(self.flight, self.state, inputs, now_us), now_us)
         for estimate in inputs.impacts:
-            if moves(self.state, Trigger.COLLISION):
+            if moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.activity, FlyItems):
                     self.activity.interrupt(now_us)
                 record_collision(self.flight, estimate, now_us)
@@ -91,7 +92,8 @@ class Machine:
                     flight.step_index = 1
                 return FlyItems(flight, now_us)
             case State.RECOVERING:
-                return Recover(flight, now_us)
+                recovery = Recover(flight, now_us)
+                return recovery if flight.expected_mode == OFFBOARD else TakeBack(flight, recovery, now_us)
             case State.HOLDING:
                 return HoldAfterRecovery(flight, now_us)
             case State.RETURNING:

@@ -29,7 +29,7 @@ LET_GO_DOWN_M_S2, LET_GO_AWAY_M_S2 = 9.0, 2.0
 
 
 def is_pinned(flight: FlightContext, record: CollisionRecord, normal_ned: Vector3) -> bool:
-    """Whether a hit of just now has tipped the vehicle over towards the obstacle, and it leans and scrapes on it still."""
+    """Whether a hit of just now has tipped the vehicle over towards the obstacle, on which it scrapes still."""
     attitude = flight.vehicle.attitude
     if attitude is None or attitude.time_boot_us - record.sample_time_boot_us > PINNED_MOST_US:
         return False

@@ -97,6 +97,7 @@ TABLE: Mapping[State, Mapping[Trigger, State]] = {
     State.LANDING: {
         Trigger.CONTROL_LOST: State.ABORTED,
         Trigger.INTERRUPTED: State.ABORTED,
+        Trigger.COLLISION: State.RECOVERING,
         Trigger.DISARMED: State.DONE,
     },
     State.DONE: {},

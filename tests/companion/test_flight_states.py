@@ -42,6 +42,7 @@ EXPECTED = {
     (State.RETURNING, Trigger.LAND_DUE): State.LANDING,
     (State.LANDING, Trigger.CONTROL_LOST): State.ABORTED,
     (State.LANDING, Trigger.INTERRUPTED): State.ABORTED,
+    (State.LANDING, Trigger.COLLISION): State.RECOVERING,
     (State.LANDING, Trigger.DISARMED): State.DONE,
 }
 
