@@ -134,6 +134,7 @@ class FlightContext:
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
+    blind_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None
     reason: str = ""

@@ -121,6 +121,7 @@ def describe_abort(abort_when: AbortWhen) -> str:
         "battery_below_percent": "battery below {:g} %",
         "flight_time_above_s": "more than {:g} s after arming",
         "setpoint_missed_by_m": "more than {:g} m from the setpoint",
+        "blind_for_s": "detector blind for {:g} s",
         "hit_above_m_s": "hit at more than {:g} m/s",
     }
     given = abort_when.model_dump(exclude_none=True)

@@ -3,8 +3,7 @@
 import math
 
 from companion.detection.classify import HOVER_M_S
-from companion.estimate.rotation import body_to_ned
-from companion.flight.collision import CollisionRecord, horizontal_unit
+from companion.flight.collision import horizontal_unit
 from companion.flight.context import FlightContext
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
@@ -17,31 +16,6 @@ REBOUND_SLACK_M = 0.2
 TELLING_CHANGE_M_S = 1.0
 # Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
 AGREEING = 0.87
-
-# Leaning so far into what it hit, a vehicle is pinned: its thrust presses the guard on with a lever longer than the
-# motors', whatever they are asked for. It comes free without thrust. Beyond 40 degrees no flight was on its way.
-PINNED_COSINE = 0.77
-PINNED_MOST_US = 1_000_000
-# Between the touches of a guard that scrapes along.
-SCRAPING_US = 250_000
-# Down as it falls; a little to the side, so that the attitude asked for leans away.
-LET_GO_DOWN_M_S2, LET_GO_AWAY_M_S2 = 9.0, 2.0
-
-
-def is_pinned(flight: FlightContext, record: CollisionRecord, normal_ned: Vector3) -> bool:
-    """Whether a hit of just now has tipped the vehicle over towards the obstacle, on which it scrapes still."""
-    attitude = flight.vehicle.attitude
-    if attitude is None or attitude.time_boot_us - record.sample_time_boot_us > PINNED_MOST_US:
-        return False
-    if attitude.time_boot_us - record.contact_ended_boot_us > SCRAPING_US:
-        return False
-    n, e, d = body_to_ned(attitude.attitude_wxyz, (0.0, 0.0, 1.0))
-    return d < PINNED_COSINE and n * normal_ned[0] + e * normal_ned[1] > 0.0
-
-
-def let_go(normal_ned: Vector3) -> Vector3:
-    """The acceleration that asks for next to no thrust, and to lean away."""
-    return (LET_GO_AWAY_M_S2 * normal_ned[0], LET_GO_AWAY_M_S2 * normal_ned[1], LET_GO_DOWN_M_S2)
 
 
 def spin_rad_s(flight: FlightContext) -> float:

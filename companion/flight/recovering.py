@@ -14,8 +14,6 @@ from companion.flight.doubt import half_way, is_believed
 from companion.flight.rebound import (
     agreed_normal,
     believable,
-    is_pinned,
-    let_go,
     spin_rad_s,
     way_back,
 )
@@ -68,7 +66,6 @@ class Recover:
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
-        self._is_pinned = False
         self._thrown_m_s = 0.0
         self._take(flight, self._law.expected(self._contact), now_us)
 
@@ -81,8 +78,6 @@ class Recover:
 
     def target(self, now_us: int) -> Target | None:
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
-        if self._is_pinned:
-            return Target(motion.position_ned_m, self._yaw_rad, REST, let_go(self._contact.normal_ned), True, True)
         if not self._is_believed:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
             a, b, braking = motion.acceleration_ned_m_s2 or REST
@@ -96,7 +91,6 @@ class Recover:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
-        self._is_pinned = self._law.is_refined and is_pinned(flight, self._record, self._contact.normal_ned)
         for sample in inputs.positions:
             if not self._believes(flight, sample):
                 continue

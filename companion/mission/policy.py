@@ -34,6 +34,9 @@ class AbortWhen(Written):
     flight_time_above_s: Positive | None = None
     # Further from the setpoint than this, the vehicle is not being flown by it.
     setpoint_missed_by_m: Positive | None = None
+    # A detector that has not seen for so long protects nothing. Links come back within seconds; a stream that was lost
+    # or a vehicle that shakes too much does not.
+    blind_for_s: Positive | None = 10.0
     # After the recovery from a hit this hard: the airframe wants to be looked at.
     hit_above_m_s: Positive | None = None
 

@@ -2,21 +2,26 @@
 
 From the motion x, v that follows the contact, with u = v . n the speed off the obstacle and v_t the rest of v:
 
-    D   = max(d_0,  t_0 |v_c . n|,  (x - x(t_c)) . n + u T / 2)
+    D   = max(d_0 + sin(10 deg) |v_t| T / 2,  t_0 |v_c . n|,  (x - x(t_c)) . n + u T / 2)
     x_d = x + (D - (x - x(t_c)) . n) n + v_t T / 2,  height x_3(t_c) unless the obstacle is steep
 
-that is, d_0 (clearance_m) or t_0 |v_c . n| (clearance_s) off the obstacle, further where the rebound would carry the
-vehicle further before it could stop, and along the obstacle where it comes to rest. v T / 2 is the length of a glide
-that only brakes. The way is a quintic from x, v to rest (way.Glide), sent with its velocity and acceleration, and T the
-shortest duration of at least 1 s for which its acceleration stays within a_max. At first the motion is the one
-expected: x(t_c), u = e |v_c . n| with the airframe's restitution e, v_t of the approach. It is measured once the
-contact is over, and goal and way are found anew.
+that is, d_0 (clearance_m), and what a normal good to 10 degrees may take of it along the obstacle, or t_0 |v_c . n|
+(clearance_s) off the obstacle, further where the rebound would carry the vehicle further before it could stop, and
+along the obstacle where it comes to rest. v T / 2 is the length of a glide that only brakes. The way is a quintic from
+x, v to rest (way.Glide), sent with its velocity and acceleration, and T the shortest duration of at least 1 s for which
+its acceleration stays within a_max. At first the motion is the one expected: x(t_c), u = e |v_c . n| with the
+airframe's restitution e, v_t of the approach. It is measured once the contact is over, and goal and way found anew.
 """
+
+import math
 
 from companion.messages import Vector3
 from companion.recovery.direction import plus, split
 from companion.recovery.interface import Contact, Moving, RecoveryConfig
 from companion.recovery.way import REST, SHORTEST_S, STEP, Way, glide, most_of
+
+# Of 10 degrees: as well as the normal is known after most hits (docs/detection.md).
+NORMAL_SINE = 0.17
 
 
 class AdaptiveLaw:
@@ -39,12 +44,13 @@ class AdaptiveLaw:
         off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
         off_m = split(_difference(motion.position_ned_m, contact.position_ned_m), normal)[0]
         into_m_s, _ = split(contact.velocity_ned_m_s, normal)
-        missing_m = max(config.clearance_m, config.clearance_s * abs(into_m_s)) - off_m
+        harder_m, along_m_s = config.clearance_s * abs(into_m_s), math.hypot(*tangential)
         if normal[2] == 0.0:
             tangential = (tangential[0], tangential[1], 0.0)
         duration_s, way = SHORTEST_S, REST
         while True:
-            off = plus(REST, max(missing_m, 0.5 * off_m_s * duration_s), normal)
+            clear_m = max(config.clearance_m + NORMAL_SINE * 0.5 * along_m_s * duration_s, harder_m)
+            off = plus(REST, max(clear_m - off_m, 0.5 * off_m_s * duration_s), normal)
             way = plus(off, 0.5 * duration_s, tangential)
             if most_of(way, motion.velocity_ned_m_s, duration_s) <= config.acceleration_m_s2:
                 break

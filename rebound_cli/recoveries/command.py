@@ -39,6 +39,7 @@ def write_table(path: Path, campaign: Campaign, results: Results, seeds: int) ->
 def _lines(cases: Sequence[Case], results: dict[int, Json], seeds: int) -> Iterator[str]:
     yield f"`rebound recoveries --seeds {seeds}`: {len(cases)} flights through the whole wire; each cell `paper` →"
     yield "`adaptive`. Settled: median; the others: the worst. Clear: the guards' distance at rest."
+    yield "Touched again: flights, and in brackets those of them in which the centre had come back to the wall."
     yield ""
     yield "| airframe, slant | speed | settled | past the setpoint | clear | height lost | risen | touched again |"
     yield "|---|---|---|---|---|---|---|---|"
@@ -60,7 +61,12 @@ def _cells(paper: list[Json], adaptive: list[Json]) -> Iterator[str]:
         yield " → ".join(
             _metres(worst(values) if (values := _known(flights, key)) else None) for flights in (paper, adaptive)
         )
-    yield " → ".join(str(sum(flight["recontacts"] > 0 for flight in flights)) for flights in (paper, adaptive))
+    yield " → ".join(_touched_again(flights) for flights in (paper, adaptive))
+
+
+def _touched_again(flights: list[Json]) -> str:
+    again, back = (sum(flight.get(key, 0) > 0 for flight in flights) for key in ("recontacts", "returned"))
+    return f"{again} ({back})"
 
 
 def _summary(cases: Sequence[Case], results: dict[int, Json]) -> str:

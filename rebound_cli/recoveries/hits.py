@@ -28,6 +28,8 @@ HEIGHT_M = 2.5
 RUN_UP_M_S2 = 3.0
 # After speeding up, the vehicle flies steadily for this long before the wall.
 STEADY_S = 1.0
+# A vehicle that leaves a wall does not come nearer again; its estimate has nothing to do with this.
+CAME_BACK_M = 0.02
 # How long the vehicle is watched at its recovery setpoint.
 HOLD_S = 2.0
 
@@ -112,12 +114,26 @@ def _figures(flown: Flown, truth: FlightTruth, mission: Mission) -> Json:
     below_m = path[during, 2] - touched[2]
     past_m = (path[during] - np.array(last.recovery_setpoint_ned_m)) @ normal
     return {
+        "returned": _returns(truth, normal, until_s),
         "settled_s": settled_s,
         "past_m": max(0.0, float(past_m.max())),
         "clear_m": float(((path[resting] - touched) @ normal).min()) if resting.any() else None,
         "lost_m": max(0.0, float(below_m.max())),
         "risen_m": max(0.0, float(-below_m.min())),
     }
+
+
+def _returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
+    """Touches in the recovery to which the centre had come back; the others are another guard swinging in."""
+    hit, time_us = truth.hits[0], truth.series["time_boot_us"]
+    off_m = truth.series["position_ned_m"] @ normal
+    returned = 0
+    for touch in truth.hits[1:]:
+        if touch.contact_at_boot_us > hit.contact_at_boot_us + 1e6 * until_s:
+            break
+        between = off_m[(time_us >= hit.ended_at_boot_us) & (time_us <= touch.contact_at_boot_us)]
+        returned += len(between) > 0 and float(between.max() - between[-1]) > CAME_BACK_M
+    return returned
 
 
 def of(all_cases: Sequence[Case], results: dict[int, Json], **wanted: object) -> list[Json]:

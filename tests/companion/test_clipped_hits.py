@@ -1,13 +1,11 @@
 """A hit that the accelerometer could not show whole: what is believed of the estimate, and when."""
 
 import math
-from types import SimpleNamespace
 
 import pytest
 
 from companion.estimate.approach import VelocityFix
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
-from companion.flight.rebound import is_pinned, let_go
 from companion.messages import LocalPosition
 from companion.recovery.height import NO_BRAKING, brake, level, thrown_down_m_s
 from companion.recovery.way import Motion
@@ -91,17 +89,3 @@ def test_height_is_the_only_thing_that_levelling_changes():
     motion = Motion((1.0, 2.0, -3.0), (0.5, 0.6, 0.7), (0.1, 0.2, 0.3))
     assert level(motion, -2.0, 1.5) == Motion((1.0, 2.0, -2.0), (0.5, 0.6, 0.0), (0.1, 0.2, 1.5))
     assert level(Motion((1.0, 2.0, -3.0)), -2.0, 0.0) == Motion((1.0, 2.0, -2.0))
-
-
-@pytest.mark.parametrize(
-    ("pitch_deg", "after_hit_us", "is_so"),
-    [(-60.0, 100_000, True), (60.0, 100_000, False), (-20.0, 100_000, False), (-60.0, 400_000, False)],
-)
-def test_pinned_is_a_vehicle_tipped_over_at_the_wall_while_it_pushes(pitch_deg, after_hit_us, is_so):
-    half = math.radians(pitch_deg) / 2
-    attitude = SimpleNamespace(time_boot_us=after_hit_us, attitude_wxyz=(math.cos(half), 0.0, math.sin(half), 0.0))
-    record = SimpleNamespace(sample_time_boot_us=0, contact_ended_boot_us=90_000)
-    flying = SimpleNamespace(vehicle=SimpleNamespace(attitude=attitude))
-    assert is_pinned(flying, record, SOUTH) is is_so
-    north, east, down = let_go(SOUTH)
-    assert north < 0.0 and east == 0.0 and down > 8.0, "next to no thrust, leaning away"

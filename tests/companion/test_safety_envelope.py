@@ -130,6 +130,7 @@ CONDITIONS = [
     ({"setpoint_missed_by_m": 2.0}, lambda v: v.position.__setitem__(1, -3.0), "from its setpoint"),
     ({"battery_below_percent": 30}, lambda v: setattr(v, "battery_percent", 29), "battery at 29 %"),
     ({"flight_time_above_s": 8.0}, lambda v: None, "flight time above 8 s"),
+    ({"blind_for_s": 3.0}, lambda v: setattr(v, "no_imu", True), "blind for 3 s"),
 ]
 
 

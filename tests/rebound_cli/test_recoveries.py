@@ -23,10 +23,21 @@ def test_a_vehicle_that_the_hit_spins_keeps_its_height():
 
 def test_the_table_has_a_line_for_each_kind_of_hit():
     flown = cases(1)
-    figures = {"settled_s": 2.0, "past_m": 0.01, "clear_m": 0.5, "lost_m": 0.02, "risen_m": 0.0, "recontacts": 0}
+    figures = {
+        "settled_s": 2.0,
+        "past_m": 0.01,
+        "clear_m": 0.5,
+        "lost_m": 0.02,
+        "risen_m": 0.0,
+        "recontacts": 0,
+        "returned": 0,
+    }
     results = {n: {**figures, "settled_s": 4.0 if case.law == "paper" else 1.0} for n, case in enumerate(flown)}
     results[1] = {"outcome": "aborted", "recontacts": 0}
     text = "\n".join(_lines(flown, results, 1))
-    assert "| foldable, 0° | 1 m/s | 4.00 s → – (1 not) | 0.01 → – | 0.50 → – | 0.02 → – | 0.00 → – | 0 → 0 |" in text
+    assert (
+        "| foldable, 0° | 1 m/s | 4.00 s → – (1 not) | 0.01 → – | 0.50 → – | 0.02 → – | 0.00 → – | 0 (0) → 0 (0) |"
+        in text
+    )
     assert "| rigid, 30° | 5 m/s | 4.00 s → 1.00 s |" in text
     assert "Of the 19 hits after which both settled, `adaptive` settles 75 % sooner in the median." in text
