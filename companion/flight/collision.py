@@ -103,6 +103,15 @@ class CollisionRecord:
             return None
         return max(0.0, (self.settled_at_boot_us - self.sample_time_boot_us) * 1e-6)
 
+    def recovered_text(self) -> str:
+        """Of one that has settled, for people."""
+        settled_after_s = self.settled_after_s()
+        assert settled_after_s is not None
+        return (
+            f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {self.overshoot_m * 100:.1f} cm, "
+            f"rebound {self.rebound_speed_m_s():.2f} m/s"
+        )
+
     def report(self) -> CollisionReport:
         velocity = self.contact.velocity_ned_m_s
         return CollisionReport(

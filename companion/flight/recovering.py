@@ -101,7 +101,7 @@ class Recover:
             if since_us is not None:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
-                flight.tell(now_us, "recovered", _recovered_text(record), **figures)
+                flight.tell(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._started_us > timeout_s * 1e6:
@@ -295,13 +295,4 @@ def _tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int)
         specific_force_m_s2=report.peak_specific_force_m_s2,
         position_ned_m=report.position_ned_m,
         recovery_setpoint_ned_m=report.recovery_setpoint_ned_m,
-    )
-
-
-def _recovered_text(record: CollisionRecord) -> str:
-    settled_after_s = record.settled_after_s()
-    assert settled_after_s is not None
-    return (
-        f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {record.overshoot_m * 100:.1f} cm, "
-        f"rebound {record.rebound_speed_m_s():.2f} m/s"
     )
