@@ -44,6 +44,7 @@ DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
 class Core:
     """All that is remembered between steps."""
 
+    flight: FlightContext
     machine: Machine
     watch: Watch
     started_at_us: int
@@ -55,10 +56,6 @@ class Core:
     values_due_us: int = 0
     limiter: Limiter = field(default_factory=Limiter)
 
-    @property
-    def flight(self) -> FlightContext:
-        return self.machine.flight
-
 
 def start(mission: Mission, now_us: int) -> Core:
     """A flight before its first step."""
@@ -66,6 +63,7 @@ def start(mission: Mission, now_us: int) -> Core:
     watching = start_watch(config, now_us)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams, tuple(watching.detector.losses)))
     return Core(
+        flight=flight,
         machine=Machine(flight, Connect(now_us)),
         watch=watching,
         started_at_us=now_us,
@@ -172,9 +170,10 @@ def beat(core: Core, now_us: int) -> None:
 
 def inform(core: Core, now_us: int) -> None:
     """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
-    flight, operator = core.flight, core.flight.mission.companion.operator
-    if flight.vehicle.identity is None:
+    flight = core.flight
+    if flight.vehicle.identity is None or not (flight.events or now_us >= core.values_due_us):
         return
+    operator = flight.mission.companion.operator
     hits = len(flight.collisions)
     if operator.status_texts:
         texts = [status_text(event, flight.mission.name, hits) for event in flight.events]

@@ -38,7 +38,8 @@ class SlowSensors:
         self._magnetometer, self._gps, self._rng = Magnetometer(rng, origin), Gps(airframe, rng, origin), rng
         self._altitude_m = origin.altitude_m
         self._due_us = [0, 0, 0]
-        self._next_us = 0
+        self.due_us = 0
+        """When any of them has its next sample."""
         self.magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
         self.air: Air | None = None
         self.gps: HilGps | None = None
@@ -48,8 +49,6 @@ class SlowSensors:
     def update(self, now_us: int, body: npt.NDArray[np.float64]) -> None:
         """Renew what is due; ``body`` (13,): true position and velocity NED, attitude (w, x, y, z), rates, SI units."""
         due_us = self._due_us
-        if now_us < self._next_us:
-            return
         north, east, down, v_north, v_east, v_down, w, x, y, z = body[:10].tolist()
         if now_us >= due_us[0]:
             due_us[0] = now_us + MAGNETOMETER_PERIOD_US
@@ -61,4 +60,4 @@ class SlowSensors:
             due_us[2] = now_us + GPS_PERIOD_US
             fix = self._gps.sample(now_us, (north, east, down), (v_north, v_east, v_down))
             self.gps = None if self.gps_is_blocked else fix
-        self._next_us = min(due_us)
+        self.due_us = min(due_us)

@@ -154,7 +154,8 @@ class SimulatedVehicle:
         acks = self._autopilot.run_commander()
         links = self._links
         for link in links:
-            link.acknowledge(acks)
+            if acks:
+                link.acknowledge(acks)
             foreign = link.receive(collects_foreign=len(links) > 1)
             if foreign:
                 for other in links:
@@ -183,13 +184,15 @@ class SimulatedVehicle:
         return True
 
     def _sense(self, telemetry: Telemetry) -> None:
-        slow, faults = self._slow, self._plant.faults
+        slow, faults, now_us = self._slow, self._plant.faults, telemetry.sample.time_boot_us
         positioning = self._positioning
         if faults is not None:
             positioning.gps_is_jammed = faults.is_lost("gps", self.time_boot_us / 1e6)
             self._autopilot.battery.supply_share = faults.voltage_share
+        if now_us < slow.due_us:
+            return
         slow.gps_is_blocked = positioning.gps_is_off or positioning.gps_is_jammed
-        slow.update(telemetry.sample.time_boot_us, self._body)
+        slow.update(now_us, self._body)
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import ClassVar, Protocol, TypeVar
+from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from companion.messages import LandedState, MessageId, Sample, Vector3
 
@@ -41,9 +41,8 @@ class Evidence(Enum):
     AFTERMATH = "aftermath"  # the contact fell between the samples; what followed it showed
 
 
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """What the flight knows when samples arrive; None where it does not.
+class Situation(NamedTuple):
+    """What the flight knows when samples arrive; None where it does not. A tuple: one is made in every step.
 
     `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
     one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told

@@ -1,6 +1,6 @@
 """Can the detector see? A blind detector is a state that is told, never silence."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from companion.written import Positive, Written
 
@@ -20,9 +20,8 @@ class SightConfig(Written):
     max_threshold_m_s2: Positive = 30.0
 
 
-@dataclass(frozen=True, slots=True)
-class Sight:
-    """What decides whether the detector sees: when it last heard, how often, and how many clipped samples."""
+class Sight(NamedTuple):
+    """What decides whether the detector sees: when it last heard, and how often. A tuple: one is made in every step."""
 
     last_heard_us: int
     window_started_us: int

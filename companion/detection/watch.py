@@ -128,7 +128,7 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
     if (reason is None) != (sight.blind_reason is None) and on:
         text = "the detector sees again" if reason is None else f"detector blind: {reason}"
         notices.append(Notice("link", text, {}))
-    watch.sight = Sight(sight.last_heard_us, sight.window_started_us, sight.heard_in_window, sight.rate_hz, reason)
+    watch.sight = sight if reason == sight.blind_reason else sight._replace(blind_reason=reason)
     if not watch.threshold_told and watch.state.phase is Phase.ARMED:
         watch.threshold_told = True
         threshold_m_s2 = watch.state.threshold_m_s2

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
@@ -58,9 +58,10 @@ class Move:
     hand_over: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Inputs:
-    """What one step brings to the flight, beyond what the vehicle view already holds."""
+class Inputs(NamedTuple):
+    """What one step brings to the flight, beyond what the vehicle view already holds. A tuple: it is made in every
+    step.
+    """
 
     acks: Sequence[CommandAck] = ()
     positions: Sequence[LocalPosition] = ()

@@ -11,6 +11,7 @@ from companion.messages import (
     CurrentMode,
     ExtendedState,
     Heartbeat,
+    ImuSample,
     LandedState,
     LocalPosition,
 )
@@ -48,6 +49,8 @@ class Vehicle:
         """Take in one sample of the identified vehicle."""
         self.last_heard_us = now_us
         match sample:
+            case ImuSample():
+                pass  # the most frequent of all: first, and nothing of it is kept here
             case LocalPosition():
                 if self.history.add(sample):
                     self.last_position_us = now_us

@@ -3,6 +3,7 @@
 The packets' layout is pymavlink's own; only its message objects are left out, which take most of the time.
 """
 
+import math
 from collections.abc import Callable
 from operator import attrgetter, itemgetter
 from typing import Any
@@ -16,9 +17,8 @@ ACCELEROMETER_UPDATED = 0x7
 
 
 def finite(*values: float) -> bool:
-    """False when any value is NaN or infinite (either makes the difference NaN)."""
-    total = sum(values)
-    return total - total == 0.0
+    """False when any value is NaN or infinite (either makes the sum so)."""
+    return math.isfinite(sum(values))
 
 
 def _imu(time_us: int, x: float, y: float, z: float, p: float, q: float, r: float, updated: int) -> ImuSample | None:

@@ -136,8 +136,9 @@ class Commander:
         self._now_us = now_us
         heard = (self.signal.arrives, self.signal.is_back)
         self.signal.update(now_us)
-        self.sticks.update(now_us)
-        self._obey_sticks()
+        if self.sticks.sticks is not None:
+            self.sticks.update(now_us)
+            self._obey_sticks()
         over = None if self._detector.landed else self._what_is_over()
         if over is not None and self.modes.apply(over, self._conditions):
             self._judge()

@@ -24,9 +24,6 @@ class CommandService:
     def handlers(self) -> Mapping[type, Handler]:
         return {Command: self._command, SetMode: self._set_mode}
 
-    def update(self, now_us: int) -> None:
-        """Nothing waits: every answer is given when it is known."""
-
     def _set_mode(self, request: SetMode) -> None:
         """The commander's answer is the only one, unlike with the command."""
         self._board.autopilot.command(request.command)

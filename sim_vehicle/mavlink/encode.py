@@ -81,7 +81,7 @@ def highres_imu(state: Telemetry) -> Message:
         pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
         if air_is_new:
             fields |= _AIR_FIELDS
-    return framing.HIGHRES_IMU(
+    return framing.HighresImu(
         sample.time_boot_us,
         *sample.specific_force_frd_m_s2,
         *sample.angular_velocity_frd_rad_s,
@@ -97,7 +97,7 @@ def highres_imu(state: Telemetry) -> Message:
 
 def local_position_ned(state: Telemetry) -> Message:
     estimate = state.published
-    return framing.LOCAL_POSITION_NED(boot_ms(estimate), *estimate.position_ned_m, *estimate.velocity_ned_m_s)
+    return framing.LocalPositionNed(boot_ms(estimate), *estimate.position_ned_m, *estimate.velocity_ned_m_s)
 
 
 def attitude(state: Telemetry) -> Message:
@@ -106,12 +106,12 @@ def attitude(state: Telemetry) -> Message:
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return framing.ATTITUDE(boot_ms(sample), roll, pitch, yaw, *sample.angular_velocity_frd_rad_s)
+    return framing.Attitude(boot_ms(sample), roll, pitch, yaw, *sample.angular_velocity_frd_rad_s)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
     sample = state.sample
-    return framing.ATTITUDE_QUATERNION(
+    return framing.AttitudeQuaternion(
         boot_ms(sample), *sample.attitude_wxyz, *sample.angular_velocity_frd_rad_s, *_NO_OFFSET
     )
 
@@ -119,7 +119,7 @@ def attitude_quaternion(state: Telemetry) -> Message:
 def odometry(state: Telemetry) -> Message:
     """Velocity is NED too (child frame 1), unlike what the message's definition suggests."""
     estimate = state.published
-    return framing.ODOMETRY(
+    return framing.Odometry(
         estimate.time_boot_us,
         *estimate.position_ned_m,
         *estimate.attitude_wxyz,

@@ -58,9 +58,6 @@ class FileService:
     def handlers(self) -> Mapping[type, Handler]:
         return {FileRequest: self._answer}
 
-    def update(self, now_us: int) -> None:
-        """Nothing waits."""
-
     def _answer(self, request: FileRequest) -> None:
         number, session, operation, size, *_ = _HEADER.unpack_from(request.payload)
         if operation >= _ACK:

@@ -64,6 +64,11 @@ class Buffer:
         self._now_us = now_us
         self.lost = 0
 
+    @property
+    def is_endless(self) -> bool:
+        """Whether everything fits: no serial line."""
+        return self._bytes_per_us is None
+
     def advance(self, now_us: int) -> None:
         """Let time pass."""
         if self._bytes_per_us is not None:

@@ -10,7 +10,7 @@ from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line
 from sim_vehicle.mavlink.outbox import Outbox
-from sim_vehicle.mavlink.service import Handler
+from sim_vehicle.mavlink.service import BusyService, Handler
 from sim_vehicle.mavlink.services import SERVICES
 from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
 from sim_vehicle.mavlink.stream_rates import LinkKind
@@ -57,6 +57,7 @@ class Link:
         self._choose_protocol()
         self._texts = TextLink()
         self._services = tuple(service(self, board) for service in SERVICES)
+        self._busy = tuple(service for service in self._services if isinstance(service, BusyService))
         self._handlers: dict[type, Handler] = {
             PeerHeartbeat: self._hear_heartbeat,
             PingRequest: self._answer_ping,
@@ -143,7 +144,7 @@ class Link:
             self._texts.add(text, now_us)
         for message in self._texts.due(now_us):
             self.send(message)
-        for service in self._services:
+        for service in self._busy:
             service.update(now_us)
         self.streams.update()
 

@@ -10,13 +10,15 @@ class Outbox:
     def __init__(self, encoder: Encoder, buffer: Buffer) -> None:
         self._encoder = encoder
         self._buffer = buffer
+        self._loses = not buffer.is_endless
         self._packets: list[bytes] = []
 
     def send(self, message: Message) -> None:
         """Make a packet of the message."""
         packet = self._encoder.packet(message)
-        if packet is not None and self._buffer.take(len(packet)):
-            self._packets.append(packet)
+        if packet is None or (self._loses and not self._buffer.take(len(packet))):
+            return
+        self._packets.append(packet)
 
     def forward(self, packet: bytes) -> None:
         """Send somebody else's packet as it is."""

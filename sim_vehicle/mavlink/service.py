@@ -1,17 +1,22 @@
 """What a link offers to whoever is at its other end: one object for each of MAVLink's protocols."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 Handler: TypeAlias = Callable[[Any], None]
 
 
 class Service(Protocol):
-    """One protocol on one link. What all links share is the autopilot's."""
+    """One protocol on one link, each message answered at once. What all links share is the autopilot's."""
 
     @property
     def handlers(self) -> Mapping[type, Handler]:
         """What to do with a message, by the class of its value; called in the order of arrival."""
+
+
+@runtime_checkable
+class BusyService(Service, Protocol):
+    """One that also has something to do when nothing has come."""
 
     def update(self, now_us: int) -> None:
         """Called at every interval, after the control and before the streams: answers, repeats, time-outs."""

@@ -39,8 +39,5 @@ class SetpointService:
             StickInput: self._take_sticks,
         }
 
-    def update(self, now_us: int) -> None:
-        """Nothing is sent."""
-
     def _take_sticks(self, sticks: StickInput) -> None:
         self._autopilot.receive(replace(sticks, source=self._source))

@@ -7,6 +7,7 @@ sends a 250 Hz topic at 125 Hz; asked for 100 Hz, in gaps of 12 and 8 ms.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import ne
 from typing import NamedTuple
 
 import numpy as np
@@ -164,12 +165,8 @@ class Stream:
 
     def renewed(self, versions: list[int]) -> tuple[bool, ...]:
         """Which of the noted topics have news since the last message."""
-        new, noted = [], self.noted
-        for place, topic in enumerate(self.kind.notes):
-            version = versions[topic]
-            new.append(version != noted[place])
-            noted[place] = version
-        return tuple(new)
+        noted, self.noted = self.noted, [versions[topic] for topic in self.kind.notes]
+        return tuple(map(ne, self.noted, noted))
 
     def sent(self, now_us: int) -> None:
         """Keep the mean rate by counting from when it was due, unless that is long ago."""

@@ -24,8 +24,5 @@ class TimeSyncService:
     def handlers(self) -> Mapping[type, Handler]:
         return {TimeSyncRequest: self._answer}
 
-    def update(self, now_us: int) -> None:
-        """Nothing waits."""
-
     def _answer(self, request: TimeSyncRequest) -> None:
         self._link.send(encode.timesync_reply(request, self._link.now_us + self._half_interval_us))

@@ -15,7 +15,8 @@ class AskedSetpoint:
         self._asked = new_record(Asked)
         self.box = boxed(self._asked)
         # Views into the record, taken once: looking a field up in Python costs microseconds.
-        self._value, self._given, self._yaw = self._asked.value, self._asked.given, self._asked.yaw
+        self._value, self._given = self._asked.value.reshape(-1), self._asked.given.reshape(-1)
+        self._yaw = self._asked.yaw
         self._taken: Setpoint | None = None
 
     def take(self, setpoint: Setpoint) -> None:
@@ -42,7 +43,7 @@ class AskedSetpoint:
     def _take_trajectory(self, setpoint: TrajectorySetpoint) -> None:
         if self._asked.level != ASKED_TRAJECTORY:
             self._asked.level = ASKED_TRAJECTORY
-        rows = (setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2)
-        self._value[:] = [[0.0 if value is None else value for value in row] for row in rows]
-        self._given[:] = [[value is not None for value in row] for row in rows]
+        asked = (*setpoint.position_ned_m, *setpoint.velocity_ned_m_s, *setpoint.acceleration_ned_m_s2)
+        self._value[:] = [0.0 if value is None else value for value in asked]
+        self._given[:] = [value is not None for value in asked]
         self._yaw[:] = (setpoint.yaw_rad or 0.0, setpoint.yaw_rad is not None, setpoint.yaw_rate_rad_s or 0.0)

@@ -284,11 +284,11 @@ def test_frequent_messages_are_framed_as_pymavlink_frames_them():
     """Zeros at the end of a payload, an all-zero payload and a wrapped sequence number included."""
     plain, framed = dialect.MAVLink(None, 7, 1), dialect.MAVLink(None, 7, 1)
     cases = [
-        (dialect.MAVLink_local_position_ned_message(5, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0), framing.LOCAL_POSITION_NED),
-        (dialect.MAVLink_local_position_ned_message(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), framing.LOCAL_POSITION_NED),
-        (dialect.MAVLink_attitude_message(5, 0.1, 0.2, 0.3, 0.0, 0.0, 1.0), framing.ATTITUDE),
-        (dialect.MAVLink_highres_imu_message(9, *[0.5] * 13, 0x3F), framing.HIGHRES_IMU),
-        (dialect.MAVLink_attitude_target_message(5, 0, (1, 0, 0, 0), 0, 0, 0, 0.5), framing.ATTITUDE_TARGET),
+        (dialect.MAVLink_local_position_ned_message(5, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0), framing.LocalPositionNed),
+        (dialect.MAVLink_local_position_ned_message(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), framing.LocalPositionNed),
+        (dialect.MAVLink_attitude_message(5, 0.1, 0.2, 0.3, 0.0, 0.0, 1.0), framing.Attitude),
+        (dialect.MAVLink_highres_imu_message(9, *[0.5] * 13, 0x3F), framing.HighresImu),
+        (dialect.MAVLink_attitude_target_message(5, 0, (1, 0, 0, 0), 0, 0, 0, 0.5), framing.AttitudeTarget),
     ]
     for sequence in (0, 255):
         plain.seq = framed.seq = sequence
@@ -304,7 +304,7 @@ def test_frequent_messages_are_signed_as_pymavlink_signs_them():
     plain, framed = dialect.MAVLink(None, 7, 1), dialect.MAVLink(None, 7, 1)
     for link in (plain, framed):
         link.signing.secret_key, link.signing.sign_outgoing, link.signing.timestamp = b"k" * 32, True, 77
-    assert framing.ATTITUDE(*in_wire_order(theirs)).pack(framed) == theirs.pack(plain)
+    assert framing.Attitude(*in_wire_order(theirs)).pack(framed) == theirs.pack(plain)
 
 
 def in_wire_order(message):
