@@ -6,6 +6,7 @@ Source: PX4's commander/failsafe/failsafe.cpp (August 2025, between v1.16 and v1
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import NamedTuple
 
 from sim_vehicle.autopilot.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.modes import Mode
@@ -71,9 +72,8 @@ class Response:
     takeover: Takeover = Takeover.AFTER_DELAY
 
 
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """What the failsafes judge, as the commander has it in this cycle."""
+class Situation(NamedTuple):
+    """What the failsafes judge, as the commander has it in this cycle. A tuple: one is made fifty times a second."""
 
     armed: bool
     intended: Mode

@@ -26,6 +26,11 @@ def njit(function: Kernel) -> Kernel:
     return cast(Kernel, numba.njit(cache=True, fastmath=False)(function))
 
 
+def inlined(function: Kernel) -> Kernel:
+    """The same, put into whatever calls it: for small functions that are called with whole arrays again and again."""
+    return cast(Kernel, numba.njit(cache=True, fastmath=False, forceinline=True)(function))
+
+
 @intrinsic  # type: ignore[untyped-decorator]
 def borrowed(_typing: Any, array: Any) -> Any:
     """The same array, in a kernel, without a count of who uses it: whoever called the kernel keeps it alive.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, Contact, Scratch
 from sim_vehicle.world import (
     FACE_ACROSS,
@@ -34,7 +34,7 @@ SEAM = 1e-9
 NOWHERE = -1e9
 
 
-@njit
+@inlined
 def part_centre(point: int, rotation: Floats, position: Floats, contact: Contact, out: Floats) -> None:
     """Write the middle (NED, m) of a guard or the hub, or where a foot is, into ``out``."""
     along_arm, below = 0.0, 0.0
@@ -50,7 +50,7 @@ def part_centre(point: int, rotation: Floats, position: Floats, contact: Contact
         out[i] = position[i] + along_arm * direction + below * rotation[i, 2]
 
 
-@njit
+@inlined
 def deepest_point(
     point: int, normal: Floats, rotation: Floats, position: Floats, contact: Contact, out: Floats
 ) -> tuple[float, float]:
@@ -227,7 +227,7 @@ def nearest_on_line(face: int, where: Floats, faces: Floats, out: Floats) -> boo
     return bool(kept != along)
 
 
-@njit
+@inlined
 def depth_in(face: int, where: Floats, faces: Floats) -> float:
     """How far a position is behind a flat face's plane, metres; negative in front of it."""
     depth = 0.0
@@ -236,7 +236,7 @@ def depth_in(face: int, where: Floats, faces: Floats) -> float:
     return depth
 
 
-@njit
+@inlined
 def within(face: int, where: Floats, faces: Floats, margin_m: float) -> bool:
     """Whether a position projects onto a flat face's rectangle, or beside it by less than a margin."""
     across, along = 0.0, 0.0
