@@ -3,11 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from companion.memory.stored import ObstacleFile
-from companion.mission.config import CompanionConfig
-from companion.mission.model import Mission
 from rebound_cli.documents import (
     Document,
     DocumentError,
@@ -21,6 +18,9 @@ from rebound_cli.documents import (
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, SceneError
 from sim_vehicle.scene import Scene, check_start_is_free
+
+if TYPE_CHECKING:
+    from companion.mission.model import Mission
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +46,8 @@ def load_mission_document(
 
     The `companion:` part of the file `companion`, where one is given, takes the place of the mission's own.
     """
+    from companion.mission.config import CompanionConfig
+
     document = load_document(path)
     if companion is not None:
         settings = load_document(companion)
@@ -62,14 +64,19 @@ def _apply_options(document: Document, sets: Sequence[str], airframe: str | None
             apply_override(document, Override(f"--{option} {value}", ("sim", option), value))
 
 
-def mission_from(document: Document) -> Mission:
+# A mission's models take a fifth of a simulated vehicle's start: imported where there is a mission.
+def mission_from(document: Document) -> "Mission":
     """Raises DocumentError, also for a file of known obstacles that cannot be read."""
+    from companion.mission.model import Mission
+
     read_obstacles(document)
     return validated(Mission, document, document.data)
 
 
 def read_obstacles(document: Document) -> None:
     """Put what the mission's `obstacles.file` holds in its place; with that a mission is whole without the file."""
+    from companion.memory.stored import ObstacleFile
+
     obstacles = document.data.get("obstacles")
     file = obstacles.get("file") if isinstance(obstacles, dict) else None
     if not isinstance(obstacles, dict) or not isinstance(file, str) or not file:
@@ -114,7 +121,7 @@ def _load_airframe(name: str, document: Document) -> Airframe:
         raise DocumentError(f"{document.place_of(('sim', 'airframe'))}: {_sentence(error)}") from error
 
 
-def resolved(mission: Mission, world: SimulatedWorld | None) -> dict[str, Any]:
+def resolved(mission: "Mission", world: SimulatedWorld | None) -> dict[str, Any]:
     """The mission with every default and option written out; it is itself a mission file."""
     data = mission.model_dump(mode="json", exclude_none=True, by_alias=True)
     if world is not None:

@@ -8,11 +8,8 @@ from argparse import Namespace
 
 from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
-from sim_vehicle.hil.messages import MOTORS_STOPPED
-from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import COMPANION_PORT, open_port, px4_ports
-from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
 from sim_vehicle.shell.realtime import serve
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -52,6 +49,11 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
 
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
+    # Here, because most vehicles have an autopilot of their own and are to start at once.
+    from sim_vehicle.hil.messages import MOTORS_STOPPED
+    from sim_vehicle.hil.vehicle import HilVehicle
+    from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
+
     def new_vehicle() -> HilVehicle:
         return HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
 

@@ -14,7 +14,7 @@ from sim_vehicle.mavlink.service import BusyService, Handler
 from sim_vehicle.mavlink.services import SERVICES
 from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
 from sim_vehicle.mavlink.stream_rates import LinkKind
-from sim_vehicle.mavlink.streams import Streams
+from sim_vehicle.mavlink.streams import HEARTBEAT_ID, Streams
 from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
 from sim_vehicle.parameters.store import Parameters
 
@@ -76,6 +76,10 @@ class Link:
             return line
         name = "MAV_1_RATE" if self.options.kind is LinkKind.ONBOARD else "MAV_0_RATE"
         return replace(line, planned_bytes_s=int(parameters[name]))
+
+    def introduce(self) -> None:
+        """Send HEARTBEAT now, and not only when its first second is over."""
+        self.streams.send_now(HEARTBEAT_ID)
 
     def push(self, data: bytes) -> None:
         """Bytes have arrived; they are read at the vehicle's next step."""

@@ -6,6 +6,8 @@ import socket
 from typing import Protocol
 
 from sim_vehicle.errors import PortInUse
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.vehicle import SimulatedVehicle
 
 Address = tuple[str, int]
 
@@ -23,6 +25,16 @@ class Port(Protocol):
 
     def close(self) -> None:
         """Give the socket or the line back."""
+
+
+def connected(vehicle: SimulatedVehicle, options: LinkOptions) -> Link:
+    """A new link that says at once who is there, as PX4's streams send their first message (mavlink_stream.cpp).
+
+    In lockstep, where nobody waits, HEARTBEAT comes after the link's first second.
+    """
+    link = vehicle.add_link(options)
+    link.introduce()
+    return link
 
 
 def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:

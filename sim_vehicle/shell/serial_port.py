@@ -6,6 +6,7 @@ import serial
 
 from sim_vehicle.errors import PortInUse
 from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.shell.port import connected
 from sim_vehicle.vehicle import SimulatedVehicle
 
 
@@ -18,7 +19,7 @@ class SerialPort:
             self._serial = serial.Serial(device, baud, timeout=0, write_timeout=0)
         except (OSError, ValueError) as problem:
             raise PortInUse(f"Serial port {device} cannot be opened: {problem}") from problem
-        self._link = vehicle.add_link(options)
+        self._link = connected(vehicle, options)
 
     def receive(self) -> None:
         # A line that is unplugged falls silent.

@@ -4,7 +4,7 @@ import contextlib
 import socket
 
 from sim_vehicle.mavlink.link import Link, LinkOptions
-from sim_vehicle.shell.port import bound_socket
+from sim_vehicle.shell.port import bound_socket, connected
 from sim_vehicle.vehicle import SimulatedVehicle
 
 _READ_BYTES = 65_536
@@ -31,7 +31,7 @@ class TcpServerPort:
         # Nobody waits to be let in, or has gone again before he was.
         with contextlib.suppress(BlockingIOError, ConnectionError):
             connection, _ = self._listener.accept()
-            self._clients.append(_Client(connection, self._vehicle.add_link(self._options)))
+            self._clients.append(_Client(connection, connected(self._vehicle, self._options)))
         for client in self._clients:
             client.receive()
         self._forget_the_gone()

@@ -3,7 +3,7 @@
 import socket
 
 from sim_vehicle.mavlink.link import Link, LinkOptions
-from sim_vehicle.shell.port import Address, bound_socket, received_datagrams, send_datagrams
+from sim_vehicle.shell.port import Address, bound_socket, connected, received_datagrams, send_datagrams
 from sim_vehicle.vehicle import SimulatedVehicle
 
 # A client that has been silent for so long is taken for gone; ground stations send a heartbeat a second.
@@ -19,7 +19,7 @@ class UdpPeerPort:
         self._socket = bound_socket(socket.SOCK_DGRAM, "0.0.0.0", listen_port)
         self._remote = remote
         self._has_peer = False
-        self._link = vehicle.add_link(options)
+        self._link = connected(vehicle, options)
 
     @property
     def local_port(self) -> int:
@@ -61,7 +61,7 @@ class UdpServerPort:
             if link is None:
                 if len(self._clients) >= MOST_CLIENTS:
                     continue
-                link = self._clients[sender] = self._vehicle.add_link(self._options)
+                link = self._clients[sender] = connected(self._vehicle, self._options)
             self._heard_us[sender] = now_us
             link.push(datagram)
         for address, heard_us in list(self._heard_us.items()):
