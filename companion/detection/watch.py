@@ -4,7 +4,7 @@ A `Watch` is changed only by `advance`: the same samples at the same times give 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
@@ -105,7 +105,7 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
         if watch.estimator.trust.is_trusted:
             watch.state, impact = watch.detector.step(watch.state, sample, situation)
         else:
-            doubtful = replace(situation, estimate_trusted=False)
+            doubtful = situation._replace(estimate_trusted=False)
             watch.state, impact = watch.detector.step(watch.state, sample, doubtful)
         if impact is not None:
             impacts.append(watch.estimator.begin(impact, situation))
