@@ -79,6 +79,7 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "let_go": _as_it_stands,
     "refused": _as_it_stands,
     "crossed": _as_it_stands,
+    "left_alone": _as_it_stands,
     "fault": _fault,
     "done": _ended,
     "aborted": _ended,

@@ -98,9 +98,9 @@ class GiveBack:
         self._aside: StepAside | None = None
         if beside_program:
             self._target = None
-            self._aside = StepAside(guard)
+            self._aside = StepAside(now_us)
         self._began_us = now_us
-        if self._aside is None or self._aside.is_over:
+        if self._aside is None:
             self._ask(guard)
 
     def target(self, now_us: int) -> Target | None:
@@ -117,7 +117,8 @@ class GiveBack:
     def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
         flight = guard.flight
         if self._aside is not None and not self._aside.is_over:
-            if self._aside.step(guard, inputs, now_us) is None:
+            self._aside.step(guard, inputs, now_us)
+            if not self._aside.is_over:
                 return None
             self._ask(guard)
             inputs = GuardInputs()

@@ -1,5 +1,6 @@
 """Runs the guard's table: looks for triggers, moves between states, makes each state's activity."""
 
+import math
 import traceback
 from dataclasses import dataclass
 
@@ -54,7 +55,10 @@ class GuardMachine:
         self._take(self._from_outside(inputs, now_us), now_us)
         for estimate in inputs.flight.impacts:
             trigger = self._trigger_of_hit()
-            if moves(self.state, trigger):
+            if trigger is Trigger.HIT_BESIDE_PROGRAM and self.guard.config.beside_program == "tell":
+                text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
+                self.guard.flight.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
+            elif moves(self.state, trigger):
                 self._remember_hit(now_us)
                 record_collision(self.guard.flight, estimate, now_us)
                 self._take(Move(trigger), now_us)
