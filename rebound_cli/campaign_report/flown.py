@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from rebound_cli.campaign.plan import Json
 from rebound_cli.random_missions.generator import MissionCase
+from rebound_cli.random_missions.judge import NOTICED_M_S
 
 # The hits that the bars are about: 1 to 5 m/s; heights of vehicles that fly level past something upright.
 HIT_SPEEDS_M_S = (1.0, 5.0)
@@ -65,6 +66,11 @@ class Missions:
 def answered(hits: Sequence[Json]) -> list[Json]:
     """Those that were noticed, so that there was a recovery."""
     return [hit for hit in hits if "past_m" in hit]
+
+
+def square(hits: Sequence[Json]) -> list[Json]:
+    """Those that go into the surface, not along it, as fast as a detector must notice."""
+    return [hit for hit in hits if hit["closing_m_s"] >= NOTICED_M_S]
 
 
 def level(hits: Sequence[Json]) -> list[Json]:

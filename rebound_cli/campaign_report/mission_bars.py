@@ -4,7 +4,7 @@ import statistics
 from collections.abc import Iterator
 
 from rebound_cli.campaign.plan import Json
-from rebound_cli.campaign_report.flown import HIT_SPEEDS_M_S, Missions, answered, level
+from rebound_cli.campaign_report.flown import HIT_SPEEDS_M_S, Missions, answered, level, square
 from rebound_cli.detectors_report.bars import Bar
 from rebound_cli.detectors_report.numbers import per_cent, share
 
@@ -64,14 +64,9 @@ def _hits(missions: Missions) -> Iterator[Bar]:
             f"{airframe}, level: height gained", level(missions.hits(airframe, 0.0, 99.0)), "risen_m", RISEN_MOST_M
         )
         yield _halved(airframe, missions.first_hits_compared(airframe))
-        every = missions.hits(airframe, 0.5, 99.0)
-        yield Bar(
-            f"{airframe}, from 0.5 m/s: hits noticed",
-            "",
-            f"{per_cent(share(h['seen'] for h in every))} %",
-            None,
-            _of(every),
-        )
+        into = square(missions.hits(airframe, 0.0, 99.0))
+        noticed = f"{per_cent(share(hit['seen'] for hit in into))} %"
+        yield Bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", "", noticed, None, _of(into))
 
 
 def is_clean(hit: Json) -> bool:

@@ -22,13 +22,14 @@ more than 1.2 m/s or when nothing said to land, more than 1 m outside the fence.
 by the rules of [missions.md](missions.md), not by the companion's own state. A vehicle that leant beyond 90° or
 touched the ground, rose again and finished its mission has crashed all the same.
 
-*Hits* count by their first contact; its speed is that against the obstacle. *Past*: beyond the recovery setpoint,
-along the surface's normal. *Again*: another contact with the same surface before the vehicle had recovered. *Other
-surface*: one with something else. *Clear*: how much further from what was touched than at the touch, the nearest
-in the last half second of the recovery. *Height*, lost or gained against the contact's: of level flights (0.3 m/s)
-into something upright that met nothing else. *The feed-forward of the height* is an acceleration that brakes a
-climb or a fall after a hit; every fifth mission is flown again without it (`recovery: {vertical_acceleration_m_s2:
-0}`), and first hits are compared, which up to then are the same.
+*Hits* count by their first contact; its speed is that against the obstacle. *Noticed*: of hits that went into the
+surface with 0.5 m/s and more. *Past*: beyond the recovery setpoint, along the surface's normal. *Again*: another
+contact with the same surface before the vehicle had recovered. *Other surface*: one with something else. *Clear*:
+how much further from what was touched than at the touch, the nearest in the last half second of the recovery.
+*Height*, lost or gained against the contact's: of level flights (0.3 m/s) into something upright that met nothing
+else. *The feed-forward of the height* is an acceleration that brakes a climb or a fall after a hit; every fifth
+mission is flown again without it (`recovery: {vertical_acceleration_m_s2: 0}`), and first hits are compared, which
+up to then are the same.
 
 *The laws* fly the same hits on a wall, square and at 30°, at 1, 2, 3, 4 and 5 m/s; [recovery.md](recovery.md) has
 their table.

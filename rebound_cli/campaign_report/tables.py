@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from rebound_cli.campaign.plan import Json
-from rebound_cli.campaign_report.flown import Flown, Missions, answered, level
+from rebound_cli.campaign_report.flown import Flown, Missions, answered, level, square
 from rebound_cli.campaign_report.mission_bars import OVERSHOOT_MOST_M
 from rebound_cli.detectors_report.numbers import per_cent, share
 from rebound_cli.paper.table import markdown
@@ -69,7 +69,7 @@ def _speed_cells(hits: list[Json]) -> Sequence[str]:
     flat = level(hits)
     return (
         str(len(hits)),
-        f"{per_cent(share(hit['seen'] for hit in hits))} %",
+        f"{per_cent(share(hit['seen'] for hit in square(hits)))} %",
         f"{statistics.median(settled):.2f} s" if settled else "-",
         str(sum(hit["past_m"] > OVERSHOOT_MOST_M for hit in seen)),
         _metres([hit["past_m"] for hit in seen]),
