@@ -22,7 +22,7 @@ def missions_campaign(missions: int, first_seed: int = 1) -> Campaign:
     cases = [MissionCase(seed, name) for seed in seeds for name in AIRFRAMES]
     cases += [MissionCase(seed, name, False) for seed in seeds if seed % COMPARED_EVERY == 0 for name in AIRFRAMES]
     parameters = {"missions": missions, "first_seed": first_seed}
-    return Campaign("missions", parameters, cases, work_out_mission, uses=("rebound_cli",))
+    return Campaign("missions", parameters, cases, work_out_mission)
 
 
 def work_out_mission(case: MissionCase) -> Json:
