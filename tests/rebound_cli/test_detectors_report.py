@@ -94,7 +94,8 @@ def test_ten_quiet_hours_meet_the_bar_one_says_nothing_and_one_alarm_misses_it()
 
 
 def test_the_baseline_is_beaten_only_by_being_ten_times_earlier_with_less_misses_and_alarms():
-    earlier, misses, alarms = comparison_bars(made_up(), *healthy(10.0))
+    earlier, with_misses, misses, alarms = comparison_bars(made_up(), *healthy(10.0))
+    assert with_misses.verdict == REPORTED
     assert earlier.verdict == MET and earlier.measured.startswith("20.0 times")
     assert misses.verdict == MISSED  # neither missed any
     assert alarms.verdict == MET
