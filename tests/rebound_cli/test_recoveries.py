@@ -1,7 +1,10 @@
 """Single hits through the whole wire with both laws, by what the simulator knows."""
 
+import pytest
+
 from rebound_cli.recoveries.command import _lines
-from rebound_cli.recoveries.hits import Case, cases, work_out
+from rebound_cli.recoveries.hits import Case, cases, fly, work_out
+from sim_vehicle.airframe import Airframe, with_base
 
 
 def test_adaptive_settles_a_quarter_sooner_without_running_past_and_clear_of_the_wall():
@@ -19,6 +22,21 @@ def test_a_vehicle_that_the_hit_spins_keeps_its_height():
     assert flight["outcome"] == "completed"
     assert flight["lost_m"] < 0.1
     assert flight["past_m"] < 0.05
+
+
+@pytest.mark.parametrize(("airframe", "speed_m_s"), [("rigid", 2.0), ("foldable", 4.0)])
+def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_the_wall_nor_past_the_goal(
+    airframe, speed_m_s
+):
+    """What a real PX4 does with such a hit (docs/px4.md): it says "into the wall", and is right a second later."""
+    clipping = {"late_s": 0.14, "frequency_rad_s": 4.45, "damping": 0.59}
+    vehicle = Airframe.model_validate(with_base({"based_on": airframe, "estimate": {"clipping": clipping}}))
+    flight = fly(Case("adaptive", airframe, 0, speed_m_s, 1), vehicle)
+    assert (flight["outcome"], flight["recontacts"], flight["returned"]) == ("completed", 0, 0)
+    assert flight["past_m"] < 0.05
+    assert flight["clear_m"] > 0.25 * speed_m_s
+    # 16 cm at 4 m/s where height is flown by the wrong velocity
+    assert flight["risen_m"] < 0.08 and flight["lost_m"] < 0.1
 
 
 def test_the_table_has_a_line_for_each_kind_of_hit():
