@@ -10,7 +10,8 @@ and the response intensity R in [0, 1] is the weighted mean (Sugeno) of the rule
 
     A low -> 0.2      A high -> 1      I high -> 0.8      F high -> 0.8      I low and F low -> 0.2.
 
-`Impact.response` carries R; the recovery may scale its reaction by it.
+The papers scale their reaction by R. Here it is told as the impact's confidence and scales nothing: the recovery laws
+answer to v_c and the normal, which are measured, and of which A, I and F are only signs.
 """
 
 import math
@@ -71,7 +72,7 @@ class FuzzyDetector:
         if impact is None:
             return state, None
         response = self.intensity(size, inclination_rad(state.attitude_wxyz), self._flip(sample, size))
-        return state, Impact(now_us, free_until_us, impact.specific_force_frd_m_s2, response=response)
+        return state, Impact(now_us, free_until_us, impact.specific_force_frd_m_s2, confidence=response)
 
     @staticmethod
     def _flip(sample: ImuSample, size_m_s2: float) -> float:
