@@ -228,7 +228,7 @@ class ImpactEstimator:
         config = self.config
         normal = normal_of(push.parts, velocity_ned_m_s, config.guards, config.imu_averaging_interval_s)
         back = _back(velocity_ned_m_s)
-        if push.is_whole or _is_along(normal, back):
+        if not push.is_blurred or _is_along(normal, back):
             return self._pushed(normal, velocity_ned_m_s)
         return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
 
