@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from companion.estimate.strapdown import Strapdown
 from companion.mavlink.decode import Decoder
-from companion.messages import ImuSample, LocalPosition
+from companion.messages import Attitude, ImuSample, LocalPosition
 from companion.shell.tlog import read_tlog
 
 Floats = npt.NDArray[np.float64]
@@ -19,6 +20,7 @@ _CHECKSUM_LENGTH = 2
 
 # Only messages with these ids are decoded; a log holds many more.
 _HIGHRES_IMU = 105
+_ATTITUDES = (30, 31)
 _LOCAL_POSITION_NED = 32
 _SET_POSITION_TARGET_LOCAL_NED = 84
 
@@ -35,6 +37,7 @@ class FlightLog:
     imu_at_us: Floats
     imu_time_boot_us: Floats
     specific_force_frd_m_s2: Floats
+    accelerated_ned_m_s: Floats  # what the accelerometer has summed up to by each of its samples; from any velocity
     position_at_us: Floats
     position_ned_m: Floats
     velocity_ned_m_s: Floats
@@ -48,23 +51,29 @@ def read_flight_log(path: Path) -> FlightLog:
     imu: list[tuple[float, ...]] = []
     positions: list[tuple[float, ...]] = []
     setpoints: list[tuple[float, ...]] = []
+    strapdown = Strapdown()
     for at_us, packet in read_tlog(path):
         message_id = _message_id(packet)
         if message_id == _SET_POSITION_TARGET_LOCAL_NED:
             payload = packet[_HEADER_LENGTH : _HEADER_LENGTH + packet[1]].ljust(_SETPOINT_LENGTH, b"\0")
             setpoints.append((at_us, *_SETPOINT_POSITION.unpack_from(payload)))
-        elif message_id in (_HIGHRES_IMU, _LOCAL_POSITION_NED):
+        elif message_id in (_HIGHRES_IMU, _LOCAL_POSITION_NED, *_ATTITUDES):
             decoder.listen_to(system_id=packet[5], component_id=packet[6])
             for _, sample in decoder.feed(packet):
                 if isinstance(sample, ImuSample):
-                    imu.append((at_us, sample.time_boot_us, *sample.specific_force_frd_m_s2))
+                    force, rates = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+                    strapdown.imu(sample.time_boot_us, force, rates)
+                    imu.append((at_us, sample.time_boot_us, *force, *strapdown.sum_ned_m_s))
+                elif isinstance(sample, Attitude):
+                    strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
                 elif isinstance(sample, LocalPosition):
                     positions.append((at_us, *sample.position_ned_m, *sample.velocity_ned_m_s))
-    imu_rows, position_rows, setpoint_rows = _rows(imu, 5), _rows(positions, 7), _rows(setpoints, 4)
+    imu_rows, position_rows, setpoint_rows = _rows(imu, 8), _rows(positions, 7), _rows(setpoints, 4)
     return FlightLog(
         imu_at_us=imu_rows[:, 0],
         imu_time_boot_us=imu_rows[:, 1],
         specific_force_frd_m_s2=imu_rows[:, 2:5],
+        accelerated_ned_m_s=imu_rows[:, 5:8],
         position_at_us=position_rows[:, 0],
         position_ned_m=position_rows[:, 1:4],
         velocity_ned_m_s=position_rows[:, 4:7],

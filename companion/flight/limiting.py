@@ -34,5 +34,6 @@ class Limiter:
             self.limited_by, self.told_us = reason, now_us
             text = f"setpoint held back: {reason}" if reason else "setpoint free again"
             flight.tell(now_us, "envelope", text, reason=reason)
-        self.last_ned_m, self.last_us = target.position_ned_m, now_us
+        # A place that is not asked for is no step from it to the next.
+        self.last_ned_m, self.last_us = None if target.leans_only else target.position_ned_m, now_us
         return target

@@ -17,6 +17,8 @@ Ints = npt.NDArray[np.int64]
 # Low-pass on the slope of the estimated velocity, the D of eq. 6: the noise of an optical-flow velocity
 # differentiated at 100 Hz would otherwise tilt the vehicle by degrees.
 SLOPE_TIME_CONSTANT_S = 0.05
+# A hit that finds the corrections of another still going on waits for none of its own.
+CORRECTED_AFTER_S = 1.5
 # Less than this hidden in an interval disturbs nobody: a propeller that makes the sensor clip now and then.
 LEAST_HIDDEN_M_S = 0.02
 
@@ -32,7 +34,7 @@ class EstimateErrors(NamedTuple):
     cursor: Ints  # (1,)
     velocity_before: Floats  # (3,) the estimate's, one interval ago
     missed: Floats  # (6,) position m, velocity m/s, NED: what the estimate is off by since clipping hid a hit from it
-    since_missed_s: Floats  # (1,) since clipping last hid something
+    since_missed_s: Floats  # (1,) since clipping began to hide something
     rotation: Floats  # (3, 3) working memory
     clipping: Floats  # (4,) interval s, late s, frequency rad/s, damping; frequency 0: nothing is missed
 
@@ -58,7 +60,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
         cursor=np.zeros(1, np.int64),
         velocity_before=np.zeros(3),
         missed=np.zeros(6),
-        since_missed_s=np.zeros(1),
+        since_missed_s=np.full(1, CORRECTED_AFTER_S),
         rotation=np.empty((3, 3)),
         clipping=np.array([interval_s, *clipping]),
     )
@@ -107,7 +109,8 @@ def miss_what_was_clipped(errors: EstimateErrors) -> None:
     step_s, late_s, frequency, damping = errors.clipping
     missed, hidden = errors.missed, errors.hidden_ned_m_s[errors.cursor[0]]
     errors.since_missed_s[0] += step_s
-    if hidden[0] != 0.0 or hidden[1] != 0.0 or hidden[2] != 0.0:
+    is_hidden = hidden[0] != 0.0 or hidden[1] != 0.0 or hidden[2] != 0.0
+    if is_hidden and errors.since_missed_s[0] > CORRECTED_AFTER_S:
         errors.since_missed_s[0] = 0.0
     for i in range(3):
         missed[3 + i] -= hidden[i]

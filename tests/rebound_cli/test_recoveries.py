@@ -7,10 +7,11 @@ from rebound_cli.recoveries.hits import Case, cases, fly, work_out
 from sim_vehicle.airframe import Airframe, with_base
 
 
-def test_adaptive_settles_a_quarter_sooner_without_running_past_and_clear_of_the_wall():
+def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
+    """This cell; docs/campaign.md has the median of all."""
     paper, adaptive = (work_out(Case(law, "foldable", 0, 2.0, 1)) for law in ("paper", "adaptive"))
     assert (paper["outcome"], adaptive["outcome"]) == ("completed", "completed")
-    assert adaptive["settled_s"] < 0.75 * paper["settled_s"]
+    assert adaptive["settled_s"] < 0.8 * paper["settled_s"]
     assert adaptive["past_m"] < 0.05 and adaptive["recontacts"] == 0
     # half of the paper's 0.5 s times 2 m/s
     assert adaptive["clear_m"] > 0.48

@@ -32,6 +32,7 @@ def quiet(airframe: Airframe, **changes: object) -> Airframe:
         data["imu"][key] = 0.0
     data["imu"]["gyroscope_bias_rad_s"] = 0.0
     data["estimate"]["kind"] = "markov"
+    data["estimate"]["clipping"] = None
     for key in ("position_noise_m", "velocity_noise_m_s", "attitude_noise_rad"):
         data["estimate"][key] = 0.0
     for path, value in changes.items():
