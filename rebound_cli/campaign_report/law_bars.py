@@ -71,6 +71,14 @@ def _of_airframe(airframe: str, found: list[Pair]) -> Iterator[Bar]:
         clean >= CLEAN_WANTED if judged else None,
         of,
     )
+    back = share(new["past_m"] <= OVERSHOOT_MOST_M and not new["returned"] for new in adaptive)
+    yield Bar(
+        f"{airframe}: the same, but for other guards that swing in while the vehicle leaves",
+        "",
+        f"{per_cent(back)} %",
+        None,
+        of,
+    )
     clear = [_is_clear(old, new) for _, old, new in found if new["clear_m"] is not None]
     yield Bar(
         f"{airframe}: guards at rest clear by 0.3 m, or by half of `paper`'s distance if that is more",

@@ -121,7 +121,8 @@ def test_every_failure_is_listed_with_seed_cause_and_the_command_to_see_it_again
 def laws(**adaptive):
     """Hits with both laws: `adaptive` as asked."""
     cases = recovery_cases(1)
-    paper = {"settled_s": 3.0, "past_m": 0.0, "clear_m": 1.0, "lost_m": 0.02, "risen_m": 0.0, "recontacts": 0}
+    touches = {"recontacts": 0, "returned": 0}
+    paper = {"settled_s": 3.0, "past_m": 0.0, "clear_m": 1.0, "lost_m": 0.02, "risen_m": 0.0, **touches}
     good = {**paper, "settled_s": 1.5, "clear_m": 0.6, **adaptive}
     return law_bars(cases, {n: dict(paper if case.law == "paper" else good) for n, case in enumerate(cases)})
 
