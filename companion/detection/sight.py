@@ -6,6 +6,10 @@ from companion.written import Positive, Written
 
 # The received rate is judged over this: 20 samples at the least rate, and no longer than a link's brief gap.
 RATE_WINDOW_US = 1_000_000
+# A stream that was too slow, or silent, has proven its rate by as many samples over as long a time: five intervals,
+# because two that happen to be short would pass a slower stream, and at 50 Hz they take 0.1 s.
+PROOF_SAMPLES = 5
+PROOF_US = 100_000
 
 
 class SightConfig(Written):
@@ -30,14 +34,23 @@ class Sight(NamedTuple):
     blind_reason: str | None = None
 
 
-def heard(sight: Sight, imu_samples: int, now_us: int) -> Sight:
+def heard(sight: Sight, imu_samples: int, config: SightConfig, now_us: int) -> Sight:
     """With the IMU samples that arrived by ``now_us`` (companion's clock)."""
-    count, started_us, rate_hz = sight.heard_in_window + imu_samples, sight.window_started_us, sight.rate_hz
+    last_us, started_us, count, rate_hz, reason = sight
+    is_slow = rate_hz is not None and rate_hz < config.min_rate_hz
+    if imu_samples:
+        silent_us = now_us - last_us
+        if silent_us > config.silence_s * 1e6:
+            # What comes after a silence has to prove its rate; until then the silence's own rate stands.
+            return Sight(now_us, now_us, 0, 1e6 / silent_us, reason)
+        if is_slow and started_us > last_us:
+            return Sight(now_us, now_us, 0, rate_hz, reason)
+        last_us, count = now_us, count + imu_samples
     elapsed_us = now_us - started_us
-    if elapsed_us >= RATE_WINDOW_US:
+    is_proof = is_slow and imu_samples > 0 and count >= PROOF_SAMPLES and elapsed_us >= PROOF_US
+    if is_proof or elapsed_us >= RATE_WINDOW_US:
         rate_hz, count, started_us = count * 1e6 / elapsed_us, 0, now_us
-    last_us = now_us if imu_samples else sight.last_heard_us
-    return Sight(last_us, started_us, count, rate_hz, sight.blind_reason)
+    return Sight(last_us, started_us, count, rate_hz, reason)
 
 
 def why_blind(sight: Sight, threshold_m_s2: float, config: SightConfig, now_us: int) -> str | None:

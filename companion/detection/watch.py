@@ -122,7 +122,7 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
 def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_us: int) -> list[Notice]:
     """Blind or seeing, told when it changes and only while the detector is on; and, once, the threshold."""
     notices: list[Notice] = []
-    sight = heard(watch.sight, imu_samples, now_us)
+    sight = heard(watch.sight, imu_samples, watch.config.sight, now_us)
     on = situation.off_reason is None
     reason = why_blind(sight, watch.state.threshold_m_s2, watch.config.sight, now_us) if on else None
     if (reason is None) != (sight.blind_reason is None) and on:

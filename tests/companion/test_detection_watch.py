@@ -90,6 +90,46 @@ def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reaso
     assert "the detector sees again" in [notice.text for notice in notices]
 
 
+def imu_every(watch, every_us, start_us, until_us):
+    """Bare samples, looked after every 4 ms; the times at which the watch became seeing or blind."""
+    changes, was = [], watch.blind_reason is None
+    for t in range(start_us, until_us, INTERVAL_US):
+        heard = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))] if (t - start_us) % every_us == 0 else []
+        advance(watch, heard, WANTED, t)
+        if (watch.blind_reason is None) is not was:
+            was = not was
+            changes.append(t - start_us)
+    return changes
+
+
+@pytest.mark.parametrize(("every_us", "seeing_us"), [(4_000, 100_000), (20_000, 100_000), (40_000, 200_000)])
+def test_after_a_silence_five_intervals_and_a_tenth_of_a_second_prove_the_rate(every_us, seeing_us):
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000)
+    advance(watch, [], WANTED, 1_500_000)
+    advance(watch, [], WANTED, 2_600_000)
+    assert watch.blind_reason is not None
+    assert imu_every(watch, every_us, 3_000_000, 6_000_000) == [seeing_us]
+
+
+def test_a_slow_stream_stays_blind_and_is_seen_again_a_tenth_of_a_second_after_it_is_fast():
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000)
+    (blind_us,) = imu_every(watch, 100_000, 1_000_000, 5_000_000)
+    assert blind_us <= 2_000_000
+    (seeing_us,) = imu_every(watch, 20_000, 5_000_000, 8_000_000)
+    assert seeing_us <= 220_000
+
+
+def test_samples_that_a_link_held_back_and_delivers_at_once_prove_no_rate():
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000)
+    late = [ImuSample(1_000_000 + INTERVAL_US * n, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)) for n in range(20)]
+    advance(watch, late, WANTED, 2_000_000)
+    advance(watch, [], WANTED, 2_200_000)
+    assert "below 20" in watch.blind_reason
+
+
 def test_a_watch_that_is_not_wanted_is_off_not_blind():
     watch = start_watch(lateral(), 0)
     fly(watch, 1_000_000, situation=Situation("landing"))
