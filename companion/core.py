@@ -113,7 +113,6 @@ def situation(core: Core) -> Situation:
         height_m=height_m,
         descent_commanded=core.machine.state is State.LANDING,
         setpoint_position_ned_m=None if target is None else target.position_ned_m,
-        setpoint_velocity_ned_m_s=None if target is None else target.velocity_ned_m_s,
     )
 
 

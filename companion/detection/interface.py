@@ -56,7 +56,6 @@ class Situation(NamedTuple):
     height_m: float | None = None
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
-    setpoint_velocity_ned_m_s: Vector3 | None = None
     estimate_trusted: bool = True
 
 

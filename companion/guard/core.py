@@ -117,7 +117,6 @@ def situation(core: GuardCore) -> Situation:
         landed_state=flight.vehicle.landed,
         height_m=height_m,
         setpoint_position_ned_m=None if target is None else target.position_ned_m,
-        setpoint_velocity_ned_m_s=None if target is None else target.velocity_ned_m_s,
     )
 
 

@@ -111,5 +111,4 @@ def _situation(asked: Asked, height_m: float) -> Situation:
         height_m=height_m,
         descent_commanded=asked.phase in ("landing", "landed"),
         setpoint_position_ned_m=as_known(asked.setpoint, "position_ned_m"),
-        setpoint_velocity_ned_m_s=as_known(asked.setpoint, "velocity_ned_m_s"),
     )

@@ -138,7 +138,6 @@ def fly_hit(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
             landed_state=LandedState.IN_AIR,
             height_m=-output.position_ned_m[2],
             setpoint_position_ned_m=_triple(place),
-            setpoint_velocity_ned_m_s=_triple(velocity),
         )
         recording.add(plant, output, situation, airframe.mass_kg)
         if not touched and hit_row[HIT_ACTIVE] == 1.0:

@@ -1,7 +1,7 @@
 """What a flight would have known at each moment of a foreign log: armed, landed, height, on the way down."""
 
 from companion.detection.interface import Situation
-from companion.messages import CurrentMode, ExtendedState, Heartbeat, LandedState, LocalPosition, Vector3
+from companion.messages import CurrentMode, ExtendedState, Heartbeat, LandedState, LocalPosition
 from companion.px4_mode import AUTO_LAND
 from rebound_cli.logs.log import Demand, Told
 
@@ -58,7 +58,6 @@ class Circumstances:
         height_m: float | None = None
         if self._down_m is not None and self._ground_down_m is not None:
             height_m = self._ground_down_m - self._down_m
-        velocity: Vector3 | None = self._demand.velocity_ned_m_s
         return Situation(
             off_reason="disarmed" if self._armed is False else None,
             armed=self._armed,
@@ -66,7 +65,6 @@ class Circumstances:
             height_m=height_m,
             descent_commanded=self._is_told_to_descend(),
             setpoint_position_ned_m=self._demand.position_ned_m,
-            setpoint_velocity_ned_m_s=velocity,
         )
 
     def _is_told_to_descend(self) -> bool:
