@@ -1,8 +1,9 @@
 """Detector `fuzzy`: an impact's acceleration, the inclination and the flip rate to one response intensity.
 
-Source: G. Dicker, F. Chui and I. Sharf, "Quadrotor collision characterization and recovery control" (ICRA 2017) and
-"Recovery control for quadrotor UAV colliding with a pole" (IROS 2018). A collision is a horizontal acceleration above a
-fixed threshold. A fuzzy process then rates it: three inputs, each low or high to a degree,
+After F. Chui, G. Dicker and I. Sharf, "Dynamics of a quadrotor undergoing impact with a wall" (ICUAS 2016) and
+G. Dicker, I. Sharf and P. Rustagi, "Recovery control for quadrotor UAV colliding with a pole" (IROS 2018). A collision
+is a horizontal acceleration above a fixed threshold. A fuzzy process then rates it: three inputs, each low or high to a
+degree,
 
     A   horizontal acceleration, m/s^2      I   inclination, rad      F   flip rate towards the obstacle, rad/s
 
@@ -10,8 +11,12 @@ and the response intensity R in [0, 1] is the weighted mean (Sugeno) of the rule
 
     A low -> 0.2      A high -> 1      I high -> 0.8      F high -> 0.8      I low and F low -> 0.2.
 
-The papers scale their reaction by R. Here it is told as the impact's confidence and scales nothing: the recovery laws
-answer to v_c and the normal, which are measured, and of which A, I and F are only signs.
+R is told as the impact's confidence and scales nothing: the recovery laws answer to v_c and the normal, which are
+measured, and of which A, I and F are only signs.
+
+Neither the articles' text nor a program of their authors was at hand: that they rate a collision by a fuzzy process is
+what the paper says of them; their inputs, rules, membership functions and threshold were not checked. Those here are
+this project's, and comparing with this file says little of theirs.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Detector `momentum`: external force by a generalised-momentum observer.
 
-Source: F. Ruggiero et al., "Impedance control of VToL UAVs with a momentum-based external generalized forces
-estimator" (ICRA 2014), after A. De Luca's residual for robot arms. Of the momentum p = m v the known part is thrust
-and gravity, so with a gain K (1/s) the residual
+After F. Ruggiero et al., "Passivity-based control of VToL UAVs with a momentum-based estimator of external wrench and
+unmodeled dynamics" (Robotics and Autonomous Systems 72, 2015), and A. De Luca's residual for robot arms. Of the
+momentum p = m v the known part is thrust and gravity, so with a gain K (1/s) the residual
 
     r = K [ p - integral of (m g e3 - T R e3 + r) dt ]      which obeys      r' = K (F_ext - r)
 
@@ -10,6 +10,10 @@ is the external force, low-passed. Per unit mass m cancels: v is the vehicle's v
 ATTITUDE_TARGET.thrust, with the gain learnt in flight (see `thrust`). The sample's force must depart from its running
 mean (drag, and the model's error) by the threshold. Nothing of the accelerometer's short peaks is used: it is as late
 as the velocity and 1 / K.
+
+Checked: residual, signs and first-order law are those of the observer in LAAS-CNRS's phynt-genom3 (there of the angular
+momentum, the known forces being torques), read as program. The article's text was not at hand: whether its estimator
+is of a higher order than one was not checked. Gain, threshold, running mean and the learnt thrust are this project's.
 """
 
 import math

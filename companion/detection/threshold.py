@@ -1,29 +1,30 @@
-"""Detector `threshold`: a fixed magnitude over a window of samples, the rule in public use; here as the baseline.
+"""Detector `threshold`: a fixed threshold on each axis, told when a window of samples is over; here as the baseline.
 
 Source: R. Wang et al., "Air Bumper: A Collision Detection and Reaction Framework for Autonomous MAV Navigation"
-(arXiv 2307.06101): the accelerometer's magnitude, gravity taken off, over a window of samples against a fixed
-20 m/s^2. Here the mean over ten samples must reach it:
+(arXiv 2307.06101, ICRA 2024), held against the authors' program, github.com/ryrobotics/air_bumper, file
+src/imu_detection.cpp. With gravity taken off the body's z axis (there 9.8 m/s^2), a sample is loud when one axis of it
+exceeds 20 m/s^2. The first loud sample opens a window, in which the sample with the largest axis is kept. The push
+kept is told by the first sample more than ten after the window's start; a sample that is loud just then opens the
+next window instead, so that a push that lasts is told when it is over.
 
-    1/n sum |f_k - f_hover| >= 20 m/s^2,    f_hover = (0, 0, -g)
+Not theirs: one contact is told once (`contact`), and reports while the detector is off are dropped.
 """
 
-import math
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from companion.detection.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
-from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.estimate.strapdown import GRAVITY_M_S2, ZERO
 from companion.messages import ImuSample, MessageId, Sample, Vector3
 from companion.written import Positive, Written
 
 
 class ThresholdConfig(Written):
-    """Settings of the detector `threshold`, as published."""
+    """Settings of the detector `threshold`, as in its authors' program."""
 
     threshold_m_s2: Positive = 20.0
     window: Annotated[int, Field(strict=True, ge=1, le=100)] = 10
@@ -31,11 +32,13 @@ class ThresholdConfig(Written):
 
 @dataclass(slots=True)
 class ThresholdState(DetectorState):
-    """Adds the window: times, and forces without gravity (body FRD, m/s^2)."""
+    """Adds the window: samples since its start, and of its loudest sample the axis and the force (FRD, no gravity)."""
 
-    times_us: deque[int] = field(default_factory=deque)
-    forces: deque[Vector3] = field(default_factory=deque)
-    sizes: deque[float] = field(default_factory=deque)
+    since: int | None = None
+    is_open: bool = False
+    free_until_us: int = 0
+    largest_m_s2: float = 0.0
+    force_m_s2: Vector3 = ZERO
 
 
 class ThresholdDetector:
@@ -54,22 +57,25 @@ class ThresholdDetector:
     def step(self, state: ThresholdState, sample: Sample, situation: Situation) -> tuple[ThresholdState, Impact | None]:
         if not isinstance(sample, ImuSample):
             return state, None
+        now_us = sample.time_boot_us
         f_x, f_y, f_z = sample.specific_force_frd_m_s2
-        f_z += GRAVITY_M_S2
-        state.times_us.append(sample.time_boot_us)
-        state.forces.append((f_x, f_y, f_z))
-        state.sizes.append(math.sqrt(f_x * f_x + f_y * f_y + f_z * f_z))
-        if len(state.sizes) > self._config.window:
-            state.times_us.popleft()
-            state.forces.popleft()
-            state.sizes.popleft()
-        size = sum(state.sizes) / len(state.sizes)
-        is_loud = len(state.sizes) == self._config.window and size >= self._config.threshold_m_s2
-        free_until_us = state.times_us[0] - self._averaging_us
-        force = max(state.forces, key=_square) if is_loud else (0.0, 0.0, 0.0)
-        off = situation.off_reason
-        return state, judge(state, sample.time_boot_us, free_until_us, force, max(state.sizes), is_loud, off)
+        self._look(state, now_us, (f_x, f_y, f_z + GRAVITY_M_S2))
+        is_told = state.is_open and state.since is not None and state.since > self._config.window
+        if is_told:
+            state.is_open = False
+        push, size, off = state.force_m_s2, state.largest_m_s2, situation.off_reason
+        return state, judge(state, now_us, state.free_until_us, push, size, is_told, off)
 
-
-def _square(force: Vector3) -> float:
-    return force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
+    def _look(self, s: ThresholdState, now_us: int, force: Vector3) -> None:
+        """Count the sample; open the window with it, or keep it if it is the loudest."""
+        size = max(abs(force[0]), abs(force[1]), abs(force[2]))
+        if s.since is not None:
+            s.since += 1
+        if size <= s.threshold_m_s2:
+            return
+        if s.since is None or s.since > self._config.window:
+            if not s.is_open:
+                s.free_until_us = min(now_us - self._averaging_us, s.last_sample_boot_us)
+            s.since, s.largest_m_s2 = 0, 0.0
+        if size > s.largest_m_s2 and s.since < self._config.window:
+            s.is_open, s.largest_m_s2, s.force_m_s2 = True, size, force

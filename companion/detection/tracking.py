@@ -1,14 +1,17 @@
 """Detector `tracking`: a supervisor that takes a large error in following the path for a contact.
 
-Source: after L. Marconi and R. Naldi, "Control of Aerial Robots: Hybrid Force and Position Feedback for a Ducted Fan"
-(IEEE Control Systems Magazine, 2012): a supervisor switches to the contact laws when the error in following the
-reference leaves a bound that free flight keeps. Here
+After R. Naldi et al., "Robust 'blind' navigation for a miniature ducted-fan aerial robot" (American Control Conference,
+2013), as the paper tells it: a supervisor detects a collision by a threshold on the error of the path-following
+controller. Here
 
     | p_setpoint(t) - p(t) | - its running mean   >= bound,
 
 the mean being the lag that every vehicle flies behind its setpoint with. It needs no accelerometer at all, and sees a
 hit only when the path has gone on without the vehicle: tenths of a second late; a hit on a vehicle that hovers only by
 how far it was thrown.
+
+Neither the article's text nor a program of its authors was at hand: which error they take (place, velocity, heading),
+and its bound, were not checked. The error of the place, the running mean and the bound are this project's.
 """
 
 import math

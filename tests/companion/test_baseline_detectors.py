@@ -58,7 +58,7 @@ def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it
     assert fly(detector, wall(40.0), off="landing") == []
 
 
-LATENCY_MS = {"fused": 0, "lateral": 0, "fuzzy": 0, "hybrid": 4, "threshold": 36, "momentum": 60, "tracking": 400}
+LATENCY_MS = {"fused": 0, "lateral": 0, "fuzzy": 0, "hybrid": 4, "threshold": 88, "momentum": 60, "tracking": 400}
 
 
 @pytest.mark.parametrize("detector", sorted(DETECTORS))
@@ -79,9 +79,41 @@ def test_a_climb_with_its_thrust_told_is_no_hit(detector):
         assert fly(detector, lift=climb) == []
 
 
-def test_the_fixed_threshold_misses_what_is_weak_or_short():
-    assert fly("threshold", wall(18.0)) == []
-    assert fly("threshold", wall(150.0, length_us=4_000)) == []
+def test_the_fixed_threshold_is_for_each_axis_and_not_for_the_magnitude():
+    def slanting(t):
+        return (-18.0, 18.0, 0.0) if HIT_US <= t < HIT_US + 60_000 else (0.0, 0.0, 0.0)
+
+    assert fly("threshold", slanting) == []
+    assert len(fly("threshold", wall(21.0))) == 1
+
+
+def test_the_fixed_threshold_takes_gravity_off_the_body_z_axis():
+    def dropped(t):
+        return (0.0, 0.0, 25.0) if HIT_US <= t < HIT_US + 8_000 else (0.0, 0.0, 0.0)
+
+    (impact,) = fly("threshold", dropped)
+    assert impact.impact.specific_force_frd_m_s2[2] == pytest.approx(25.0, abs=0.01)
+
+
+def test_the_fixed_threshold_tells_its_windows_largest_push_eleven_samples_after_the_first():
+    """Five samples from 25 to 60 and back to 30 m/s^2."""
+    pushes = (25.0, 40.0, 60.0, 45.0, 30.0)
+
+    def growing(t):
+        index = (t - HIT_US) // TICK_US
+        return (-pushes[index], 0.0, 0.0) if 0 <= index < len(pushes) else (0.0, 0.0, 0.0)
+
+    (impact,) = fly("threshold", growing)
+    assert impact.impact.sample_time_boot_us == HIT_US + 11 * TICK_US
+    assert impact.impact.specific_force_frd_m_s2[0] == pytest.approx(-60.0, abs=0.2)
+    assert impact.impact.contact_free_until_boot_us == HIT_US - 5_000  # the first sample's averaging
+
+
+def test_a_push_longer_than_the_fixed_thresholds_window_is_told_once_when_it_is_over():
+    """Fifteen loud samples: the twelfth opens a second window, which ends eleven samples later."""
+    (impact,) = fly("threshold", wall(40.0))
+    assert impact.impact.sample_time_boot_us == HIT_US + 22 * TICK_US
+    assert impact.impact.contact_free_until_boot_us < HIT_US
 
 
 def test_the_response_grows_with_each_input_and_stays_a_share():
