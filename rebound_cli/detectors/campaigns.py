@@ -5,7 +5,9 @@ from pathlib import Path
 
 from rebound_cli.campaign.plan import Campaign
 from rebound_cli.detectors.flights import AIRBORNE_S, FlightCase, work_out_flight
+from rebound_cli.detectors.hands import draw_hand, work_out_hand
 from rebound_cli.detectors.hits import AIRFRAMES, HitCase, draw_case, work_out_hit
+from rebound_cli.detectors.links import JITTERY
 from rebound_cli.detectors.mishaps import FAMILIES
 from rebound_cli.detectors.recorded import (
     SCALES,
@@ -31,6 +33,9 @@ VARIED_SHARE = 16
 VIBRATIONS_M_S2 = (0.05, 1.0, 2.0, 4.0)
 # Of the vehicle's velocity estimate, RMS on each axis: motion capture, GPS with RTK, plain GPS.
 VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
+# Over a bad link, of a hovering vehicle, by hand: one in so many each, by the default detector and the baseline alone.
+# No more than these, which take two minutes of one core together; a missed one in a hundred shows.
+SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
 USES = ("rebound_cli.logs", "rebound_cli.replay")
 
 # Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
@@ -38,7 +43,7 @@ FLIGHT_S = AIRBORNE_S + 40.0
 
 
 def hits_campaign(hits: int) -> Campaign:
-    """So many hits as the airframes are, and a sixteenth more of each variation."""
+    """So many hits as the airframes are, a sixteenth more of each variation, and some over a bad link and in hover."""
     every = _every(hits, COMPARED_HITS)
     swept = every * max(1, round(hits / (every * SWEPT_HITS)))
     cases: list[HitCase] = [
@@ -50,7 +55,16 @@ def hits_campaign(hits: int) -> Campaign:
     for seed in range(2 * hits, 2 * hits + hits // VARIED_SHARE):
         noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
         cases.append(draw_case("velocity", seed, _thorough(), velocity_noise_m_s=noise))
+    side = _side(hits, SIDE_HITS_AT_MOST)
+    cases += [draw_case("link", 3 * hits + count, _thorough(), link=JITTERY) for count in range(side)]
+    cases += [draw_case("struck", 4 * hits + count, _thorough(), is_struck=True) for count in range(side)]
     return Campaign("hits", {"hits": hits}, cases, work_out_hit)
+
+
+def hands_campaign(hits: int) -> Campaign:
+    """A hand's grips on a hovering vehicle, as many as belong to so many hits."""
+    cases = [draw_hand(seed, _thorough()) for seed in range(2 * _side(hits, HANDS_AT_MOST // 2))]
+    return Campaign("hands", {"hits": hits}, cases, work_out_hand)
 
 
 def flights_campaign(hours: float) -> Campaign:
@@ -88,6 +102,11 @@ def injected_campaign(folder: Path, rounds: int) -> Campaign:
             log, seed = healthy[(number + turn) % len(healthy)], turn * len(drops) + number
             cases.append(InjectedCase(str(folder), log, drop, seed, detectors))
     return Campaign("recorded-impacts", {"logs": healthy, "rounds": rounds}, cases, work_out_injected, USES)
+
+
+def _side(hits: int, at_most: int) -> int:
+    """In pairs, one for each airframe, and never none."""
+    return 2 * max(1, min(at_most, hits // SIDE_SHARE) // 2)
 
 
 def _every(cases: int, compared: int) -> int:

@@ -29,6 +29,8 @@ SPEEDS_M_S = (0.5, 5.0)
 # Below the speeds that are asked for, to see where it ends.
 SLOW_SPEEDS_M_S = (0.3, 0.5)
 SLOW_SHARE = 0.06
+# Of an obstacle that comes towards a hovering vehicle: a person who walks, a door that swings.
+STRUCK_SPEEDS_M_S = (0.5, 3.0)
 
 # Off the ground by more than any fall within a hit; nothing about the ground is wanted here.
 HEIGHT_M = 30.0
@@ -71,12 +73,18 @@ class HitCase:
     """RMS on each axis of the vehicle's velocity estimate; None: the airframe's own."""
     sweeps: bool = False
     """Whether the detectors' thresholds are swept, too."""
+    is_struck: bool = False
+    """The vehicle hovers, and the obstacle comes at it with the speed."""
+    link: str | None = None
+    """By name, of what the link to the companion does to packets; None: nothing."""
 
 
 def draw_case(family: str, seed: int, detectors: tuple[str, ...] | None = None, **settings: Any) -> HitCase:
     """The case that belongs to a seed: airframes and approaches in turn, speeds at random."""
     rng = np.random.default_rng([seed, 0])
     speeds = SLOW_SPEEDS_M_S if rng.random() < SLOW_SHARE else SPEEDS_M_S
+    if settings.get("is_struck"):
+        speeds = STRUCK_SPEEDS_M_S
     return HitCase(
         family=family,
         seed=seed,
@@ -92,7 +100,7 @@ def work_out_hit(case: HitCase) -> dict[str, Any]:
     """Fly it once, then let every detector hear it at every rate."""
     airframe = airframe_of(case)
     recording, hit = fly_hit(case, airframe)
-    return score_hit(recording, hit, airframe, case.seed, case.detectors, case.sweeps)
+    return score_hit(recording, hit, airframe, case.seed, case.detectors, case.sweeps, case.link)
 
 
 def airframe_of(case: HitCase) -> Airframe:
@@ -113,13 +121,15 @@ def built_in(name: str) -> Airframe:
 
 
 def fly_hit(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
-    """Straight on into the obstacle, and on for a moment. Raises NoTouch."""
+    """Straight on into the obstacle, or hovering until it comes, and on for a moment. Raises NoTouch."""
     rng = np.random.default_rng([case.seed, 1])
-    velocity = _velocity(case, airframe, rng)
+    towards = _velocity(case, airframe, rng)
+    velocity = 0.0 * towards if case.is_struck else towards
     free_s = float(rng.uniform(*FREE_FLIGHT_S))
     start = np.array([0.0, 0.0, -HEIGHT_M])
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
-    scene = Scene.model_validate(_obstacle(case, airframe, start + free_s * velocity, velocity, rng))
+    place = _obstacle(case, airframe, start + free_s * velocity, towards, rng)
+    scene = Scene.model_validate(_coming(place, -towards, free_s) if case.is_struck else place)
     cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
     recording, interval_s = Recording(), 1e-6 * airframe.imu.integration_interval_us
     plant, truth, hit_row = cruise.plant, cruise.plant.truth, cruise.plant.state.hit
@@ -191,6 +201,18 @@ def _obstacle(
     extent_m = math.hypot(reach_m * sideways, airframe.geometry.guard_height_m * upward)
     point = at_ned_m - extent_m * normal
     return {"walls": [{"point_ned_m": point.tolist(), "normal_ned": normal.tolist(), "width_m": 60, "height_m": 40}]}
+
+
+def _coming(scene: Mapping[str, Any], velocity: Floats, after_s: float) -> dict[str, Any]:
+    """The scene with its obstacle on the way at a velocity, where it was asked to be after so long."""
+    motion = {"velocity_ned_m_s": velocity.tolist()}
+    return {
+        kind: [
+            {**one, "point_ned_m": (np.array(one["point_ned_m"]) - after_s * velocity).tolist(), "motion": motion}
+            for one in obstacles
+        ]
+        for kind, obstacles in scene.items()
+    }
 
 
 def _triple(vector: Floats) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample
+from rebound_cli.detectors.links import LINKS, over_link
 from rebound_cli.detectors.recording import Recording
 from rebound_cli.detectors.watching import (
     ASKED_HZ,
@@ -49,19 +50,29 @@ class Possible:
 
 def first_possible(recording: Recording, arrived: Sequence[Heard], touch_boot_us: float, floor_m_s2: float) -> Possible:
     """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
+    # A sample's own interval: over a bad link it may arrive in a later one.
+    stamps = (sample.time_boot_us for sample in recording.samples)
+    contact_m_s2 = dict(zip(stamps, recording.contact_m_s2, strict=True))
     times, first = [], None
     for step in arrived:
-        if not any(isinstance(sample, ImuSample) for sample in step.samples):
+        stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
+        if not stamps_heard:
             continue
         times.append(step.time_boot_us)
-        shows = step.time_boot_us >= touch_boot_us and recording.contact_m_s2[step.index] > floor_m_s2
+        shows = any(stamp >= touch_boot_us and contact_m_s2[stamp] > floor_m_s2 for stamp in stamps_heard)
         if shows and first is None:
             first = step.time_boot_us
     return Possible(first, times)
 
 
 def score_hit(
-    recording: Recording, hit: Hit, airframe: Airframe, seed: int, detectors: Sequence[str], sweeps: bool
+    recording: Recording,
+    hit: Hit,
+    airframe: Airframe,
+    seed: int,
+    detectors: Sequence[str],
+    sweeps: bool,
+    link: str | None = None,
 ) -> dict[str, Any]:
     """What the tables need of one hit, for every rate and detector."""
     touch_us = hit.contact_at_boot_us
@@ -76,11 +87,14 @@ def score_hit(
     wire = Wire(recording)
     for rate in ASKED_HZ:
         arrived = wire.heard(streams_asked_hz(rate), seed + rate)
+        if link is not None:
+            arrived = over_link(arrived, recording, LINKS[link], seed + rate)
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
         entries, swept = {}, {}
         for name in detectors:
-            found, _, blind = watch_all(configuration(name), arrived, recording.situations)
-            entries[name] = _entry(found, hit, possible, blind)
+            found, touches, blind = watch_all(configuration(name), arrived, recording.situations)
+            told_us = [touch.impact.sample_time_boot_us for touch in touches]
+            entries[name] = _entry(found, hit, possible, blind) | {"touches": sum(t >= touch_us for t in told_us)}
             if sweeps and rate in SWEPT_RATES:
                 swept[name] = [_is_found(name, factor, arrived, recording, touch_us) for factor in SWEPT_FACTORS]
         possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)

@@ -12,8 +12,14 @@ from matplotlib.figure import Figure
 from rebound_cli import __version__
 from rebound_cli.campaign.plan import Campaign
 from rebound_cli.campaign.run import Results, Workers, failures_text, run_campaign
-from rebound_cli.detectors.campaigns import flights_campaign, healthy_campaign, hits_campaign, injected_campaign
-from rebound_cli.detectors_report import comparison, flights, hit_bars, hits, pictures
+from rebound_cli.detectors.campaigns import (
+    flights_campaign,
+    hands_campaign,
+    healthy_campaign,
+    hits_campaign,
+    injected_campaign,
+)
+from rebound_cli.detectors_report import comparison, families, flights, hit_bars, hits, pictures
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.detectors_report.numbers import Hits
 from rebound_cli.detectors_report.reading import HOW_TO_READ
@@ -28,7 +34,7 @@ def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
     started_s = time.monotonic()
     workers = Workers(options.jobs, options.scheduler)
-    campaigns = [hits_campaign(options.hits), flights_campaign(options.hours)]
+    campaigns = [hits_campaign(options.hits), hands_campaign(options.hits), flights_campaign(options.hours)]
     if options.data is not None:
         rounds = max(1, round(options.hits / HITS_PER_ROUND))
         campaigns += [healthy_campaign(options.data), injected_campaign(options.data, rounds)]
@@ -54,8 +60,11 @@ def _hits(worked_out: Worked) -> Hits:
 
 
 def _bars(worked_out: Worked) -> list[Bar]:
+    bars = hit_bars.hit_bars(_hits(worked_out)) + families.family_bars(_hits(worked_out))
+    campaign, results = worked_out["hands"]
+    bars += families.hand_bars(campaign.cases, results.results)
     campaign, results = worked_out["flights"]
-    bars = hit_bars.hit_bars(_hits(worked_out)) + flights.flight_bars(campaign.cases, results.results)
+    bars += flights.flight_bars(campaign.cases, results.results)
     for name, judge in (("recorded-flights", flights.recorded_bars), ("recorded-impacts", flights.injected_bars)):
         if name in worked_out:
             recorded, found = worked_out[name]
@@ -65,6 +74,7 @@ def _bars(worked_out: Worked) -> list[Bar]:
 
 def _sections(worked_out: Worked, bars: list[Bar]) -> list[str]:
     flown, results = worked_out["flights"]
+    held, in_hand = worked_out["hands"]
     all_hits = _hits(worked_out)
     parts: list[tuple[str, str]] = [
         ("What must be shown", bars_text(bars)),
@@ -78,6 +88,8 @@ def _sections(worked_out: Worked, bars: list[Bar]) -> list[str]:
         ("By speed", hits.speeds_text(all_hits)),
         ("By vibration", hits.vibrations_text(all_hits)),
         ("By the quality of the vehicle's velocity", hits.velocity_text(all_hits)),
+        ("Over a bad link, and struck in hover", families.families_text(all_hits)),
+        ("In a person's hand", families.hands_text(held.cases, in_hand.results)),
         ("Healthy flights, simulated", flights.alarms_text(flown.cases, results.results)),
         ("By kind of flight", flights.families_text(flown.cases, results.results)),
     ]

@@ -12,6 +12,16 @@ which ask for `HIGHRES_IMU` at 50, 100 and 250 Hz and receive what PX4's rule se
 and 246 Hz); everything else comes at the rates that the companion asks for. Every detector hears the same samples,
 with its default settings.
 
+*Over a bad link* each packet waits up to 10 ms more, 1 % are lost and 1 % are overtaken (20 ms later): other hits of
+the same kinds, heard so. *Struck in hover*: the vehicle holds its place and the same obstacles come at it at 0.5 to 3
+m/s and do not stop. *In a person's hand*: the vehicle hovers (drifting at up to 0.1 m/s) and is held where it is (by
+an arm of 100 to 400 N/m) or pushed level with 2 to 6 m/s² that rise within 0.08 to 0.2 s, for 0.4 to 1.5 s; a grip
+that gives no force beyond the threshold is told as nothing. Any collision told before, meanwhile or within 0.5 s after
+it counts against the detector.
+
+*Told as a mere contact, too*: beside the collision, or instead of it, a touch was reported that is none; of a vehicle
+struck softly the collision is then often a later touch of the same obstacle.
+
 *Found*: a collision is reported within 0.4 s of the first touch. A touch that is classed as a landing or a hand is
 not a collision. *False before*: reports before the first touch.
 
