@@ -128,8 +128,8 @@ def fly_hit(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
     free_s = float(rng.uniform(*FREE_FLIGHT_S))
     start = np.array([0.0, 0.0, -HEIGHT_M])
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
-    place = _obstacle(case, airframe, start + free_s * velocity, towards, rng)
-    scene = Scene.model_validate(_coming(place, -towards, free_s) if case.is_struck else place)
+    obstacle = _obstacle(case, airframe, start + free_s * velocity, towards, rng)
+    scene = Scene.model_validate(_coming(obstacle, -towards, free_s) if case.is_struck else obstacle)
     cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
     recording, interval_s = Recording(), 1e-6 * airframe.imu.integration_interval_us
     plant, truth, hit_row = cruise.plant, cruise.plant.truth, cruise.plant.state.hit
