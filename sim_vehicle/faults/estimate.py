@@ -1,4 +1,4 @@
-"""Faults of the vehicle's estimate: it jumps, it misses what clipping hid, it drifts without its sensors."""
+"""Faults of the vehicle's estimate: it jumps, it resets after a clipped hit, it drifts without its sensors."""
 
 from bisect import insort
 
@@ -8,7 +8,6 @@ import numpy.typing as npt
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import AidingLoss, EstimatorAfterClipping, EstimatorReset
 from sim_vehicle.physics.layout import Disturbance, State
-from sim_vehicle.physics.rotation import matrix_from_quaternion
 
 Floats = npt.NDArray[np.float64]
 
@@ -27,7 +26,6 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         self._due_s: list[float] = []
         self._kick_m_s = 0.0
         self._settles_s = 1.0
-        self._rotation = np.empty((3, 3))
         self._shift, self._velocity, self._drift = np.zeros(3), np.zeros(3), np.zeros(6)
         self.reset_counter = 0
 
@@ -44,7 +42,7 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
     def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
         self._velocity *= np.exp(-self._step_s / self._settles_s)
         self._jump(time_s)
-        self._miss(time_s, state)
+        self._switch(time_s, state)
         self._stray(time_s)
         disturbance.estimate_jump[0:3] = self._shift + self._drift[0:3]
         disturbance.estimate_jump[3:6] = self._velocity + self._drift[3:6]
@@ -57,8 +55,8 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
             self._settles_s = reset.settles_s
             self.reset_counter += 1
 
-    def _miss(self, time_s: float, state: State) -> None:
-        """Velocity that clipping has hidden is missing at once; resets follow, each leaving an error of its own."""
+    def _switch(self, time_s: float, state: State) -> None:
+        """After a clipped hit resets follow, each leaving an error of its own."""
         for fault in self._faults:
             if not isinstance(fault, EstimatorAfterClipping):
                 continue
@@ -66,8 +64,6 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
             hidden = np.array(state.clipped_off_m_s)
             if not start_s <= time_s < end_s or float(np.linalg.norm(hidden)) < fault.least_hidden_m_s:
                 continue
-            matrix_from_quaternion(state.body, self._rotation)
-            self._velocity -= self._rotation @ hidden
             self._settles_s, self._kick_m_s = fault.settles_s, fault.kick_m_s
             if not self._due_s:
                 self._due_s = [time_s + fault.over_s * (n + 1) / fault.resets for n in range(fault.resets)]

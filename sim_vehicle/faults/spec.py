@@ -169,7 +169,7 @@ class EstimatorReset(Moment):
 
 
 class EstimatorAfterClipping(Timed):
-    """What clipping hides of a hit is missing in the estimated velocity, which then resets again and again.
+    """After a hit that the accelerometer clipped the estimated velocity resets again and again.
 
     PX4 after a hit of 108 m/s2 changed its primary estimator four times in 36 ms (a log of v1.12 on an FMU v5).
     """
