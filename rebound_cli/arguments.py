@@ -1,6 +1,7 @@
 """Kinds of arguments that the command line takes: text to value, or a sentence why not."""
 
 import argparse
+import os
 
 SIMULATED_AUTOPILOTS = ("builtin", "px4")
 
@@ -37,7 +38,9 @@ def speed(text: str) -> float:
     except ValueError:
         value = -1.0
     if not 0 <= value <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a speed: give a number from 0 to 1000")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR"
+        )
     return value
 
 
@@ -49,6 +52,18 @@ def hours(text: str) -> float:
     if not 0 < value <= 10_000:
         raise argparse.ArgumentTypeError(f"{text!r} is not a time: give hours, such as 0.5")
     return value
+
+
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--jobs", type=count, default=2, help="processes at a time (default 2)")
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """For what is worked out on Dask: here, or wherever a scheduler has workers."""
+    parser.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"
+    )
 
 
 def add_world_options(parser: argparse.ArgumentParser) -> None:

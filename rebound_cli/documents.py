@@ -19,6 +19,8 @@ Model = TypeVar("Model", bound=BaseModel)
 _MOST_ERRORS_SHOWN = 5
 
 _ITEM_NUMBER = re.compile(r"\bitem (\d+)\b")
+# pydantic speaks of the program's types, the person wrote YAML.
+_OF_THE_MODEL = re.compile(r"a valid (tuple|list|dictionary( or instance of \w+)?)")
 
 
 class DocumentError(ConfigurationError):
@@ -226,6 +228,7 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
     for lead in ("Value error, ", "Assertion failed, "):
         message = message.removeprefix(lead)
     message = message.replace("Input should be", "must be").rstrip(".")
+    message = _OF_THE_MODEL.sub(lambda found: "a list" if "tuple" in found[0] else "a mapping", message)
     given = error.get("input")
     if kind != "value_error" and isinstance(given, str | int | float | None):
         message += f", not {given!r}" if given is not None else ", not empty"
@@ -236,5 +239,5 @@ def _unknown_key(key: str, allowed: Sequence[str]) -> str:
     if not allowed:
         return f"unknown key '{key}'; no keys are allowed here"
     match = nearest(key, allowed)
-    question = f"did you mean '{match}'? " if match else ""
-    return f"unknown key '{key}'; {question}Allowed here: {', '.join(allowed)}"
+    question = f"did you mean '{match}'? Allowed" if match else "allowed"
+    return f"unknown key '{key}'; {question} here: {', '.join(allowed)}"

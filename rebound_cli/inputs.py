@@ -13,6 +13,7 @@ from rebound_cli.documents import (
     apply_overrides,
     empty_document,
     load_document,
+    parse_override,
     validated,
 )
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
@@ -105,6 +106,9 @@ def world_from(document: Document) -> SimulatedWorld:
 
 def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, seed: int | None) -> SimulatedWorld:
     """For the simulated vehicle alone: of the mission file, if there is one, only the `sim:` part counts."""
+    for override in map(parse_override, sets):
+        if override.path[0] != "sim":
+            raise DocumentError(f"{override.text}: only what begins with sim. counts here, such as sim.seed=7.")
     document = load_document(path) if path is not None else empty_document("no mission file")
     _apply_options(document, sets, airframe, seed)
     return world_from(document)

@@ -1,6 +1,7 @@
 """The command `rebound`: reads its arguments and turns expected errors into one sentence."""
 
 import argparse
+import errno
 import itertools
 import os
 import sys
@@ -9,16 +10,7 @@ from pathlib import Path
 
 from companion.errors import ReboundError
 from rebound_cli import __version__
-from rebound_cli.arguments import (
-    SIMULATED_AUTOPILOTS,
-    add_world_options,
-    count,
-    host_and_port,
-    hours,
-    instance,
-    port,
-    speed,
-)
+from rebound_cli.arguments import SIMULATED_AUTOPILOTS, add_jobs, add_workers, count, hours
 from rebound_cli.campaign_report.arguments import add_campaign
 from rebound_cli.check.arguments import add_check
 from rebound_cli.fly_arguments import add_fly
@@ -26,11 +18,14 @@ from rebound_cli.guard.arguments import add_guard
 from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
+from rebound_cli.sim_arguments import add_sim
 from rebound_cli.tune.arguments import add_tune
 
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
+# Whoever ends these at once leaves a vehicle to itself.
+COMMANDING = ("fly", "guard")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -44,12 +39,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"rebound: {error}", file=sys.stderr)
         return EXIT_ERROR
     except KeyboardInterrupt:
-        text = "ended at once; a vehicle in the air does what its autopilot does when setpoints stop."
-        print(f"rebound: {text}", file=sys.stderr)
+        text = "ended at once"
+        if options.command in COMMANDING:
+            text += "; a vehicle in the air does what its autopilot does when setpoints stop"
+        print(f"rebound: {text}.", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone (`rebound ... | head`): nobody is left to tell.
         sys.stderr.close()
+        return EXIT_ERROR
+    except OSError as error:
+        # A file or folder that cannot be had, or a full disk; an error of any other kind is a fault of ours.
+        if error.filename is None and error.errno != errno.ENOSPC:
+            raise
+        where = "" if error.filename is None else f"{error.filename}: "
+        print(f"rebound: {where}{error.strerror}.", file=sys.stderr)
         return EXIT_ERROR
 
 
@@ -59,12 +63,12 @@ def build_parser() -> argparse.ArgumentParser:
         description="Detects a collision of a PX4 multicopter in one IMU sample and recovers from it.",
     )
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     add_fly(commands)
     add_guard(commands)
     add_check(commands)
     add_plan(commands)
-    _add_sim(commands)
+    add_sim(commands)
     _add_results(commands)
     _add_recoveries(commands)
     add_campaign(commands)
@@ -78,63 +82,6 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    sim = commands.add_parser(
-        "sim",
-        help="run the simulated vehicle alone",
-        description="A simulated PX4 quadrotor for any MAVLink client.",
-    )
-    sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
-    add_world_options(sim)
-    sim.add_argument(
-        "--autopilot",
-        choices=SIMULATED_AUTOPILOTS,
-        default="builtin",
-        help="px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/px4.md",
-    )
-    sim.add_argument(
-        "--port",
-        type=port,
-        help="UDP port to listen on for the companion (default 14580 + instance; 0: any free one); "
-        "with --autopilot px4 the TCP port (4560)",
-    )
-    sim.add_argument(
-        "--speed",
-        type=speed,
-        default=os.environ.get("PX4_SIM_SPEED_FACTOR", "1"),
-        metavar="N",
-        help="at most N times real time, 0 for as fast as it goes (default: $PX4_SIM_SPEED_FACTOR, else 1)",
-    )
-    sim.add_argument(
-        "--sensor-rate",
-        type=int,
-        choices=(250, 500, 1000),
-        default=1000,
-        help="with --autopilot px4: HIL_SENSOR a second; 250 is three times as fast and less like a real sensor",
-    )
-    sim.add_argument(
-        "--remote",
-        type=host_and_port,
-        metavar="HOST:PORT",
-        help="where the companion's link sends unasked (default 127.0.0.1:14540 + instance)",
-    )
-    sim.add_argument(
-        "--link",
-        action="append",
-        default=[],
-        metavar="URL",
-        help="one more link, e.g. tcpin://0.0.0.0:5760 or serial:///dev/ttyUSB0:57600; see docs/vehicle.md",
-    )
-    sim.add_argument(
-        "--instance", type=instance, default=0, metavar="N", help="adds N to the UDP ports and to the system's number"
-    )
-    sim.add_argument(
-        "--truth", type=Path, metavar="FILE", help="write what really happened to this .npz file at the end"
-    )
-    sim.add_argument("--stop-with-stdin", action="store_true", help="end when standard input ends")
-    sim.set_defaults(run=_sim)
-
-
 def _add_results(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     results = commands.add_parser(
         "results",
@@ -144,8 +91,8 @@ def _add_results(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     results.add_argument(
         "--out", type=Path, default=Path("docs/results.md"), metavar="FILE", help="default: docs/results.md"
     )
-    results.add_argument("--seeds", type=int, default=20, help="flights for each speed and airframe (default 20)")
-    results.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
+    results.add_argument("--seeds", type=count, default=20, help="flights for each speed and airframe (default 20)")
+    add_jobs(results)
     results.set_defaults(run=_results)
 
 
@@ -159,7 +106,7 @@ def _add_recoveries(commands: "argparse._SubParsersAction[argparse.ArgumentParse
         "--out", type=Path, default=Path("docs/recovery.md"), metavar="FILE", help="default: docs/recovery.md"
     )
     recoveries.add_argument("--seeds", type=count, default=10, help="flights for each hit and law (default 10)")
-    recoveries.add_argument("--jobs", type=int, default=2, help="processes at a time (default 2)")
+    add_jobs(recoveries)
     recoveries.set_defaults(run=_recoveries)
 
 
@@ -177,7 +124,7 @@ def _add_paper(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="folder of paper.md and images/paper (default: docs)",
     )
     paper.add_argument("--seeds", type=count, default=6, help="walls from any side: flights at each speed (default 6)")
-    paper.add_argument("--jobs", type=count, default=2, help="processes at a time (default 2)")
+    add_jobs(paper)
     paper.set_defaults(run=_paper)
 
 
@@ -198,10 +145,7 @@ def _add_detectors(commands: "argparse._SubParsersAction[argparse.ArgumentParser
         default=os.environ.get("REBOUND_DATA") or None,
         help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
     )
-    detectors.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
-    detectors.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"
-    )
+    add_workers(detectors)
     detectors.add_argument(
         "--out",
         type=Path,
@@ -255,12 +199,6 @@ def _add_identify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 # The commands' modules are imported when they run: `--help` and errors in arguments come at once.
-def _sim(options: argparse.Namespace) -> int:
-    from rebound_cli.sim import run_sim
-
-    return run_sim(options)
-
-
 def _recoveries(options: argparse.Namespace) -> int:
     from rebound_cli.recoveries.command import run_recoveries
 

@@ -18,7 +18,7 @@ from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.paper.flights import DETECTOR, GAMMA_S, LAW
 from rebound_cli.progress import with_progress
-from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.run_folder import TLOG_NAME, FlightRecorder, make_folder
 from rebound_cli.sensitivity import stop_sensitivity_text
 from rebound_cli.summary import FlightFacts, build_summary
 from rebound_cli.truth_match import match_contacts
@@ -75,6 +75,7 @@ class CaseFigures:
 
 def run_results(options: Namespace) -> int:
     """Fly every case and write the table. 0 when the file is written, whatever it says."""
+    make_folder(options.out.parent)
     cases = [
         Case(airframe, speed_m_s, seed)
         for airframe in AIRFRAMES
@@ -85,7 +86,6 @@ def run_results(options: Namespace) -> int:
     fly_case(cases[0])
     with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
         figures = list(with_progress(pool.imap_unordered(fly_case, cases), len(cases)))
-    options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(results_text(figures, options.seeds), encoding="utf-8")
     print(f"Written to {options.out}.")
     return 0

@@ -1,6 +1,7 @@
 """The folder of one flight: what was flown, with what, and every byte and event of it."""
 
 import json
+import os
 import platform
 import re
 from datetime import UTC, datetime
@@ -77,6 +78,16 @@ def create_run_folder(out: Path | None, mission_name: str) -> Path:
         text = f"The run folder {out or RUNS_FOLDER} cannot be made: {error.strerror}."
         raise RunFolderError(text) from error
     raise RunFolderError(f"The run folder {RUNS_FOLDER / stem} cannot be made: too many have that name.")
+
+
+def make_folder(folder: Path) -> None:
+    """Before hours of work that are to be written there. Raises RunFolderError where it cannot be had."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunFolderError(f"The folder {folder} cannot be made: {error.strerror}.") from error
+    if not os.access(folder, os.W_OK):
+        raise RunFolderError(f"The folder {folder} cannot be written to.")
 
 
 class FlightRecorder:

@@ -6,6 +6,7 @@ import threading
 import time
 from argparse import Namespace
 
+from companion.errors import ConfigurationError
 from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
 from sim_vehicle.parameters.pace import time_outs_at
@@ -16,6 +17,8 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 def run_sim(options: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or until stdin closes when the caller wants to be outlived by nobody."""
+    if options.truth is not None and not options.truth.parent.is_dir():
+        raise ConfigurationError(f"--truth {options.truth}: there is no folder {options.truth.parent}.")
     world = load_world(options.mission, options.set, options.airframe, options.seed)
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -56,7 +56,10 @@ class Watch:
 
     @property
     def estimate_trusted(self) -> bool:
-        """False while the vehicle's velocity and position cannot be believed: part of a hit was not measured."""
+        """False while the vehicle's velocity and position cannot be believed: part of a hit was not measured.
+
+        For the detector and the timeline; by what a recovery flies is decided in `flight.doubt`, which says why.
+        """
         return self.estimator.trust.is_trusted
 
     @property

@@ -3,6 +3,9 @@
 What clipping hides of a hit is missing in PX4's velocity; its estimator finds back within a second, in a swing that
 looks like another hit (measured on a real PX4: off by up to 3.6 m/s, unchanged for a tenth of a second, a seventh too
 far on the other side after 0.9 s). While velocity and accelerometer contradict each other it is correcting itself.
+
+This judges for the detector, which must not take that swing for a second hit and loses little by waiting. A recovery
+has its own judge, `flight.doubt`: it needs a velocity sooner, and knows the normal and the rebound to expect.
 """
 
 from collections import deque

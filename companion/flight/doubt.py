@@ -3,6 +3,11 @@
 What clipping hides of a hit is missing in the estimated velocity: a real PX4 that bounced back at 1.6 m/s said +2 m/s,
 into the wall, for 0.14 s; its other sensors then put velocity and place right, by an overshoot of 15 %, within a second
 (docs/px4.md). Until then both are worse than nothing: whoever flies by them leans into the obstacle or far off it.
+
+This judges for a recovery, which must have a velocity as soon as there is a good one and knows what to expect of it: a
+rebound seen at once ends the doubt, and so does a steady estimate half a second after the hit. For the detector
+`estimate.trust` judges (`Watch.estimate_trusted`): it knows no law and no normal, and may wait longer, because what it
+must not do is to take the estimator's correction for a second hit.
 """
 
 from collections.abc import Sequence
@@ -24,15 +29,19 @@ STEADY_M_S = 0.12
 
 
 def is_believed(
-    sample: LocalPosition, before_ned_m_s: Vector3, normals: Sequence[Vector3], fixes: Sequence[VelocityFix], us: int
+    sample: LocalPosition,
+    before_ned_m_s: Vector3,
+    normals: Sequence[Vector3],
+    fixes: Sequence[VelocityFix],
+    since_us: int,
 ) -> bool:
-    """Whether the sample's velocity and place are those of the vehicle, ``us`` after a hit at a velocity.
+    """Whether the sample's velocity and place are those of the vehicle, ``since_us`` after a hit at a velocity.
 
     ``normals``: NED, of the obstacle, as the push and as the approach have it.
     """
-    if us > LATEST_US or (us < CORRECTED_US and any(_rebounds(sample, before_ned_m_s, n) for n in normals)):
+    if since_us > LATEST_US or (since_us < CORRECTED_US and any(_rebounds(sample, before_ned_m_s, n) for n in normals)):
         return True
-    return us >= EARLIEST_US and is_steady(fixes, sample.time_boot_us)
+    return since_us >= EARLIEST_US and is_steady(fixes, sample.time_boot_us)
 
 
 def _rebounds(sample: LocalPosition, before_ned_m_s: Vector3, normal_ned: Vector3) -> bool:

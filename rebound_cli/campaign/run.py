@@ -1,9 +1,12 @@
 """Working a campaign out on Dask: a local cluster of processes, or a scheduler that is already there."""
 
 import logging
+import signal
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +82,11 @@ def _outcomes(campaign: Campaign, missing: Sequence[tuple[int, Any]], workers: W
     if not rest:
         return
     logging.getLogger("distributed").setLevel(logging.ERROR)
-    with _client(workers) as client:
+    with _ctrl_c_waiting() as pressed:
+        started = _client(workers)
+    with started as client:
+        if pressed:
+            raise KeyboardInterrupt
         _check_versions(client, campaign)
         tasks = [rest[start : start + CASES_PER_TASK] for start in range(0, len(rest), CASES_PER_TASK)]
         futures = {client.submit(work_out, campaign.work_out, task, pure=False): task for task in tasks}
@@ -91,6 +98,24 @@ def _outcomes(campaign: Campaign, missing: Sequence[tuple[int, Any]], workers: W
                 # Not the cases' own exceptions, which are outcomes: a worker that died, time and again.
                 yield from (Outcome(number, None, f"worker lost: {future.exception()!r}") for number, _ in task)
             future.release()
+
+
+@contextmanager
+def _ctrl_c_waiting() -> Iterator[list[int]]:
+    """Meanwhile Ctrl-C is only noted, and the processes that are started never hear of it.
+
+    It reaches every process of the terminal; workers that hear it each print a traceback. They inherit what is blocked.
+    """
+    pressed: list[int] = []
+    # It unblocks the signal when it starts, which is with the first worker otherwise.
+    resource_tracker.ensure_running()
+    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield pressed
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, before)
 
 
 def _client(workers: Workers) -> Client:

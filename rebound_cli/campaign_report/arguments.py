@@ -1,10 +1,9 @@
 """The arguments of `rebound campaign`; what they run is imported when it runs."""
 
 import argparse
-import os
 from pathlib import Path
 
-from rebound_cli.arguments import count
+from rebound_cli.arguments import add_workers, count
 
 
 def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -20,15 +19,12 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     campaign.add_argument(
         "--hits", type=count, default=5, metavar="SEEDS", help="of each hit with each recovery law (default 5)"
     )
-    campaign.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
-    campaign.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"
-    )
+    add_workers(campaign)
     campaign.add_argument(
         "--only", type=count, metavar="SEED", help="fly this one mission again and keep its whole run folder"
     )
     campaign.add_argument(
-        "--airframe", choices=("foldable", "rigid"), default="foldable", help="with --only (default foldable)"
+        "--airframe", choices=("foldable", "rigid"), help="with --only, which of its two flights (default foldable)"
     )
     campaign.add_argument(
         "--out",

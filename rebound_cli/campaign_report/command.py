@@ -5,6 +5,7 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
+from companion.errors import ConfigurationError
 from rebound_cli import __version__
 from rebound_cli.campaign.plan import Campaign
 from rebound_cli.campaign.run import Results, Workers, failures_text, run_campaign
@@ -17,8 +18,9 @@ from rebound_cli.campaign_report.picture import missions_figure
 from rebound_cli.campaign_report.reading import HOW_TO_READ
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.random_missions.campaign import missions_campaign
-from rebound_cli.recoveries.command import write_table
+from rebound_cli.recoveries.command import DocumentError, check_document, write_table
 from rebound_cli.recoveries.hits import recoveries_campaign
+from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
 START_MARK, END_MARK = "<!-- generated: campaign -->", "<!-- end -->"
@@ -27,9 +29,12 @@ START_MARK, END_MARK = "<!-- generated: campaign -->", "<!-- end -->"
 def run_campaign_command(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed to be flown."""
     if options.only is not None:
-        return run_only(options.only, options.airframe, options.out)
+        return run_only(options.only, options.airframe or "foldable", options.out)
+    if options.airframe is not None:
+        raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
     started_s = time.monotonic()
     workers, out = Workers(options.jobs, options.scheduler), options.out or Path("docs")
+    _check(out)
     flown = missions_campaign(options.missions, options.first_seed)
     missions_results = run_campaign(flown, workers)
     hits = recoveries_campaign(options.hits)
@@ -46,6 +51,18 @@ def run_campaign_command(options: Namespace) -> int:
         print(text)
     print(f"Written to {out / DOCUMENT_NAME} in {time.monotonic() - started_s:.0f} s.")
     return 1 if failed else 0
+
+
+def _check(folder: Path) -> None:
+    """Whether there will be a place for it all, before hours are flown. Raises ReboundError."""
+    make_folder(folder)
+    with_tables(_document(folder / DOCUMENT_NAME), "")
+    if (folder / RECOVERY_NAME).exists():
+        check_document(folder / RECOVERY_NAME)
+
+
+def _document(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.exists() else f"# Campaign\n\n{START_MARK}\n{END_MARK}\n"
 
 
 def _text(options: Namespace, missions: Missions, bars: list[Bar], worked_out: list[tuple[Campaign, Results]]) -> str:
@@ -83,14 +100,16 @@ def _write(folder: Path, missions: Missions, text: str) -> None:
     (folder / PICTURE.parent).mkdir(parents=True, exist_ok=True)
     missions_figure(missions).savefig(folder / PICTURE)
     path = folder / DOCUMENT_NAME
-    before = path.read_text(encoding="utf-8") if path.exists() else f"# Campaign\n\n{START_MARK}\n{END_MARK}\n"
-    path.write_text(with_tables(before, text), encoding="utf-8")
+    path.write_text(with_tables(_document(path), text), encoding="utf-8")
 
 
 def with_tables(document: str, text: str) -> str:
-    """The document with what stands between its marks made anew; raises ValueError where there are none."""
+    """The document with what stands between its marks made anew; raises DocumentError where there are none."""
     marked = re.compile(rf"({re.escape(START_MARK)}\n).*?({re.escape(END_MARK)})", re.DOTALL)
     changed, found = marked.subn(lambda match: match[1] + text + match[2], document)
     if found != 1:
-        raise ValueError(f"the document has {found} places for the campaign's tables, not one")
+        raise DocumentError(
+            f"{DOCUMENT_NAME} has {found} places for the campaign's tables, not one: "
+            f"give it a line `{START_MARK}` and, after it, a line `{END_MARK}`."
+        )
     return changed

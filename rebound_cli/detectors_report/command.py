@@ -23,6 +23,7 @@ from rebound_cli.detectors_report import comparison, families, flights, hit_bars
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.detectors_report.numbers import Hits
 from rebound_cli.detectors_report.reading import HOW_TO_READ
+from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
 START_MARK, END_MARK = "<!-- generated: detectors -->", "<!-- end -->"
@@ -32,6 +33,7 @@ HITS_PER_ROUND = 2500
 
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
+    make_folder(options.out)
     started_s = time.monotonic()
     workers = Workers(options.jobs, options.scheduler)
     campaigns = [hits_campaign(options.hits), hands_campaign(options.hits), flights_campaign(options.hours)]

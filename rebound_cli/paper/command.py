@@ -21,6 +21,7 @@ from rebound_cli.paper.flights import Flight, Result, fly
 from rebound_cli.paper.study import Findings, Study, concluded
 from rebound_cli.paper.table import Row, rows_text
 from rebound_cli.progress import with_progress
+from rebound_cli.run_folder import make_folder
 
 STUDIES: tuple[Study, ...] = (
     arm,
@@ -39,6 +40,7 @@ START_MARK, END_MARK = "<!-- generated: paper results -->", "<!-- end -->"
 
 def run_paper(options: Namespace) -> int:
     """Fly everything and write it. 0 when it is written, whatever it says."""
+    make_folder(options.out)
     planned = [study.flights(options.seeds) for study in STUDIES]
     results = _fly_all([flight for flights in planned for flight in flights], options.jobs)
     findings, first = [], 0

@@ -20,17 +20,24 @@ class DocumentError(ReboundError):
 
 def run_recoveries(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
+    check_document(options.out)
     campaign = recoveries_campaign(options.seeds)
     results = run_campaign(campaign, Workers(options.jobs))
     write_table(options.out, campaign, results, options.seeds)
     return 1 if results.failures else 0
 
 
+def check_document(path: Path) -> str:
+    """Its text. Raises DocumentError where there is no place for the table."""
+    text = path.read_text(encoding="utf-8") if path.is_file() else ""
+    if not MARK.search(text):
+        raise DocumentError(f"{path} has no line `<!-- generated: recoveries -->` with an `<!-- end -->` after it.")
+    return text
+
+
 def write_table(path: Path, campaign: Campaign, results: Results, seeds: int) -> None:
     """Make what stands between the document's marks anew. Raises DocumentError where there are none."""
-    text = path.read_text(encoding="utf-8") if path.exists() else ""
-    if not MARK.search(text):
-        raise DocumentError(f"{path} has no line `<!-- generated: recoveries -->` with an `<!-- end -->` after it")
+    text = check_document(path)
     body = "\n".join([*_lines(campaign.cases, results.results, seeds), failures_text(campaign, results), ""])
     path.write_text(MARK.sub(lambda found: found[1] + body + found[2], text), encoding="utf-8")
     print(f"Written to {path}.")

@@ -25,6 +25,7 @@ COMPANION_LISTEN_PORT, COMPANION_PORT = 14580, 14540
 GROUND_LISTEN_PORT, GROUND_PORT = 18570, 14550
 
 _ADDRESS = re.compile(r"^(?P<scheme>\w+)://(?P<rest>[^?]+)(\?set=(?P<set>\w+))?$")
+_HIGHEST_PORT = 65_535
 _FORMS = "udpout://HOST:PORT, udpin://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
@@ -39,7 +40,7 @@ def open_port(vehicle: SimulatedVehicle, address: str) -> Port:
         options = LinkOptions(_kind(address, found["set"], LinkKind.ONBOARD), Line(baud), forwards=False)
         return SerialPort(vehicle, options, device, baud)
     options = LinkOptions(_kind(address, found["set"], LinkKind.GROUND))
-    host, port = _split(address, rest)
+    host, port = _host_and_port(address, rest)
     if scheme == "udpout":
         return UdpPeerPort(vehicle, options, 0, (host, port))
     if scheme == "udpin":
@@ -85,3 +86,10 @@ def _split(address: str, rest: str) -> tuple[str, int]:
     if not separator or not name or not number.isdigit():
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
     return name, int(number)
+
+
+def _host_and_port(address: str, rest: str) -> tuple[str, int]:
+    host, port = _split(address, rest)
+    if port > _HIGHEST_PORT:
+        raise LinkAddressError(f"{address!r} names no port: give one from 0 to {_HIGHEST_PORT}.")
+    return host, port

@@ -63,6 +63,18 @@ def test_a_wrong_address():
     assert_one_clear_sentence(run("fly", SQUARE, "--connect", "0.0.0.0:14540"), "udpin://HOST:PORT")
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--truth", "nowhere/truth.npz"), ("--truth nowhere/truth.npz", "there is no folder nowhere")),
+        (("--set", "walls=3"), ("--set walls=3", "begins with sim.")),
+        (("--set", "sim.walls=3"), ("sim.walls: must be a list, not 3",)),
+    ],
+)
+def test_what_the_simulated_vehicle_alone_cannot_do(options, words):
+    assert_one_clear_sentence(run("sim", *options), *words)
+
+
 def test_options_of_the_simulated_vehicle_with_a_real_one():
     assert_one_clear_sentence(run("fly", SQUARE, "--connect", "udpin://:14540", "--seed", "2"), "--seed")
 

@@ -145,6 +145,7 @@ def test_a_serial_line_over_a_pseudo_terminal_carries_no_more_than_its_speed():
         ("nonsense", "is not an address"),
         ("tcpin://127.0.0.1", "is not an address"),
         ("carrier://pigeon:7", "unknown scheme 'carrier'"),
+        ("tcpin://0.0.0.0:65536", "names no port"),
         ("udpin://0.0.0.0:14551?set=satellite", "unknown set of streams"),
     ],
 )

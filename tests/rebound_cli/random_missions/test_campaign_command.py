@@ -16,6 +16,7 @@ from rebound_cli.detectors_report.bars import MET, MISSED, REPORTED
 from rebound_cli.main import main
 from rebound_cli.random_missions.campaign import missions_campaign
 from rebound_cli.random_missions.generator import MissionCase
+from rebound_cli.recoveries.command import DocumentError
 from rebound_cli.recoveries.hits import cases as recovery_cases
 
 # A short mission in which a pole is hit.
@@ -185,8 +186,33 @@ def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written
 
 def test_a_document_without_the_place_for_the_tables_is_refused():
     assert with_tables(f"a\n{START_MARK}\nold\n{END_MARK}\n", "new\n") == f"a\n{START_MARK}\nnew\n{END_MARK}\n"
-    with pytest.raises(ValueError, match="0 places"):
+    with pytest.raises(DocumentError, match="0 places"):
         with_tables("# Campaign\n", "new\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        (".", "", "cannot be made"),
+        ("campaign.md", "# Campaign\n", "0 places"),
+        ("recovery.md", "# Recovery\n", "recovery.md has no line"),
+    ],
+)
+def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsys, monkeypatch, name, text, words):
+    monkeypatch.setattr(command, "run_campaign", lambda *_: pytest.fail("flown"))
+    out = tmp_path / "docs"
+    if name == ".":
+        out.write_text("a file")
+    else:
+        out.mkdir()
+        (out / name).write_text(text)
+    assert main(["campaign", "--missions", "1", "--out", str(out)]) == 1
+    assert words in capsys.readouterr().err
+
+
+def test_an_airframe_is_chosen_for_a_single_mission_only(capsys):
+    assert main(["campaign", "--airframe", "rigid"]) == 1
+    assert "--airframe belongs to --only" in capsys.readouterr().err
 
 
 def test_cases_are_seeds_in_turn_with_both_airframes():
