@@ -15,6 +15,11 @@ GROUND_M = 1.0
 TURN_RAD_S_PER_M_S = 10.0
 
 
+def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
+    """Whether a vehicle with this velocity is too slow to have run into anything; not where it is unknown."""
+    return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < HOVER_M_S
+
+
 def kind_of(
     impulse_ned_m_s: Vector3, velocity_ned_m_s: Vector3 | None, turn_rad_s: float, situation: Situation
 ) -> ImpactKind:
@@ -30,11 +35,10 @@ def kind_of(
     near_ground = height_m is None or height_m < GROUND_M
     if situation.descent_commanded and (near_ground or up > STEEP):
         return ImpactKind.LANDING
-    v = velocity_ned_m_s
-    hovers = v is not None and math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2) < HOVER_M_S
+    is_hovering = hovers(velocity_ned_m_s)
     if up > STEEP:
-        return ImpactKind.STRUCK if hovers and not near_ground else ImpactKind.FLOOR
-    if hovers:
+        return ImpactKind.STRUCK if is_hovering and not near_ground else ImpactKind.FLOOR
+    if is_hovering:
         return ImpactKind.STRUCK
     if up < -STEEP:
         return ImpactKind.CEILING

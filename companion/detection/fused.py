@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from companion.detection.aftermath import Aftermath
-from companion.detection.classify import HOVER_M_S, kind_of
+from companion.detection.classify import hovers, kind_of
 from companion.detection.floor import Floor
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
@@ -69,6 +69,7 @@ class FusedState(DetectorState):
     contact_began_boot_us: int = 0
     held_since_boot_us: int | None = None
     held_free_until_us: int = 0
+    held_in_hover: bool = False
 
 
 class FusedDetector:
@@ -215,27 +216,26 @@ class FusedDetector:
         if s.held_since_boot_us is not None:
             free_until_us = s.held_free_until_us
         kind = None
+        is_doubtful = ratio < CLEAR and s.threshold_m_s2 > SHAKING * self._config.side_threshold_m_s2
         if size < self._config.soft_m_s2 and self._hovers(s):
             if self._held_us(s, free_until_us) < self._soft_us:
                 return None
             kind = ImpactKind.CONTACT
-        elif self._may_be_the_sensors(s, ratio) and self._held_us(s, free_until_us) == 0:
+        elif is_doubtful and self._held_us(s, free_until_us) == 0:
             return None
         confidence = min(1.0, 0.5 * ratio)
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, confidence, kind)
 
-    def _may_be_the_sensors(self, s: FusedState, ratio: float) -> bool:
-        return ratio < CLEAR and s.threshold_m_s2 > SHAKING * self._config.side_threshold_m_s2
-
     def _held_us(self, s: FusedState, free_until_us: int) -> int:
         """How long the present doubtful force has been looked at."""
         if s.held_since_boot_us is None:
+            s.held_in_hover = self._hovers(s)
             s.held_since_boot_us, s.held_free_until_us = s.last_sample_boot_us, free_until_us
         return s.last_sample_boot_us - s.held_since_boot_us
 
     def _hovers(self, s: FusedState) -> bool:
-        v = s.velocity_ned_m_s
-        return v is not None and math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) < HOVER_M_S
+        """Whether it did when the force began: a hand soon moves what it holds."""
+        return hovers(s.velocity_ned_m_s) if s.held_since_boot_us is None else s.held_in_hover
 
     def _fire(
         self,

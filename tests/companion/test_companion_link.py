@@ -203,7 +203,7 @@ def test_a_blind_detector_says_so_and_so_does_one_that_sees_again():
     assert "blind" in f.companion.status().detector
     assert "blind" in f.event("link").text
     f.vehicle.no_imu = False
-    f.run_for(0.1)
+    f.run_for(0.2)
     assert "sees again" in f.event("link", 1).text
     f.run_to_end()
     assert f.companion.report().outcome == "completed"
