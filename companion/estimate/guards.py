@@ -54,7 +54,8 @@ def pushed(
 ) -> tuple[Floats, Floats, Floats]:
     """Velocity and rates after a push along the normal, with friction against the sliding; and the whole push.
 
-    All body FRD, columns; impulses per unit mass. Friction gives no more than what ends the sliding (Coulomb).
+    All body FRD, columns: m/s, rad/s, m; impulses per unit mass, m/s. Friction gives no more than what ends the sliding
+    (Coulomb).
     """
     sliding = velocity + cross(rates, point)
     sliding = sliding - (sliding * normal).sum(axis=0) * normal

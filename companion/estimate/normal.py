@@ -148,6 +148,7 @@ class _Course:
 def _course(
     trials: _Trials, part: Part, is_first: bool, force: float, before: float, after: float, averaging_s: float
 ) -> _Course:
+    """Between the sample before and this one, of which the wire shows only the ends. Forces per unit mass, m/s^2."""
     steps = max(1, math.ceil(part.over_s / SUB_STEP_S))
     if is_first:
         touched_s = trials.share * part.over_s

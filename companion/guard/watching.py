@@ -1,7 +1,7 @@
 """States connecting, standing by and watching: nothing is commanded, at most it is made ready to be."""
 
 from companion.flight.connecting import request_streams
-from companion.flight.context import Target
+from companion.flight.context import Inputs, Target
 from companion.guard.context import GuardContext, GuardInputs, Move
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, SetMessageInterval, VehicleCommand
@@ -77,7 +77,7 @@ class Connect:
             return
         if commands:
             flight.commander.begin(commands.pop(0))
-            flight.command_outcome(type(inputs.flight)(), False, now_us)
+            flight.command_outcome(Inputs(), False, now_us)
         else:
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
