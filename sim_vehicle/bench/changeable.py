@@ -46,6 +46,11 @@ class ChangeableVehicle(SimulatedVehicle):
         return self._autopilot.arming.armed
 
     @property
+    def may_arm(self) -> bool:
+        """Whether its checks would let it be armed now."""
+        return self._autopilot.checks_pass
+
+    @property
     def mode(self) -> str:
         """What flies, by PX4's name."""
         return NUMBERS[self._autopilot.modes.flown].title

@@ -25,6 +25,8 @@ class Truth:
     arm_fold_m: Quadruple
     """Of each arm, inward; front right, rear left, front left, rear right."""
     is_armed: bool
+    may_arm: bool
+    """Whether the vehicle's checks would let it be armed now, as a ground station shows `ready`."""
     mode: str
     """What flies, by PX4's name: Hold, Takeoff, Offboard ..."""
     hits: tuple[Hit, ...]
@@ -54,6 +56,7 @@ def truth_of(vehicle: ChangeableVehicle) -> Truth:
         angular_velocity_frd_rad_s=(p, q, r),
         arm_fold_m=(one, two, three, four),
         is_armed=vehicle.is_armed,
+        may_arm=vehicle.may_arm,
         mode=vehicle.mode,
         hits=tuple(vehicle.truth.hits),
         faults=tuple(vehicle.truth.faults),
