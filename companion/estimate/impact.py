@@ -199,6 +199,9 @@ class ImpactEstimator:
             push.add(sample, loud)
             if push.is_whole:
                 self.trust.restore()
+            elif self.trust.is_trusted:
+                # Arms may meet their stop, and clip, long after a touch that could be measured.
+                self.trust.doubt(sample.time_boot_us)
             if loud or is_final:
                 estimate = self._refined(estimate, push, is_final)
         self.estimate = replace(estimate, is_final=is_final) if is_final else estimate

@@ -32,14 +32,18 @@ def test_a_clipped_push_along_the_obstacle_is_none_of_its_normal(push_m_s2, norm
         assert estimate.normal_ned[:2] == pytest.approx((normal_north, normal_east), abs=0.15)
 
 
-def after_a_hit(seconds, peak_m_s2, lasts, error_m_s):
-    """Hovering still; a push at 2.0 s; from then on velocities that are off by what `error_m_s` of the time says."""
+def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, stop_m_s2=0.0):
+    """Hovering still; a push at 2.0 s; from then on velocities that are off by what `error_m_s` of the time says.
+
+    With `stop_m_s2` the push's last sample is that much harder: arms that meet their stop.
+    """
     watch = start_watch(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     impacts, told, trusted = [], [], []
     speed = 0.0
     for t_us in range(4_000, round(seconds * 1e6), 4_000):
         push = -peak_m_s2 if 2_000_000 <= t_us < 2_000_000 + 4_000 * lasts else 0.0
+        push -= stop_m_s2 if t_us == 2_000_000 + 4_000 * (lasts - 1) else 0.0
         speed += 0.004 * push
         samples = [ImuSample(t_us, (push, 0.0, -9.80665), STILL)]
         if t_us % 32_000 == 0:
@@ -68,6 +72,14 @@ def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit():
         "velocity believed again",
     ]
     assert 2_600_000 < told[1][0] < 3_550_000
+    assert trusted[-1]
+
+
+def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all_the_same():
+    """Given springs that push for six samples, when the seventh clips, then what follows is no second hit."""
+    impacts, told, trusted = after_a_hit(4.0, 30.0, 7, swing, stop_m_s2=90.0)
+    assert len(impacts) == 1
+    assert told[0][1] == "velocity not believed: part of the hit was not measured"
     assert trusted[-1]
 
 
