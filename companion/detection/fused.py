@@ -5,8 +5,8 @@ contact, each against what this vehicle shows in its own flight:
 
 * sideways: a departure of f_x, f_y from their running mean (see `lateral`), with room for the drag that changes as
   the vehicle turns;
-* vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`), or thrust gone faster than
-  rotors stop: a motor that fails, free fall, a dropped payload and every manoeuvre stay inside;
+* vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
+  fall, a dropped payload and every manoeuvre stay inside;
 * aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
   the rates jumped, too.
 
@@ -24,7 +24,7 @@ from companion.detection.classify import hovers, kind_of
 from companion.detection.floor import Floor
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.detection.thrust import ThrustGain, lost_m_s2
+from companion.detection.thrust import ThrustGain
 from companion.estimate.rotation import body_to_ned, ned_to_body
 from companion.messages import (
     Attitude,
@@ -91,7 +91,9 @@ class FusedDetector:
         self._soft_us = round(config.soft_wait_s * 1e6)
 
     def initial(self) -> FusedState:
-        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2, aftermath=Aftermath(self._averaging_us))
+        return FusedState(
+            threshold_m_s2=self._config.side_threshold_m_s2, aftermath=Aftermath(averaging_us=self._averaging_us)
+        )
 
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
         kind = type(sample)
@@ -125,7 +127,7 @@ class FusedDetector:
             # Nearly every sample ends here.
             room = self._vertical_threshold(s)
             jolted = s.aftermath.newest_rate_step_rad_s > self._config.jolt_rad_s and self._is_jolt(s, side, f_z)
-            if -s.thrust.most_m_s2(now_us) - room < f_z < room and not jolted and not self._is_held_down(s, f_z):
+            if -s.thrust.most_m_s2(now_us) - room < f_z < room and not jolted:
                 s.held_since_boot_us = None
                 self._learn(s, f, before_us)
                 return None
@@ -136,7 +138,7 @@ class FusedDetector:
         room = self._vertical_threshold(s)
         below, above = f_z - room, -f_z - s.thrust.most_m_s2(now_us) - room
         threshold = s.threshold_m_s2 + self._drag_room(s, turning)
-        jolted = s.phase is Phase.ARMED and (self._is_jolt(s, side, f_z) or self._is_held_down(s, f_z))
+        jolted = s.phase is Phase.ARMED and self._is_jolt(s, side, f_z)
         if side < threshold and below < 0.0 and above < 0.0 and not jolted:
             self._quiet(s, f, before_us)
             return None
@@ -152,17 +154,8 @@ class FusedDetector:
             return False
         return side_m_s2 > 0.5 * s.threshold_m_s2 or abs(f_z - s.floor.z) > self._vertical_threshold(s)
 
-    def _is_held_down(self, s: FusedState, f_z: float) -> bool:
-        if f_z - s.floor.last_z < self._config.vertical_threshold_m_s2:
-            return False
-        over_us = s.aftermath.strapdown.time_boot_us - s.aftermath.previous_imu_us
-        return f_z - s.floor.last_z > lost_m_s2(-s.floor.last_z, over_us * 1e-6) + self._vertical_noise(s)
-
-    def _vertical_noise(self, s: FusedState) -> float:
-        return self._config.noise_factor * s.floor.vertical_m_s2
-
     def _vertical_threshold(self, s: FusedState) -> float:
-        return max(self._config.vertical_threshold_m_s2, self._vertical_noise(s))
+        return max(self._config.vertical_threshold_m_s2, self._config.noise_factor * s.floor.vertical_m_s2)
 
     def _drag_room(self, s: FusedState, turning_rad_s: float) -> float:
         """Drag goes round with the vehicle while the mean stays behind."""

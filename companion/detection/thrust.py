@@ -1,6 +1,5 @@
 """What the propellers can do to the accelerometer's z axis: push up, at most as hard as they can."""
 
-import math
 from dataclasses import dataclass
 
 # A quadrotor lifts between 1.3 and 5 times its weight. Where nothing is heard of the thrust asked for, a push from
@@ -18,14 +17,6 @@ TRUSTED_S = 0.5
 CHANGE = 0.3
 # Batteries, ground effect and a mean that is not yet settled: the gain is good to this.
 MARGIN = 1.15
-
-# The quickest rotors lose their thrust with this lag once nothing drives them: most motors' is 20 ms and more.
-ROTORS_STOP_S = 0.015
-
-
-def lost_m_s2(thrust_m_s2: float, elapsed_s: float) -> float:
-    """The most that a thrust may have fallen by in this time, all rotors stopping; what falls faster is pushed down."""
-    return max(thrust_m_s2, 0.0) * (1.0 - math.exp(-elapsed_s / ROTORS_STOP_S))
 
 
 @dataclass(slots=True)

@@ -82,20 +82,6 @@ class Flight:
 # --- force --------------------------------------------------------------------------------------------------
 
 
-def test_a_push_down_that_leaves_thrust_some_of_its_own_is_too_sudden_for_rotors_that_stop():
-    """A ceiling brushed within 1 ms: the window's mean is still a push up, of a quarter of hover."""
-    (impact,) = Flight(pulse((0.0, 0.0, 30.0)), velocity=(0.0, 0.0, -1.0)).fly()
-    assert impact.evidence is Evidence.FORCE and impact.kind is ImpactKind.CEILING
-    assert impact.sample_time_boot_us - HIT_US <= WINDOW_US
-
-
-def test_rotors_that_all_stop_are_no_push():
-    """Free fall: the thrust goes with the motors' lag of 20 ms."""
-    lift = lambda t: GRAVITY * (math.exp(-(t - HIT_US) / 20_000) if t >= HIT_US else 1.0)  # noqa: E731
-    for imu_every_us in (4_000, 8_000, 20_000):
-        assert Flight(lift=lift, imu_every_us=imu_every_us).fly(HIT_US + 400_000) == []
-
-
 @pytest.mark.parametrize("direction_deg", [0, 77, 180, 301])
 @pytest.mark.parametrize("speed_m_s", [0.5, 5.0])
 def test_a_foldable_hit_shows_in_the_first_sample_that_holds_it(speed_m_s, direction_deg):
