@@ -35,10 +35,9 @@ def _gusts(rng: np.random.Generator) -> Mishaps:
     for start_s in _moments(rng, GUSTS):
         side, speed_m_s = rng.uniform(-math.pi, math.pi), rng.uniform(3.0, 8.0)
         velocity = [speed_m_s * math.cos(side), speed_m_s * math.sin(side), rng.uniform(-2.0, 2.0)]
-        span = [start_s, start_s + float(rng.uniform(1.0, 5.0))]
-        faults.append(
-            {"kind": "gust", "between_s": span, "velocity_ned_m_s": velocity, "rise_s": rng.uniform(0.2, 1.0)}
-        )
+        lasts_s, rise_s = float(rng.uniform(1.0, 5.0)), float(rng.uniform(0.2, 1.0))
+        span = [start_s, start_s + max(lasts_s, 2.1 * rise_s)]
+        faults.append({"kind": "gust", "between_s": span, "velocity_ned_m_s": velocity, "rise_s": rise_s})
     return Mishaps(tuple(faults))
 
 
