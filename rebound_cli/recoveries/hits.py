@@ -17,7 +17,7 @@ from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.summary import LONGEST_RECOVERY_S, Flown
 from rebound_cli.truth_match import FlightTruth, match_contacts
-from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 
 LAWS = ("paper", "adaptive")
@@ -85,17 +85,12 @@ def mission_data(case: Case) -> dict[str, Any]:
 
 def work_out(case: Case) -> Json:
     """Fly it in lockstep; what happened after the first hit, by the simulator's truth. SI units."""
-    return fly(case, load_built_in(case.airframe))
-
-
-def fly(case: Case, airframe: Airframe) -> Json:
-    """The same with an airframe of one's own."""
     mission = Mission.model_validate(mission_data(case))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": case.airframe, "seed": case.seed})
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:
-            world = SimulatedWorld(scene, airframe)
+            world = SimulatedWorld(scene, load_built_in(case.airframe))
             flown, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
         finally:
             recorder.close()

@@ -7,6 +7,7 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.physics.plant import Plant
 from tests.sim_vehicle.physics.throwing import quiet, throw
 
+# As the built-in airframes, whose 0.12 s begin when an estimate 0.02 s late has seen the hit.
 AS_PX4 = {"late_s": 0.14, "frequency_rad_s": 4.45, "damping": 0.59}
 
 
