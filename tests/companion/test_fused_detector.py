@@ -239,6 +239,13 @@ def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     assert [(i.kind, i.is_collision) for i in ball] == [(ImpactKind.STRUCK, True)]
 
 
+@pytest.mark.parametrize("late_us", [0, 4_000, 8_000, 12_000])
+def test_a_hand_that_soon_moves_what_it_holds_is_still_a_hand(late_us):
+    """Given a hover that drifts, when a push carries it past a hover's speed while it is still looked at."""
+    hand = Flight(pulse((6.0, 0.0, 0.0), HIT_US + late_us, 400_000), velocity=(0.12, 0.0, 0.0)).fly()
+    assert not hand[0].is_collision
+
+
 # --- phases -------------------------------------------------------------------------------------------------
 
 
