@@ -10,8 +10,9 @@ from pathlib import Path
 from companion.companion import Companion
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
+from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection, UdpInConnection, open_connection
+from companion.shell.connection import Connection, UdpInConnection
 from rebound_cli import run_folder
 from rebound_cli.console import Console, console_for, summary_text, timeline
 from rebound_cli.documents import Override, apply_override

@@ -1,16 +1,7 @@
-"""Connection addresses, in MAVSDK's convention, turned into sockets and serial ports.
-
-udpin://0.0.0.0:14540            listen; answers go to the last sender
-udpout://192.168.1.20:14580      send first, to this address
-tcpout://127.0.0.1:5760          connect to a server
-tcpin://0.0.0.0:5760             wait for one client
-serial:///dev/ttyAMA0:921600     serial port and baud rate
-udp://:14540                     the older form of udpin (or of udpout when a remote host is given)
-"""
+"""Connections to a vehicle over UDP, TCP and serial ports; `addresses.py` says which."""
 
 import errno
 import os
-import re
 import select
 import socket
 import time
@@ -20,13 +11,10 @@ from companion.errors import ConnectionSetupError
 
 # A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
 TCP_CONNECT_TIMEOUT_S = 5.0
-# A send that blocks longer than this would stall the 20 Hz setpoint stream; the packet is dropped instead.
+# A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
 SEND_TIMEOUT_S = 0.02
 # More than the longest MAVLink packet (280 bytes) and more than one UDP datagram can hold.
 _READ_SIZE = 65_536
-
-_HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
-_FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
 class Connection(Protocol):
@@ -39,29 +27,6 @@ class Connection(Protocol):
         """Send one packet; one datagram a packet on UDP. Dropped when nobody is there to take it."""
 
     def close(self) -> None: ...
-
-
-def open_connection(url: str) -> Connection:
-    """Open the address. Raises ConnectionSetupError with one clear sentence."""
-    scheme, separator, rest = url.partition("://")
-    if not separator:
-        raise ConnectionSetupError(f"{url!r} is not a connection address: use {_FORMS}.")
-    if scheme == "serial":
-        return _open_serial(url, rest)
-    host, port = _host_and_port(url, rest)
-    if scheme == "udp":
-        scheme = "udpin" if host in ("", "0.0.0.0", "::") else "udpout"
-    if scheme in ("udpout", "tcpout") and (not host or port == 0):
-        raise ConnectionSetupError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
-    if scheme == "udpin":
-        return UdpInConnection(host, port)
-    if scheme == "udpout":
-        return UdpOutConnection(host, port)
-    if scheme == "tcpout":
-        return TcpOutConnection(host, port)
-    if scheme == "tcpin":
-        return TcpInConnection(host, port)
-    raise ConnectionSetupError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
 
 
 class UdpInConnection:
@@ -161,7 +126,7 @@ class TcpOutConnection:
     def __init__(self, host: str, port: int) -> None:
         try:
             self._socket = socket.create_connection((host.strip("[]"), port), TCP_CONNECT_TIMEOUT_S)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
             text = f"Cannot connect to {host}:{port} over TCP: {_plain(error)}."
             raise ConnectionSetupError(text) from error
         _without_delay(self._socket)
@@ -201,8 +166,13 @@ class TcpInConnection:
     def _take_client(self) -> None:
         if self._client is not None:
             self._client.close()
-        self._client, _ = self._listener.accept()
-        _without_delay(self._client)
+        try:
+            self._client, _ = self._listener.accept()
+            _without_delay(self._client)
+        except OSError:
+            # It has gone again before it was let in.
+            self._client = self._stream = None
+            return
         self._stream = _Stream(self._client.fileno())
 
     def send(self, frame: bytes) -> None:
@@ -218,9 +188,16 @@ class TcpInConnection:
 class SerialConnection:
     """A serial port of 8 data bits, no parity, one stop bit, without flow control, as PX4's TELEM ports."""
 
-    def __init__(self, port: Any) -> None:
-        self._port = port
-        self._stream = _Stream(port.fileno())
+    def __init__(self, device: str, baud: int) -> None:
+        import serial  # only here: it costs start-up time
+
+        if not os.path.exists(device):
+            raise ConnectionSetupError(f"Serial port {device} does not exist: is the cable plugged in?")
+        try:
+            self._port = serial.Serial(device, baud)
+        except (OSError, ValueError) as error:
+            raise ConnectionSetupError(f"Serial port {device} cannot be opened: {_plain(error)}.") from error
+        self._stream = _Stream(self._port.fileno())
 
     def receive(self, timeout_s: float) -> bytes:
         return self._stream.receive(timeout_s)
@@ -232,31 +209,11 @@ class SerialConnection:
         self._port.close()
 
 
-def _open_serial(url: str, rest: str) -> SerialConnection:
-    import serial  # only here: it costs start-up time
-
-    device, separator, baud = rest.rpartition(":")
-    if not separator or not device or not baud.isdigit() or int(baud) == 0:
-        raise ConnectionSetupError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
-    if not os.path.exists(device):
-        raise ConnectionSetupError(f"Serial port {device} does not exist: is the cable plugged in?")
-    try:
-        return SerialConnection(serial.Serial(device, int(baud)))
-    except (OSError, ValueError) as error:
-        raise ConnectionSetupError(f"Serial port {device} cannot be opened: {_plain(error)}.") from error
-
-
-def _host_and_port(url: str, rest: str) -> tuple[str, int]:
-    match = _HOST_PORT.match(rest)
-    if match is None or int(match["port"]) > 65_535:
-        raise ConnectionSetupError(f"{url!r} names no host and port: use {_FORMS}.")
-    return match["host"], int(match["port"])
-
-
 def _resolve(kind: socket.SocketKind, host: str, port: int) -> tuple[socket.AddressFamily, Any]:
     try:
         family, _, _, _, address = socket.getaddrinfo(host.strip("[]"), port, type=kind)[0]
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
+        # Python turns a name into bytes first, which one with an empty part, or a part of more than 63 letters, fails.
         raise ConnectionSetupError(f"Host {host!r} is unknown: {_plain(error)}.") from error
     return family, address
 

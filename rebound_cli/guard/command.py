@@ -6,8 +6,9 @@ from dataclasses import asdict
 from companion.errors import ConfigurationError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
+from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection, open_connection
+from companion.shell.connection import Connection
 from rebound_cli import run_folder
 from rebound_cli.console import Console, console_for, timeline
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated

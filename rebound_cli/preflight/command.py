@@ -8,8 +8,9 @@ from dataclasses import asdict
 from companion.errors import ConfigurationError
 from companion.preflight.checks import Finding, Verdict
 from companion.preflight.preflight import Preflight
+from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection, open_connection
+from companion.shell.connection import Connection
 from rebound_cli.console import Console, console_for
 from rebound_cli.replay.settings import companion_settings
 

@@ -8,7 +8,8 @@ import threading
 import pytest
 
 from companion.errors import ConnectionSetupError
-from companion.shell.connection import UdpInConnection, open_connection
+from companion.shell.addresses import open_connection
+from companion.shell.connection import UdpInConnection
 
 LOCAL = "127.0.0.1"
 
@@ -131,6 +132,9 @@ def test_a_packet_that_a_full_pipe_cannot_take_does_not_stall_the_loop():
         ("serial:///dev/does-not-exist:57600", "/dev/does-not-exist"),
         ("serial:///dev/null:57600", "/dev/null"),
         ("udpin://203.0.113.9:14540", "203.0.113.9"),
+        ("udpin://..:14540", "'..' is unknown"),
+        (f"tcpout://{'a' * 64}.de:5760", "a.de"),
+        ("serial:///dev/null:5\N{SUPERSCRIPT TWO}", "baud"),
     ],
 )
 def test_a_bad_address_is_one_sentence_that_names_the_fault(url, named):

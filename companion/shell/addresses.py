@@ -1,0 +1,61 @@
+"""Connection addresses, in MAVSDK's convention, turned into connections.
+
+udpin://0.0.0.0:14540            listen; answers go to the last sender
+udpout://192.168.1.20:14580      send first, to this address
+tcpout://127.0.0.1:5760          connect to a server
+tcpin://0.0.0.0:5760             wait for one client
+serial:///dev/ttyAMA0:921600     serial port and baud rate
+udp://:14540                     the older form of udpin (or of udpout when a remote host is given)
+"""
+
+import re
+
+from companion.errors import ConnectionSetupError
+from companion.shell.connection import (
+    Connection,
+    SerialConnection,
+    TcpInConnection,
+    TcpOutConnection,
+    UdpInConnection,
+    UdpOutConnection,
+)
+
+_HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
+_FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
+
+
+def open_connection(url: str) -> Connection:
+    """Open the address. Raises ConnectionSetupError with one clear sentence."""
+    scheme, separator, rest = url.partition("://")
+    if not separator:
+        raise ConnectionSetupError(f"{url!r} is not a connection address: use {_FORMS}.")
+    if scheme == "serial":
+        return SerialConnection(*_device_and_baud(url, rest))
+    host, port = _host_and_port(url, rest)
+    if scheme == "udp":
+        scheme = "udpin" if host in ("", "0.0.0.0", "::") else "udpout"
+    if scheme in ("udpout", "tcpout") and (not host or port == 0):
+        raise ConnectionSetupError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
+    if scheme == "udpin":
+        return UdpInConnection(host, port)
+    if scheme == "udpout":
+        return UdpOutConnection(host, port)
+    if scheme == "tcpout":
+        return TcpOutConnection(host, port)
+    if scheme == "tcpin":
+        return TcpInConnection(host, port)
+    raise ConnectionSetupError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+
+
+def _device_and_baud(url: str, rest: str) -> tuple[str, int]:
+    device, separator, baud = rest.rpartition(":")
+    if not separator or not device or not baud.isdecimal() or int(baud) == 0:
+        raise ConnectionSetupError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
+    return device, int(baud)
+
+
+def _host_and_port(url: str, rest: str) -> tuple[str, int]:
+    match = _HOST_PORT.match(rest)
+    if match is None or int(match["port"]) > 65_535:
+        raise ConnectionSetupError(f"{url!r} names no host and port: use {_FORMS}.")
+    return match["host"], int(match["port"])
