@@ -17,7 +17,8 @@ from rebound_cli.documents import (
     validated,
 )
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
-from sim_vehicle.errors import AirframeError, SceneError
+from sim_vehicle.errors import AirframeError, FaultError, SceneError
+from sim_vehicle.mavlink.restamp import check_messages
 from sim_vehicle.scene import Scene, check_start_is_free
 
 if TYPE_CHECKING:
@@ -94,8 +95,15 @@ def read_obstacles(document: Document) -> None:
 
 
 def world_from(document: Document) -> SimulatedWorld:
-    """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position."""
+    """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position and for a
+    fault of the wire that names no MAVLink message.
+    """
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
+    for number, fault in enumerate(scene.faults):
+        try:
+            check_messages(fault)
+        except FaultError as error:
+            raise DocumentError(f"{document.place_of(('sim', 'faults', number, 'messages'))}: {error}") from error
     airframe = _load_airframe(scene.airframe, document)
     try:
         check_start_is_free(scene, airframe)

@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from argparse import Namespace
+from pathlib import Path
 
 from companion.errors import ConfigurationError
 from rebound_cli.inputs import SimulatedWorld, load_world
@@ -17,8 +18,8 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 def run_sim(options: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or until stdin closes when the caller wants to be outlived by nobody."""
-    if options.truth is not None and not options.truth.parent.is_dir():
-        raise ConfigurationError(f"--truth {options.truth}: there is no folder {options.truth.parent}.")
+    if options.truth is not None:
+        _check_place(options.truth)
     world = load_world(options.mission, options.set, options.airframe, options.seed)
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -30,6 +31,14 @@ def run_sim(options: Namespace) -> int:
     else:
         _serve_builtin(options, world, stopped)
     return 0
+
+
+def _check_place(truth: Path) -> None:
+    """Before hours are simulated of which nothing could be kept."""
+    if not truth.parent.is_dir():
+        raise ConfigurationError(f"--truth {truth}: there is no folder {truth.parent}.")
+    if truth.is_dir() or not os.access(truth if truth.exists() else truth.parent, os.W_OK):
+        raise ConfigurationError(f"--truth {truth}: this cannot be written to; give another file.")
 
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:

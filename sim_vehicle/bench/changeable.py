@@ -3,10 +3,10 @@
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.modes import NUMBERS
 from sim_vehicle.errors import FaultError, SceneError
-from sim_vehicle.faults.spec import Fault, WireFault, overlapping
+from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.mavlink.faulty_link import FaultyLink
 from sim_vehicle.mavlink.link import Link, LinkOptions
-from sim_vehicle.mavlink.restamp import message_number
+from sim_vehicle.mavlink.restamp import check_messages
 from sim_vehicle.physics.layout import Constants, State
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -79,7 +79,8 @@ class ChangeableVehicle(SimulatedVehicle):
 
     def add_fault(self, fault: Fault) -> None:
         """One more fault from now on. Raises FaultError for one that does not fit those that are there."""
-        problem = overlapping((*self._faults, fault)) or _unknown_message(fault)
+        check_messages(fault)
+        problem = overlapping((*self._faults, fault))
         if problem is not None:
             raise FaultError(f"{problem}.")
         self._faults.append(fault)
@@ -99,13 +100,3 @@ class ChangeableVehicle(SimulatedVehicle):
     @property
     def _now_s(self) -> float:
         return self.time_boot_us / 1e6
-
-
-def _unknown_message(fault: Fault) -> str | None:
-    try:
-        for message in fault.messages if isinstance(fault, WireFault) else ():
-            if isinstance(message, str):
-                message_number(message)
-    except ValueError as problem:
-        return str(problem)
-    return None

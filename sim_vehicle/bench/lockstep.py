@@ -8,7 +8,7 @@ from sim_vehicle.bench.timeline import Event
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.stream_rates import link_kind
 from sim_vehicle.truth import TruthRecorder
 
 
@@ -18,10 +18,10 @@ class LockstepVehicle:
     def __init__(self, streams: str = "onboard", **setup: Any) -> None:
         """``setup``: the fields of `Setup`. ``streams``: onboard, normal or ground, PX4's sets for a link.
 
-        Raises AirframeError, SceneError and ParameterError.
+        Raises AirframeError, SceneError, ParameterError and LinkAddressError.
         """
         self._bench = Bench(Setup(**setup))
-        self._link = self._bench.vehicle.add_link(LinkOptions(LinkKind(streams)))
+        self._link = self._bench.vehicle.add_link(LinkOptions(link_kind(streams)))
 
     @property
     def setup(self) -> Setup:

@@ -4,6 +4,7 @@ import heapq
 import random
 from collections.abc import Callable, Iterable, Sequence
 
+from sim_vehicle.errors import FaultError
 from sim_vehicle.faults.spec import WireFault
 
 _MAVLINK_1, _MAVLINK_2 = 0xFE, 0xFD
@@ -141,5 +142,5 @@ def _number(message: int | str, number_of: Callable[[str], int] | None) -> int:
     if isinstance(message, int):
         return message
     if number_of is None:
-        raise ValueError(f"message {message!r} has a name, and nobody here knows its number")
+        raise FaultError(f"message {message!r} has a name, and nobody here knows its number.")
     return number_of(message)

@@ -4,6 +4,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.errors import FaultError
+from sim_vehicle.faults.spec import Fault, WireFault
+
 # Times since boot, by field and its unit in microseconds.
 _STAMPS_US = {"time_boot_ms": 1000, "time_usec": 1}
 # The narrow ones wrap as the vehicle's own counters would; SERVO_OUTPUT_RAW counts microseconds in 32 bits.
@@ -57,8 +60,15 @@ class Restamper:
 
 
 def message_number(name: str) -> int:
-    """The number of a message by its name; raises ValueError where there is none."""
+    """The number of a message by its name; raises FaultError where there is none."""
     number = getattr(dialect, f"MAVLINK_MSG_ID_{name.upper()}", None)
     if number is None:
-        raise ValueError(f"no MAVLink message is called {name!r}")
+        raise FaultError(f"no MAVLink message is called {name!r}.")
     return int(number)
+
+
+def check_messages(fault: Fault) -> None:
+    """Raise FaultError if a fault of the wire names a message that there is not."""
+    for message in fault.messages if isinstance(fault, WireFault) else ():
+        if isinstance(message, str):
+            message_number(message)

@@ -6,6 +6,8 @@ equipment that this vehicle does not have (gimbal, camera, transponder, speed co
 
 from enum import Enum
 
+from sim_vehicle.errors import LinkAddressError
+
 UNLIMITED = -1.0
 """Whenever there is something new."""
 
@@ -94,3 +96,12 @@ class LinkKind(Enum):
 
 
 _RATES = {LinkKind.ONBOARD: _ONBOARD, LinkKind.NORMAL: _NORMAL, LinkKind.GROUND: _NORMAL_SITL}
+
+
+def link_kind(name: str) -> LinkKind:
+    """By its name in addresses. Raises LinkAddressError for one that there is not."""
+    try:
+        return LinkKind(name)
+    except ValueError as problem:
+        names = ", ".join(kind.value for kind in LinkKind)
+        raise LinkAddressError(f"unknown set of streams {name!r}: use one of {names}.") from problem

@@ -13,7 +13,7 @@ import re
 from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.line import Line
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.stream_rates import LinkKind, link_kind
 from sim_vehicle.shell.port import Address, Port
 from sim_vehicle.shell.serial_port import SerialPort
 from sim_vehicle.shell.tcp_port import TcpServerPort
@@ -72,18 +72,15 @@ def px4_ports(
 
 
 def _kind(address: str, name: str | None, default: LinkKind) -> LinkKind:
-    if name is None:
-        return default
     try:
-        return LinkKind(name)
-    except ValueError as problem:
-        names = ", ".join(kind.value for kind in LinkKind)
-        raise LinkAddressError(f"{address!r} names an unknown set of streams: use one of {names}.") from problem
+        return default if name is None else link_kind(name)
+    except LinkAddressError as problem:
+        raise LinkAddressError(f"{address!r}: {problem}") from problem
 
 
 def _split(address: str, rest: str) -> tuple[str, int]:
     name, separator, number = rest.rpartition(":")
-    if not separator or not name or not number.isdigit():
+    if not separator or not name or not number.isdecimal():
         raise LinkAddressError(f"{address!r} is not an address of a link: use {_FORMS}.")
     return name, int(number)
 

@@ -5,7 +5,7 @@ import errno
 import socket
 from typing import Protocol
 
-from sim_vehicle.errors import PortInUse
+from sim_vehicle.errors import LinkAddressError, PortInUse
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.vehicle import SimulatedVehicle
 
@@ -38,13 +38,19 @@ def connected(vehicle: SimulatedVehicle, options: LinkOptions) -> Link:
 
 
 def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:
-    """A non-blocking IPv4 socket of ``kind`` on ``host``:``port``; raises PortInUse where it cannot be had."""
+    """A non-blocking IPv4 socket of ``kind`` on ``host``:``port``.
+
+    Raises PortInUse where it cannot be had, LinkAddressError for a host that cannot be one.
+    """
     name = "UDP" if kind is socket.SOCK_DGRAM else "TCP"
     link = socket.socket(socket.AF_INET, kind)
     try:
         if kind is socket.SOCK_STREAM:
             link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         link.bind((host, port))
+    except (UnicodeError, socket.gaierror) as problem:
+        link.close()
+        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
     except OSError as problem:
         link.close()
         if problem.errno == errno.EADDRINUSE:

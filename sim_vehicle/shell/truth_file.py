@@ -18,7 +18,9 @@ def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int) -> None:
     hits = json.dumps([asdict(hit) for hit in truth.hits])
     faults = json.dumps([asdict(fault) for fault in truth.faults])
     arrays: dict[str, Any] = {**truth.series(), "hits": hits, "faults": faults, "epoch_at_boot_us": epoch_at_boot_us}
-    np.savez_compressed(path, **arrays)
+    # Given a path, numpy would put its own ending on it.
+    with path.open("wb") as file:
+        np.savez_compressed(file, **arrays)
 
 
 def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:

@@ -2,6 +2,7 @@
 
 import socket
 
+from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.shell.port import Address, bound_socket, connected, received_datagrams, send_datagrams
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -16,8 +17,9 @@ class UdpPeerPort:
     """Sends unasked to ``remote``, and from the first datagram on to its sender for good, as PX4 does."""
 
     def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, listen_port: int, remote: Address) -> None:
+        """Raises LinkAddressError for a host that nobody knows, PortInUse where ``listen_port`` cannot be had."""
+        self._remote = _resolved(remote)
         self._socket = bound_socket(socket.SOCK_DGRAM, "0.0.0.0", listen_port)
-        self._remote = remote
         self._has_peer = False
         self._link = connected(vehicle, options)
 
@@ -37,6 +39,16 @@ class UdpPeerPort:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def _resolved(remote: Address) -> Address:
+    """With the host's number in place of its name, which would be looked up for every packet."""
+    host, port = remote
+    try:
+        *_, address = socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0]
+    except (OSError, UnicodeError) as problem:
+        raise LinkAddressError(f"Host {host!r} is unknown: give a name or a number such as 127.0.0.1.") from problem
+    return str(address[0]), port
 
 
 class UdpServerPort:

@@ -147,6 +147,9 @@ def test_a_serial_line_over_a_pseudo_terminal_carries_no_more_than_its_speed():
         ("carrier://pigeon:7", "unknown scheme 'carrier'"),
         ("tcpin://0.0.0.0:65536", "names no port"),
         ("udpin://0.0.0.0:14551?set=satellite", "unknown set of streams"),
+        ("udpout://nobody.invalid:14550", "Host 'nobody.invalid' is unknown"),
+        (f"tcpin://{'a' * 64}.de:5760", "Host 'a+.de' is unknown"),
+        ("serial:///dev/ttyUSB0:5\N{SUPERSCRIPT TWO}", "not an address"),
     ],
 )
 def test_a_wrong_address_is_one_sentence(address, words):
@@ -157,6 +160,21 @@ def test_a_wrong_address_is_one_sentence(address, words):
 def test_a_serial_port_that_is_not_there_is_one_sentence():
     with pytest.raises(PortInUse, match="Serial port /dev/none cannot be opened"):
         open_port(new_vehicle(), "serial:///dev/none:57600")
+
+
+def test_a_peer_by_name_is_sent_to_without_looking_the_name_up_again():
+    # Given a companion that is named, not numbered
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as companion:
+        companion.bind(("127.0.0.1", 0))
+        vehicle = new_vehicle()
+        port, ground = px4_ports(vehicle, 0, 0, ("localhost", companion.getsockname()[1]))
+        ground.close()
+        # When packets go out
+        with served(vehicle, port):
+            reader = read_socket(companion, {"HEARTBEAT"})
+        # Then they arrive, and what is kept is the number
+        assert reader.messages
+        assert port._remote[0] == "127.0.0.1"
 
 
 def test_two_vehicles_beside_one_another():
