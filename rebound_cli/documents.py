@@ -99,6 +99,11 @@ def parse_document(text: str, name: str) -> Document:
         raise DocumentError(f"{name}:{line}: not valid YAML: {error.problem or error.context}.") from error
     except yaml.YAMLError as error:
         raise DocumentError(f"{name}: not valid YAML: {' '.join(str(error).split())}.") from error
+    except ValueError as error:
+        # PyYAML makes a date or a number of what looks like one: the 99th of some month, 5000 digits.
+        raise DocumentError(f"{name}: a value in it cannot be read: {str(error).partition(';')[0]}.") from error
+    except RecursionError as error:
+        raise DocumentError(f"{name}: nested too deeply, or in itself.") from error
     return Document(name, data, lines, [])
 
 
@@ -139,9 +144,9 @@ def parse_override(text: str) -> Override:
         raise DocumentError(f"--set {text}: give PATH=VALUE, such as items.1.go_to.speed_m_s=2.5.")
     try:
         value = yaml.safe_load(value_text)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError, RecursionError):
         raise DocumentError(f"--set {text}: the value {value_text!r} is not valid YAML.") from None
-    return Override(f"--set {text}", tuple(int(part) if part.isdigit() else part for part in parts), value)
+    return Override(f"--set {text}", tuple(int(part) if part.isdecimal() else part for part in parts), value)
 
 
 def apply_override(document: Document, override: Override) -> None:

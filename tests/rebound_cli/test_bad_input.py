@@ -67,6 +67,8 @@ def test_a_wrong_address():
     ("options", "words"),
     [
         (("--truth", "nowhere/truth.npz"), ("--truth nowhere/truth.npz", "there is no folder nowhere")),
+        (("--truth", "missions"), ("--truth missions", "give another file")),
+        (("--remote", "nobody.invalid:14540"), ("Host 'nobody.invalid' is unknown",)),
         (("--set", "walls=3"), ("--set walls=3", "begins with sim.")),
         (("--set", "sim.walls=3"), ("sim.walls: must be a list, not 3",)),
     ],

@@ -155,3 +155,28 @@ def test_an_airframe_file_is_laid_over_its_base(tmp_path):
     own.write_text("based_on: foldable\nname: heavy\nmas_kg: 1.2\n")
     text = complaint(world_from, document(sets=[f"sim.airframe={own}"]))
     assert text.startswith(f"{own}:3: mas_kg: unknown key") and "did you mean 'mass_kg'?" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name: demo\nitems: 2001-99-99\n", "month must be in 1..12"),
+        (f"name: demo\nsim: {{seed: 1{'0' * 5000}}}\n", "cannot be read"),
+        ("name: &all\n  again: *all\n", "nested too deeply, or in itself"),
+        ("items: " + 2000 * "[" + 2000 * "]", "nested too deeply"),
+    ],
+)
+def test_yaml_that_means_nothing_is_refused_with_the_files_name(text, words):
+    found = complaint(parse_document, text, "demo.yaml")
+    assert found.startswith("demo.yaml: ") and words in found and "\n" not in found
+
+
+@pytest.mark.parametrize("text", ["items.\N{SUPERSCRIPT TWO}.hold=1", "items.1.go_to.speed_m_s=2001-99-99"])
+def test_a_set_that_means_nothing_is_refused(text):
+    assert complaint(apply_overrides, document(), [text]).startswith(f"--set {text}: ")
+
+
+def test_a_wire_fault_on_a_message_that_there_is_not_is_found_before_the_flight():
+    fault = "  faults:\n    - {kind: wire, at_s: 1, loss: 1.0, messages: [ATTITUDE, ATITUDE]}\n"
+    text = complaint(world_from, parse_document(MISSION + fault, "demo.yaml"))
+    assert text == "demo.yaml:12: no MAVLink message is called 'ATITUDE'."
