@@ -1,6 +1,5 @@
 """`rebound fly MISSION --resume RUN`: from the folder of an interrupted flight, where to take it up again."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from companion.errors import ConfigurationError
 from companion.mission.model import Mission
 from rebound_cli.documents import Document, Override, apply_override, load_document
 from rebound_cli.inputs import mission_from
-from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME
+from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text
 
 
 class ResumeError(ConfigurationError):
@@ -28,13 +27,16 @@ def resume_of(run: Path, mission: Mission) -> dict[str, Any]:
         raise ResumeError(f"{run} was flown to its end: there is nothing to resume.")
     if armed is None or item is None:
         raise ResumeError(f"{run} ended before its first item: fly it from the start.")
-    at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
-    return {
-        "at_step": max(1, at_step),
-        "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
-        "armed_at_us": armed["time_us"],
-        "armed_boot_us": armed["data"]["time_boot_us"],
-    }
+    try:
+        at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
+        return {
+            "at_step": max(1, at_step),
+            "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
+            "armed_at_us": armed["time_us"],
+            "armed_boot_us": armed["data"]["time_boot_us"],
+        }
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ResumeError(f"{run / EVENTS_NAME}: not the events of a flight; the file is damaged.") from error
 
 
 def remember_from(run: Path, document: Document) -> None:
@@ -47,18 +49,8 @@ def remember_from(run: Path, document: Document) -> None:
 
 def _events(path: Path) -> Sequence[dict[str, Any]]:
     """A killed process may leave its last line unfinished: that one is left out."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise ResumeError(f"{path}: cannot be read: {error.strerror}.") from error
-    events = []
-    for number, line in enumerate(lines, start=1):
-        try:
-            events.append(json.loads(line))
-        except ValueError as error:
-            if number < len(lines):
-                raise ResumeError(f"{path}:{number}: not an event; the file is damaged.") from error
-    return events
+    whole, _, _ = read_text(path).rpartition("\n")
+    return list(read_records(path, whole))
 
 
 def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:

@@ -17,7 +17,7 @@ from companion.shell.tlog import TlogWriter, is_packet
 from rebound_cli import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from companion.companion import StepResult
     from companion.memory.patch import Patch
@@ -53,7 +53,7 @@ _VERSIONED_PACKAGES = (
 
 
 class RunFolderError(ReboundError):
-    """The folder cannot be made, or already holds a flight."""
+    """The folder cannot be made, already holds a flight, or holds a damaged one."""
 
 
 def create_run_folder(out: Path | None, mission_name: str) -> Path:
@@ -152,6 +152,26 @@ def event_line(event: "Event") -> str:
     """The event as `events.jsonl` has it."""
     record = {"time_us": event.time_us, "kind": event.kind, "text": event.text, "data": dict(event.data)}
     return json.dumps(record) + "\n"
+
+
+def read_records(path: Path, text: str) -> "Iterator[dict[str, Any]]":
+    """Each line of `events.jsonl` or `inputs.jsonl` with its time and kind. Raises RunFolderError for a damaged one."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            record = json.loads(line)
+            record["time_us"], record["kind"] = int(record["time_us"]), str(record["kind"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise RunFolderError(f"{path}:{number}: not a record of a flight; the file is damaged.") from error
+        yield record
+
+
+def read_text(path: Path) -> str:
+    """Raises RunFolderError."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
+        raise RunFolderError(f"{path}: cannot be read: {reason}.") from error
 
 
 def write_yaml(path: Path, data: Any) -> None:

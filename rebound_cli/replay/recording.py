@@ -1,12 +1,11 @@
 """A run folder as the companion lived it: for each step what came, when, and what the companion did."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
 
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mission.model import Mission
@@ -14,7 +13,16 @@ from companion.shell.tlog import read_tlog
 from rebound_cli.documents import load_document
 from rebound_cli.inputs import mission_from
 from rebound_cli.logs.log import LogError
-from rebound_cli.run_folder import EVENTS_NAME, INPUTS_NAME, RESOLVED_NAME, SUMMARY_NAME, TLOG_NAME, VERSIONS_NAME
+from rebound_cli.run_folder import (
+    EVENTS_NAME,
+    INPUTS_NAME,
+    RESOLVED_NAME,
+    SUMMARY_NAME,
+    TLOG_NAME,
+    VERSIONS_NAME,
+    read_records,
+    read_text,
+)
 
 _MAGIC_V2 = 0xFD
 
@@ -51,7 +59,7 @@ def is_run_folder(path: Path) -> bool:
 
 
 def read_recording(folder: Path) -> Recording:
-    """Raises LogError, DocumentError."""
+    """Raises LogError, DocumentError, RunFolderError."""
     inputs_file = folder / INPUTS_NAME
     if not inputs_file.exists():
         raise LogError(
@@ -63,22 +71,22 @@ def read_recording(folder: Path) -> Recording:
     if not steps:
         raise LogError(f"{folder / TLOG_NAME}: no packet in it: nothing was ever heard in this flight.")
     last_packet_us = max(steps)
-    for record in _records(inputs_file, _text(inputs_file)):
+    for record in read_records(inputs_file, read_text(inputs_file)):
         step = steps.setdefault(record["time_us"], Step(record["time_us"]))
         step.confirms |= record["kind"] == "confirm"
         step.file_appears |= record["kind"] == "file"
         step.stop_reason = record.get("reason", step.stop_reason)
-    lines = _text(folder / EVENTS_NAME).splitlines(keepends=True)
+    lines = read_text(folder / EVENTS_NAME).splitlines(keepends=True)
     is_cut = not (folder / SUMMARY_NAME).exists()
     if is_cut:
         # Of the last step perhaps not all was written.
         steps = {time_us: step for time_us, step in steps.items() if time_us < last_packet_us}
         whole = "".join(line for line in lines if line.endswith("\n"))
-        events = zip(lines, _records(folder / EVENTS_NAME, whole), strict=False)
+        events = zip(lines, read_records(folder / EVENTS_NAME, whole), strict=False)
         lines = [line for line, event in events if event["time_us"] < last_packet_us]
     try:
-        versions = dict(json.loads(_text(folder / VERSIONS_NAME)))
-    except ValueError as error:
+        versions = dict(json.loads(read_text(folder / VERSIONS_NAME)))
+    except (ValueError, TypeError) as error:
         raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(mission, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
 
@@ -97,20 +105,3 @@ def _steps(tlog: Path) -> dict[int, Step]:
 
 def _is_ours(packet: bytes) -> bool:
     return packet[6 if packet[0] == _MAGIC_V2 else 4] == int(COMPONENT_ID)
-
-
-def _records(path: Path, text: str) -> Iterator[dict[str, Any]]:
-    for number, line in enumerate(text.splitlines(), start=1):
-        try:
-            record = json.loads(line)
-            record["time_us"], record["kind"] = int(record["time_us"]), str(record["kind"])
-        except (ValueError, KeyError, TypeError) as error:
-            raise LogError(f"{path}:{number}: not a record of a flight; the file is damaged.") from error
-        yield record
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise LogError(f"{path}: cannot be read; a replay needs it.") from error

@@ -43,6 +43,12 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
     cut = [line for line in events if '"aborted"' not in line and '"mode"' not in line]
     (first / EVENTS_NAME).write_text("".join(cut) + cut[-1][:20])
     assert resume_of(first, mission_from(load_mission_document(SQUARE, QUICK[1:])))["at_step"] == 3
+    # and what is no word of a flight is refused
+    for damage in (b"5\n", b"\xff\xfe\n", b'{"time_us": 1, "kind": "armed"}\n{"time_us": 2, "kind": "item"}\n'):
+        (first / EVENTS_NAME).write_bytes(damage)
+        capsys.readouterr()
+        assert fly(*QUICK, "--resume", first) == 1
+        assert capsys.readouterr().err.startswith(f"rebound: {first / EVENTS_NAME}")
 
 
 def test_a_mission_that_waits_for_a_file_goes_on_when_it_is_there_and_replays(tmp_path):
