@@ -1,12 +1,20 @@
-"""The arguments of `rebound fly`; what they run is imported when it runs."""
+"""The arguments of `rebound fly`."""
 
-import argparse
 from pathlib import Path
 
-from rebound_cli.arguments import SIMULATED_AUTOPILOTS, add_world_options, instance
+from rebound_cli.arguments import (
+    SIMULATED_AUTOPILOTS,
+    Commands,
+    add_companion,
+    add_connect,
+    add_json,
+    add_world_options,
+    instance,
+    runs,
+)
 
 
-def add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_fly(commands: Commands) -> None:
     fly = commands.add_parser("fly", help="fly a mission", description="Fly a mission from take-off to landing.")
     fly.add_argument("mission", type=Path, metavar="MISSION", help="mission file, such as missions/wall.yaml")
     how = fly.add_mutually_exclusive_group(required=True)
@@ -20,19 +28,13 @@ def add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         "px4: with your PX4 as its autopilot, see docs/px4.md",
     )
     how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")
-    how.add_argument(
-        "--connect",
-        metavar="URL",
-        help="a vehicle, e.g. udpin://0.0.0.0:14540 or serial:///dev/ttyAMA0:921600",
-    )
+    add_connect(how, required=False)
     add_world_options(fly)
     fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
     fly.add_argument(
         "--instance", type=instance, default=0, metavar="N", help="with --sim px4: PX4's instance (its option -i)"
     )
-    fly.add_argument(
-        "--companion", type=Path, metavar="FILE", help="take the companion: part from this file, e.g. from rebound tune"
-    )
+    add_companion(fly)
     fly.add_argument(
         "--resume",
         type=Path,
@@ -45,12 +47,6 @@ def add_fly(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         metavar="FILE",
         help="what is known beforehand, e.g. another run's obstacles.json",
     )
-    fly.add_argument("--json", action="store_true", help="print the summary on stdout and nothing else there")
+    add_json(fly, "summary")
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
-    fly.set_defaults(run=_fly)
-
-
-def _fly(options: argparse.Namespace) -> int:
-    from rebound_cli.fly import run_fly
-
-    return run_fly(options)
+    fly.set_defaults(run=runs("rebound_cli.fly:run_fly"))

@@ -20,8 +20,6 @@ def run_identify(options: Namespace) -> int:
     out: Path | None = options.out
     if out is not None and out.exists():
         raise IdentificationError(f"{out} exists already: give --out another name.")
-    if options.mass is not None and options.mass <= 0:
-        raise IdentificationError(f"--mass {options.mass:g}: give a mass above zero, in kilograms.")
     axis = AXES[options.axis] if options.axis is not None else None
     found = identify([_hit(path, axis) for path in options.data])
     mass_kg = _mass_kg(options)

@@ -1,13 +1,21 @@
-"""The arguments of `rebound sim`; what they run is imported when it runs."""
+"""The arguments of `rebound sim`."""
 
-import argparse
 import os
 from pathlib import Path
 
-from rebound_cli.arguments import SIMULATED_AUTOPILOTS, add_world_options, host_and_port, instance, port, speed
+from rebound_cli.arguments import (
+    SIMULATED_AUTOPILOTS,
+    Commands,
+    add_world_options,
+    host_and_port,
+    instance,
+    port,
+    runs,
+    speed,
+)
 
 
-def add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_sim(commands: Commands) -> None:
     sim = commands.add_parser(
         "sim",
         help="run the simulated vehicle alone",
@@ -61,10 +69,4 @@ def add_sim(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
         "--truth", type=Path, metavar="FILE", help="write what really happened to this .npz file at the end"
     )
     sim.add_argument("--stop-with-stdin", action="store_true", help="end when standard input ends")
-    sim.set_defaults(run=_sim)
-
-
-def _sim(options: argparse.Namespace) -> int:
-    from rebound_cli.sim import run_sim
-
-    return run_sim(options)
+    sim.set_defaults(run=runs("rebound_cli.sim:run_sim"))

@@ -1,6 +1,7 @@
 """The rooms' rules: who may import whom, and where the world outside may be touched."""
 
 import ast
+import importlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -85,3 +86,18 @@ def test_files_stay_short() -> None:
 def test_the_documented_diagrams_are_those_of_the_tables() -> None:
     text = (ROOT / "docs/architecture.md").read_text()
     assert text == with_diagrams(text), "run `make diagrams`"
+
+
+def test_every_command_runs_a_function_that_there_is() -> None:
+    # Commands name their function in text, to import it late: no type checker sees a wrong one.
+    named = [
+        node.args[0].value
+        for path in sources("rebound_cli")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "runs"
+        if isinstance(node.args[0], ast.Constant)
+    ]
+    assert len(named) > 10
+    for function in named:
+        module, _, attribute = str(function).partition(":")
+        assert callable(getattr(importlib.import_module(module), attribute)), function

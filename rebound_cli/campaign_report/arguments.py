@@ -1,12 +1,11 @@
-"""The arguments of `rebound campaign`; what they run is imported when it runs."""
+"""The arguments of `rebound campaign`."""
 
-import argparse
 from pathlib import Path
 
-from rebound_cli.arguments import add_workers, count
+from rebound_cli.arguments import Commands, add_workers, count, runs
 
 
-def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def add_campaign(commands: Commands) -> None:
     campaign = commands.add_parser(
         "campaign",
         help="fly random missions in random rooms and write what became of them",
@@ -33,10 +32,4 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="folder of campaign.md and images (default: docs); with --only the run folder "
         "(default: runs/<time>-random-SEED)",
     )
-    campaign.set_defaults(run=_campaign)
-
-
-def _campaign(options: argparse.Namespace) -> int:
-    from rebound_cli.campaign_report.command import run_campaign_command
-
-    return run_campaign_command(options)
+    campaign.set_defaults(run=runs("rebound_cli.campaign_report.command:run_campaign_command"))

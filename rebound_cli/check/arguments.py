@@ -1,10 +1,11 @@
-"""The arguments of `rebound check`; what they run is imported when it runs."""
+"""The arguments of `rebound check`."""
 
-import argparse
 from pathlib import Path
 
+from rebound_cli.arguments import Commands, add_set, runs
 
-def add_check(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+
+def add_check(commands: Commands) -> None:
     check = commands.add_parser(
         "check",
         help="check a mission file and show what would be flown",
@@ -14,13 +15,7 @@ def add_check(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     check.add_argument(
         "--schema", action="store_true", help="print the JSON schema of mission files, for editors, and nothing else"
     )
-    check.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="PATH=VALUE",
-        help="change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5",
-    )
+    add_set(check, "change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5")
     check.add_argument(
         "--out",
         type=Path,
@@ -29,10 +24,4 @@ def add_check(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
         help="folder of the pictures (default: runs/check)",
     )
     check.add_argument("--no-picture", action="store_true", help="draw nothing")
-    check.set_defaults(run=_check)
-
-
-def _check(options: argparse.Namespace) -> int:
-    from rebound_cli.check.command import run_check
-
-    return run_check(options)
+    check.set_defaults(run=runs("rebound_cli.check.command:run_check"))

@@ -17,6 +17,7 @@ from rebound_cli.paper import (
     sample_scenario,
     simulation_experiment,
 )
+from rebound_cli.paper.arguments import DEFAULT_SEEDS
 from rebound_cli.paper.flights import Flight, Result, fly
 from rebound_cli.paper.study import Findings, Study, concluded
 from rebound_cli.paper.table import Row, rows_text
@@ -108,7 +109,3 @@ def results_text(findings: Sequence[Findings], seeds: int) -> str:
     parts += [f"### Table: {found.title}\n\n{found.sampling}\n\n{rows_text(found.rows)}" for found in findings]
     parts += [f"## {found.title}\n\n{found.text}" for found in findings]
     return "\n" + "\n".join(parts) + "\n"
-
-
-# Chosen so that all of it takes less than five minutes on two cores.
-DEFAULT_SEEDS = 6

@@ -1,10 +1,12 @@
-"""The arguments of `rebound plan`; what they run is imported when it runs."""
+"""The arguments of `rebound plan`."""
 
 import argparse
 from pathlib import Path
 
+from rebound_cli.arguments import Commands, runs
 
-def add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+
+def add_plan(commands: Commands) -> None:
     plan = commands.add_parser(
         "plan",
         help="missions from and for QGroundControl",
@@ -15,7 +17,7 @@ def add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     reading.add_argument("plan", type=Path, metavar="PLAN", help="QGroundControl's file")
     reading.add_argument("--name", help="name of the mission (default: the file's)")
     _add_out(reading, "default: standard output")
-    reading.set_defaults(run=_import)
+    reading.set_defaults(run=runs("rebound_cli.plan.command:run_import"))
     writing = ways.add_parser("export", help="a .plan from a mission file", description="Makes a .plan of a mission.")
     writing.add_argument("mission", type=Path, metavar="MISSION")
     writing.add_argument(
@@ -26,7 +28,7 @@ def add_plan(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         help="where the vehicle will be armed: degrees, and metres above sea level (default 0)",
     )
     _add_out(writing, "default: standard output")
-    writing.set_defaults(run=_export)
+    writing.set_defaults(run=runs("rebound_cli.plan.command:run_export"))
 
 
 def _add_out(parser: argparse.ArgumentParser, default: str) -> None:
@@ -42,15 +44,3 @@ def _home(text: str) -> tuple[float, float, float]:
         raise argparse.ArgumentTypeError(f"{text!r} is not LAT,LON or LAT,LON,ALT, such as 47.3977,8.5456,488")
     latitude_deg, longitude_deg, *altitude_m = numbers
     return latitude_deg, longitude_deg, altitude_m[0] if altitude_m else 0.0
-
-
-def _import(options: argparse.Namespace) -> int:
-    from rebound_cli.plan.command import run_import
-
-    return run_import(options)
-
-
-def _export(options: argparse.Namespace) -> int:
-    from rebound_cli.plan.command import run_export
-
-    return run_export(options)

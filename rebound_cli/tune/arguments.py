@@ -1,10 +1,11 @@
-"""The arguments of `rebound tune`; what they run is imported when it runs."""
+"""The arguments of `rebound tune`."""
 
-import argparse
 from pathlib import Path
 
+from rebound_cli.arguments import Commands, add_json, runs
 
-def add_tune(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+
+def add_tune(commands: Commands) -> None:
     tune = commands.add_parser(
         "tune",
         help="settings for a vehicle from its healthy flights",
@@ -19,11 +20,5 @@ def add_tune(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     )
     tune.add_argument("--companion", type=Path, metavar="FILE", help="settings to begin with (default: the defaults)")
     tune.add_argument("--out", type=Path, metavar="FILE", help="write the settings, for rebound fly --companion FILE")
-    tune.add_argument("--json", action="store_true", help="print the figures on stdout and nothing else there")
-    tune.set_defaults(run=_tune)
-
-
-def _tune(options: argparse.Namespace) -> int:
-    from rebound_cli.tune.command import run_tune
-
-    return run_tune(options)
+    add_json(tune, "figures")
+    tune.set_defaults(run=runs("rebound_cli.tune.command:run_tune"))
