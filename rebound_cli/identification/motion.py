@@ -93,6 +93,9 @@ def _even(time_s: Floats) -> tuple[Floats, float]:
 def _hardest(table: Table, span: slice, axis: int, towards: float) -> Hit | None:
     """The hardest turn in one gapless part, if there is one as hard as a hit."""
     time_s, interval_s = _even(table.time_s[span])
+    if interval_s <= 0.0:
+        # All rows of one time: no column of times.
+        return None
     position = towards * table.position_m[span, axis]
     speed = slopes(time_s, position, interval_s)
     reach = max(1, round(_LONGEST_TURN_S / interval_s))

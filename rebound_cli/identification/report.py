@@ -1,5 +1,6 @@
 """What was found, as text for a person and as the airframe file."""
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -161,11 +162,12 @@ def airframe_text(found: Identified, name: str, mass_kg: float, base_name: str, 
     """An airframe file that states what was identified and takes the rest from ``base``."""
     scale = mass_kg / base.mass_kg
     inertia = ", ".join(f"{scale * value:.5g}" for value in base.inertia_kg_m2)
+    hits = ", ".join(hit.name for hit in found.hits)
     lines = [
         f"# Number of hits: {len(found.hits)}. Made by `rebound identify`; ± is one standard deviation.",
         f"based_on: {base_name}",
-        f"name: {name}",
-        f"description: Contact identified from {', '.join(hit.name for hit in found.hits)}",
+        f"name: {_quoted(name)}",
+        f"description: {_quoted(f'Contact identified from {hits}')}",
         "",
         f"mass_kg: {mass_kg:g}",
         f"# Not identified: those of {base_name}, in proportion to the mass.",
@@ -181,6 +183,11 @@ def airframe_text(found: Identified, name: str, mass_kg: float, base_name: str, 
             f"surface: {{guard_friction: {found.friction.value:.3f}}}   # at least; ± {found.friction.sigma:.3f}",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    """As YAML takes it, whatever is in it: names are those of files."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _spring_lines(found: Identified, spring: Spring, base_name: str, base: Airframe) -> list[str]:

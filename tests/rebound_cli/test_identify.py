@@ -144,6 +144,10 @@ def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
     assert airframe.arms.damping_per_s == pytest.approx(30, rel=0.1)
     assert airframe.arms.stiffness_per_s2 == pytest.approx(500, rel=0.3)
     assert airframe.arms.fold_max_m == pytest.approx(0.03, abs=0.005)
+    # whatever the file is called
+    named = run("identify", tmp_path / "run", "--out", tmp_path / "a: #b.yaml", "--name", 'an "own": vehicle')
+    assert named.returncode == 0, named.stderr
+    assert load_document(tmp_path / "a: #b.yaml").data["name"] == 'an "own": vehicle'
     # And flies the same mission
     again = run("fly", WALL, "--lockstep", "--airframe", tmp_path / "found.yaml", "--out", tmp_path / "again")
     assert again.returncode == 0, again.stderr
@@ -156,6 +160,8 @@ def test_bad_data_end_in_one_clear_sentence(tmp_path):
     no_column = tmp_path / "no_column.csv"
     no_column.write_text("time_s,position_x_m\n0,1\n")
     assert_one_clear_sentence(run("identify", no_column), no_column, "position_y_m")
+    weightless = run("identify", no_column, "--mass", "nan")
+    assert weightless.returncode == 2 and "'nan' is not a mass" in weightless.stderr
 
 
 @pytest.mark.parametrize(
@@ -171,6 +177,13 @@ def test_a_table_that_is_none(tmp_path, text, words):
     file.write_text(text)
     with pytest.raises(IdentificationError, match=words):
         read_table(file)
+
+
+def test_a_column_of_times_that_is_none(tmp_path):
+    file = tmp_path / "standing.csv"
+    file.write_text("time_s,position_x_m,position_y_m\n" + "".join(f"1.0,{0.01 * row},0\n" for row in range(100)))
+    with pytest.raises(IdentificationError, match="no hit found"):
+        find_hit(read_table(file))
 
 
 def test_a_flight_without_a_hit(tmp_path):
