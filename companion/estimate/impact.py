@@ -197,11 +197,8 @@ class ImpactEstimator:
         if push is not None and sample.time_boot_us > push.time_boot_us:
             loud = state.last_loud_boot_us == sample.time_boot_us
             push.add(sample, loud)
-            if push.is_whole:
-                self.trust.restore()
-            elif self.trust.is_trusted:
-                # Arms may meet their stop, and clip, long after a touch that could be measured.
-                self.trust.doubt(sample.time_boot_us)
+            # Anew with each sample: arms may meet their stop, and clip, long after a touch that could be measured.
+            self.trust.judge(push.is_whole, sample.time_boot_us)
             if loud or is_final:
                 estimate = self._refined(estimate, push, is_final)
         self.estimate = replace(estimate, is_final=is_final) if is_final else estimate

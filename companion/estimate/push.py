@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
+from companion.estimate.clipping import Clipping, may_have_clipped
 from companion.estimate.normal import LOOKED_AT_S, Part
 from companion.estimate.rotation import body_to_ned, turned
 from companion.messages import ImuSample, Quaternion, Vector3
@@ -12,9 +13,6 @@ CONTIGUOUS = 1.5
 # What comes after this long without a push is another part of the vehicle, turned round by the first: the guard on the
 # other side, the hub. Its direction is no longer that of the hit.
 QUIET_US = 20_000
-# The mean over a window of a pulse that reaches the range's end: one of a third of the window's length shows a third
-# of the range. Nothing less is certain not to have been clipped but by VIBRATION's counts.
-CLIPPED_SHARE = 1.0 / 3.0
 # A force that is over within this many samples was shorter than they can tell: its raw peak may well have been clipped.
 SHORT = 2
 
@@ -33,6 +31,8 @@ class Push:
     earlier: ImuSample | None = None
     """The sample before the contact's first."""
     time_boot_us: int = 0
+    heard_boot_us: int = 0
+    """Of the latest sample, also after the push."""
     first_boot_us: int = 0
     rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
     first_rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
@@ -50,28 +50,35 @@ class Push:
     gap: bool = False
     first_size_m_s2: float = 0.0
     begun_boot_us: int | None = None
+    clipping: Clipping = field(init=False)
+    """Of the whole contact, also of what comes after the push."""
+
+    def __post_init__(self) -> None:
+        self.clipping = Clipping(self.averaging_us, self.range_m_s2)
 
     def add(self, sample: ImuSample, loud: bool) -> None:
         """Take one sample of the contact; what comes after the last loud one does not belong to it."""
         now_us, w = sample.time_boot_us, sample.angular_velocity_frd_rad_s
+        f, free = sample.specific_force_frd_m_s2, self.free_frd_m_s2
+        frd = (f[0] - free[0], f[1] - free[1], f[2] - free[2])
         first = self.time_boot_us == 0
+        elapsed_us = now_us - (self.started_boot_us if first else self.heard_boot_us)
+        contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
+        self.heard_boot_us = now_us
+        self.clipping.add(f, frd, contiguous)
         if not first and now_us - self.loud_boot_us > max(QUIET_US, 2 * self.averaging_us):
             self.closed = True
         if self.closed:
             return
-        elapsed_us = now_us - (self.started_boot_us if first else self.time_boot_us)
         if first:
             self.first_rates_frd_rad_s = w
         else:
             p, q, r = self.rates_frd_rad_s
             mean = (0.5 * (p + w[0]), 0.5 * (q + w[1]), 0.5 * (r + w[2]))
             self.attitude_wxyz = turned(self.attitude_wxyz, mean, elapsed_us * 1e-6)
-        f, free = sample.specific_force_frd_m_s2, self.free_frd_m_s2
         before = self.rates_frd_rad_s if not first else (self.earlier or sample).angular_velocity_frd_rad_s
         turned_by = (w[0] - before[0], w[1] - before[1], w[2] - before[2])
-        frd = (f[0] - free[0], f[1] - free[1], f[2] - free[2])
         ned = body_to_ned(self.attitude_wxyz, frd)
-        contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
         last = ned if contiguous or first else self.last_ned_m_s2
         over_s = 0.5e-6 * (min(elapsed_us, self.averaging_us) if first else elapsed_us)
         sums = self.unconfirmed_ned_m_s
@@ -119,7 +126,7 @@ class Push:
         self.loud_boot_us = now_us
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
         self.gap = self.gap or not contiguous
-        self.clipped = self.clipped or max(abs(f[0]), abs(f[1]), abs(f[2])) >= CLIPPED_SHARE * self.range_m_s2
+        self.clipped = self.clipped or may_have_clipped(f, self.range_m_s2)
         if self.samples == 1:
             self.first_size_m_s2 = size_m_s2
         elif self.samples == 2 and contiguous and size_m_s2 > 0.0:
@@ -129,7 +136,7 @@ class Push:
 
     @property
     def may_be_clipped(self) -> bool:
-        return self.clipped or self.samples <= SHORT
+        return not self.is_whole
 
     @property
     def is_lower_bound(self) -> bool:
@@ -138,7 +145,7 @@ class Push:
     @property
     def is_whole(self) -> bool:
         """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
-        return not self.clipped and self.samples > SHORT
+        return not self.clipping.may_hide and self.samples > SHORT
 
     @property
     def is_blurred(self) -> bool:

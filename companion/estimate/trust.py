@@ -28,30 +28,46 @@ class Trust:
     """Changed only by its methods. Times: vehicle's boot clock."""
 
     doubted_boot_us: int | None = None
+    """Since the latest hit; None when that was measured whole."""
+    earlier_boot_us: int | None = None
+    """Since one before it, which was still in doubt when the latest came."""
     errors: deque[tuple[int, Vector3]] = field(default_factory=deque)
 
     @property
     def is_trusted(self) -> bool:
-        return self.doubted_boot_us is None
+        return self._since_us is None
+
+    @property
+    def _since_us(self) -> int | None:
+        return self.earlier_boot_us if self.doubted_boot_us is None else self.doubted_boot_us
 
     def doubt(self, time_us: int) -> None:
-        """A hit that may have been more than was seen."""
-        self.doubted_boot_us = time_us
+        """A new hit, which may have been more than was seen."""
+        self.earlier_boot_us, self.doubted_boot_us = self._since_us, time_us
         self.errors.clear()
 
+    def judge(self, is_whole: bool, time_us: int) -> None:
+        """Whether the latest hit has been measured whole, as far as it is known now; what an earlier one hid stays."""
+        if is_whole:
+            self.doubted_boot_us = None
+        elif self.doubted_boot_us is None:
+            self.doubted_boot_us = time_us
+            self.errors.clear()
+
     def restore(self) -> None:
-        """The hit was seen whole, or the estimate agrees again."""
-        self.doubted_boot_us = None
+        """The estimate agrees again."""
+        self.doubted_boot_us = self.earlier_boot_us = None
         self.errors.clear()
 
     def age(self, now_us: int) -> None:
         """Doubt ends, whatever the velocities say or if none comes."""
-        if self.doubted_boot_us is not None and now_us - self.doubted_boot_us > MOST_US:
+        since_us = self._since_us
+        if since_us is not None and now_us - since_us > MOST_US:
             self.restore()
 
     def hear(self, time_us: int, velocity_less_sum_m_s: Vector3) -> None:
         """Take one velocity less the accelerometer's sum: constant while the two agree."""
-        doubted_us, errors = self.doubted_boot_us, self.errors
+        doubted_us, errors = self._since_us, self.errors
         if doubted_us is None:
             return
         errors.append((time_us, velocity_less_sum_m_s))

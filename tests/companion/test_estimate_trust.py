@@ -32,10 +32,13 @@ def test_a_clipped_push_along_the_obstacle_is_none_of_its_normal(push_m_s2, norm
         assert estimate.normal_ned[:2] == pytest.approx((normal_north, normal_east), abs=0.15)
 
 
-def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, stop_m_s2=0.0):
+def after_a_hit(
+    seconds, peak_m_s2, lasts, error_m_s, stop_m_s2=0.0, first_m_s2=0.0, again_m_s2=0.0, other_guard_m_s2=0.0
+):
     """Hovering still; a push at 2.0 s; from then on velocities that are off by what `error_m_s` of the time says.
 
-    With `stop_m_s2` the push's last sample is that much harder: arms that meet their stop.
+    With `stop_m_s2` the push's last sample is that much harder: arms that meet their stop; with `first_m_s2` its first.
+    `again_m_s2` is what a touch at 2.12 s shows for 40 ms, `other_guard_m_s2` what one sample shows at 2.04 s.
     """
     watch = start_watch(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
@@ -44,6 +47,9 @@ def after_a_hit(seconds, peak_m_s2, lasts, error_m_s, stop_m_s2=0.0):
     for t_us in range(4_000, round(seconds * 1e6), 4_000):
         push = -peak_m_s2 if 2_000_000 <= t_us < 2_000_000 + 4_000 * lasts else 0.0
         push -= stop_m_s2 if t_us == 2_000_000 + 4_000 * (lasts - 1) else 0.0
+        push -= first_m_s2 if t_us == 2_000_000 else 0.0
+        push -= again_m_s2 if 2_120_000 <= t_us < 2_160_000 else 0.0
+        push -= other_guard_m_s2 if t_us == 2_040_000 else 0.0
         speed += 0.004 * push
         samples = [ImuSample(t_us, (push, 0.0, -9.80665), STILL)]
         if t_us % 32_000 == 0:
@@ -81,6 +87,29 @@ def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all
     assert len(impacts) == 1
     assert told[0][1] == "velocity not believed: part of the hit was not measured"
     assert trusted[-1]
+
+
+def test_a_stiff_hit_whose_means_stay_far_below_the_range_is_no_second_hit():
+    """Given a hit of a millisecond that shows as 26 m/s^2 and rings, when the velocity swings back, nothing is told."""
+    impacts, told, trusted = after_a_hit(4.0, 3.0, 4, swing, first_m_s2=23.0)
+    assert len(impacts) == 1
+    assert told[0][1] == "velocity not believed: part of the hit was not measured"
+    assert trusted[-1]
+
+
+def test_a_whole_touch_does_not_clear_the_velocity_of_the_hit_before_it():
+    """Given a clipped hit, when the vehicle leans on the obstacle for a moment, its velocity is still not believed."""
+    impacts, _, trusted = after_a_hit(4.0, 120.0, 3, swing, again_m_s2=3.0)
+    assert len(impacts) == 2
+    assert not any(trusted[round(2.2 / 0.004) : round(2.6 / 0.004)])
+    assert trusted[-1]
+
+
+def test_what_clips_after_the_push_has_paused_leaves_the_velocity_in_doubt():
+    """Given a push measured whole, when the other guard swings in 30 ms later and clips, then it is not believed."""
+    impacts, told, _ = after_a_hit(4.0, 20.0, 4, swing, other_guard_m_s2=90.0)
+    assert len(impacts) == 1
+    assert told[0][1] == "velocity not believed: part of the hit was not measured"
 
 
 def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():

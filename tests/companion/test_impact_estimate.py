@@ -140,7 +140,10 @@ def test_the_impulse_is_the_sum_of_the_loud_samples_and_of_what_lies_between_the
     push = pushed([(-20.0, True), (-40.0, True), (-1.0, False), (-10.0, True), (-5.0, False)])
     assert push.impulse_ned_m_s == pytest.approx((-0.284, 0.0, 0.0))
     assert push.peak_m_s2 == pytest.approx(40.0)
-    assert not push.is_lower_bound
+
+
+def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():
+    assert not pushed([(-10.0, True), (-25.0, True), (-30.0, True), (-22.0, True), (-8.0, True)]).is_lower_bound
 
 
 def test_the_first_window_tells_when_the_contact_began():
@@ -157,8 +160,13 @@ def test_a_vehicle_that_turns_in_the_contact_is_followed():
 
 @pytest.mark.parametrize(
     ("pushes", "every_us"),
-    [([(-60.0, True)] * 5, 4_000), ([(-20.0, True)] * 2, 4_000), ([(-20.0, True)] * 5, 20_000)],
-    ids=["may have clipped", "too short to tell", "gaps"],
+    [
+        ([(-60.0, True)] * 5, 4_000),
+        ([(-20.0, True)] * 2, 4_000),
+        ([(-20.0, True)] * 5, 20_000),
+        ([(-3.0, True), (-30.0, True), (-4.0, True), (-3.0, True)], 4_000),
+    ],
+    ids=["may have clipped", "too short to tell", "gaps", "over in one window"],
 )
 def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
     assert pushed(pushes, every_us).is_lower_bound
