@@ -1,18 +1,18 @@
 """`python -m rebound_cli.diagrams FILE`: writes the state diagrams and tables into a document, from the tables."""
 
-import re
 import sys
 from pathlib import Path
 
 from companion.flight.states import markdown_table, mermaid_diagram
 from companion.guard.states import markdown_table as guard_table
 from companion.guard.states import mermaid_diagram as guard_diagram
+from rebound_cli.marked import with_part
 from sim_vehicle.autopilot.failsafe_table import markdown_table as failsafe_table
 from sim_vehicle.autopilot.modes import mode_diagram
 
 
 def with_diagrams(text: str) -> str:
-    """The document with everything between its `generated` marks made anew."""
+    """The document with everything between its `generated` marks made anew. Raises MarkedPartError."""
     contents = {
         "flight diagram": f"```mermaid\n{mermaid_diagram()}```\n",
         "flight table": markdown_table(),
@@ -22,10 +22,7 @@ def with_diagrams(text: str) -> str:
         "failsafe table": failsafe_table(),
     }
     for name, content in contents.items():
-        mark = re.compile(rf"(<!-- generated: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        text, found = mark.subn(lambda match, content=content: match[1] + content + match[2], text)
-        if found != 1:
-            raise ValueError(f"the document has {found} places for the {name}, not one")
+        text = with_part(text, name, content)
     return text
 
 

@@ -1,6 +1,5 @@
 """`rebound campaign`: flies everything that must be shown and writes docs/campaign.md, and docs/recovery.md's table."""
 
-import re
 import time
 from argparse import Namespace
 from pathlib import Path
@@ -17,13 +16,15 @@ from rebound_cli.campaign_report.only import run_only
 from rebound_cli.campaign_report.picture import missions_figure
 from rebound_cli.campaign_report.reading import HOW_TO_READ
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
+from rebound_cli.marked import checked_text, write_part
 from rebound_cli.random_missions.campaign import missions_campaign
-from rebound_cli.recoveries.command import DocumentError, check_document, write_table
+from rebound_cli.recoveries.command import PART as RECOVERY_PART
+from rebound_cli.recoveries.command import write_table
 from rebound_cli.recoveries.hits import recoveries_campaign
 from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
-START_MARK, END_MARK = "<!-- generated: campaign -->", "<!-- end -->"
+PART, TITLE = "campaign", "Campaign"
 
 
 def run_campaign_command(options: Namespace) -> int:
@@ -56,13 +57,9 @@ def run_campaign_command(options: Namespace) -> int:
 def _check(folder: Path) -> None:
     """Whether there will be a place for it all, before hours are flown. Raises ReboundError."""
     make_folder(folder)
-    with_tables(_document(folder / DOCUMENT_NAME), "")
+    checked_text(folder / DOCUMENT_NAME, PART, TITLE)
     if (folder / RECOVERY_NAME).exists():
-        check_document(folder / RECOVERY_NAME)
-
-
-def _document(path: Path) -> str:
-    return path.read_text(encoding="utf-8") if path.exists() else f"# Campaign\n\n{START_MARK}\n{END_MARK}\n"
+        checked_text(folder / RECOVERY_NAME, RECOVERY_PART)
 
 
 def _text(options: Namespace, missions: Missions, bars: list[Bar], worked_out: list[tuple[Campaign, Results]]) -> str:
@@ -99,17 +96,4 @@ def _write(folder: Path, missions: Missions, text: str) -> None:
     """The picture beside the document; what stands between its marks made anew, the rest left as it is."""
     (folder / PICTURE.parent).mkdir(parents=True, exist_ok=True)
     missions_figure(missions).savefig(folder / PICTURE)
-    path = folder / DOCUMENT_NAME
-    path.write_text(with_tables(_document(path), text), encoding="utf-8")
-
-
-def with_tables(document: str, text: str) -> str:
-    """The document with what stands between its marks made anew; raises DocumentError where there are none."""
-    marked = re.compile(rf"({re.escape(START_MARK)}\n).*?({re.escape(END_MARK)})", re.DOTALL)
-    changed, found = marked.subn(lambda match: match[1] + text + match[2], document)
-    if found != 1:
-        raise DocumentError(
-            f"{DOCUMENT_NAME} has {found} places for the campaign's tables, not one: "
-            f"give it a line `{START_MARK}` and, after it, a line `{END_MARK}`."
-        )
-    return changed
+    write_part(folder / DOCUMENT_NAME, PART, text, TITLE)

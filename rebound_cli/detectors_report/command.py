@@ -1,6 +1,5 @@
 """`rebound detectors`: works the bench's campaigns out, writes the tables of docs/detection.md and the pictures."""
 
-import re
 import time
 from argparse import Namespace
 from collections.abc import Mapping
@@ -23,10 +22,11 @@ from rebound_cli.detectors_report import comparison, families, flights, hit_bars
 from rebound_cli.detectors_report.bars import Bar, bars_text, summary_text
 from rebound_cli.detectors_report.numbers import Hits
 from rebound_cli.detectors_report.reading import HOW_TO_READ
+from rebound_cli.marked import checked_text, write_part
 from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
-START_MARK, END_MARK = "<!-- generated: detectors -->", "<!-- end -->"
+PART, TITLE = "detectors", "Detection"
 # Recorded impacts: each once for a first look, more often where the hits are many.
 HITS_PER_ROUND = 2500
 
@@ -34,6 +34,7 @@ HITS_PER_ROUND = 2500
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
     make_folder(options.out)
+    checked_text(options.out / DOCUMENT_NAME, PART, TITLE)
     started_s = time.monotonic()
     workers = Workers(options.jobs, options.scheduler)
     campaigns = [hits_campaign(options.hits), hands_campaign(options.hits), flights_campaign(options.hours)]
@@ -129,15 +130,4 @@ def _write(folder: Path, text: str, figures: Mapping[str, Any]) -> None:
     (folder / PICTURES_FOLDER).mkdir(parents=True, exist_ok=True)
     for name, figure in figures.items():
         figure.savefig(folder / PICTURES_FOLDER / name)
-    path = folder / DOCUMENT_NAME
-    before = path.read_text(encoding="utf-8") if path.exists() else f"# Detection\n\n{START_MARK}\n{END_MARK}\n"
-    path.write_text(with_tables(before, text), encoding="utf-8")
-
-
-def with_tables(document: str, text: str) -> str:
-    """The document with what stands between its marks made anew; raises ValueError where there are none."""
-    marked = re.compile(rf"({re.escape(START_MARK)}\n).*?({re.escape(END_MARK)})", re.DOTALL)
-    changed, found = marked.subn(lambda match: match[1] + text + match[2], document)
-    if found != 1:
-        raise ValueError(f"the document has {found} places for the detectors' tables, not one")
-    return changed
+    write_part(folder / DOCUMENT_NAME, PART, text, TITLE)

@@ -1,12 +1,12 @@
 """`rebound paper`: flies every study and writes pictures, table and the result section of docs/paper.md."""
 
 import multiprocessing
-import re
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from rebound_cli import __version__
+from rebound_cli.marked import checked_text, write_part
 from rebound_cli.paper import (
     arm,
     causes,
@@ -36,12 +36,13 @@ STUDIES: tuple[Study, ...] = (
 )
 
 DOCUMENT_NAME, PICTURES_FOLDER = "paper.md", Path("images") / "paper"
-START_MARK, END_MARK = "<!-- generated: paper results -->", "<!-- end -->"
+PART, TITLE = "paper results", "Results"
 
 
 def run_paper(options: Namespace) -> int:
     """Fly everything and write it. 0 when it is written, whatever it says."""
     make_folder(options.out)
+    checked_text(options.out / DOCUMENT_NAME, PART, TITLE)
     planned = [study.flights(options.seeds) for study in STUDIES]
     results = _fly_all([flight for flights in planned for flight in flights], options.jobs)
     findings, first = [], 0
@@ -75,24 +76,13 @@ def verdict_text(rows: Sequence[Row]) -> str:
 
 
 def write(folder: Path, findings: Sequence[Findings], seeds: int) -> None:
-    """Pictures beside the document; its result section made anew, the rest left as it is."""
+    """Pictures beside the document; its result section made anew, the rest left as it is. Raises MarkedPartError."""
     pictures = folder / PICTURES_FOLDER
     pictures.mkdir(parents=True, exist_ok=True)
     for found in findings:
         for name, figure in found.pictures.items():
             figure.savefig(pictures / name)
-    path = folder / DOCUMENT_NAME
-    before = path.read_text(encoding="utf-8") if path.exists() else f"# Results\n\n{START_MARK}\n{END_MARK}\n"
-    path.write_text(with_results(before, results_text(findings, seeds)), encoding="utf-8")
-
-
-def with_results(document: str, results: str) -> str:
-    """The document with what stands between its marks made anew; raises ValueError where there are none."""
-    marked = re.compile(rf"({re.escape(START_MARK)}\n).*?({re.escape(END_MARK)})", re.DOTALL)
-    text, found = marked.subn(lambda match: match[1] + results + match[2], document)
-    if found != 1:
-        raise ValueError(f"the document has {found} places for the results, not one")
-    return text
+    write_part(folder / DOCUMENT_NAME, PART, results_text(findings, seeds), TITLE)
 
 
 def results_text(findings: Sequence[Findings], seeds: int) -> str:

@@ -1,45 +1,31 @@
 """`rebound recoveries`: the same hits with the paper's law and with `adaptive`, as a table in docs/recovery.md."""
 
-import re
 import statistics
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from companion.errors import ReboundError
 from rebound_cli.campaign.plan import Campaign, Json
 from rebound_cli.campaign.run import Results, Workers, failures_text, run_campaign
+from rebound_cli.marked import checked_text, write_part
 from rebound_cli.recoveries.hits import AIRFRAMES, LAWS, SLANTS_DEG, SPEEDS_M_S, Case, of, recoveries_campaign
 
-MARK = re.compile(r"(<!-- generated: recoveries -->\n).*?(<!-- end -->)", re.DOTALL)
-
-
-class DocumentError(ReboundError):
-    """A document without the place for the table."""
+PART = "recoveries"
 
 
 def run_recoveries(options: Namespace) -> int:
     """0 when the table is written, whatever it says; 1 when a flight failed to be flown."""
-    check_document(options.out)
+    checked_text(options.out, PART)
     campaign = recoveries_campaign(options.seeds)
     results = run_campaign(campaign, Workers(options.jobs))
     write_table(options.out, campaign, results, options.seeds)
     return 1 if results.failures else 0
 
 
-def check_document(path: Path) -> str:
-    """Its text. Raises DocumentError where there is no place for the table."""
-    text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    if not MARK.search(text):
-        raise DocumentError(f"{path} has no line `<!-- generated: recoveries -->` with an `<!-- end -->` after it.")
-    return text
-
-
 def write_table(path: Path, campaign: Campaign, results: Results, seeds: int) -> None:
-    """Make what stands between the document's marks anew. Raises DocumentError where there are none."""
-    text = check_document(path)
+    """Make what stands between the document's marks anew. Raises MarkedPartError where there are none."""
     body = "\n".join([*_lines(campaign.cases, results.results, seeds), failures_text(campaign, results), ""])
-    path.write_text(MARK.sub(lambda found: found[1] + body + found[2], text), encoding="utf-8")
+    write_part(path, PART, body)
     print(f"Written to {path}.")
 
 

@@ -2,8 +2,6 @@
 
 import dataclasses
 
-import pytest
-
 from rebound_cli.campaign import run as running
 from rebound_cli.campaign.plan import work_out
 from rebound_cli.detectors import campaigns, pilot
@@ -11,7 +9,6 @@ from rebound_cli.detectors import flights as flown
 from rebound_cli.detectors.flights import FlightCase
 from rebound_cli.detectors.hits import draw_case
 from rebound_cli.detectors_report.bars import MET, MISSED, REPORTED, Bar, summary_text
-from rebound_cli.detectors_report.command import END_MARK, START_MARK, with_tables
 from rebound_cli.detectors_report.comparison import comparison_bars
 from rebound_cli.detectors_report.flights import flight_bars
 from rebound_cli.detectors_report.hit_bars import hit_bars
@@ -110,13 +107,6 @@ def test_missed_bars_are_named_on_the_terminal():
         [Bar("speed", "≤ 1", "2", False, "9 hits"), Bar("height", "≤ 1", "1", True), Bar("x", "", "", None)]
     )
     assert "1 of 2 bars are met" in text and "missed: speed: wanted ≤ 1, measured 2 (9 hits)" in text
-
-
-def test_only_what_stands_between_the_marks_is_made_anew():
-    document = f"# Detection\n\nprose\n\n{START_MARK}\nold\n{END_MARK}\nmore prose\n"
-    assert with_tables(document, "new\n") == document.replace("old\n", "new\n")
-    with pytest.raises(ValueError, match="0 places"):
-        with_tables("no marks", "new")
 
 
 def test_the_command_writes_tables_and_pictures(tmp_path, monkeypatch, capsys):

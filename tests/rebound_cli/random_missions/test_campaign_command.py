@@ -7,7 +7,6 @@ import pytest
 from rebound_cli.campaign import run as running
 from rebound_cli.campaign.plan import Campaign, work_out
 from rebound_cli.campaign_report import command
-from rebound_cli.campaign_report.command import END_MARK, START_MARK, with_tables
 from rebound_cli.campaign_report.flown import Missions
 from rebound_cli.campaign_report.law_bars import law_bars
 from rebound_cli.campaign_report.mission_bars import mission_bars
@@ -16,7 +15,6 @@ from rebound_cli.detectors_report.bars import MET, MISSED, REPORTED
 from rebound_cli.main import main
 from rebound_cli.random_missions.campaign import missions_campaign
 from rebound_cli.random_missions.generator import MissionCase
-from rebound_cli.recoveries.command import DocumentError
 from rebound_cli.recoveries.hits import cases as recovery_cases
 
 # A short mission in which a pole is hit.
@@ -184,18 +182,12 @@ def test_a_single_mission_again_is_the_same_flight_with_its_whole_folder(written
     assert (tmp_path / "again" / "flight.png").exists()
 
 
-def test_a_document_without_the_place_for_the_tables_is_refused():
-    assert with_tables(f"a\n{START_MARK}\nold\n{END_MARK}\n", "new\n") == f"a\n{START_MARK}\nnew\n{END_MARK}\n"
-    with pytest.raises(DocumentError, match="0 places"):
-        with_tables("# Campaign\n", "new\n")
-
-
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
         (".", "", "cannot be made"),
         ("campaign.md", "# Campaign\n", "0 places"),
-        ("recovery.md", "# Recovery\n", "recovery.md has no line"),
+        ("recovery.md", "# Recovery\n", "recovery.md: The document has 0 places"),
     ],
 )
 def test_what_cannot_be_written_is_said_before_anything_is_flown(tmp_path, capsys, monkeypatch, name, text, words):
