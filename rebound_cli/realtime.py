@@ -1,11 +1,11 @@
-"""The companion on a real connection and the real clock."""
+"""The companion or the guard on a real connection and the real clock."""
 
 import os
 import select
 from pathlib import Path
 from typing import Protocol
 
-from companion.companion import Companion
+from companion.companion import Companion, StepResult
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli.console import Console
@@ -78,6 +78,27 @@ class AskPerson:
         return self._typed.split(b"\n")[0].decode(errors="replace").strip().lower()
 
 
+class Stepped(Protocol):
+    """The companion or the guard: bytes and time in, frames and events out."""
+
+    def next_deadline_us(self) -> int: ...
+
+    def step(self, received: bytes, now_us: int) -> StepResult: ...
+
+
+def exchange(
+    stepped: Stepped, connection: Connection, clock: Clock, recorder: FlightRecorder
+) -> tuple[int, StepResult]:
+    """Wait for bytes or the next deadline, take one step, send and record; the time of the step and what came of it."""
+    received = connection.receive(min((stepped.next_deadline_us() - clock.now_us()) / 1e6, LONGEST_WAIT_S))
+    now_us = clock.now_us()
+    result = stepped.step(received, now_us)
+    for frame in result.sent_frames:
+        connection.send(frame)
+    recorder.record(now_us, result)
+    return now_us, result
+
+
 def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -> None:
     """For a mission that waits for a file."""
     if companion.file_awaited is not None and Path(companion.file_awaited).exists():
@@ -98,13 +119,7 @@ def fly_realtime(
     started_us = clock.now_us()
     is_stopped = False
     while not companion.finished:
-        wait_s = min((companion.next_deadline_us() - clock.now_us()) / 1e6, LONGEST_WAIT_S)
-        received = connection.receive(wait_s)
-        now_us = clock.now_us()
-        result = companion.step(received, now_us)
-        for frame in result.sent_frames:
-            connection.send(frame)
-        recorder.record(now_us, result)
+        now_us, result = exchange(companion, connection, clock, recorder)
         if result.events:
             recorder.record_obstacles(companion.obstacles())
         confirmation.poll(companion)

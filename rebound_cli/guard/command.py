@@ -13,9 +13,9 @@ from rebound_cli import run_folder
 from rebound_cli.console import Console, console_for, timeline
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
 from rebound_cli.interrupts import Interrupts
+from rebound_cli.realtime import exchange
 from rebound_cli.run_folder import FlightRecorder
 
-LONGEST_WAIT_S = 0.05
 CONFIG_NAME = "guard.yaml"
 
 
@@ -60,13 +60,7 @@ def _run(
     clock = Clock()
     started_us = clock.now_us()
     while not guard.finished:
-        wait_s = min((guard.next_deadline_us() - clock.now_us()) / 1e6, LONGEST_WAIT_S)
-        received = connection.receive(wait_s)
-        now_us = clock.now_us()
-        result = guard.step(received, now_us)
-        for frame in result.sent_frames:
-            connection.send(frame)
-        recorder.record(now_us, result)
+        now_us, result = exchange(guard, connection, clock, recorder)
         if result.events:
             console.print(timeline(result.events, started_us))
         if interrupts.reason is not None:
