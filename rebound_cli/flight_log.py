@@ -9,14 +9,11 @@ import numpy.typing as npt
 
 from companion.estimate.strapdown import Strapdown
 from companion.mavlink.decode import Decoder
+from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Attitude, ImuSample, LocalPosition
 from companion.shell.tlog import read_tlog
 
 Floats = npt.NDArray[np.float64]
-
-_MAGIC_V2 = 0xFD
-_HEADER_LENGTH = 10
-_CHECKSUM_LENGTH = 2
 
 # Only messages with these ids are decoded; a log holds many more.
 _HIGHRES_IMU = 105
@@ -46,19 +43,19 @@ class FlightLog:
 
 
 def read_flight_log(path: Path) -> FlightLog:
-    """Read what the figure and the table of results need from a log of MAVLink 2 packets."""
+    """Read what the figure and the table of results need from a log."""
     decoder = Decoder()
     imu: list[tuple[float, ...]] = []
     positions: list[tuple[float, ...]] = []
     setpoints: list[tuple[float, ...]] = []
     strapdown = Strapdown()
     for at_us, packet in read_tlog(path):
-        message_id = _message_id(packet)
+        message_id = message_id_of(packet)
         if message_id == _SET_POSITION_TARGET_LOCAL_NED:
-            payload = packet[_HEADER_LENGTH : _HEADER_LENGTH + packet[1]].ljust(_SETPOINT_LENGTH, b"\0")
+            payload = payload_of(packet).ljust(_SETPOINT_LENGTH, b"\0")
             setpoints.append((at_us, *_SETPOINT_POSITION.unpack_from(payload)))
         elif message_id in (_HIGHRES_IMU, _LOCAL_POSITION_NED, *_ATTITUDES):
-            decoder.listen_to(system_id=packet[5], component_id=packet[6])
+            decoder.listen_to(*source_of(packet))
             for _, sample in decoder.feed(packet):
                 if isinstance(sample, ImuSample):
                     force, rates = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
@@ -80,12 +77,6 @@ def read_flight_log(path: Path) -> FlightLog:
         setpoint_at_us=setpoint_rows[:, 0],
         setpoint_ned_m=setpoint_rows[:, 1:4],
     )
-
-
-def _message_id(packet: bytes) -> int | None:
-    if packet[0] != _MAGIC_V2 or len(packet) < _HEADER_LENGTH + _CHECKSUM_LENGTH:
-        return None
-    return packet[7] | packet[8] << 8 | packet[9] << 16
 
 
 def _rows(rows: list[tuple[float, ...]], width: int) -> Floats:

@@ -14,6 +14,16 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.frequent import FREQUENT, finite
+from companion.mavlink.packet import (
+    HEADER_V1,
+    HEADER_V2,
+    MAGIC_V1,
+    MAGIC_V2,
+    message_id_of,
+    packet_length,
+    payload_of,
+    source_of,
+)
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -40,9 +50,6 @@ from companion.messages import (
 
 Frame = tuple[bytes, Sample | None]
 
-MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
-HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
-FLAG_SIGNED = 0x01
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
 # POSITION_TARGET_TYPEMASK: x, y or z.
@@ -187,7 +194,7 @@ class Decoder:
         start = bad_start = 0
         end = len(data)
         while start < end:
-            length = _packet_length(data, start)
+            length = packet_length(data, start)
             if length == 0 or (start + length <= end and not _checksum_holds(data, start, length)):
                 start += 1
                 continue
@@ -208,21 +215,18 @@ class Decoder:
         frames.append((bad, None))
 
     def _sample(self, packet: bytes) -> Sample | None:
-        if packet[0] == MAGIC_V2:
-            source, message_id = (packet[5], packet[6]), packet[7] | packet[8] << 8 | packet[9] << 16
-        else:
-            source, message_id = (packet[3], packet[4]), packet[5]
+        message_id = message_id_of(packet)
         frequent, converter = FREQUENT.get(message_id), self._converters.get(message_id)
         if frequent is None and converter is None:
             return None
-        if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
+        is_from_vehicle = source_of(packet) == self._vehicle
+        if not is_from_vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
             return None
         if converter is not None:
             sample = self._converted(converter, packet)
         else:
             assert frequent is not None
-            start = HEADER_V2 if packet[0] == MAGIC_V2 else HEADER_V1
-            sample = frequent.sample(packet[start : start + packet[1]])
+            sample = frequent.sample(payload_of(packet))
         if isinstance(sample, ImuSample):
             self._boot_us = sample.time_boot_us
         elif self._boot_us > WRAP_US // 2 and isinstance(sample, LocalPosition | Attitude | AttitudeTarget):
@@ -235,23 +239,6 @@ class Decoder:
             return converter(self._mavlink.decode(bytearray(packet)))
         except dialect.MAVError:
             return None
-
-
-def _packet_length(data: bytes, start: int) -> int:
-    """Length of the packet that may begin at `start`: 0 when none can, 1 over the end when not yet known."""
-    magic = data[start]
-    if magic == MAGIC_V2:
-        if len(data) < start + 3:
-            return len(data) - start + 1
-        flags = data[start + 2]
-        if flags & ~FLAG_SIGNED:
-            return 0
-        return HEADER_V2 + data[start + 1] + CHECKSUM + (SIGNATURE if flags else 0)
-    if magic == MAGIC_V1:
-        if len(data) < start + 2:
-            return len(data) - start + 1
-        return HEADER_V1 + data[start + 1] + CHECKSUM
-    return 0
 
 
 def _checksum_holds(data: bytes, start: int, length: int) -> bool:

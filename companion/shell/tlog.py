@@ -4,17 +4,12 @@ import struct
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from companion.mavlink.packet import packet_length
+
 _STAMP = struct.Struct(">Q")
 
 # A killed process must leave a log complete to its last second; half of that leaves room for a slow disk.
 FLUSH_INTERVAL_US = 500_000
-
-_MAGIC_V1 = 0xFE
-_MAGIC_V2 = 0xFD
-_OVERHEAD_V1 = 8
-_OVERHEAD_V2 = 12
-_SIGNATURE_LENGTH = 13
-_SIGNED_FLAG = 0x01
 
 # After foreign bytes the reader looks for the next stamp: this near to the last. Earlier than the last it may be too,
 # as other programs stamp with a clock that can be set back.
@@ -64,8 +59,8 @@ def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
     while position + _STAMP.size < len(content):
         stamp_us = int(_STAMP.unpack_from(content, position)[0])
         start = position + _STAMP.size
-        length = _frame_length(content, start)
-        if length is None or not _plausible(stamp_us, last_us) or not _stamp_follows(content, start + length, stamp_us):
+        length = packet_length(content, start)
+        if length == 0 or not _plausible(stamp_us, last_us) or not _stamp_follows(content, start + length, stamp_us):
             position += 1
             continue
         if start + length > len(content):
@@ -77,7 +72,7 @@ def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
 
 def is_packet(frame: bytes) -> bool:
     """Whether bytes are as long as their own header says: `read_tlog` gives them back; others it passes over."""
-    return len(frame) > 0 and _frame_length(frame, 0) == len(frame)
+    return len(frame) > 0 and packet_length(frame) == len(frame)
 
 
 def _plausible(stamp_us: int, last_us: int | None) -> bool:
@@ -89,13 +84,3 @@ def _stamp_follows(content: bytes, end: int, stamp_us: int) -> bool:
     if end + _STAMP.size > len(content):
         return True
     return _plausible(int(_STAMP.unpack_from(content, end)[0]), stamp_us)
-
-
-def _frame_length(content: bytes, start: int) -> int | None:
-    magic = content[start]
-    if magic == _MAGIC_V1 and start + 1 < len(content):
-        return _OVERHEAD_V1 + content[start + 1]
-    if magic == _MAGIC_V2 and start + 2 < len(content):
-        signed = content[start + 2] & _SIGNED_FLAG
-        return _OVERHEAD_V2 + content[start + 1] + (_SIGNATURE_LENGTH if signed else 0)
-    return None

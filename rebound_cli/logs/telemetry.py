@@ -6,15 +6,13 @@ from pathlib import Path
 
 from companion.link.identity import Identity, identify, is_autopilot
 from companion.mavlink.decode import Decoder
+from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
 
 Packets = list[tuple[int, bytes]]
 Source = tuple[int, int]
-
-_MAGIC_V2 = 0xFD
-_HEADER_V1, _HEADER_V2 = 6, 10
 
 _POSITION_TARGET_LOCAL_NED = 85
 # time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros at the end are left out.
@@ -36,13 +34,13 @@ def read_telemetry(path: Path) -> Log:
     decoder.listen_to(*source)
     heard: list[Heard] = []
     for at_us, packet in packets:
-        if _source(packet) != source:
+        if source_of(packet) != source:
             continue
-        if _message_id(packet) == _POSITION_TARGET_LOCAL_NED:
+        if message_id_of(packet) == _POSITION_TARGET_LOCAL_NED:
             heard.append(Heard(at_us, _demand(packet)))
             continue
         heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
-    kinds = {_message_id(packet) for _, packet in packets if _source(packet) == source}
+    kinds = {message_id_of(packet) for _, packet in packets if source_of(packet) == source}
     losses = [f"{MessageId(number).name} is not in it" for number in _WANTED if number not in kinds]
     if others:
         losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
@@ -71,9 +69,9 @@ def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
     beats: dict[int, Heartbeat] = {}
     imu: Counter[int] = Counter()
     for _, packet in packets:
-        number = _message_id(packet)
+        number = message_id_of(packet)
         if number == MessageId.HIGHRES_IMU:
-            imu[_source(packet)[0]] += 1
+            imu[source_of(packet)[0]] += 1
         elif number == 0:
             for _, sample in decoder.feed(packet):
                 if isinstance(sample, Heartbeat) and is_autopilot(sample):
@@ -87,17 +85,8 @@ def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
     return chosen, ", ".join(str(v.system_id) for v in vehicles if v is not chosen)
 
 
-def _source(packet: bytes) -> Source:
-    return (packet[5], packet[6]) if packet[0] == _MAGIC_V2 else (packet[3], packet[4])
-
-
-def _message_id(packet: bytes) -> int:
-    return packet[7] | packet[8] << 8 | packet[9] << 16 if packet[0] == _MAGIC_V2 else packet[5]
-
-
 def _demand(packet: bytes) -> Demand:
-    header = _HEADER_V2 if packet[0] == _MAGIC_V2 else _HEADER_V1
-    payload = packet[header : header + packet[1]].ljust(_TARGET.size, b"\0")
+    payload = payload_of(packet).ljust(_TARGET.size, b"\0")
     time_ms, x, y, z, vx, vy, vz, *_, mask, _ = _TARGET.unpack_from(payload)
     position = None if mask & _MASK_POSITION or x != x or y != y or z != z else (x, y, z)
     velocity = None if mask & _MASK_VELOCITY or vx != vx or vy != vy or vz != vz else (vx, vy, vz)

@@ -8,6 +8,7 @@ from operator import itemgetter
 from pathlib import Path
 
 from companion.mavlink.encode import COMPONENT_ID
+from companion.mavlink.packet import source_of
 from companion.mission.model import Mission
 from companion.shell.tlog import read_tlog
 from rebound_cli.documents import load_document
@@ -23,8 +24,6 @@ from rebound_cli.run_folder import (
     read_records,
     read_text,
 )
-
-_MAGIC_V2 = 0xFD
 
 
 @dataclass(slots=True)
@@ -104,4 +103,4 @@ def _steps(tlog: Path) -> dict[int, Step]:
 
 
 def _is_ours(packet: bytes) -> bool:
-    return packet[6 if packet[0] == _MAGIC_V2 else 4] == int(COMPONENT_ID)
+    return source_of(packet)[1] == int(COMPONENT_ID)
