@@ -22,7 +22,7 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
     axis.plot(asked[:, 1], asked[:, 0], label="setpoints sent", **ASKED)
     axis.plot(flown[:, 1], flown[:, 0], label="path measured", **MEASURED)
     shown = np.concatenate([asked[:, :2], flown[:, :2]])
-    # A setpoint that asks for an acceleration alone has no place.
+    # A setpoint that asks for an acceleration or an attitude alone has no place.
     shown = shown[np.isfinite(shown).all(axis=1)]
     for number, (_, obstacle) in enumerate(scene.obstacles() if scene else ()):
         corners = footprint(obstacle) - origin[:2]
@@ -32,12 +32,9 @@ def draw_map(axis: Any, log: FlightLog, report: FlightReport, scene: Scene | Non
     for number, collision in enumerate(report.collisions):
         north, east = collision.position_ned_m[0] - origin[0], collision.position_ned_m[1] - origin[1]
         axis.plot([east], [north], "o", color=DETECTED, label="hit detected" if number == 0 else None)
-    # A setpoint that only says how to lean has no place.
-    shown = shown[np.isfinite(shown).all(axis=1)]
     if len(shown):
         # A wall may be far longer than the flight: the flight is what is looked at.
-        # A setpoint that only leans the vehicle has no place.
-        least, most = np.nanmin(shown, axis=0), np.nanmax(shown, axis=0)
+        least, most = shown.min(axis=0), shown.max(axis=0)
         (north, east), half_m = 0.5 * (least + most), 0.5 * float((most - least).max()) + 1.0
         axis.set(xlim=(east - half_m, east + half_m), ylim=(north - half_m, north + half_m), aspect="equal")
     finish(axis, "From above", "east of the take-off point [m]", "north of the take-off point [m]")

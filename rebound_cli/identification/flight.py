@@ -31,6 +31,8 @@ _CARRIED_SIGMA_M_S = 0.1
 _FEWEST_SAMPLES = 3
 # A sample this near to the usual +-16 g (156.9) has clipped raw samples in it and shows too little: no spring makes it.
 _CLIPPED_M_S2 = 140.0
+# A sample is the mean of raw ones: with a third of them clipped it shows this, whatever the others do.
+_MAY_BE_CLIPPED_M_S2 = _CLIPPED_M_S2 / 3
 # A push that rises again to this share over its first decay has met the stop of the arms.
 _STOP_RISE = 1.3
 
@@ -73,7 +75,7 @@ def _hit(name: str, log: FlightLog, touch: int, release: int) -> Hit | None:
     if not before.any():
         return None
     arriving = horizontal[before].mean(axis=0)
-    is_clipped = bool((np.abs(log.specific_force_frd_m_s2[touch : release + 1]) > _CLIPPED_M_S2 / 3).any())
+    is_clipped = bool((np.abs(log.specific_force_frd_m_s2[touch : release + 1]) > _MAY_BE_CLIPPED_M_S2).any())
     leaving = _carried_back(log, release) if is_clipped else _soon_after(log, float(release_us), arriving)
     if leaving is None:
         return None
@@ -119,7 +121,8 @@ def _carried_back(log: FlightLog, release: int) -> Floats | None:
     gained = [np.interp(log.position_at_us[later], log.imu_at_us, summed[:, axis]) for axis in range(2)]
     back: Floats = (log.velocity_ned_m_s[later, :2] - np.column_stack(gained)).mean(axis=0)
     # The first sample after the contact: the sum takes half of each sample's mean to be still to come.
-    return back + summed[min(release + 1, len(summed) - 1)]
+    carried: Floats = back + summed[min(release + 1, len(summed) - 1)]
+    return carried
 
 
 def _direction(lateral: Floats) -> tuple[Floats, int]:

@@ -7,21 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from rebound_cli.head_on import AFTER_S, HeadOnHit, head_on
 from rebound_cli.paper.figures import CONTACT, finish, new_figure
 from rebound_cli.paper.flights import Flight, Floats, Result
 from rebound_cli.paper.study import Findings
 from rebound_cli.paper.table import around
-from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.plant import Plant
-from sim_vehicle.scene import Scene
-from sim_vehicle.truth import Hit
+from sim_vehicle.airframe import load_built_in
 
 # The paper, section IV.
 DAMPING_PER_S, STIFFNESS_PER_S2, FOLD_MAX_M = 30.0, 500.0, 0.03
 IMPACT_M_S, REBOUND_M_S = 1.4, 0.28
-
-# The wall is far above the ground and met at once, so that the fall counts for nothing.
-HEIGHT_M, GAP_M, AFTER_S = 5.0, 0.02, 0.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,34 +63,6 @@ class SpringResponse:
     def at(self, time_s: float) -> tuple[float, float]:
         """Fold (m) and its rate (m/s)."""
         return float(self.fold_m(np.array(time_s))), float(self.rate_m_s(np.array(time_s)))
-
-
-@dataclass(frozen=True, slots=True)
-class ArmHit:
-    """A single head-on hit of the level vehicle, motors off, without drag and friction."""
-
-    hit: Hit
-    time_s: Floats
-    fold_m: Floats
-    speed_m_s: Floats
-    """Into the wall."""
-
-
-def head_on(airframe: Airframe, speed_m_s: float) -> ArmHit:
-    """Throw the vehicle at a wall; the arms' fold over the time since the first touch."""
-    data = airframe.model_dump()
-    data["drag_n_s_m"] = 0.0
-    data["surface"]["guard_friction"] = 0.0
-    wall = {"point_ned_m": [0, 0, -HEIGHT_M], "normal_ned": [-1, 0, 0]}
-    plant = Plant(Airframe.model_validate(data), Scene.model_validate({"walls": [wall]}), seed=1)
-    geometry = airframe.geometry
-    touch_m = geometry.motor_radius_m / math.sqrt(2.0) + geometry.guard_radius_m
-    plant.place((-touch_m - GAP_M, 0.0, -HEIGHT_M), (speed_m_s, 0.0, 0.0))
-    for _ in range(round((GAP_M / speed_m_s + AFTER_S) * 1e6 / plant.interval_us)):
-        plant.step(None, armed=False)
-    hit, series = plant.truth.hits[0], plant.truth.series()
-    time_s = 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us)
-    return ArmHit(hit, time_s, series["arm_fold_m"].max(axis=1), series["velocity_ned_m_s"][:, 0])
 
 
 def flights(seeds: int) -> list[Flight]:
@@ -181,7 +148,7 @@ one at which a wall lets go.
 """
 
 
-def _figure(single: ArmHit, arms: Any) -> Any:
+def _figure(single: HeadOnHit, arms: Any) -> Any:
     figure, axes = new_figure(1, 1, "An arm folds and unfolds: head-on hit at 1.4 m/s", width=8.0, height=4.2)
     axis = axes[0, 0]
     response = SpringResponse(DAMPING_PER_S, STIFFNESS_PER_S2, IMPACT_M_S)

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from rebound_cli.head_on import head_on
 from rebound_cli.paper.approach import approach
-from rebound_cli.paper.arm import head_on
 from rebound_cli.paper.figures import add_legend, draw_position, draw_velocity, finish, new_figure
-from rebound_cli.paper.flight_tests import SAFE_FORCE_N, safety_text
+from rebound_cli.paper.flight_tests import safety_text
 from rebound_cli.paper.flights import Flight, Floats, Result
 from rebound_cli.paper.study import Findings, sampling_text
 from rebound_cli.paper.table import Row, around, at_least, at_most, markdown, within_factor
+from rebound_cli.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.scene import Scene
@@ -159,7 +160,7 @@ def _force_rows(foldable: Sequence[Pulse]) -> tuple[Row, ...]:
             "factor of safety at 5 m/s, 185 N over the peak",
             "1.85 at 100 N",
             1.0,
-            SAFE_FORCE_N / fastest.peak_force_n,
+            BREAKING_FORCE_N / fastest.peak_force_n,
             "",
             "185 N / 463 N = 0.40 with an ideal stop",
         ),

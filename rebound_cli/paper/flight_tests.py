@@ -10,6 +10,7 @@ from rebound_cli.paper.figures import add_legend, draw_position, draw_velocity, 
 from rebound_cli.paper.flights import Flight, Result
 from rebound_cli.paper.study import Findings, sampling_text
 from rebound_cli.paper.table import Row, around, at_least, at_most, markdown, number
+from rebound_cli.summary import BREAKING_FORCE_N
 
 PAPER_SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
 BEYOND_M_S = (3.0, 4.0, 5.0)
@@ -127,12 +128,10 @@ than a tenth of the contact lies in `HIGHRES_IMU` samples that arrived. *Factor 
 the second after the first touch, negative where the thrust always pointed away.
 """
 
-SAFE_FORCE_N = 185.0
-
 
 def safety_text(peak_force_n: float) -> str:
     """The paper's factor of safety at this force, flagged where the arm would not hold."""
-    factor = SAFE_FORCE_N / peak_force_n
+    factor = BREAKING_FORCE_N / peak_force_n
     return f"{factor:.2f}" if factor >= 1.0 else f"**{factor:.2f}**"
 
 
@@ -166,8 +165,9 @@ def _figure(results: Sequence[Result], airframe: str, speeds: Sequence[float]) -
     title = f"{airframe}: straight into a wall, recovery setpoint γ v_c back (γ = 0.5)"
     figure, axes = new_figure(2, len(speeds), title, width=3.9, height=3.2)
     for column, speed_m_s in enumerate(speeds):
-        drawn = [result for result in of(results, airframe, (speed_m_s,)) if result.track is not None]
-        for result in drawn:
+        for result in of(results, airframe, (speed_m_s,)):
+            if result.track is None:
+                continue
             seen = "" if result.first.is_detected else ", not seen: its sample was lost"
             draw_position(axes[0, column], result.track, f"v_c = {speed_m_s:g} m/s{seen}")
             draw_velocity(axes[1, column], result.track, "")

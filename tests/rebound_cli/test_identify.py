@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from rebound_cli.documents import load_document, validated
+from rebound_cli.head_on import head_on
 from rebound_cli.identification.fit import fit_friction, fit_restitution, fit_restitution_with_loss, fit_spring
 from rebound_cli.identification.hit import IdentificationError
 from rebound_cli.identification.motion import find_hit
 from rebound_cli.identification.report import leave_one_out
 from rebound_cli.identification.table import read_table
-from rebound_cli.sensitivity import head_on_hit
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.scene import Scene
@@ -96,7 +96,7 @@ def test_a_rigid_vehicle_has_a_restitution_and_no_spring(tmp_path):
     hit = find_hit(read_table(file))
     # A contact of 1 ms lies between two samples: any stiff spring would fit.
     assert fit_spring([hit]) is None
-    truth = head_on_hit(airframe, 1.2)
+    truth = head_on(airframe, 1.2).hit
     assert fit_restitution([hit]).restitution.value == pytest.approx(truth.rebound_speed_m_s / 1.2, abs=0.02)
     assert fit_restitution([hit]).restitution.value == pytest.approx(0.9, abs=0.02)
 

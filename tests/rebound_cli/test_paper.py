@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from companion.mission.model import Mission
+from rebound_cli.head_on import head_on
 from rebound_cli.paper import (
     arm,
     causes,
@@ -95,7 +96,7 @@ def test_a_hover_takes_the_stated_share_of_thrust():
 
 
 def hit_between(start_us, end_us):
-    (template,) = [claims.head_on(load_built_in("rigid"), 1.0).hit]
+    (template,) = [head_on(load_built_in("rigid"), 1.0).hit]
     return dataclasses.replace(template, contact_at_boot_us=start_us, ended_at_boot_us=end_us)
 
 
