@@ -1,6 +1,5 @@
 """`rebound results`: the paper's comparison, flown in lockstep and written as a table."""
 
-import multiprocessing
 import platform
 import tempfile
 from argparse import Namespace
@@ -17,8 +16,8 @@ from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.paper.flights import DETECTOR, GAMMA_S, LAW
-from rebound_cli.progress import with_progress
-from rebound_cli.run_folder import TLOG_NAME, FlightRecorder, make_folder
+from rebound_cli.processes import in_processes
+from rebound_cli.run_folder import TLOG_NAME, FlightRecorder, make_place
 from rebound_cli.sensitivity import stop_sensitivity_text
 from rebound_cli.summary import FlightFacts, build_summary
 from rebound_cli.truth_match import match_contacts
@@ -74,17 +73,14 @@ class CaseFigures:
 
 def run_results(options: Namespace) -> int:
     """Fly every case and write the table. 0 when the file is written, whatever it says."""
-    make_folder(options.out.parent)
+    make_place(options.out)
     cases = [
         Case(airframe, speed_m_s, seed)
         for airframe in AIRFRAMES
         for speed_m_s in SPEEDS_M_S
         for seed in range(1, options.seeds + 1)
     ]
-    # Compiled kernels are in the cache after one flight; two processes would compile them twice.
-    fly_case(cases[0])
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        figures = list(with_progress(pool.imap_unordered(fly_case, cases), len(cases)))
+    figures = in_processes(fly_case, cases, options.jobs)
     options.out.write_text(results_text(figures, options.seeds), encoding="utf-8")
     print(f"Written to {options.out}.")
     return 0

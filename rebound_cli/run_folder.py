@@ -90,6 +90,13 @@ def make_folder(folder: Path) -> None:
         raise RunFolderError(f"The folder {folder} cannot be written to.")
 
 
+def make_place(file: Path) -> None:
+    """The same for a single file, of which only the folder is made."""
+    make_folder(file.parent)
+    if file.is_dir() or (file.exists() and not os.access(file, os.W_OK)):
+        raise RunFolderError(f"{file} cannot be written to.")
+
+
 class FlightRecorder:
     """Writes packets and events as they happen and keeps the events for the timeline.
 

@@ -1,12 +1,9 @@
 """Working a campaign out on Dask: a local cluster of processes, or a scheduler that is already there."""
 
 import logging
-import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +12,7 @@ from distributed import Client, LocalCluster, as_completed
 from companion.errors import ReboundError
 from rebound_cli.campaign.plan import Campaign, Json, Outcome, code_version, work_out
 from rebound_cli.campaign.record import Record
+from rebound_cli.interrupts import ctrl_c_waiting
 from rebound_cli.progress import with_progress
 
 # Cases handed to a worker at a time: a task costs Dask a millisecond or two, a case takes 50 and more.
@@ -82,7 +80,7 @@ def _outcomes(campaign: Campaign, missing: Sequence[tuple[int, Any]], workers: W
     if not rest:
         return
     logging.getLogger("distributed").setLevel(logging.ERROR)
-    with _ctrl_c_waiting() as pressed:
+    with ctrl_c_waiting() as pressed:
         started = _client(workers)
     with started as client:
         if pressed:
@@ -98,24 +96,6 @@ def _outcomes(campaign: Campaign, missing: Sequence[tuple[int, Any]], workers: W
                 # Not the cases' own exceptions, which are outcomes: a worker that died, time and again.
                 yield from (Outcome(number, None, f"worker lost: {future.exception()!r}") for number, _ in task)
             future.release()
-
-
-@contextmanager
-def _ctrl_c_waiting() -> Iterator[list[int]]:
-    """Meanwhile Ctrl-C is only noted, and the processes that are started never hear of it.
-
-    It reaches every process of the terminal; workers that hear it each print a traceback. They inherit what is blocked.
-    """
-    pressed: list[int] = []
-    # It unblocks the signal when it starts, which is with the first worker otherwise.
-    resource_tracker.ensure_running()
-    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield pressed
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        signal.signal(signal.SIGINT, before)
 
 
 def _client(workers: Workers) -> Client:

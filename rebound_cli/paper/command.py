@@ -1,8 +1,7 @@
 """`rebound paper`: flies every study and writes pictures, table and the result section of docs/paper.md."""
 
-import multiprocessing
 from argparse import Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from rebound_cli import __version__
@@ -18,10 +17,10 @@ from rebound_cli.paper import (
     simulation_experiment,
 )
 from rebound_cli.paper.arguments import DEFAULT_SEEDS
-from rebound_cli.paper.flights import Flight, Result, fly
+from rebound_cli.paper.flights import fly
 from rebound_cli.paper.study import Findings, Study, concluded
 from rebound_cli.paper.table import Row, rows_text
-from rebound_cli.progress import with_progress
+from rebound_cli.processes import in_processes
 from rebound_cli.run_folder import make_folder
 
 STUDIES: tuple[Study, ...] = (
@@ -44,7 +43,7 @@ def run_paper(options: Namespace) -> int:
     make_folder(options.out)
     checked_text(options.out / DOCUMENT_NAME, PART, TITLE)
     planned = [study.flights(options.seeds) for study in STUDIES]
-    results = _fly_all([flight for flights in planned for flight in flights], options.jobs)
+    results = in_processes(fly, [flight for flights in planned for flight in flights], options.jobs)
     findings, first = [], 0
     for study, flights in zip(STUDIES, planned, strict=True):
         findings.append(concluded(study, results[first : first + len(flights)]))
@@ -54,16 +53,6 @@ def run_paper(options: Namespace) -> int:
     print(verdict_text(rows))
     print(f"Written to {options.out / DOCUMENT_NAME} and {options.out / PICTURES_FOLDER}.")
     return 0
-
-
-def _fly_all(flights: Sequence[Flight], jobs: int) -> list[Result]:
-    """The results in the order of the flights, whichever is flown first."""
-    # Compiled kernels are in the cache after one flight; two processes would compile them twice.
-    results = [fly(flights[0])]
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        rest: Iterable[Result] = pool.imap(fly, flights[1:])
-        results.extend(with_progress(rest, len(flights) - 1))
-    return results
 
 
 def verdict_text(rows: Sequence[Row]) -> str:

@@ -1,5 +1,9 @@
 """The table of results: what one flight adds to it, and what it says of many."""
 
+import pytest
+
+from rebound_cli import results
+from rebound_cli.main import main
 from rebound_cli.results import Case, CaseFigures, HitFigures, case_document, fly_case, results_text
 
 
@@ -52,3 +56,9 @@ def test_a_row_counts_all_flights_and_takes_the_worst_where_the_worst_matters():
 def test_flights_without_hits_leave_empty_cells():
     row = next(line for line in results_text([], seeds=20).splitlines() if line.startswith("| 1 |"))
     assert [cell.strip() for cell in row.strip("|").split("|")][:3] == ["1", "0 of 0", "0"]
+
+
+def test_a_place_that_cannot_be_written_to_is_said_before_anything_is_flown(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(results, "in_processes", lambda *_: pytest.fail("flown"))
+    assert main(["results", "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err == f"rebound: {tmp_path} cannot be written to.\n"
