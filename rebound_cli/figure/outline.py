@@ -21,10 +21,11 @@ def footprint(obstacle: Obstacle) -> Floats:
     else:
         points = _corners(obstacle if isinstance(obstacle, Box) else obstacle.box())
     try:
-        return points[ConvexHull(points).vertices]
+        hull: Floats = points[ConvexHull(points).vertices]
     except QhullError:
         # thinner than can be told from a line
         return points
+    return hull
 
 
 def _ring(centre_ned_m: Floats, radius_m: float) -> Floats:
