@@ -9,7 +9,7 @@ that fails turns the vehicle too.
 import math
 from dataclasses import dataclass, field
 
-from companion.estimate.strapdown import Strapdown
+from companion.estimate.strapdown import ZERO, Strapdown
 from companion.messages import Vector3
 
 # The velocities before the newest that it is compared with: enough to halve their noise, few enough to be recent.
@@ -25,6 +25,11 @@ MEMORY, RISE = 100, 10
 UNSEEN_SHARE = 0.1
 # A vehicle's velocity estimate lags by no more than this (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
+# Vibration that falls between the samples is missing in their sum. A rotor's that beats with the stream, 87 Hz with
+# samples 8 and 12 ms apart, has one sign there for tenths of a second: its amplitude (1.4 of both axes' true spreads,
+# and the floor reads half too much), over what is not seen of the 0.1 s that the velocities compared are apart, with
+# some reserve; and, with every sample seen, over what a velocity's stamp of a millisecond and a lost sample leave open.
+SHAKEN_S, STAMP_S = 0.15, 0.008
 # A step of the rates marks the gap that the contact fell into for this long: the velocity's interval and its delay.
 RATE_STEP_KEPT_US = 120_000
 
@@ -36,6 +41,11 @@ class Aftermath:
     averaging_us: int
     strapdown: Strapdown = field(default_factory=Strapdown)
     previous_imu_us: int = 0
+    earlier_imu_us: int = 0
+    earlier_rates_rad_s: Vector3 = ZERO
+    """Of the sample before the previous one."""
+    spun_rad_s: float = 0.0
+    """By how much the rates stepped at the previous sample, if the newest one keeps it: the lesser of the two steps."""
     newest_rate_step_rad_s: float = 0.0
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
@@ -58,14 +68,17 @@ class Aftermath:
             unseen_us = time_us - before_us - self.averaging_us
             unseen = unseen_us / (time_us - before_us) if unseen_us > 0 else 0.0
             self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
+            before = self.newest_rate_step_rad_s
             step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
+            self.spun_rad_s = min(before, math.dist(w, self.earlier_rates_rad_s)) if before > 0.0 else 0.0
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         else:
-            self.newest_rate_step_rad_s = 0.0
+            self.newest_rate_step_rad_s = self.spun_rad_s = 0.0
             self.forget()
-        self.previous_imu_us = before_us
+        self.earlier_imu_us, self.previous_imu_us = self.previous_imu_us, before_us
+        self.earlier_rates_rad_s = (p_0, q_0, r_0)
 
     def forget(self) -> None:
         """The sum has a hole, a contact in it, or the estimator was reset: what was before is no measure."""
@@ -113,6 +126,10 @@ class Aftermath:
     def spread_m_s(self) -> float:
         """Of a quiet vehicle's steps, each axis; without bound until enough are known."""
         return math.sqrt(self.variance_m2_s2) if self.known >= TRUSTED else math.inf
+
+    def shaken_m_s(self, shaking_m_s2: float) -> float:
+        """What vibration of this spread may add to the velocity without the samples showing it."""
+        return shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S)
 
     def rate_step_near(self, velocity_us: int) -> float:
         """The largest step of the rates from sample to sample that a jump at ``velocity_us`` may belong to."""

@@ -10,8 +10,9 @@ contact, each against what this vehicle shows in its own flight:
 * aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
   the rates jumped, too.
 
-What was touched is `classify`'s; a touch that begins softly on a vehicle that hardly moves is looked at for a moment
-before it is called a hit or a hand.
+A vehicle that turns from one sample to the next as no motor turns it was hit between them, whatever its accelerometer
+shows. What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment
+before it is called a hit or a hand (see `soft`).
 """
 
 import math
@@ -20,17 +21,18 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from companion.detection.aftermath import Aftermath
-from companion.detection.classify import hovers, kind_of
+from companion.detection.classify import kind_of
 from companion.detection.floor import Floor
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.detection.soft import SoftTouch
 from companion.detection.thrust import ThrustGain
 from companion.estimate.rotation import body_to_ned, ned_to_body
+from companion.estimate.strapdown import ZERO
 from companion.messages import (
     Attitude,
     AttitudeTarget,
     ImuSample,
-    LandedState,
     LocalPosition,
     MessageId,
     Odometry,
@@ -43,11 +45,6 @@ SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
 # 11 m/s^2 in one sample, nothing in the next): the next one must show it, too.
 CLEAR = 1.6
-# Vibration that falls between the samples is missing in their sum. A rotor's that beats with the stream, 87 Hz with
-# samples 8 and 12 ms apart, has one sign there for tenths of a second: its amplitude (1.4 of both axes' true spreads,
-# and the floor reads half too much), over what is not seen of the 0.1 s that the velocities compared are apart, with
-# some reserve; and, with every sample seen, over what a velocity's stamp of a millisecond and a lost sample leave open.
-SHAKEN_S, STAMP_S = 0.15, 0.008
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -67,9 +64,7 @@ class FusedState(DetectorState):
     odometry_boot_us: int | None = None
     reset_counter: int = 0
     contact_began_boot_us: int = 0
-    held_since_boot_us: int | None = None
-    held_free_until_us: int = 0
-    held_in_hover: bool = False
+    soft: SoftTouch = field(default_factory=SoftTouch)
 
 
 class FusedDetector:
@@ -98,7 +93,9 @@ class FusedDetector:
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
         kind = type(sample)
         if kind is ImuSample:
-            return state, self._imu(state, sample, situation)  # type: ignore[arg-type]
+            impact = self._imu(state, sample, situation)  # type: ignore[arg-type]
+            state.soft.imu(state.last_sample_boot_us, sample.specific_force_frd_m_s2)  # type: ignore[union-attr]
+            return state, impact
         match sample:
             case Odometry():
                 return state, self._odometry(state, sample, situation)
@@ -119,7 +116,7 @@ class FusedDetector:
         s.aftermath.imu(now_us, f, w)
         before_us, s.last_sample_boot_us = s.last_sample_boot_us, now_us
         f_x, f_y, f_z = f
-        off = _why_off(situation)
+        off = situation.why_off
         x, y = f_x - s.floor.x, f_y - s.floor.y
         side = math.sqrt(x * x + y * y)
         turning = abs(w[0]) + abs(w[1]) + abs(w[2])
@@ -128,9 +125,9 @@ class FusedDetector:
             room = self._vertical_threshold(s)
             jolted = s.aftermath.newest_rate_step_rad_s > self._config.jolt_rad_s and self._is_jolt(s, side, f_z)
             if -s.thrust.most_m_s2(now_us) - room < f_z < room and not jolted:
-                s.held_since_boot_us = None
+                s.soft.since_boot_us = None
                 self._learn(s, f, before_us)
-                return None
+                return self._spun(s, situation)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
             self._learn(s, f, before_us)
@@ -177,7 +174,7 @@ class FusedDetector:
 
     def _quiet(self, s: FusedState, f: Vector3, before_us: int) -> None:
         now_us = s.last_sample_boot_us
-        s.held_since_boot_us = None
+        s.soft.since_boot_us = None
         self._learn(s, f, before_us)
         if s.phase is Phase.OFF:
             s.phase, s.off_reason, s.last_loud_boot_us = Phase.QUIET, "", now_us
@@ -188,10 +185,13 @@ class FusedDetector:
     def _loud(
         self, s: FusedState, sample: ImuSample, situation: Situation, force: Vector3, size: float, ratio: float
     ) -> Impact | None:
-        now_us = s.last_sample_boot_us
+        now_us, soft = s.last_sample_boot_us, s.soft
+        jumps = soft.turns(now_us, s.aftermath.newest_rate_step_rad_s)
+        jumps = jumps or soft.jumps(now_us, sample.specific_force_frd_m_s2, s.threshold_m_s2)
         if s.phase is Phase.CONTACT:
             s.last_loud_boot_us = now_us
-            if now_us - s.contact_began_boot_us > WORSE_AFTER_US and size > WORSE * s.peak_specific_force_m_s2:
+            is_another = jumps if soft.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
+            if is_another and size > WORSE * s.peak_specific_force_m_s2:
                 return self._fire(s, now_us, situation, force, s.aftermath.previous_imu_us, Evidence.FORCE, 1.0)
             s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             if now_us - s.contact_began_boot_us > self._longest_us:
@@ -206,29 +206,18 @@ class FusedDetector:
             self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
             return None
         free_until_us = min(now_us - self._averaging_us, s.aftermath.previous_imu_us)
-        if s.held_since_boot_us is not None:
-            free_until_us = s.held_free_until_us
+        if soft.since_boot_us is not None:
+            free_until_us = soft.free_until_us
         kind = None
         is_doubtful = ratio < CLEAR and s.threshold_m_s2 > SHAKING * self._config.side_threshold_m_s2
-        if size < self._config.soft_m_s2 and self._hovers(s):
-            if self._held_us(s, free_until_us) < self._soft_us:
+        if size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps:
+            if soft.looked_at_us(now_us, free_until_us) < self._soft_us:
                 return None
             kind = ImpactKind.CONTACT
-        elif is_doubtful and self._held_us(s, free_until_us) == 0:
+        elif is_doubtful and soft.looked_at_us(now_us, free_until_us) == 0:
             return None
         confidence = min(1.0, 0.5 * ratio)
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, confidence, kind)
-
-    def _held_us(self, s: FusedState, free_until_us: int) -> int:
-        """How long the present doubtful force has been looked at."""
-        if s.held_since_boot_us is None:
-            s.held_in_hover = self._hovers(s)
-            s.held_since_boot_us, s.held_free_until_us = s.last_sample_boot_us, free_until_us
-        return s.last_sample_boot_us - s.held_since_boot_us
-
-    def _hovers(self, s: FusedState) -> bool:
-        """Whether it did when the force began: a hand soon moves what it holds."""
-        return hovers(s.velocity_ned_m_s) if s.held_since_boot_us is None else s.held_in_hover
 
     def _fire(
         self,
@@ -252,8 +241,22 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.held_since_boot_us = None
+        s.soft.fired(now_us, kind is ImpactKind.CONTACT)
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
+
+    def _spun(self, s: FusedState, situation: Situation) -> Impact | None:
+        """Turned as no motor turns a vehicle, and nothing else to see: hit before the sample that showed it first."""
+        a, config = s.aftermath, self._config
+        if a.spun_rad_s < config.spin_rad_s or s.phase is not Phase.ARMED:
+            return None
+        free_until_us, over_s = a.earlier_imu_us, 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
+        if a.spun_rad_s < config.spin_rad_s + config.spin_rad_s2 * over_s:
+            return None
+        # Which way it was pushed does not show: as an obstacle does that is in the vehicle's way.
+        v = s.velocity_ned_m_s or ZERO
+        force = ned_to_body(a.strapdown.attitude_wxyz, (-v[0] / over_s, -v[1] / over_s, -v[2] / over_s))
+        a.forget()
+        return self._fire(s, s.last_sample_boot_us, situation, force, free_until_us, Evidence.AFTERMATH, 1.0)
 
     # --- aftermath --------------------------------------------------------------------------------------------
 
@@ -266,14 +269,18 @@ class FusedDetector:
     def _local_position(self, s: FusedState, sample: LocalPosition, situation: Situation) -> Impact | None:
         told = s.odometry_boot_us
         if told is not None and sample.time_boot_us - told < ODOMETRY_KEPT_US:
-            s.velocity_ned_m_s = sample.velocity_ned_m_s
+            self._moves(s, sample.time_boot_us, sample.velocity_ned_m_s)
             return None
         return self._velocity(s, sample.time_boot_us, sample.velocity_ned_m_s, situation, 2.0)
+
+    def _moves(self, s: FusedState, time_us: int, velocity_ned_m_s: Vector3) -> None:
+        s.velocity_ned_m_s = velocity_ned_m_s
+        s.soft.velocity(time_us, velocity_ned_m_s)
 
     def _velocity(
         self, s: FusedState, time_us: int, velocity_ned_m_s: Vector3, situation: Situation, caution: float
     ) -> Impact | None:
-        s.velocity_ned_m_s = velocity_ned_m_s
+        self._moves(s, time_us, velocity_ned_m_s)
         aftermath, config = s.aftermath, self._config
         step = aftermath.step_m_s(time_us, velocity_ned_m_s)
         rests = time_us - s.last_loud_boot_us < self._rest_us or not situation.estimate_trusted
@@ -289,8 +296,7 @@ class FusedDetector:
         least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
         p, q, _ = aftermath.strapdown.rates_frd_rad_s
         shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
-        shaken = shaking * (SHAKEN_S * aftermath.unseen_share + STAMP_S)
-        room = config.velocity_per_rate_m * (abs(p) + abs(q)) + shaken
+        room = config.velocity_per_rate_m * (abs(p) + abs(q)) + aftermath.shaken_m_s(shaking)
         threshold = caution * max(least, config.noise_factor * spread_m_s) + room
         if size < threshold or s.phase is not Phase.ARMED:
             return None
@@ -304,10 +310,3 @@ class FusedDetector:
         v = velocity_ned_m_s
         before = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence, None, before)
-
-
-def _why_off(situation: Situation) -> str | None:
-    """The flight's reason, or the ground: feet that stand on it shake and push."""
-    if situation.off_reason is not None:
-        return situation.off_reason
-    return "on the ground" if situation.landed_state is LandedState.ON_GROUND else None

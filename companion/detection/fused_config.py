@@ -30,12 +30,17 @@ class FusedConfig(Written):
     # of a force threshold, on z against the mean, it is a contact that grazes; alone it is no hit.
     jolt_rad_s: Positive = 0.4
     jolt_rad_s2: Positive = 200.0
+    # Spun: the same without any force in the samples, kept by the next one; twice of what motors can, so that a nimbler
+    # vehicle's flips are none. A rigid vehicle that meets a leaning wall at 2 m/s steps by 15 rad/s and more.
+    spin_rad_s: Positive = 2.0
+    spin_rad_s2: Positive = 400.0
     # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
     rearm_quiet_s: Positive = 0.04
     # Longer loud than this is no contact but a new way to shake, and is learnt.
     longest_contact_s: Positive = 0.5
     # After a contact the estimate swings (its delay, a filter's switching): velocities count again after this.
     velocity_rest_s: Positive = 0.15
-    # A hand is slower than an obstacle: below `soft_m_s2` on a hovering vehicle wait for the force to show itself.
+    # A hand is slower than an obstacle: below `soft_m_s2` on a hovering vehicle wait for the force to show itself, for
+    # so long at most; a force that jumps is no hand's (see `soft`).
     soft_m_s2: Positive = 8.0
     soft_wait_s: Positive = 0.02

@@ -58,6 +58,13 @@ class Situation(NamedTuple):
     setpoint_position_ned_m: Vector3 | None = None
     estimate_trusted: bool = True
 
+    @property
+    def why_off(self) -> str | None:
+        """The flight's reason, or the ground: feet that stand on it shake and push."""
+        if self.off_reason is not None:
+            return self.off_reason
+        return "on the ground" if self.landed_state is LandedState.ON_GROUND else None
+
 
 @dataclass(frozen=True, slots=True)
 class Impact:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.detection.aftermath import Aftermath
 from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
@@ -239,11 +240,52 @@ def test_a_hand_is_a_contact_and_a_thrown_ball_is_not():
     assert [(i.kind, i.is_collision) for i in ball] == [(ImpactKind.STRUCK, True)]
 
 
-@pytest.mark.parametrize("late_us", [0, 4_000, 8_000, 12_000])
-def test_a_hand_that_soon_moves_what_it_holds_is_still_a_hand(late_us):
-    """Given a hover that drifts, when a push carries it past a hover's speed while it is still looked at."""
-    hand = Flight(pulse((6.0, 0.0, 0.0), HIT_US + late_us, 400_000), velocity=(0.12, 0.0, 0.0)).fly()
-    assert not hand[0].is_collision
+@pytest.mark.parametrize("imu_every_us", [4_000, 20_000])
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.12])
+def test_a_hand_that_soon_moves_what_it_holds_is_still_a_hand(speed_m_s, imu_every_us):
+    """Given a hover that drifts, when a push carries it past a hover's speed and lets go a second later."""
+
+    def push(t):
+        since_s = min(t - HIT_US, HIT_US + 1_000_000 - t) * 1e-6
+        return (5.0 * min(1.0, max(0.0, since_s / 0.1)), 0.0, 0.0)
+
+    told = Flight(push, imu_every_us, velocity=(speed_m_s, 0.0, 0.0)).fly(5_000_000)
+    assert {impact.kind for impact in told} == {ImpactKind.CONTACT}
+
+
+@pytest.mark.parametrize("imu_every_us", [4_000, 8_000, 20_000])
+def test_a_soft_strike_on_a_hover_jumps_and_is_no_hand(imu_every_us):
+    """Given a door at half a metre a second, when its push is no harder than a hand's and there at once."""
+    struck = Flight(pulse((7.0, 0.0, 0.0), length_us=60_000), imu_every_us, velocity=(0.0, 0.0, 0.0)).fly()
+    assert [impact.kind for impact in struck] == [ImpactKind.STRUCK]
+    assert struck[0].sample_time_boot_us <= HIT_US + imu_every_us + WINDOW_US
+
+
+def test_what_a_hand_holds_can_still_be_struck():
+    def held_and_struck(t):
+        struck = HIT_US + 200_000 <= t < HIT_US + 230_000
+        return (30.0 if struck else 4.0 * min(1.0, max(0.0, (t - HIT_US) * 1e-5)), 0.0, 0.0)
+
+    told = Flight(held_and_struck, velocity=(0.0, 0.0, 0.0)).fly(3_400_000)
+    assert [impact.is_collision for impact in told] == [False, True]
+
+
+@pytest.mark.parametrize("imu_every_us", [4_000, 20_000])
+@pytest.mark.parametrize(("rates_rad_s", "hits"), [((15.0, -8.0, 0.0), 1), ((3.0, 1.0, 0.0), 0)])
+def test_turning_as_no_motor_turns_it_a_vehicle_was_hit_between_the_samples(rates_rad_s, hits, imu_every_us):
+    """When its rates have stepped, stay so, and neither force nor velocity shows anything."""
+    spun = Flight(rates=lambda t: rates_rad_s if t > HIT_US else (0.0, 0.0, 0.0), imu_every_us=imu_every_us)
+    impacts = spun.fly(3_000_000 + 4 * imu_every_us)
+    assert [impact.evidence for impact in impacts] == hits * [Evidence.AFTERMATH]
+    assert all(impact.contact_free_until_boot_us <= HIT_US for impact in impacts)
+
+
+def test_a_gyroscope_that_shakes_to_and_fro_has_not_spun():
+    aftermath, spun = Aftermath(WINDOW_US), []
+    for count in range(20):
+        aftermath.imu(4_000 * count, (0.0, 0.0, -GRAVITY), (6.0 * (-1) ** count, 0.0, 0.0))
+        spun.append(aftermath.spun_rad_s)
+    assert max(spun) == 0.0
 
 
 # --- phases -------------------------------------------------------------------------------------------------
