@@ -11,7 +11,8 @@ from typing import Any, Protocol
 
 from sim_vehicle.autopilot import flight_commands, ground_commands
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
-from sim_vehicle.autopilot.modes import AUTO_MAIN_MODE, CUSTOM_FLAG, Mode, mode_from_request
+from sim_vehicle.autopilot.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
+from sim_vehicle.autopilot.modes import Mode
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21

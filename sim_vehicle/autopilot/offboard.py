@@ -6,6 +6,7 @@ commander's offboardCheck.cpp and PositionControl::_inputValid; the delays are m
 
 import math
 
+from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.flight_messages import AttitudeTarget, GlobalTarget
 from sim_vehicle.autopilot.messages import PositionTarget, Severity, StatusText
 from sim_vehicle.geography import Origin
@@ -169,8 +170,7 @@ def _turned_by_yaw(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:
     forward, right, down = vector
     if forward is None or right is None:
         return FREE
-    w, x, y, z = attitude_wxyz
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    yaw = yaw_of(attitude_wxyz)
     cos, sin = math.cos(yaw), math.sin(yaw)
     return cos * forward - sin * right, sin * forward + cos * right, down
 

@@ -3,24 +3,21 @@
 Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp, DISTANCE_SENSOR.hpp and HIL_STATE_QUATERNION.hpp.
 """
 
-import math
-
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.hil.messages import Place
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.setpoint import Quaternion, Vector3
 
-# Where the local frame's origin lies on the Earth: where PX4's own simulators put their home.
-HOME_LATITUDE_DEG, HOME_LONGITUDE_DEG, HOME_ALTITUDE_M = 47.397742, 8.545594, 488.0
-# The sphere of PX4's projection (lib/geo).
-_EARTH_RADIUS_M = 6_371_000.0
 _UNKNOWN_DISTANCE = -1.0
 _LASER, _LOOKS_DOWN = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270
 _BAD_SIGNAL, _GOOD_SIGNAL = 1, 100
 # LeddarOne's beam, as PX4's driver states it: 6 degrees.
 _BEAM_RAD = 0.105
 _UNKNOWN_VARIANCE = 255
+_NO_AIRSPEED, _NO_ACCELERATION = (0, 0), (0, 0, 0)
 
 
 def optical_flow_rad(state: Telemetry) -> Message:
@@ -85,28 +82,29 @@ def distance_looking_down(sample: RangeSample) -> Message:
 
 
 def hil_state_quaternion(state: Telemetry) -> Message:
-    """The truth, only ever sent on request; accelerations and airspeed are left at zero.
-
-    Meridians are taken as parallel: 100 m from home that is wrong by 1 mm, a tenth of the message's resolution.
-    """
+    """The truth, only ever sent on request."""
     assert state.true_body is not None, "streamed only where there is a truth"
     north, east, down, v_north, v_east, v_down, w, x, y, z, p, q, r = state.true_body.tolist()
-    parallel_radius_m = _EARTH_RADIUS_M * math.cos(math.radians(HOME_LATITUDE_DEG))
+    place = state.origin.place_at((north, east, down))
+    return hil_state(state.sample.time_boot_us, (w, x, y, z), (p, q, r), place, (v_north, v_east, v_down))
+
+
+def hil_state(
+    time_us: int,
+    attitude_wxyz: Quaternion,
+    angular_velocity_frd_rad_s: Vector3,
+    place: Place,
+    velocity_ned_m_s: Vector3,
+) -> Message:
+    """HIL_STATE_QUATERNION; accelerations and airspeed are left at zero."""
     return dialect.MAVLink_hil_state_quaternion_message(
-        state.sample.time_boot_us,
-        (w, x, y, z),
-        p,
-        q,
-        r,
-        round(1e7 * (HOME_LATITUDE_DEG + math.degrees(north / _EARTH_RADIUS_M))),
-        round(1e7 * (HOME_LONGITUDE_DEG + math.degrees(east / parallel_radius_m))),
-        round(1e3 * (HOME_ALTITUDE_M - down)),
-        round(100 * v_north),
-        round(100 * v_east),
-        round(100 * v_down),
-        0,
-        0,
-        0,
-        0,
-        0,
+        time_us,
+        attitude_wxyz,
+        *angular_velocity_frd_rad_s,
+        round(1e7 * place.latitude_deg),
+        round(1e7 * place.longitude_deg),
+        round(1e3 * place.altitude_m),
+        *(round(100 * speed) for speed in velocity_ned_m_s),
+        *_NO_AIRSPEED,
+        *_NO_ACCELERATION,
     )

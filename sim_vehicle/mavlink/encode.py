@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.estimate import Estimate
+from sim_vehicle.autopilot.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
-from sim_vehicle.autopilot.modes import NUMBERS, base_mode
+from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
@@ -59,7 +59,7 @@ def payload_bytes(message_id: int) -> int:
 
 def heartbeat(state: Telemetry) -> Message:
     autopilot = state.autopilot
-    mode = autopilot.modes.shown
+    mode = autopilot.modes.flown
     return dialect.MAVLink_heartbeat_message(
         int(state.parameter("MAV_TYPE")),
         dialect.MAV_AUTOPILOT_PX4,
@@ -102,11 +102,8 @@ def local_position_ned(state: Telemetry) -> Message:
 
 def attitude(state: Telemetry) -> Message:
     sample = state.sample
-    w, x, y, z = sample.attitude_wxyz
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return framing.Attitude(boot_ms(sample), roll, pitch, yaw, *sample.angular_velocity_frd_rad_s)
+    angles = (*roll_pitch_of(sample.attitude_wxyz), yaw_of(sample.attitude_wxyz))
+    return framing.Attitude(boot_ms(sample), *angles, *sample.angular_velocity_frd_rad_s)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
@@ -125,8 +122,8 @@ def odometry(state: Telemetry) -> Message:
         *estimate.attitude_wxyz,
         *estimate.velocity_ned_m_s,
         *estimate.angular_velocity_frd_rad_s,
-        *_covariance(state.position_variance_m2, state.attitude_variance_rad2),
-        *_covariance(state.velocity_variance_m2_s2, 0.0),
+        *diagonal_covariance(state.position_variance_m2, state.attitude_variance_rad2),
+        *diagonal_covariance(state.velocity_variance_m2_s2, 0.0),
         dialect.MAV_FRAME_LOCAL_NED,
         dialect.MAV_FRAME_LOCAL_NED,
         estimate.reset_counter & 0xFF,
@@ -152,7 +149,7 @@ def timesync(state: Telemetry) -> Message:
 
 
 def current_mode(state: Telemetry) -> Message:
-    shown, intended = NUMBERS[state.autopilot.modes.shown], NUMBERS[state.autopilot.modes.intended]
+    shown, intended = NUMBERS[state.autopilot.modes.flown], NUMBERS[state.autopilot.modes.intended]
     return dialect.MAVLink_current_mode_message(shown.standard_mode, shown.custom_mode, intended.custom_mode)
 
 
@@ -211,7 +208,7 @@ def boot_ms(estimate: Estimate) -> int:
     return (estimate.time_boot_us // 1000) & 0xFFFFFFFF
 
 
-def _covariance(first: float, second: float) -> list[float]:
+def diagonal_covariance(first: float, second: float) -> list[float]:
     """Upper right triangle of a 6x6 matrix, row by row, with ``first`` and ``second`` three times each."""
     triangle = [0.0] * 21
     triangle[0] = triangle[6] = triangle[11] = first

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
 from sim_vehicle.mavlink import aiding
+from sim_vehicle.mavlink.encode import diagonal_covariance
 
 Message: TypeAlias = Any
 
@@ -28,7 +29,6 @@ _FIX_3D = 3
 _SATELLITES = 16
 _BEST_QUALITY = 100
 _UNKNOWN_VELOCITY_AND_RATES = (math.nan,) * 6
-_DIAGONAL = (0, 6, 11, 15, 18, 20)
 _NO_COURSE = 65_535
 # Below this the course over ground is noise.
 _LEAST_SPEED_FOR_COURSE_M_S = 0.1
@@ -133,8 +133,8 @@ def _motion_capture(seen: MotionCapture) -> Message:
         *seen.position_ned_m,
         list(seen.attitude_wxyz),
         *_UNKNOWN_VELOCITY_AND_RATES,
-        _covariance(seen.position_variance_m2, seen.attitude_variance_rad2),
-        _covariance(math.nan, math.nan),
+        diagonal_covariance(seen.position_variance_m2, seen.attitude_variance_rad2),
+        diagonal_covariance(math.nan, math.nan),
         0,
         # As MOCAP it would go to a topic that EKF2 does not read.
         dialect.MAV_ESTIMATOR_TYPE_VISION,
@@ -142,31 +142,9 @@ def _motion_capture(seen: MotionCapture) -> Message:
     )
 
 
-def _covariance(first_three: float, last_three: float) -> list[float]:
-    """The upper triangle, row by row, of a 6 x 6 matrix with only a diagonal."""
-    triangle = [0.0] * 21
-    for row, start in enumerate(_DIAGONAL):
-        triangle[start] = first_three if row < 3 else last_three
-    return triangle
-
-
 def _state(state: HilState) -> Message:
-    north, east, down = state.velocity_ned_m_s
-    return dialect.MAVLink_hil_state_quaternion_message(
-        state.time_us,
-        list(state.attitude_wxyz),
-        *state.angular_velocity_frd_rad_s,
-        round(1e7 * state.place.latitude_deg),
-        round(1e7 * state.place.longitude_deg),
-        round(1e3 * state.place.altitude_m),
-        round(100 * north),
-        round(100 * east),
-        round(100 * down),
-        0,
-        0,
-        0,
-        0,
-        0,
+    return aiding.hil_state(
+        state.time_us, state.attitude_wxyz, state.angular_velocity_frd_rad_s, state.place, state.velocity_ned_m_s
     )
 
 

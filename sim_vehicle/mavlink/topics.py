@@ -94,7 +94,7 @@ class Topics:
             self._range = state.range
             versions[Topic.RANGE] += 1
         autopilot, now_us = state.autopilot, state.sample.time_boot_us
-        status = (autopilot.modes.mode, autopilot.arming.armed, autopilot.system_status)
+        status = (autopilot.modes.flown, autopilot.arming.armed, autopilot.system_status)
         if status[0] is Mode.ORBIT:
             versions[14] += 1
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:

@@ -18,7 +18,7 @@ def state(client: Client) -> tuple:
     autopilot = client.vehicle._board.autopilot
     parameters = client.vehicle.parameters
     return (
-        autopilot.modes.shown,
+        autopilot.modes.flown,
         autopilot.modes.intended,
         autopilot.arming.armed,
         parameters.sets,

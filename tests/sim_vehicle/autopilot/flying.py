@@ -8,7 +8,8 @@ from sim_vehicle.autopilot.flight_messages import StickInput
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_messages import MissionItem, MissionType
 from sim_vehicle.autopilot.mission_store import Plan
-from sim_vehicle.autopilot.modes import NUMBERS, Mode
+from sim_vehicle.autopilot.mode_numbers import NUMBERS
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.geography import Origin
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode, mode_from_request
 from sim_vehicle.autopilot.modes import (
     NEEDS,
-    NUMBERS,
     TRANSITIONS,
     Conditions,
     Event,
@@ -13,10 +13,8 @@ from sim_vehicle.autopilot.modes import (
     ModeState,
     Need,
     Transition,
-    base_mode,
     find_transition,
     mode_diagram,
-    mode_from_request,
 )
 
 EVERYTHING = frozenset(Need)

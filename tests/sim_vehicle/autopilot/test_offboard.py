@@ -113,7 +113,7 @@ def test_in_the_air_offboard_without_setpoints_is_refused():
     assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
     flight.fly(2.0)
     assert flight.ask(DO_SET_MODE, 1, 6) is Result.TEMPORARILY_REJECTED
-    assert flight.autopilot.modes.mode is Mode.LOITER
+    assert flight.autopilot.modes.flown is Mode.LOITER
 
 
 @pytest.mark.parametrize("extra_steps", range(0, 26, 5))
@@ -121,7 +121,7 @@ def test_lost_setpoints_change_the_mode_after_a_second(extra_steps):
     flight = hovering()
     flight.fly(0.004 * extra_steps)
     flight.autopilot.setpoint(UP_THERE)
-    waited_s = flight.fly_until(lambda: flight.autopilot.modes.shown is Mode.POSCTL, 2.0)
+    waited_s = flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.POSCTL, 2.0)
     assert 1.03 <= waited_s <= 1.11
     assert flight.autopilot.system_status == 5
     assert flight.autopilot.texts[-1].text == "Failsafe activated"
@@ -132,17 +132,17 @@ def test_lost_setpoints_sink_land_and_disarm_and_offboard_is_shown_again():
     flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, 2.0)
     flight.fly(1.5)
     assert flight.state.velocity_ned_m_s[2] == pytest.approx(0.7, abs=0.01)
-    assert flight.autopilot.modes.shown is Mode.POSCTL
+    assert flight.autopilot.modes.flown is Mode.POSCTL
     flight.fly_until(lambda: not flight.autopilot.arming.armed, 10.0)
     assert flight.height_m == 0.0
-    assert flight.autopilot.modes.shown is Mode.OFFBOARD
+    assert flight.autopilot.modes.flown is Mode.OFFBOARD
 
 
 def test_setpoints_that_come_back_put_it_into_offboard_again():
     flight = hovering()
     flight.fly_until(lambda: flight.autopilot.commander.failsafe.acts, 2.0)
     flight.fly(0.5)
-    waited_s = flight.fly_until(lambda: flight.autopilot.modes.shown is Mode.OFFBOARD, 0.5, UP_THERE)
+    waited_s = flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.OFFBOARD, 0.5, UP_THERE)
     assert waited_s == pytest.approx(0.09, abs=0.01)
     flight.fly(3.0, UP_THERE)
     assert flight.height_m == pytest.approx(3.0, abs=0.05)
@@ -155,7 +155,7 @@ def test_a_slow_stream_holds_offboard(rate_hz):
     shown = set()
     for _ in range(10):
         flight.fly(1 / rate_hz, UP_THERE, rate_hz)
-        shown.add(flight.autopilot.modes.shown)
+        shown.add(flight.autopilot.modes.flown)
     assert shown == {Mode.OFFBOARD}
 
 
@@ -166,7 +166,7 @@ def test_too_slow_a_stream_flips_to_and_fro():
         flight.autopilot.setpoint(UP_THERE)
         for _ in range(round(250 / 0.8)):
             flight.step()
-            shown.append(flight.autopilot.modes.shown)
+            shown.append(flight.autopilot.modes.flown)
     changes = sum(a is not b for a, b in pairwise(shown))
     assert changes >= 8
 
@@ -186,7 +186,7 @@ def test_only_setpoints_received_in_offboard_are_flown():
     flight.ask(DO_SET_MODE, 1, 6)
     flight.fly(0.9)
     # Then the vehicle stays
-    assert flight.autopilot.modes.mode is Mode.OFFBOARD
+    assert flight.autopilot.modes.flown is Mode.OFFBOARD
     assert abs(flight.state.position_ned_m[0]) < 0.1
 
 
@@ -194,6 +194,6 @@ def test_a_pilots_change_is_not_undone_by_setpoints():
     flight = hovering()
     assert flight.ask(DO_SET_MODE, 1, 4, 3) is Result.ACCEPTED
     flight.fly(3.0, target(position=(50.0, 0.0, -3.0)))
-    assert flight.autopilot.modes.shown is flight.autopilot.modes.intended is Mode.LOITER
+    assert flight.autopilot.modes.flown is flight.autopilot.modes.intended is Mode.LOITER
     assert abs(flight.state.position_ned_m[0]) < 0.1
     assert flight.autopilot.system_status == 4

@@ -23,7 +23,7 @@ def taken_off(start: Estimate | None = None) -> Flight:
     flight = Flight(start)
     flight.ask(NAV_TAKEOFF)
     flight.ask(COMPONENT_ARM_DISARM, 1)
-    flight.fly_until(lambda: flight.autopilot.modes.mode is Mode.LOITER, 12.0)
+    flight.fly_until(lambda: flight.autopilot.modes.flown is Mode.LOITER, 12.0)
     return flight
 
 
@@ -32,7 +32,7 @@ def test_takeoff_climbs_to_two_and_a_half_metres_and_holds():
     flight.ask(NAV_TAKEOFF)
     flight.ask(COMPONENT_ARM_DISARM, 1)
     fastest = 0.0
-    while flight.autopilot.modes.mode is Mode.TAKEOFF:
+    while flight.autopilot.modes.flown is Mode.TAKEOFF:
         flight.step()
         fastest = max(fastest, -flight.state.velocity_ned_m_s[2])
         assert flight.time_s < 12.0
@@ -119,7 +119,7 @@ def test_landing_sinks_at_seventy_centimetres_a_second_and_disarms_on_the_ground
     assert waited_s == pytest.approx(3.0, abs=0.5)
     texts = [text.text for text in flight.autopilot.texts]
     assert texts[-3:] == ["Landing at current position", "Landing detected", "Disarmed by landing"]
-    assert flight.autopilot.modes.mode is Mode.LOITER
+    assert flight.autopilot.modes.flown is Mode.LOITER
 
 
 def test_landing_is_faster_high_up():

@@ -5,8 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.hil.earth import HOME, place_at
-from sim_vehicle.mavlink import aiding
+from sim_vehicle.hil.earth import place_at
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.sim_vehicle.estimator.flying import filtered
@@ -17,8 +16,8 @@ OPTICAL_FLOW_RAD, HIL_STATE_QUATERNION, DISTANCE_SENSOR, ODOMETRY = 106, 115, 13
 class Wire:
     """Everything that a vehicle sends, decoded, with a way to ask for a stream."""
 
-    def __init__(self, airframe, scene=None):
-        self.vehicle = SimulatedVehicle(airframe, scene or Scene(), seed=1)
+    def __init__(self, airframe, scene=None, parameters=None):
+        self.vehicle = SimulatedVehicle(airframe, scene or Scene(), seed=1, parameters=parameters)
         self._link = dialect.MAVLink(None, srcSystem=1, srcComponent=191)
         self._parser = dialect.MAVLink(None)
         self._waiting = b""
@@ -74,12 +73,14 @@ def test_the_truth_is_sent_on_request_alone():
     assert truth.attitude_quaternion == pytest.approx([math.sqrt(0.5), 0, 0, math.sqrt(0.5)], abs=0.01)
 
 
-def test_the_origin_is_where_px4s_simulators_put_it():
-    assert (
-        HOME.latitude_deg,
-        HOME.longitude_deg,
-        HOME.altitude_m,
-    ) == (aiding.HOME_LATITUDE_DEG, aiding.HOME_LONGITUDE_DEG, aiding.HOME_ALTITUDE_M)
+def test_the_truth_lies_where_the_parameters_put_the_world():
+    there = {"SIH_LOC_LAT0": -33.0, "SIH_LOC_LON0": 151.0, "SIH_LOC_H0": 20.0}
+    wire = Wire(filtered(), parameters=there)
+    wire.ask(HIL_STATE_QUATERNION, 50)
+    wire.run(0.5)
+    truth = wire.received[HIL_STATE_QUATERNION][-1]
+    assert (truth.lat, truth.lon) == pytest.approx((-330_000_000, 1_510_000_000), abs=1)
+    assert truth.alt == pytest.approx(20_000, abs=100)
 
 
 def test_odometry_counts_the_filters_resets_and_states_its_variances():
