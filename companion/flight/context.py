@@ -8,6 +8,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
 from companion.flight.commander import Commander, CommandOutcome
 from companion.flight.course import Pace
+from companion.flight.leaning import Leaning
 from companion.flight.states import Trigger
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
@@ -135,6 +136,7 @@ class FlightContext:
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
+    leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
     blind_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 
 from companion.detection import watch
-from companion.detection.interface import Situation
+from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.detection.watch import Watch
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.rotation import ned_to_body
 from companion.flight.context import FlightContext
-from companion.messages import Sample
+from companion.flight.leaning import Held
+from companion.messages import Attitude, LocalPosition, Sample
 
 
 def collisions(
@@ -22,7 +24,56 @@ def collisions(
     for estimate in seen.impacts:
         if not estimate.impact.is_collision:
             _tell_contact(flight, estimate, now_us)
-    return [estimate for estimate in seen.impacts if estimate.impact.is_collision]
+    found = [estimate for estimate in seen.impacts if estimate.impact.is_collision]
+    held = None if found else _held(flight, samples, situation, now_us)
+    return found if held is None else [held]
+
+
+def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation, now_us: int) -> ImpactEstimate | None:
+    """What no detector feels: that the vehicle leans on something, where it is to fly to a place by setpoints."""
+    target, attitude, leaning = flight.target, flight.vehicle.attitude, flight.leaning
+    flown_to = situation.setpoint_position_ned_m
+    is_off = situation.off_reason is not None or situation.descent_commanded
+    if is_off or flown_to is None or target is None or target.leans_only or attitude is None:
+        leaning.forget()
+        return None
+    for sample in samples:
+        if isinstance(sample, LocalPosition):
+            held = leaning.step(sample, attitude.attitude_wxyz, flown_to)
+            if held is not None:
+                _tell_held(flight, held, sample, now_us)
+                return _estimate_of(held, sample, attitude)
+    return None
+
+
+def _estimate_of(held: Held, sample: LocalPosition, attitude: Attitude) -> ImpactEstimate:
+    """As of a hit: by a vehicle that hardly moves, and as sure of the normal as a lean is steady."""
+    n, e, _ = held.normal_ned
+    push_ned = (held.push_m_s2 * n, held.push_m_s2 * e, 0.0)
+    force = ned_to_body(attitude.attitude_wxyz, push_ned)
+    lasted_us = sample.time_boot_us - held.since_boot_us
+    return ImpactEstimate(
+        impact=Impact(sample.time_boot_us, held.since_boot_us, force, ImpactKind.STRUCK),
+        time_boot_us=sample.time_boot_us,
+        time_error_us=lasted_us,
+        position_ned_m=sample.position_ned_m,
+        velocity_ned_m_s=sample.velocity_ned_m_s,
+        velocity_error_m_s=0.0,
+        normal_ned=held.normal_ned,
+        peak_specific_force_m_s2=held.push_m_s2,
+        impulse_m_s=0.5 * held.push_m_s2 * lasted_us * 1e-6,
+        is_lower_bound=False,
+        may_be_clipped=False,
+        kind=ImpactKind.STRUCK,
+        confidence=1.0,
+        is_final=True,
+    )
+
+
+def _tell_held(flight: FlightContext, held: Held, sample: LocalPosition, now_us: int) -> None:
+    lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
+    text = f"something is in the way: leant on it for {lasted_s:.1f} s, by {held.push_m_s2:.1f} m/s^2 more"
+    flight.tell(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.push_m_s2, lasted_s=lasted_s)
 
 
 def follow_contact(flight: FlightContext, watching: Watch) -> None:

@@ -68,6 +68,7 @@ def _fault(event: Event, mission: str, hits: int) -> StatusText:
 _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "armed": _began,
     "detection": _hit,
+    "in_the_way": _as_it_stands,
     "recovered": _recovered,
     "policy": _as_it_stands,
     "unreachable": _as_it_stands,

@@ -31,6 +31,8 @@ from companion.recovery.way import REST, Coast, Way
 # 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
 # Waiting for 120 ms made no better recoveries.
 REBOUND_KNOWN_US = 80_000
+# What has changed later, as when the estimate was not believed before, is the work of gravity and motors as well.
+REBOUND_LATEST_US = 200_000
 # A vehicle's estimate is up to 0.02 s late (see estimate.approach).
 HEIGHT_KNOWN_US = 15_000
 # A glancing hit on one guard spins the vehicle, at 5 m/s with up to 16 rad/s. What it leans to is then turned away from
@@ -135,7 +137,7 @@ class Recover:
         """With the motion after the contact, once; while something goes on pushing, again and again."""
         record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
-        if self._after_ned_m_s is None and since_us >= REBOUND_KNOWN_US:
+        if self._after_ned_m_s is None and REBOUND_KNOWN_US <= since_us <= REBOUND_LATEST_US:
             self._after_ned_m_s = sample.velocity_ned_m_s
         if self._law.is_refined and self._after_ned_m_s is not None:
             normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
@@ -232,6 +234,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
         impulse_m_s=estimate.impulse_m_s,
+        may_be_clipped=not estimate.is_final or estimate.may_be_clipped,
         doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
         inherits_doubt=doubted is not None,
     )

@@ -1,0 +1,128 @@
+"""Being pushed for long: the vehicle leans towards where it is to be, more and more, and does not get there.
+
+A vehicle that meets something slowly feels no hit. Its loops lean it on, by the error and, for ever, by the error's
+integral, until it slips off or is tipped on and pinned by its own thrust: a wall met at 0.2 m/s had it on the ground
+three seconds later. What holds it shows in what does not follow: in free air a lean that grows by g tan(a) is an
+acceleration that grows so, but for what the wind takes of it.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from companion.estimate.rotation import body_to_ned
+from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.messages import LocalPosition, Quaternion, Vector3
+
+Flat = tuple[float, float]
+
+# A setpoint nearer than this is reached: three times a good estimate's noise, and what a recovery may rest beside it.
+BESIDE_M = 0.1
+# While it is, drag and wind are learnt: the mean of so long.
+FOLLOWED_S = 1.0
+# A vehicle that comes nearer to where it is to be is not kept from it.
+NEARER_M = 0.05
+# Not evenly where the velocity has changed by more: four times a good estimate's noise. With 0.15 a slow gust was.
+STEADY_M_S = 0.12
+# Lean and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
+SMOOTHING_S = 0.2
+# An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet.
+LEAST_US = 300_000
+# What the lean has to do in vain, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes 1.1 m/s^2 of
+# the paper's vehicle, and moves it (docs/recovery.md: the gusts with which this was tried). Arms that press on a wall
+# carry a vehicle that leans by 15 degrees; from 22 on it is tipped over.
+HELD_M_S2 = 1.5
+# Less than this, three times the noise, is no push: of a vehicle that turns to another place the lean comes back first.
+LET_GO_M_S2 = 0.5
+# Who comes nearer as fast as this is not kept from it.
+NEARING_M_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """Something is in the way; local NED, horizontal.
+
+    `normal_ned` is away from it, `push_m_s2` what it takes of the lean's acceleration, since `since_boot_us`.
+    """
+
+    normal_ned: Vector3
+    push_m_s2: float
+    since_boot_us: int
+
+
+@dataclass(slots=True)
+class _Stretch:
+    """For how long the vehicle has moved evenly, and what its lean did not move at first: drag and wind."""
+
+    since_us: int
+    velocity_m_s: Vector3
+    missing_m_s2: Flat
+    error_m: float
+
+    def follow(self, leaning: "Leaning", now_us: int, weight: float) -> None:
+        """Where the vehicle is where it is to be, all that is free air."""
+        (u, v, w), (a, b, c) = self.velocity_m_s, leaning.velocity_m_s
+        (n, e), (p, q) = self.missing_m_s2, leaning.missing_m_s2
+        self.velocity_m_s = (u + weight * (a - u), v + weight * (b - v), w + weight * (c - w))
+        self.missing_m_s2 = (n + weight * (p - n), e + weight * (q - e))
+        self.since_us, self.error_m = now_us, 0.0
+
+
+@dataclass(slots=True)
+class Leaning:
+    """Looked at with each position while setpoints are flown; begun anew with `forget`."""
+
+    stretch: _Stretch | None = None
+    time_us: int = 0
+    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
+    lean_m_s2: Flat = (0.0, 0.0)
+    missing_m_s2: Flat = (0.0, 0.0)
+
+    def forget(self) -> None:
+        self.stretch, self.time_us = None, 0
+
+    def step(self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3) -> Held | None:
+        """Take one sample, the attitude and the setpoint as last sent."""
+        elapsed_s = self._smooth(sample, lean_of(attitude_wxyz))
+        north, east = goal_ned_m[0] - sample.position_ned_m[0], goal_ned_m[1] - sample.position_ned_m[1]
+        error_m = math.hypot(north, east)
+        stretch, (u, v, _) = self.stretch, self.velocity_m_s
+        comes_nearer = stretch is not None and error_m < stretch.error_m - NEARER_M and stretch.error_m > BESIDE_M
+        if stretch is None or comes_nearer or math.dist(self.velocity_m_s, stretch.velocity_m_s) > STEADY_M_S:
+            self.stretch = _Stretch(sample.time_boot_us, self.velocity_m_s, self.missing_m_s2, error_m)
+            return None
+        if error_m < BESIDE_M:
+            stretch.follow(self, sample.time_boot_us, elapsed_s / (FOLLOWED_S + elapsed_s))
+            return None
+        stretch.error_m = max(stretch.error_m, error_m)
+        n, e = north / error_m, east / error_m
+        grown = (self.missing_m_s2[0] - stretch.missing_m_s2[0], self.missing_m_s2[1] - stretch.missing_m_s2[1])
+        towards_m_s2 = grown[0] * n + grown[1] * e
+        is_pushed_back = self.missing_m_s2[0] * n + self.missing_m_s2[1] * e > LET_GO_M_S2
+        is_kept_off = is_pushed_back and u * n + v * e < NEARING_M_S
+        if towards_m_s2 < HELD_M_S2 or not is_kept_off or sample.time_boot_us - stretch.since_us < LEAST_US:
+            return None
+        size, since_us = math.hypot(*grown), stretch.since_us
+        # What it was in free air stays known.
+        self.stretch = replace(stretch, since_us=sample.time_boot_us, velocity_m_s=self.velocity_m_s, error_m=0.0)
+        return Held((-grown[0] / size, -grown[1] / size, 0.0), towards_m_s2, since_us)
+
+    def _smooth(self, sample: LocalPosition, lean_m_s2: Flat) -> float:
+        """Means, and the lean's acceleration less the velocity's, which is the change of its mean; the time since."""
+        if self.time_us == 0:
+            self.velocity_m_s, self.lean_m_s2 = sample.velocity_ned_m_s, lean_m_s2
+        elapsed_s = (sample.time_boot_us - self.time_us) * 1e-6
+        weight = elapsed_s / (SMOOTHING_S + elapsed_s)
+        (u, v, w), (a, b, c), (n, e) = self.velocity_m_s, sample.velocity_ned_m_s, self.lean_m_s2
+        self.velocity_m_s = (u + weight * (a - u), v + weight * (b - v), w + weight * (c - w))
+        self.lean_m_s2 = n, e = (n + weight * (lean_m_s2[0] - n), e + weight * (lean_m_s2[1] - e))
+        u, v, _ = self.velocity_m_s
+        self.missing_m_s2 = (n - (a - u) / SMOOTHING_S, e - (b - v) / SMOOTHING_S)
+        self.time_us = sample.time_boot_us
+        return elapsed_s
+
+
+def lean_of(attitude_wxyz: Quaternion) -> Flat:
+    """The horizontal acceleration of a vehicle that leans so and keeps its height, NED; endless on its side."""
+    n, e, d = body_to_ned(attitude_wxyz, (0.0, 0.0, -1.0))
+    up = max(-d, 0.05)
+    return (GRAVITY_M_S2 * n / up, GRAVITY_M_S2 * e / up)

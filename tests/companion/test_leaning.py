@@ -1,0 +1,147 @@
+"""Being pushed for long: a vehicle that leans on something is told from one that leans on the wind."""
+
+import json
+import math
+
+import pytest
+
+from companion.flight.leaning import HELD_M_S2, Leaning, lean_of
+from companion.messages import LocalPosition
+from companion.mission.model import Mission
+from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.run_folder import FlightRecorder
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
+
+EVERY_S = 0.02
+
+
+def leaning_north(acceleration_m_s2):
+    """The attitude, nose north, of a vehicle whose thrust carries it and gives that acceleration."""
+    half = -0.5 * math.atan(acceleration_m_s2 / 9.80665)
+    return (math.cos(half), 0.0, math.sin(half), 0.0)
+
+
+def watched(seconds, north_m, speed_m_s, lean_m_s2, goal_north_m=1.0):
+    """The first time at which something is found in the way, and what; functions of the time."""
+    leaning = Leaning()
+    for step in range(round(seconds / EVERY_S)):
+        t = step * EVERY_S
+        sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m(t), 0.0, -1.5), (speed_m_s(t), 0.0, 0.0))
+        held = leaning.step(sample, leaning_north(lean_m_s2(t)), (goal_north_m, 0.0, -1.5))
+        if held is not None:
+            return t, held
+    return None
+
+
+def test_the_lean_is_the_acceleration_that_it_gives_in_free_air():
+    assert lean_of((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0))
+    assert lean_of(leaning_north(2.0)) == pytest.approx((2.0, 0.0))
+
+
+def test_a_vehicle_that_stands_still_and_leans_more_and_more_is_kept_off_its_goal():
+    # Given a lean that the integral of a metre's error makes, when nothing moves
+    at_s, held = watched(5.0, lambda t: 0.0, lambda t: 0.0, lambda t: 1.0 + 0.8 * t)
+    # Then it is told as soon as that much has had no effect, with the way out
+    assert 0.8 * (at_s - 0.3) == pytest.approx(HELD_M_S2, abs=0.2)
+    assert held.normal_ned == pytest.approx((-1.0, 0.0, 0.0))
+
+
+def test_a_lean_that_moves_the_vehicle_is_kept_from_nothing():
+    accelerating = watched(3.0, lambda t: 0.5 * t * t, lambda t: t, lambda t: min(1.0, 5.0 * t), goal_north_m=9.0)
+    braking = watched(2.0, lambda t: t - 0.5 * t * t, lambda t: 1.0 - t, lambda t: -1.0, goal_north_m=9.0)
+    assert accelerating is None and braking is None
+
+
+def test_a_steady_wind_is_no_wall_however_far_the_vehicle_is_from_its_goal():
+    assert watched(5.0, lambda t: 0.0, lambda t: 0.0, lambda t: 3.0) is None
+
+
+def test_a_gust_that_blows_the_vehicle_away_and_is_leant_against_is_no_wall():
+    """Back by 0.4 m with up to 0.4 m/s, as the gust has it; the lean follows late and is what the gust is at last."""
+
+    def speed_m_s(t):
+        return -0.4 * math.sin(math.pi * t / 1.6) if t < 1.6 else 0.05
+
+    assert watched(4.0, lambda t: -0.25, speed_m_s, lambda t: min(1.8, 1.2 * t)) is None
+
+
+def test_a_vehicle_that_comes_nearer_is_not_kept_off():
+    assert watched(4.0, lambda t: 0.2 * t, lambda t: 0.2, lambda t: 0.8 * t) is None
+
+
+def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new():
+    """Given a vehicle found pressing north, when it is sent back south and its lean returns to level."""
+    leaning, found = Leaning(), []
+    for step in range(200):
+        t = step * EVERY_S
+        lean = min(0.8 * t, 1.8) if not found else max(0.0, 1.8 - 2.0 * (t - found[0]))
+        sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, 0.0, -1.5), (0.0, 0.0, 0.0))
+        goal = (-0.35 if found else 1.0, 0.0, -1.5)
+        if leaning.step(sample, leaning_north(lean), goal) is not None:
+            found.append(t)
+    assert len(found) == 1
+
+
+def flown(folder, items, **sim):
+    """In lockstep: the flight, and what its timeline says of things in the way."""
+    mission = Mission.model_validate(
+        {
+            "name": "slow",
+            "items": [{"takeoff": {"height_m": 1.5}}, *items, {"land": {}}],
+            "on_collision": {"then": "hold", "hold_s": 1},
+            "fence": {"radius_m": 10, "max_height_m": 5},
+            "sim": sim,
+        }
+    )
+    recorder = FlightRecorder(folder)
+    world = SimulatedWorld(Scene.model_validate({**sim, "seed": 1}), load_built_in("foldable"))
+    flight, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
+    recorder.close()
+    told = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    return flight, [event for event in told if event["kind"] == "in_the_way"]
+
+
+def most_tilt_deg(flight):
+    _, x, y, _ = flight.truth.series["attitude_wxyz"].T
+    return math.degrees(math.acos(min(1.0 - 2.0 * (x * x + y * y))))
+
+
+def screen(north_m, **motion):
+    wall = {"name": "screen", "point_ned_m": [north_m, 0, -1.5], "normal_ned": [-1, 0, 0], "width_m": 6, "height_m": 6}
+    return [wall | ({"motion": motion} if motion else {})]
+
+
+def test_a_wall_met_at_a_crawl_is_backed_away_from(tmp_path):
+    # Given a goal 1 m behind a wall, when the vehicle comes with 0.2 m/s, which no detector takes for a hit
+    go = {"go_to": {"position_ned_m": [2.5, 0, -1.5], "speed_m_s": 0.2}}
+    flight, told = flown(tmp_path, [go], walls=screen(1.5))
+    # Then it leans on it for no longer than it takes to be sure, backs away, and the policy follows
+    assert len(told) == 1 and len(flight.report.collisions) == 1
+    assert most_tilt_deg(flight) < 25.0
+    collision = flight.report.collisions[0]
+    assert collision.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.2)
+    assert collision.recovery_setpoint_ned_m[0] < collision.position_ned_m[0] - 0.25
+    assert collision.settled_after_s is not None and collision.settled_after_s < 4.0
+    assert flight.report.outcome == "completed"
+    assert flight.report.obstacles
+
+
+def test_a_door_that_comes_slowly_pushes_the_hovering_vehicle_out_of_its_way(tmp_path):
+    door = screen(1.0, velocity_ned_m_s=[-0.1, 0, 0], from_s=9.0, until_s=20.0)
+    flight, told = flown(tmp_path, [{"hold": {"duration_s": 14}}], walls=door)
+    assert told and flight.report.outcome == "completed"
+    assert most_tilt_deg(flight) < 25.0
+    assert all(collision.settled_after_s is not None for collision in flight.report.collisions)
+
+
+def test_gusts_of_five_metres_a_second_are_nothing_in_the_way(tmp_path):
+    gusts = [
+        {"kind": "gust", "between_s": [9 + 4 * k, 12.5 + 4 * k], "velocity_ned_m_s": [-5 * n, 5 * e, 0], "rise_s": rise}
+        for k, (n, e, rise) in enumerate([(1.0, 0.0, 0.3), (0.0, 1.0, 1.0), (-0.7, 0.7, 1.6)])
+    ]
+    slow = {"go_to": {"position_ned_m": [1, 0, -1.5], "speed_m_s": 0.2}}
+    flight, told = flown(tmp_path, [{"hold": {"duration_s": 8}}, slow], wind_ned_m_s=[2, 1, 0], faults=gusts)
+    assert told == [] and flight.report.collisions == ()
