@@ -31,7 +31,7 @@ from companion.recovery.way import REST, Coast, Way
 # 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
 # Waiting for 120 ms made no better recoveries.
 REBOUND_KNOWN_US = 80_000
-# What has changed later, as when the estimate was not believed before, is the work of gravity and motors as well.
+# Where it is believed later than this, the vehicle has fallen meanwhile: of the hit only the level part is left.
 REBOUND_LATEST_US = 200_000
 # A vehicle's estimate is up to 0.02 s late (see estimate.approach).
 HEIGHT_KNOWN_US = 15_000
@@ -137,8 +137,9 @@ class Recover:
         """With the motion after the contact, once; while something goes on pushing, again and again."""
         record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
-        if self._after_ned_m_s is None and REBOUND_KNOWN_US <= since_us <= REBOUND_LATEST_US:
-            self._after_ned_m_s = sample.velocity_ned_m_s
+        if self._after_ned_m_s is None and since_us >= REBOUND_KNOWN_US:
+            u, v, w = sample.velocity_ned_m_s
+            self._after_ned_m_s = (u, v, w if since_us <= REBOUND_LATEST_US else record.contact.velocity_ned_m_s[2])
         if self._law.is_refined and self._after_ned_m_s is not None:
             normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
             self._contact = replace(self._contact, normal_ned=normal)

@@ -5,9 +5,16 @@ import math
 import pytest
 
 from companion.estimate.approach import VelocityFix
+from companion.flight.collision import CollisionRecord
+from companion.flight.context import FlightContext, Inputs
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
+from companion.flight.recovering import Recover
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
+from companion.mission.model import Mission
 from companion.recovery.height import NO_BRAKING, brake, level, thrown_down_m_s
+from companion.recovery.interface import Contact
 from companion.recovery.way import Motion
 
 NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
@@ -89,3 +96,22 @@ def test_height_is_the_only_thing_that_levelling_changes():
     motion = Motion((1.0, 2.0, -3.0), (0.5, 0.6, 0.7), (0.1, 0.2, 0.3))
     assert level(motion, -2.0, 1.5) == Motion((1.0, 2.0, -2.0), (0.5, 0.6, 0.0), (0.1, 0.2, 1.5))
     assert level(Motion((1.0, 2.0, -3.0)), -2.0, 0.0) == Motion((1.0, 2.0, -2.0))
+
+
+def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
+    # Given a clipped hit square into a wall, whose estimate is believed only when it must be
+    falling = Mission.model_validate({"name": "fall", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
+    flight = FlightContext(falling, Vehicle(), StreamMonitor(falling.companion.streams))
+    flight.origin_ned_m = (0.0, 0.0, 0.0)
+    wall = Contact(1_000_000, (3.0, 0.0, -2.0), (2.0, 0.0, 0.0), SOUTH)
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.0, 0.0, -2.0), SOUTH, 150.0, 1_000_000, 2.0)
+    record.doubted_since_boot_us = 1_000_000
+    flight.collisions.append(record)
+    recover = Recover(flight, 0)
+    # When the vehicle has by then fallen 1.5 m
+    late = LocalPosition(1_000_000 + LATEST_US + 20_000, (2.8, 0.0, -0.5), (-0.4, 0.0, 3.5))
+    recover.step(flight, Inputs(positions=[late]), LATEST_US + 20_000)
+    # Then the way out is still away from the wall, and back up to where it was
+    assert record.is_believed
+    n, e, d = record.setpoint_ned_m
+    assert n < 2.7 and abs(e) < 0.1 and d == pytest.approx(-2.0)
