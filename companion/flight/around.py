@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from companion.flight.course import Pace, way_home, way_of
+from companion.flight.course import Limits, Pace, way_home, way_of
 from companion.flight.curve import CurveProfile
 from companion.flight.trajectory import Chain, LineProfile, Trajectory
 from companion.memory.route import route
@@ -49,12 +49,12 @@ def way_around(item: Motion, start_m: Vector3, pace: Pace, known: Surroundings) 
     # Of a circle any part is worth flying; a line or a path has somewhere to be.
     if len(places) == 1 or (not isinstance(item, OrbitItem) and places[-1] != points[-1]):
         return Planned(None)
-    speed, acceleration = pace.limits(item.speed_m_s, item.acceleration_m_s2)
+    limits = pace.limits(item.speed_m_s, item.acceleration_m_s2)
     if not isinstance(item, GoToItem):
-        curve = CurveProfile(places, speed, acceleration)
+        curve = CurveProfile(places, *limits)
         if not _is_blocked(curve, known) and _is_inside(curve, known):
             return Planned(curve, True, left_out)
-    return Planned(lines(places, speed, acceleration), True, left_out)
+    return Planned(lines(places, limits), True, left_out)
 
 
 def home_around(start_m: Vector3, item: ReturnItem, pace: Pace, known: Surroundings) -> Planned:
@@ -67,13 +67,12 @@ def home_around(start_m: Vector3, item: ReturnItem, pace: Pace, known: Surroundi
     found = route(known, places[-1], across.target_m)
     if found is None:
         return Planned(None)
-    speed, acceleration = pace.limits(item.speed_m_s, None)
-    return Planned(lines([*places, *found], speed, acceleration), True)
+    return Planned(lines([*places, *found], pace.limits(item.speed_m_s, None)), True)
 
 
-def lines(places_m: Sequence[Vector3], speed_m_s: float, acceleration_m_s2: float) -> Chain:
+def lines(places_m: Sequence[Vector3], limits: Limits) -> Chain:
     """Straight from each to the next, at rest in each."""
-    return Chain([LineProfile(a, b, speed_m_s, acceleration_m_s2) for a, b in pairwise(places_m)])
+    return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 
 def passed(item: PathItem, way: Trajectory, elapsed_s: float) -> int:

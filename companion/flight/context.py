@@ -146,7 +146,7 @@ class FlightContext:
 
     def __post_init__(self) -> None:
         config = self.mission.companion.flight
-        self.pace = Pace(config.cruise_speed_m_s, config.cruise_acceleration_m_s2)
+        self.pace = Pace.of(config)
         self.steps = self.steps or steps_to_fly(self.mission)
         self.patches = self.mission.obstacles.patches()
         last = self.steps[-1].action

@@ -1,7 +1,8 @@
 """From an item to the way it is flown. Mission coordinates, metres."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from companion.flight.curve import CurveProfile
 from companion.flight.trajectory import Chain, CircleProfile, LineProfile, Trajectory
@@ -18,23 +19,36 @@ from companion.mission.items import (
     VelocityItem,
 )
 
+# Speed, acceleration, and that while the speed grows.
+Limits: TypeAlias = tuple[float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """Speed and acceleration of items that state none; `factor` slows down an item that is tried again."""
+    """Speed and acceleration of items that state none; `factor` slows down an item that is tried again.
+
+    `speeding_up_m_s2` holds for all items.
+    """
 
     speed_m_s: float
     acceleration_m_s2: float
     factor: float = 1.0
+    speeding_up_m_s2: float = math.inf
+
+    @classmethod
+    def of(cls, config: FlightConfig) -> "Pace":
+        """With which a mission begins."""
+        return cls(config.cruise_speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
 
     def changed_to(self, item: SetSpeedItem) -> "Pace":
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
-        return Pace(item.speed_m_s, acceleration)
+        return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration, factor=1.0)
 
-    def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> tuple[float, float]:
-        """Those of an item, or else its pace's."""
+    def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> Limits:
+        """Speed and acceleration of an item, or else its pace's; how fast it may speed up."""
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
-        return speed * self.factor, self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
+        acceleration = self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
+        return speed * self.factor, acceleration, self.speeding_up_m_s2
 
 
 def climb(start_m: Vector3, height_m: float, config: FlightConfig) -> LineProfile:
@@ -52,42 +66,44 @@ def way_of(item: Motion, start_m: Vector3, pace: Pace) -> Trajectory:
     """How to fly the item from where the setpoint is."""
     if isinstance(item, VelocityItem):
         return _with_velocity(item, start_m, pace)
-    speed, acceleration = pace.limits(item.speed_m_s, item.acceleration_m_s2)
+    limits = pace.limits(item.speed_m_s, item.acceleration_m_s2)
     match item:
         case GoToItem():
-            return LineProfile(start_m, item.position_ned_m, speed, acceleration)
+            return LineProfile(start_m, item.position_ned_m, *limits)
         case PathItem():
-            return CurveProfile((start_m, *item.points_ned_m), speed, acceleration)
+            return CurveProfile((start_m, *item.points_ned_m), *limits)
         case OrbitItem():
-            return _round(item, start_m, speed, acceleration)
+            return _round(item, start_m, limits)
 
 
 def _with_velocity(item: VelocityItem, start_m: Vector3, pace: Pace) -> LineProfile:
     """The line that is covered in the time, ramps included."""
     speed = math.hypot(*item.velocity_ned_m_s)
-    _, acceleration = pace.limits(None, item.acceleration_m_s2)
+    _, braking, speeding_up = pace.limits(None, item.acceleration_m_s2)
+    n, e, d = (component / speed for component in item.velocity_ned_m_s)
+    growth = min(braking, speeding_up / math.hypot(n, e)) if (n, e) != (0.0, 0.0) else braking
     # With ramps of top / acceleration at both ends; a time too short for the speed is all ramps.
-    top = min(speed * pace.factor, 0.5 * acceleration * item.duration_s)
-    length = top * (item.duration_s - top / acceleration)
-    n, e, d = (component / speed * length for component in item.velocity_ned_m_s)
-    target = (start_m[0] + n, start_m[1] + e, start_m[2] + d)
-    return LineProfile(start_m, target, top, acceleration)
+    ramps_s2_per_m = 0.5 / growth + 0.5 / braking
+    top = min(speed * pace.factor, 0.5 * item.duration_s / ramps_s2_per_m)
+    length = top * (item.duration_s - top * ramps_s2_per_m)
+    target = (start_m[0] + n * length, start_m[1] + e * length, start_m[2] + d * length)
+    return LineProfile(start_m, target, top, braking, speeding_up)
 
 
-def _round(item: OrbitItem, start_m: Vector3, speed: float, acceleration: float) -> Chain:
+def _round(item: OrbitItem, start_m: Vector3, limits: Limits) -> Chain:
     """To the nearest point of the circle, which for a start in its middle is the one in the north, and round."""
     n, e, _ = item.centre_ned_m
     start_rad = math.atan2(start_m[1] - e, start_m[0] - n)
     angle_rad = math.tau * item.turns * (1.0 if item.clockwise else -1.0)
-    circle = CircleProfile(item.centre_ned_m, item.radius_m, start_rad, angle_rad, speed, acceleration)
-    return Chain((LineProfile(start_m, circle.at(0.0)[0], speed, acceleration), circle))
+    circle = CircleProfile(item.centre_ned_m, item.radius_m, start_rad, angle_rad, *limits)
+    return Chain((LineProfile(start_m, circle.at(0.0)[0], *limits), circle))
 
 
 def way_home(start_m: Vector3, item: ReturnItem, pace: Pace, fence: Fence) -> Chain:
     """Up first where that is asked for, then straight to above the arming position, never above the fence."""
-    speed, acceleration = pace.limits(item.speed_m_s, None)
+    limits = pace.limits(item.speed_m_s, None)
     wanted_m = max(-start_m[2], item.height_m or 0.0)
     down_m = -min(max(wanted_m, fence.min_height_m), fence.max_height_m)
     up = (start_m[0], start_m[1], down_m)
     home = (0.0, 0.0, down_m)
-    return Chain((LineProfile(start_m, up, speed, acceleration), LineProfile(up, home, speed, acceleration)))
+    return Chain((LineProfile(start_m, up, *limits), LineProfile(up, home, *limits)))

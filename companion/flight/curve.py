@@ -1,5 +1,6 @@
 """A smooth curve through points, flown as fast as limits of speed and acceleration allow."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,13 +30,19 @@ class CurveProfile:
     along the curve hold the change of speed within its own (the method of Bobrow, Dubowsky and Gibson, 1985).
     """
 
-    def __init__(self, points_m: Sequence[Vector3], speed_m_s: float, acceleration_m_s2: float) -> None:
+    def __init__(
+        self,
+        points_m: Sequence[Vector3],
+        speed_m_s: float,
+        acceleration_m_s2: float,
+        speeding_up_m_s2: float = math.inf,
+    ) -> None:
         points = _distinct(points_m)
         self.target_m: Vector3 = points[-1]
         self.duration_s = self.distance_m = 0.0
         self._table: list[Motion] = []
         if len(points) > 1:
-            self._plan(np.array(points), speed_m_s, acceleration_m_s2)
+            self._plan(np.array(points), speed_m_s, acceleration_m_s2, speeding_up_m_s2)
 
     def at(self, elapsed_s: float) -> Motion:
         """Position, velocity and acceleration; before the start at rest there, after the end at the target."""
@@ -51,7 +58,7 @@ class CurveProfile:
             _between(before[2], after[2], part),
         )
 
-    def _plan(self, points: Floats, speed_m_s: float, acceleration_m_s2: float) -> None:
+    def _plan(self, points: Floats, speed_m_s: float, acceleration_m_s2: float, speeding_up_m_s2: float) -> None:
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
         knots = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])
         spline = CubicSpline(knots, points)
@@ -63,7 +70,8 @@ class CurveProfile:
         curvature = _curvature(first / rate[:, None], pieces_m)
         along_m = np.concatenate([[0.0], np.cumsum(pieces_m)])
         top_m_s = np.minimum(speed_m_s, np.sqrt(TURNING_SHARE * acceleration_m_s2 / np.maximum(curvature, 1e-9)))
-        speeds = _within_acceleration(top_m_s, pieces_m, SPEEDING_SHARE * acceleration_m_s2)
+        braking_m_s2 = SPEEDING_SHARE * acceleration_m_s2
+        speeds = _within_acceleration(top_m_s, pieces_m, min(braking_m_s2, speeding_up_m_s2), braking_m_s2)
         times_s = np.concatenate([[0.0], np.cumsum(2.0 * pieces_m / (speeds[1:] + speeds[:-1]))])
         self.distance_m, self.duration_s = float(along_m[-1]), float(times_s[-1])
         self._tabulate(spline, u, along_m, speeds, times_s)
@@ -95,15 +103,15 @@ def _curvature(tangents: Floats, pieces_m: Floats) -> Floats:
     return curvature
 
 
-def _within_acceleration(top_m_s: Floats, pieces_m: Floats, acceleration_m_s2: float) -> Floats:
-    """The fastest speeds from rest to rest below `top` whose change along the way stays within the limit."""
+def _within_acceleration(top_m_s: Floats, pieces_m: Floats, speeding_up_m_s2: float, braking_m_s2: float) -> Floats:
+    """The fastest speeds from rest to rest below `top` whose change along the way stays within the limits."""
     squares = top_m_s**2
     squares[0] = squares[-1] = 0.0
-    gain = 2.0 * acceleration_m_s2 * pieces_m
+    gain, loss = 2.0 * speeding_up_m_s2 * pieces_m, 2.0 * braking_m_s2 * pieces_m
     for k in range(len(gain)):
         squares[k + 1] = min(squares[k + 1], squares[k] + gain[k])
-    for k in range(len(gain) - 1, -1, -1):
-        squares[k] = min(squares[k], squares[k + 1] + gain[k])
+    for k in range(len(loss) - 1, -1, -1):
+        squares[k] = min(squares[k], squares[k + 1] + loss[k])
     speeds: Floats = np.sqrt(squares)
     return speeds
 

@@ -40,41 +40,51 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Ramps:
-    """A trapezoidal speed along a way of any shape: accelerate, cruise, brake."""
+    """A trapezoidal speed along a way of any shape: speed up, cruise, brake."""
 
     distance_m: float
     speed_m_s: float
-    acceleration_m_s2: float
+    speeding_up_m_s2: float
+    braking_m_s2: float
+
+    @property
+    def _ramps_s2_per_m(self) -> float:
+        """Times a top speed squared, what both ramps together take of the way."""
+        return 0.5 / self.speeding_up_m_s2 + 0.5 / self.braking_m_s2
 
     @property
     def top_speed_m_s(self) -> float:
         """The cruise speed, or what a way too short for it allows."""
-        return min(self.speed_m_s, math.sqrt(self.distance_m * self.acceleration_m_s2))
+        return min(self.speed_m_s, math.sqrt(self.distance_m / self._ramps_s2_per_m))
 
     @property
     def duration_s(self) -> float:
         top = self.top_speed_m_s
-        return self.distance_m / top + top / self.acceleration_m_s2 if top > 0.0 else 0.0
+        return self.distance_m / top + top * self._ramps_s2_per_m if top > 0.0 else 0.0
 
     def at(self, elapsed_s: float, remaining_s: float) -> tuple[float, float, float]:
         """Distance covered, speed and acceleration; at a time within the duration."""
-        top, acceleration = self.top_speed_m_s, self.acceleration_m_s2
-        ramp_s = top / acceleration
+        top, growth, braking = self.top_speed_m_s, self.speeding_up_m_s2, self.braking_m_s2
+        ramp_s = top / growth
         if elapsed_s < ramp_s:
-            return 0.5 * acceleration * elapsed_s**2, acceleration * elapsed_s, acceleration
-        if remaining_s < ramp_s:
-            return self.distance_m - 0.5 * acceleration * remaining_s**2, acceleration * remaining_s, -acceleration
-        return 0.5 * acceleration * ramp_s**2 + top * (elapsed_s - ramp_s), top, 0.0
+            return 0.5 * growth * elapsed_s**2, growth * elapsed_s, growth
+        if remaining_s < top / braking:
+            return self.distance_m - 0.5 * braking * remaining_s**2, braking * remaining_s, -braking
+        return 0.5 * growth * ramp_s**2 + top * (elapsed_s - ramp_s), top, 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class LineProfile:
-    """A straight line, never faster than `speed`, never changing faster than `acceleration`."""
+    """A straight line, never faster than `speed`, never changing faster than `acceleration`.
+
+    `speeding_up_m_s2` limits how fast the horizontal speed grows (see FlightConfig).
+    """
 
     start_m: Vector3
     target_m: Vector3
     speed_m_s: float
     acceleration_m_s2: float
+    speeding_up_m_s2: float = math.inf
 
     @property
     def distance_m(self) -> float:
@@ -82,7 +92,10 @@ class LineProfile:
 
     @property
     def _ramps(self) -> Ramps:
-        return Ramps(self.distance_m, self.speed_m_s, self.acceleration_m_s2)
+        growth, level_m = self.acceleration_m_s2, math.dist(self.start_m[:2], self.target_m[:2])
+        if level_m > 0.0:
+            growth = min(growth, self.speeding_up_m_s2 * self.distance_m / level_m)
+        return Ramps(self.distance_m, self.speed_m_s, growth, self.acceleration_m_s2)
 
     @property
     def duration_s(self) -> float:
@@ -111,6 +124,7 @@ class CircleProfile:
     angle_rad: float  # positive clockwise
     speed_m_s: float
     acceleration_m_s2: float
+    speeding_up_m_s2: float = math.inf
 
     @property
     def distance_m(self) -> float:
@@ -120,7 +134,9 @@ class CircleProfile:
     def _ramps(self) -> Ramps:
         # v^2 / R sideways within its share of the acceleration
         turning_m_s = math.sqrt(TURNING_SHARE * self.acceleration_m_s2 * self.radius_m)
-        return Ramps(self.distance_m, min(self.speed_m_s, turning_m_s), SPEEDING_SHARE * self.acceleration_m_s2)
+        braking = SPEEDING_SHARE * self.acceleration_m_s2
+        growth = min(braking, self.speeding_up_m_s2)
+        return Ramps(self.distance_m, min(self.speed_m_s, turning_m_s), growth, braking)
 
     @property
     def duration_s(self) -> float:

@@ -125,6 +125,10 @@ class FlightConfig(Written):
     cruise_speed_m_s: Annotated[Positive, Field(le=12.0)] = 1.0
     # A tilt of 11 degrees, well inside every multicopter's.
     cruise_acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 2.0
+    # The most, of any item's acceleration, with which the horizontal speed grows. A vehicle that leans into its way is
+    # hit below its centre and tips: beyond 10 degrees at 3 m/s, or 16 at 1 m/s, its thrust then pins it to the obstacle
+    # (docs/recovery.md). This leans it by 6; drag and a head wind by up to 6 more. Braking leans it the other way.
+    speeding_up_m_s2: Annotated[Positive, Field(le=9.81)] = 1.0
     # A waypoint is passed, not settled on. A PX4 that flies by GPS wanders by this much around a setpoint (its own
     # simulator's noise moves a hover by 0.5 m); a quarter of it could be missed for a long time.
     acceptance_radius_m: Positive = 0.5

@@ -81,7 +81,7 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
     known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
-    pace = Pace(flight.cruise_speed_m_s, flight.cruise_acceleration_m_s2)
+    pace = Pace.of(flight)
     for step in program(mission):
         action = step.action
         way: Trajectory | None = None

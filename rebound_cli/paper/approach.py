@@ -63,7 +63,8 @@ def approach(
         "acceleration_m_s2": ACCELERATION_M_S2,
         "yaw_deg": 0.0,
     }
-    settings: dict[str, Any] = {"streams": {"window_s": 0.5}, "flight": {"arrival_timeout_s": 2.0}}
+    flight = {"arrival_timeout_s": 2.0, "speeding_up_m_s2": ACCELERATION_M_S2}
+    settings: dict[str, Any] = {"streams": {"window_s": 0.5}, "flight": flight}
     for part, values in (companion or {}).items():
         settings[part] = {**settings.get(part, {}), **values} if isinstance(values, Mapping) else values
     return pinned(

@@ -78,6 +78,7 @@ def mission_data(case: Case) -> dict[str, Any]:
         "items": [{"takeoff": {"height_m": HEIGHT_M}}, {"go_to": go_to}, {"land": {}}],
         "on_collision": {"then": "hold", "hold_s": HOLD_S},
         "recovery": {"law": case.law},
+        "companion": {"flight": {"speeding_up_m_s2": RUN_UP_M_S2}},
         "fence": {"radius_m": 40, "max_height_m": 8},
         "sim": {"walls": [wall]},
     }
