@@ -62,7 +62,7 @@ def test_setpoints_lead_the_mode_switch_by_a_second_and_never_pause_in_flight():
     assert arm_at > offboard_at
     gaps = [b - a for a, b in itertools.pairwise(times)]
     assert max(gaps) <= 50_000, "20 Hz or faster"
-    assert {m.type_mask for _, m in f.vehicle.setpoints} == {0x800, 0x9C0, 0x9F8}
+    assert {m.type_mask for _, m in f.vehicle.setpoints} == {0x800, 0x9F8}
 
 
 def test_setpoints_stop_once_the_vehicle_lands_by_itself():

@@ -19,10 +19,10 @@ def flown(*items, wall_north_m=3.0) -> Flight:
 
 # (expectation, whether it is met, a piece of what was found), for a flight into a wall at 2 m/s
 BEFORE_THE_HIT = [
-    ({"collision": {"within_s": 5}}, True, "2.0"),
+    ({"collision": {"within_s": 5}}, True, "2.1"),
     ({"collision": {"within_s": 1}}, False, "no hit"),
-    ({"collision": {"within_s": 5, "min_speed_m_s": 2.5}}, False, "hit at 2.0"),
-    ({"collision": {"within_s": 5, "max_speed_m_s": 2.5}}, True, "2.0"),
+    ({"collision": {"within_s": 5, "min_speed_m_s": 2.5}}, False, "hit at 2.1"),
+    ({"collision": {"within_s": 5, "max_speed_m_s": 2.5}}, True, "2.1"),
     ({"no_collision": None}, False, "hit at"),
     ({"no_collision": {"for_s": 0.5}}, True, "none"),
 ]

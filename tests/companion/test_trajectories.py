@@ -88,3 +88,32 @@ def test_a_velocity_lasts_its_time_with_its_ramps(velocity, duration_s, top):
     middle = way.at(0.5 * duration_s)[1]
     assert math.hypot(*middle) == pytest.approx(top, abs=0.01)
     assert np.dot(middle, velocity) > 0.0
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        LineProfile((0.0, 0.0, -2.0), (8.0, 0.0, -2.0), 3.0, 2.0, 1.0),
+        CurveProfile(ZIGZAG, 3.0, 2.0, 1.0),
+        CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, 1.5 * math.tau, 2.0, 2.0, 1.0),
+        way_of(
+            VelocityItem(velocity_ned_m_s=(2.0, 0.0, 0.0), duration_s=5.0),
+            (0.0, 0.0, -2.0),
+            Pace(1.0, 2.0, speeding_up_m_s2=1.0),
+        ),
+    ],
+)
+def test_the_speed_grows_slower_than_it_falls(way):
+    times = np.arange(0.0, way.duration_s, 0.02)
+    speeds = [math.hypot(*way.at(t)[1]) for t in times]
+    changes = np.diff(speeds) / 0.02
+    assert changes.max() == pytest.approx(1.0, abs=0.05)
+    assert changes.min() < -1.1
+    assert math.dist(way.at(way.duration_s - 1e-6)[0], way.target_m) < 1e-4
+
+
+def test_straight_up_no_speed_leans_the_vehicle():
+    up = LineProfile((0.0, 0.0, -1.0), (0.0, 0.0, -5.0), 2.0, 2.0, 1.0)
+    assert up.at(0.5)[2] == (0.0, 0.0, -2.0)
+    aside = LineProfile((0.0, 0.0, -1.0), (3.0, 0.0, -5.0), 2.0, 2.0, 1.0)
+    assert aside.at(0.2)[2][0] == pytest.approx(1.0)
