@@ -38,7 +38,7 @@ GATE = {
             "normal_ned": [-1, 0, 0],
             "width_m": 6,
             "height_m": 6,
-            "motion": {"velocity_ned_m_s": [-1.2, 0, 0], "from_s": 8.6, "until_s": 10.2},
+            "motion": {"velocity_ned_m_s": [-1.2, 0, 0], "from_s": 9.5, "until_s": 11.1},
         }
     ]
 }

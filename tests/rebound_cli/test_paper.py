@@ -183,9 +183,9 @@ def test_each_study_states_how_the_sensor_was_received(sample, study):
 
 def test_a_vehicle_that_hits_again_or_overshoots_makes_the_directions_red(sample):
     flights = directions.flights(1)
-    good = results_like(sample, flights)
+    short, past = (dataclasses.replace(sample.first, overshoot_m=overshoot_m) for overshoot_m in (0.02, 0.2))
+    good = [dataclasses.replace(result, contacts=(short,)) for result in results_like(sample, flights)]
     assert all(row.agrees for row in directions.conclude(good).rows)
-    past = dataclasses.replace(sample.first, overshoot_m=0.2)
     bad = [dataclasses.replace(result, recontacts=1, contacts=(past, past)) for result in good]
     assert not any(row.agrees for row in directions.conclude(bad).rows)
 

@@ -1,0 +1,50 @@
+"""A vehicle that leans into its way tips over where it hits: how it speeds up, and how fast it takes off."""
+
+import numpy as np
+
+from companion.mission.model import Mission
+from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.random_missions.crashes import tilts_deg
+from rebound_cli.run_folder import FlightRecorder
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
+
+WALL = {"walls": [{"name": "wall", "point_ned_m": [1.18, 0, -2], "normal_ned": [-1, 0, 0], "height_m": 8}]}
+FAST = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 4.0, "acceleration_m_s2": 3.0, "yaw_deg": 0}}
+
+
+def flown(folder, *items, **sim):
+    mission = Mission.model_validate(
+        {
+            "name": "lean",
+            "items": [{"takeoff": {"height_m": 3}}, *items, {"land": {}}],
+            "on_collision": {"then": "land"},
+            "fence": {"radius_m": 12, "max_height_m": 6},
+        }
+    )
+    scene = Scene.model_validate({**sim, "seed": 1})
+    recorder = FlightRecorder(folder)
+    flight, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, load_built_in("foldable")), recorder, Interrupts())
+    recorder.close()
+    return flight
+
+
+def test_a_wall_met_while_speeding_up_does_not_tip_the_vehicle_over(tmp_path):
+    # Given a wall a metre ahead, and an item that allows for 3 m/s^2, with which the vehicle would lean by 21 degrees
+    flight = flown(tmp_path, FAST, **WALL)
+    series, hit = flight.truth.series, flight.truth.hits[0]
+    at = int(np.searchsorted(series["time_boot_us"], hit.contact_at_boot_us)) - 1
+    tilt_deg = tilts_deg(series["attitude_wxyz"])
+    # Then it meets the wall while it speeds up, nearly level, and stays so
+    assert hit.impact_velocity_ned_m_s[0] > 1.0
+    assert tilt_deg[at] < 11.0
+    assert tilt_deg.max() < 35.0
+    assert series["position_ned_m"][at : at + 500, 2].max() - series["position_ned_m"][at, 2] < 0.1
+
+
+def test_the_take_off_is_no_faster_than_asked(tmp_path):
+    flight = flown(tmp_path)
+    climb_m_s = -flight.truth.series["velocity_ned_m_s"][:, 2]
+    assert climb_m_s.max() < 1.3, "companion.flight.takeoff_speed_m_s is 1.0"
