@@ -62,6 +62,7 @@ def _allocation(airframe: Airframe) -> Iterable[Parameter]:
         yield Parameter(f"CA_ROTOR{rotor}_KM", float(sign * moment_m), "reaction torque over thrust, metres")
         yield Parameter(f"PWM_MAIN_FUNC{rotor + 1}", _FIRST_MOTOR_FUNCTION + rotor, "the motor's output")
     yield Parameter("THR_MDL_FAC", 0.0, "thrust is linear in the motor command")
+    yield Parameter("MC_AIRMODE", 1, "with little thrust, too, it can be turned level: roll and pitch before thrust")
 
 
 def _gains(airframe: Airframe) -> Iterable[Parameter]:
@@ -78,6 +79,10 @@ def _gains(airframe: Airframe) -> Iterable[Parameter]:
         yield Parameter(f"MC_{axis}RATE_I", p, "trim within a second")
         yield Parameter(f"MC_{axis}RATE_D", p * motors.time_constant_s / 2, "half of the motors' lag")
         yield Parameter(f"MC_{axis}_P", control.attitude_frequency_rad_s / (2 * control.attitude_damping), "1/s")
+    # A vehicle that a hit tips by more than half a radian is turned back as fast as by the built-in autopilot.
+    fastest_deg_s = math.degrees(control.attitude_frequency_rad_s / (2 * control.attitude_damping))
+    yield Parameter("MC_ROLLRATE_MAX", fastest_deg_s, "deg/s; 220 turns a tipped vehicle back too slowly")
+    yield Parameter("MC_PITCHRATE_MAX", fastest_deg_s, "the same")
     yaw_rate_per_s = 2 * control.attitude_damping * control.yaw_frequency_rad_s
     per_unit = _YAW_MOTOR_SHARE * all_n * motors.moment_per_thrust_m / jz
     yield Parameter("MC_YAWRATE_P", yaw_rate_per_s / per_unit, f"rate loop of {yaw_rate_per_s:.0f} 1/s")
@@ -136,6 +141,10 @@ def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
         yield Parameter("SENS_FLOW_ROT", 0, "mounted along the body's axes")
     else:
         yield Parameter("EKF2_EV_CTRL", 0, "no motion capture outdoors")
+        # At the default of 5 PX4 rejects the true fix for 5 s after a hit at 3.4 m/s, meanwhile flies 14 m off at
+        # 3 m/s, then finds its position invalid and lands.
+        yield Parameter("EKF2_GPS_P_GATE", 50.0, "standard deviations; a hit must not make the true fix incredible")
+        yield Parameter("EKF2_GPS_V_GATE", 50.0, "the same")
         yield Parameter("EKF2_GPS_P_NOISE", 0.05, "m; the fix is an RTK receiver's")
         yield Parameter("EKF2_GPS_V_NOISE", 0.1, "m/s; PX4 takes no less than 0.25 for a simulated fix")
 

@@ -82,6 +82,21 @@ def test_ekf2_gets_the_gyroscopes_noise_over_its_own_step():
     assert values()["EKF2_GYR_NOISE"] == pytest.approx(FOLDABLE.imu.gyroscope_noise_rad_s * math.sqrt(0.4))
 
 
+def test_a_hit_makes_no_true_place_incredible_whatever_px4_flies_by():
+    """At PX4's default gate of 5 the filter goes its own way for seconds after a hit that clipped."""
+    assert values(position="mocap")["EKF2_EVP_GATE"] >= 50
+    outdoors = values(position="gps")
+    assert min(outdoors["EKF2_GPS_P_GATE"], outdoors["EKF2_GPS_V_GATE"]) >= 50
+
+
+def test_a_tipped_vehicle_is_turned_back_by_all_that_the_built_in_loop_asks_for_at_most():
+    """P_rate * (MC_*RATE_MAX) is eq. 5's k_R e_R at a right angle, w^2; and with little thrust as well."""
+    found, control = values(), FOLDABLE.control
+    loop_per_s = 2 * control.attitude_damping * control.attitude_frequency_rad_s
+    assert loop_per_s * math.radians(found["MC_PITCHRATE_MAX"]) == pytest.approx(control.attitude_frequency_rad_s**2)
+    assert found["MC_AIRMODE"] == 1
+
+
 def test_names_fit_px4_and_come_once():
     names = [parameter.name for parameter in px4_parameters(FOLDABLE)]
     assert len(set(names)) == len(names)
