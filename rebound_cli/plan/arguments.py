@@ -1,6 +1,7 @@
 """The arguments of `rebound plan`."""
 
 import argparse
+import math
 from pathlib import Path
 
 from rebound_cli.arguments import Commands, runs
@@ -40,7 +41,8 @@ def _home(text: str) -> tuple[float, float, float]:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = []
-    if len(numbers) not in (2, 3) or abs(numbers[0]) > 90.0 or abs(numbers[1]) > 180.0:
+    is_place = len(numbers) in (2, 3) and all(map(math.isfinite, numbers))
+    if not is_place or abs(numbers[0]) > 90.0 or abs(numbers[1]) > 180.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not LAT,LON or LAT,LON,ALT, such as 47.3977,8.5456,488")
     latitude_deg, longitude_deg, *altitude_m = numbers
     return latitude_deg, longitude_deg, altitude_m[0] if altitude_m else 0.0

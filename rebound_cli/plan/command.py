@@ -20,7 +20,10 @@ from sim_vehicle.hil.messages import Place
 
 def run_import(options: Namespace) -> int:
     plan, name = _read_json(options.plan), options.name or _name_of(options.plan)
-    data, notes = mission_of_plan(plan, name)
+    try:
+        data, notes = mission_of_plan(plan, name)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{options.plan}: {error}") from error
     text = mission_yaml(data, f"From {options.plan.name}, a plan of QGroundControl.")
     # What is written can be flown: a plan that leaves its own fence is refused here and not at the field.
     mission_from(parse_document(text, f"the mission from {options.plan}"))

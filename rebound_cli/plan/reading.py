@@ -10,6 +10,7 @@ from companion.messages import Vector3
 from companion.mission.items import MAX_SPEED_M_S
 from rebound_cli.plan import commands
 from rebound_cli.plan.fences import fence_of_plan
+from rebound_cli.plan.shape import fault_of
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 
@@ -65,6 +66,9 @@ def mission_of_plan(plan: Any, name: str) -> tuple[dict[str, Any], Sequence[str]
     """The content of a mission file and notes on what was left out or put in. Raises PlanError."""
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan" or not isinstance(plan.get("mission"), dict):
         raise PlanError("this is no plan of QGroundControl: it has no fileType 'Plan' and mission.")
+    fault = fault_of(plan)
+    if fault is not None:
+        raise PlanError(f"this is no whole plan of QGroundControl: {fault}.")
     mission = _Mission(Origin(_home(plan["mission"])))
     items = list(_items(plan["mission"]))
     if not items:

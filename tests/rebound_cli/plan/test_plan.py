@@ -1,14 +1,18 @@
 """Missions from and for QGroundControl: places, order, repeats and fences survive both ways."""
 
+import contextlib
 import copy
+import functools
 import json
 import math
+import operator
 
 import pytest
 import yaml
 
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
+from rebound_cli.main import main
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
 from sim_vehicle.hil.messages import Place
@@ -201,3 +205,34 @@ def test_a_file_that_is_no_plan(tmp_path, text, words):
         path.write_text(text)
     result = rebound("plan", "import", path)
     assert result.returncode == 1 and words in result.stderr and "Traceback" not in result.stderr
+
+
+def places_in(node, place=()):
+    yield place
+    for key in node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ():
+        yield from places_in(node[key], (*place, key))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [None, -1, "x", [], {}, math.nan, math.inf, 10**400, True],
+    ids=["null", "negative", "text", "list", "object", "nan", "infinite", "huge", "true"],
+)
+def test_a_plan_with_any_part_of_another_kind_is_read_or_refused(wrong):
+    centre = [HOME.latitude_deg, HOME.longitude_deg]
+    circle = {"circle": {"center": centre, "radius": 40.0}, "inclusion": True}
+    survey = {"type": "ComplexItem", "TransectStyleComplexItem": {"Items": [waypoint()]}}
+    whole = plan(TAKEOFF, survey, item(177, 1, 1, *[0] * 5), fence={"circles": [circle], "polygons": []}, hoverSpeed=3)
+    polygon = {"polygon": [centre, centre, centre]}
+    for written in (whole, {**whole, "geoFence": {"circles": [], "polygons": [polygon]}}):
+        for *way, last in filter(None, places_in(written)):
+            damaged = copy.deepcopy(written)
+            functools.reduce(operator.getitem, way, damaged)[last] = wrong
+            with contextlib.suppress(ConfigurationError):
+                mission_of_plan(damaged, "t")
+
+
+def test_a_place_that_is_no_number_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        main(["plan", "export", "missions/hover.yaml", "--home", "nan,8"])
+    assert "'nan,8' is not LAT,LON" in capsys.readouterr().err
