@@ -13,6 +13,8 @@ CLEAN_WANTED = 0.99
 OVERSHOOT_MOST_M = 0.05
 LOST_MOST_M, LOST_UP_TO_M_S = 0.10, 2.5
 RISEN_MOST_M = 0.05
+# A vehicle that leant by more hangs on the obstacle by its own thrust (docs/recovery.md).
+PINNED_DEG = 60.0
 LOSING_M, LEFT_MOST = 0.05, 0.5
 CLEAR_LEAST_M = 0.3
 
@@ -50,6 +52,10 @@ def _hits(missions: Missions) -> Iterator[Bar]:
             clean >= CLEAN_WANTED if judged else None,
             f"{len(answered(hits))} hits, {_reasons(answered(hits))}",
         )
+        swung = share(is_clean(hit, "returned") for hit in answered(hits))
+        apart = f"{airframe}, 1 to 5 m/s: the same, but for other guards that swing in while the vehicle leaves"
+        came_back = sum(hit["returned"] > 0 for hit in answered(hits))
+        yield Bar(apart, "", f"{per_cent(swung)} %", None, f"{came_back} had come back")
         clear = [hit["clear_m"] for hit in hits if hit.get("clear_m") is not None]
         yield Bar(
             f"{airframe}, 1 to 5 m/s: guards at rest {CLEAR_LEAST_M} m clear of what was hit",
@@ -60,17 +66,18 @@ def _hits(missions: Missions) -> Iterator[Bar]:
         )
         slow = level(missions.hits(airframe, 0.0, LOST_UP_TO_M_S))
         yield _worst(f"{airframe}, level, up to 2.5 m/s: height lost", slow, "lost_m", LOST_MOST_M)
-        yield _worst(
-            f"{airframe}, level: height gained", level(missions.hits(airframe, 0.0, 99.0)), "risen_m", RISEN_MOST_M
-        )
+        upright = [hit for hit in slow if hit["leant_deg"] < PINNED_DEG]
+        yield _worst(f"{airframe}: the same, but for hits that tip it by {PINNED_DEG:g} deg", upright, "lost_m")
+        every = level(missions.hits(airframe, 0.0, 99.0))
+        yield _worst(f"{airframe}, level: height gained", every, "risen_m", RISEN_MOST_M)
         yield _halved(airframe, missions.first_hits_compared(airframe))
         into = square(missions.hits(airframe, 0.0, 99.0))
         noticed = f"{per_cent(share(hit['seen'] for hit in into))} %"
         yield Bar(f"{airframe}: hits noticed, of those with 0.5 m/s into the surface", "", noticed, None, _of(into))
 
 
-def is_clean(hit: Json) -> bool:
-    return bool(hit["past_m"] <= OVERSHOOT_MOST_M and not hit["again"])
+def is_clean(hit: Json, touches: str = "again") -> bool:
+    return bool(hit["past_m"] <= OVERSHOOT_MOST_M and not hit[touches])
 
 
 def _reasons(hits: list[Json]) -> str:
@@ -78,13 +85,17 @@ def _reasons(hits: list[Json]) -> str:
     return f"{past} past by more, {sum(hit['again'] > 0 for hit in hits)} touched again"
 
 
-def _worst(what: str, hits: list[Json], key: str, most_m: float) -> Bar:
+def _worst(what: str, hits: list[Json], key: str, most_m: float | None = None) -> Bar:
+    """The largest; reported only, without a limit."""
+    bar = "" if most_m is None else f"≤ {100 * most_m:g} cm"
     if not hits:
-        return Bar(what, f"≤ {100 * most_m:g} cm", "-", None, "no hit")
+        return Bar(what, bar, "-", None, "no hit")
     values = [hit[key] for hit in hits]
-    over = sum(value > most_m for value in values)
     measured = f"{100 * max(values):.1f} cm at most, {100 * statistics.median(values):.1f} in the median"
-    return Bar(what, f"≤ {100 * most_m:g} cm", measured, over == 0, f"{len(hits)} hits, {over} beyond")
+    if most_m is None:
+        return Bar(what, bar, measured, None, _of(hits))
+    over = sum(value > most_m for value in values)
+    return Bar(what, bar, measured, over == 0, f"{len(hits)} hits, {over} beyond")
 
 
 def _halved(airframe: str, pairs: list[tuple[Json, Json]]) -> Bar:

@@ -1,12 +1,14 @@
 """Figures of every recovery of a flight, by the simulator's truth. SI units."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from rebound_cli.campaign.plan import Json
 from rebound_cli.random_missions.contacts import Contact, Role
+from rebound_cli.random_missions.crashes import tilts_deg
 from rebound_cli.random_missions.flight import JudgedFlight
 from rebound_cli.random_missions.phases import phases_of
 from rebound_cli.summary import LONGEST_RECOVERY_S
@@ -17,6 +19,8 @@ Rows = npt.NDArray[np.intp]
 
 # The vehicle is watched at rest for this long, unless it flies on earlier.
 RESTING_S = 0.5
+# A vehicle that leaves a surface does not come nearer again by this; else a touch is another guard swinging in.
+CAME_BACK_M = 0.02
 # A vehicle at rest moves by a millimetre in so many rows of truth.
 _LOOK_EVERY = 10
 _DIGITS = 4
@@ -47,6 +51,7 @@ def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
         "seen": first.collision is not None,
         "again": sum(contact.role is Role.AGAIN for contact in episode),
         "others": sum(contact.role is Role.NEXT for contact in episode),
+        "returned": sum(_returned(flight, before, touch) for before, touch in pairwise(episode)),
     }
     if first.collision is not None:
         collision = flight.report.collisions[first.collision]
@@ -71,9 +76,6 @@ def _recovery(flight: JudgedFlight, contact: Contact, episode: Sequence[Contact]
     ended_us = phases_of(flight.events, flight.truth.epoch_at_boot_us).end_of(detected_boot_us + 1.0)
     if ended_us is not None:
         until_s = min(until_s, 1e-6 * (ended_us - hit.contact_at_boot_us))
-    later = [other.contact_at_boot_us for other in flight.truth.hits if other.contact_at_boot_us > hit.ended_at_boot_us]
-    if later:
-        until_s = min(until_s, 1e-6 * (later[0] - hit.contact_at_boot_us))
     until_boot_us = hit.contact_at_boot_us + 1e6 * until_s
     past_m, lost_m = flight.truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, until_boot_us)
     during = (since_s >= 0.0) & (since_s <= until_s)
@@ -86,8 +88,22 @@ def _recovery(flight: JudgedFlight, contact: Contact, episode: Sequence[Contact]
         "past_m": round(past_m, _DIGITS),
         "lost_m": round(lost_m, _DIGITS),
         "risen_m": round(max(0.0, risen_m), _DIGITS),
+        "leant_deg": round(float(tilts_deg(series["attitude_wxyz"][during]).max(initial=0.0)), 1),
         "clear_m": None if clear_m is None else round(clear_m, _DIGITS),
     }
+
+
+def _returned(flight: JudgedFlight, before: Contact, touch: Contact) -> bool:
+    """Whether the centre had come back to a surface that is touched again; one that goes from corner to corner has."""
+    if touch.role is not Role.AGAIN:
+        return False
+    time_us, obstacle = flight.truth.series["time_boot_us"], flight.obstacles.get(touch.hit.obstacle)
+    between = np.flatnonzero((time_us >= before.hit.ended_at_boot_us) & (time_us <= touch.hit.contact_at_boot_us))
+    if obstacle is None or len(between) == 0:
+        return False
+    rows = [*between[::_LOOK_EVERY], between[-1]]
+    off_m = [_distance_m(obstacle, flight.truth.series["position_ned_m"][row], time_us[row]) for row in rows]
+    return max(off_m) - off_m[-1] > CAME_BACK_M
 
 
 def _clear_m(flight: JudgedFlight, episode: Sequence[Contact], resting: Rows) -> float | None:

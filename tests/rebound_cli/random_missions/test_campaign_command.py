@@ -29,6 +29,8 @@ HIT = {
     "steepness": 0.0,
     "seen": True,
     "again": 0,
+    "returned": 0,
+    "leant_deg": 15.0,
     "others": 0,
     "latency_ms": 3.0,
     "settled_s": 1.4,
@@ -95,6 +97,15 @@ def test_one_hit_beyond_a_limit_on_height_is_enough(changes, word):
 def test_one_hit_in_fifty_that_overshoots_or_touches_again_is_too_many(changes):
     assert verdicts(mission_bars(made_up(count=50, **changes)), "overshoot")[0] == MISSED
     assert verdicts(mission_bars(made_up(count=100, **changes)), "overshoot")[0] == MET
+
+
+def test_guards_that_swing_in_and_hits_that_pin_the_vehicle_are_reported_apart():
+    bars = mission_bars(made_up(count=50, again=1, lost_m=0.5, leant_deg=70.0))
+    apart = [bar.measured for bar in bars if "swing in" in bar.what]
+    strict = [bar.measured for bar in bars if "without touching the surface again" in bar.what]
+    assert (apart[0], strict[0]) == ("100.0 %", "98.0 %")
+    assert verdicts(bars, "height lost")[0] == MISSED
+    assert "50.0 cm" not in next(bar.measured for bar in bars if "tip it" in bar.what)
 
 
 def test_the_feed_forward_halves_what_is_lost_without_it():

@@ -219,6 +219,24 @@ def test_a_bounce_before_anybody_told_of_the_hit_belongs_to_it():
     assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.HIT]
 
 
+def test_a_guard_that_swings_in_while_the_vehicle_leaves_is_counted_apart_and_ends_no_recovery():
+    # Given a vehicle that rebounds and runs past its setpoint, whose other guard brushes the wall on the way
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (10.5, 1.3, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(series))
+    assert (figures["again"], figures["returned"]) == (1, 0)
+    assert figures["past_m"] == pytest.approx(0.2, abs=0.02)
+    assert figures["clear_m"] == pytest.approx(0.46, abs=0.01), "from where that guard touched"
+    # and one whose centre comes back for it
+    back = path((0, 0, 0, 0), (10, 2, 0, 2), (10.05, 1.95, 0, 2), (10.08, 1.98, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(back))
+    assert (figures["again"], figures["returned"]) == (1, 1)
+
+
+def _touched_again(series):
+    judged = bounced(series=series, hits=[hit(), hit(at_s=10.08, place=(1.96, 0.0, -2.08))])
+    return judged, contacts_of(judged)
+
+
 def test_clear_is_the_nearest_of_the_last_half_second():
     # Given a vehicle that settles 0.5 m off the wall and then drifts back to 0.2 m
     series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 1.5, 0, 2), (11.2, 1.8, 0, 2), (17, 1.8, 0, 2))
