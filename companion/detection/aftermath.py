@@ -135,6 +135,11 @@ class Aftermath:
         """The largest step of the rates from sample to sample that a jump at ``velocity_us`` may belong to."""
         return self.rate_step_rad_s if velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US else 0.0
 
+    @property
+    def rate_step_s(self) -> float:
+        """How long the largest step of the rates had: from one sample to the next."""
+        return 1e-6 * (self.rate_step_until_us - self.rate_step_from_us)
+
     def contact_gap_us(self, velocity_us: int, least_rad_s: float) -> int:
         """Latest time at which the vehicle was certainly free before the step seen at ``velocity_us``."""
         if self.rate_step_near(velocity_us) >= least_rad_s:

@@ -292,12 +292,16 @@ class FusedDetector:
         spread_m_s = aftermath.spread_m_s
         aftermath.learn(step)
         size = math.sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2])
-        turned = aftermath.rate_step_near(time_us) >= config.rate_step_rad_s
+        turned_rad_s = aftermath.rate_step_near(time_us)
+        turned = turned_rad_s >= config.rate_step_rad_s
         least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
         p, q, _ = aftermath.strapdown.rates_frd_rad_s
         shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
-        room = config.velocity_per_rate_m * (abs(p) + abs(q)) + aftermath.shaken_m_s(shaking)
-        threshold = caution * max(least, config.noise_factor * spread_m_s) + room
+        noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
+        if turned and turned_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * aftermath.rate_step_s:
+            # No motor did that, and the thrust has not turned for long: two signs, half as clear.
+            noise_m_s, room = 0.5 * noise_m_s, 0.0
+        threshold = caution * max(least, noise_m_s) + room + aftermath.shaken_m_s(shaking)
         if size < threshold or s.phase is not Phase.ARMED:
             return None
         free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)

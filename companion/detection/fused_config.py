@@ -16,9 +16,9 @@ class FusedConfig(Written):
     noise_factor: Positive = 4.2
     # Drag per mass is 0.2 to 0.4 /s times the speed and turns with the vehicle.
     drag_per_s: NotNegative = 0.3
-    # A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; ten times that. A rigid vehicle's hit
-    # at 0.5 m/s changes its velocity by 0.95 m/s, a foldable one's by 0.7.
-    velocity_step_m_s: Positive = 0.2
+    # A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six times that. A foldable vehicle's hit
+    # at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long, clipping leaves the estimate 0.16.
+    velocity_step_m_s: Positive = 0.12
     # With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by 2 rad/s changes its velocity
     # by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s.
     velocity_step_turned_m_s: Positive = 0.07

@@ -127,9 +127,29 @@ def test_a_hit_far_from_the_centre_moves_little_and_turns_much():
     def rates(t):
         return (0.0, 0.0, 4.0 if t > HIT_US else 0.0)
 
-    slight = pulse((-120.0, 0.0, 0.0))
+    slight = pulse((-105.0, 0.0, 0.0))
     assert Flight(slight, imu_every_us=20_000).fly() == []
     assert [i.evidence for i in Flight(slight, imu_every_us=20_000, rates=rates).fly()] == [Evidence.AFTERMATH]
+
+
+@pytest.mark.parametrize(("step_m_s", "hits"), [(0.16, 1), (0.08, 0)])
+def test_of_a_stiff_hit_between_the_samples_what_clipping_leaves_in_the_velocity_is_enough(step_m_s, hits):
+    """Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that."""
+    jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
+    impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump).fly(until_us=3_200_000)
+    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
+
+
+@pytest.mark.parametrize(("turn_rad_s", "step_m_s", "hits"), [(9.0, 0.1, 1), (9.0, 0.0, 0), (3.0, 0.1, 0)])
+def test_a_turn_that_no_motor_makes_needs_little_of_a_step(turn_rad_s, step_m_s, hits):
+    """A beam met in the climb at 50 Hz: within 20 ms motors turn the vehicle by 4.4 rad/s at most."""
+
+    def rates(t):
+        return (turn_rad_s * 0.7, turn_rad_s * 0.7, 0.0) if t > 3_002_000 else (0.0, 0.0, 0.0)
+
+    jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
+    flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump, rates=rates)
+    assert [i.evidence for i in flight.fly(until_us=3_045_000)] == [Evidence.AFTERMATH] * hits
 
 
 @pytest.mark.parametrize(("counted", "heard_odometry", "hits"), [(1, True, 0), (0, True, 1), (1, False, 1)])
