@@ -194,6 +194,17 @@ def test_stabilised_sticks_are_angles_and_thrust():
         assert flight.autopilot.applied.thrust_fraction == pytest.approx(thrust)
 
 
+def test_after_arming_the_throttle_waits_for_the_motors_and_then_rises_slowly():
+    flight = Flight(None)
+    sticks(flight, 0.2, throttle=-1.0)
+    assert set_mode(flight, Mode.STABILIZED) is Result.ACCEPTED
+    assert flight.ask(COMPONENT_ARM_DISARM, 1) is Result.ACCEPTED
+    # Given COM_SPOOLUP_TIME, 1 s; then half of the throttle a second, however far the stick is up
+    for more_s, thrust in ((0.9, 0.0), (0.6, 0.25), (0.5, 0.5), (1.2, 1.0)):
+        sticks(flight, more_s, throttle=1.0)
+        assert flight.autopilot.applied.thrust_fraction == pytest.approx(thrust, abs=0.02)
+
+
 def test_acro_sticks_are_rates():
     flight = flying(Mode.ACRO)
     sticks(flight, 0.1, roll=1.0, pitch=0.5, yaw=-1.0)

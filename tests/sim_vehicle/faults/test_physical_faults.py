@@ -72,6 +72,15 @@ def test_turbulence_has_the_strength_and_the_memory_that_the_model_asks_for() ->
     assert np.corrcoef(air[:-lag, 0], air[lag:, 0])[0, 1] == pytest.approx(math.exp(-1), abs=0.08)
 
 
+def test_turbulence_turns_with_the_mean_wind() -> None:
+    """Right of a wind to the north is east; right of one to north-east by east is to the south-east."""
+    to_north, turned = (Dryden(15.4, along, 0.02, np.random.default_rng(5)) for along in ((2, 0, 0), (0.6, 0.8, 0)))
+    for _ in range(100):
+        along, across, down = to_north.next(6.1, 15.0)
+        expected = (0.6 * along - 0.8 * across, 0.8 * along + 0.6 * across, down)
+        assert turned.next(6.1, 15.0) == pytest.approx(expected)
+
+
 # --- motors, supply, load ----------------------------------------------------------------------------------
 
 
