@@ -16,7 +16,7 @@ class Record:
     """The outcomes known so far by case number, and the open file behind them."""
 
     def __init__(self, campaign: Campaign, folder: Path) -> None:
-        """Open the campaign's file, or begin it. Raises RecordError where another campaign's lines are in it."""
+        """Open the campaign's file, or begin it. Raises RecordError where other lines are in it."""
         self.path = folder / f"{campaign.name}-{campaign.key}.jsonl"
         folder.mkdir(parents=True, exist_ok=True)
         self.outcomes: dict[int, Outcome] = {}
@@ -25,12 +25,16 @@ class Record:
 
     def _open(self, head: dict[str, Any]) -> TextIO:
         _cut_torn_line(self.path)
-        lines = self.path.read_text(encoding="utf-8").splitlines() if self.path.exists() else []
-        if lines and json.loads(lines[0]) != head:
-            raise RecordError(f"{self.path} holds another campaign's results; move it away")
-        for line in lines[1:]:
-            entry = json.loads(line)
-            self.outcomes[entry["case"]] = Outcome(entry["case"], entry.get("result"), entry.get("failure"))
+        lines = self.path.read_bytes().splitlines() if self.path.exists() else []
+        for number, line in enumerate(lines):
+            try:
+                entry = json.loads(line)
+                if number > 0:
+                    self.outcomes[entry["case"]] = Outcome(entry["case"], entry.get("result"), entry.get("failure"))
+            except (ValueError, KeyError, TypeError, AttributeError) as error:
+                raise RecordError(f"{self.path} is damaged in line {number + 1}; move it away.") from error
+            if number == 0 and entry != head:
+                raise RecordError(f"{self.path} holds another campaign's results; move it away.")
         file = self.path.open("a", encoding="utf-8")
         if not lines:
             _write(file, head)

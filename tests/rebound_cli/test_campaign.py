@@ -119,6 +119,16 @@ def test_another_version_of_the_code_is_another_campaign(monkeypatch):
     assert campaign().key != before
 
 
+@pytest.mark.parametrize("line", [b"nonsense", b"\xff", b"3", b'{"result":1}', b'{"case":[]}'])
+def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
+    record = Record(campaign(), tmp_path)
+    record.close()
+    with record.path.open("ab") as file:
+        file.write(line + b"\n")
+    with pytest.raises(RecordError, match=r"is damaged in line 2; move it away\.$"):
+        Record(campaign(), tmp_path)
+
+
 def test_a_file_of_another_campaign_is_refused(tmp_path):
     wanted = campaign()
     path = tmp_path / f"throws-{wanted.key}.jsonl"
