@@ -102,10 +102,8 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
 def situation(core: Core) -> Situation:
     """What the flight knows, for the detector."""
     flight = core.flight
-    latest, target = flight.vehicle.history.latest(), flight.target
-    height_m = None
-    if latest is not None and flight.origin_ned_m is not None:
-        height_m = flight.origin_ned_m[2] - latest.position_ned_m[2]
+    target = flight.target
+    height_m = flight.height_m
     return Situation(
         off_reason=why_not_detecting(core, height_m),
         armed=flight.vehicle.armed,

@@ -3,9 +3,8 @@
 import sys
 from pathlib import Path
 
-from companion.flight.states import markdown_table, mermaid_diagram
-from companion.guard.states import markdown_table as guard_table
-from companion.guard.states import mermaid_diagram as guard_diagram
+from companion.flight.states import TABLE as FLIGHT
+from companion.guard.states import TABLE as GUARD
 from rebound_cli.marked import with_part
 from sim_vehicle.autopilot.failsafe_table import markdown_table as failsafe_table
 from sim_vehicle.autopilot.modes import mode_diagram
@@ -14,10 +13,10 @@ from sim_vehicle.autopilot.modes import mode_diagram
 def with_diagrams(text: str) -> str:
     """The document with everything between its `generated` marks made anew. Raises MarkedPartError."""
     contents = {
-        "flight diagram": f"```mermaid\n{mermaid_diagram()}```\n",
-        "flight table": markdown_table(),
-        "guard diagram": f"```mermaid\n{guard_diagram()}```\n",
-        "guard table": guard_table(),
+        "flight diagram": f"```mermaid\n{FLIGHT.mermaid_diagram()}```\n",
+        "flight table": FLIGHT.markdown_table(),
+        "guard diagram": f"```mermaid\n{GUARD.mermaid_diagram()}```\n",
+        "guard table": GUARD.markdown_table(),
         "mode diagram": f"```mermaid\n{mode_diagram().rstrip()}\n```\n",
         "failsafe table": failsafe_table(),
     }

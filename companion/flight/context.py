@@ -157,6 +157,12 @@ class FlightContext:
     def step(self) -> Step:
         return self.steps[self.step_index]
 
+    @property
+    def height_m(self) -> float | None:
+        """Above the arming position; None before that, or where nothing is heard."""
+        latest, origin = self.vehicle.history.latest(), self.origin_ned_m
+        return None if latest is None or origin is None else origin[2] - latest.position_ned_m[2]
+
     def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))

@@ -14,7 +14,7 @@ from companion.flight.progress import FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.remembering import remember
 from companion.flight.returning import FlyHome
-from companion.flight.states import FINAL_STATES, State, Trigger, moves, next_state
+from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 from companion.flight.takeoff import TakeOff
 from companion.mission.items import TakeoffItem
 from companion.px4_mode import OFFBOARD
@@ -39,7 +39,7 @@ class Machine:
         if self.state not in FINAL_STATES:
             self._take(guard(self.flight, self.state, inputs, now_us), now_us)
         for estimate in inputs.impacts:
-            if moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
+            if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.activity, FlyItems):
                     self.activity.interrupt(now_us)
                 record_collision(self.flight, estimate, now_us)
@@ -68,9 +68,9 @@ class Machine:
         return self.activity is not before
 
     def _take(self, move: Move | None, now_us: int) -> None:
-        if move is None or not moves(self.state, move.trigger):
+        if move is None or not TABLE.moves(self.state, move.trigger):
             return
-        previous, self.state = self.state, next_state(self.state, move.trigger)
+        previous, self.state = self.state, TABLE.next_state(self.state, move.trigger)
         self.activity = self._begin(previous, move, now_us)
 
     def _begin(self, previous: State, move: Move, now_us: int) -> Activity:

@@ -1,7 +1,8 @@
-"""The flight's state machine: one table, everything else is derived from it."""
+"""The flight's state machine: one table, from which everything else follows."""
 
-from collections.abc import Mapping
 from enum import Enum
+
+from companion.state_table import StateTable
 
 
 class State(Enum):
@@ -43,92 +44,66 @@ class Trigger(Enum):
     DISARMED = "vehicle disarmed itself"
 
 
-# A trigger that a state does not list leaves the flight where it is.
-TABLE: Mapping[State, Mapping[Trigger, State]] = {
-    State.CONNECT: {
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.REFUSED: State.ABORTED,
-        Trigger.VEHICLE_READY: State.READY,
-    },
-    State.READY: {
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.REFUSED: State.ABORTED,
-        Trigger.PLAN_CONFIRMED: State.TAKEOFF,
-    },
-    State.TAKEOFF: {
-        Trigger.CONTROL_LOST: State.ABORTED,
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.REFUSED: State.ABORTED,
-        Trigger.COLLISION: State.RECOVERING,
-        Trigger.TAKEN_OFF: State.MISSION,
-    },
-    State.MISSION: {
-        Trigger.CONTROL_LOST: State.ABORTED,
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.COLLISION: State.RECOVERING,
-        Trigger.RETURN_DUE: State.RETURNING,
-        Trigger.LAND_DUE: State.LANDING,
-    },
-    State.RECOVERING: {
-        Trigger.CONTROL_LOST: State.ABORTED,
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.COLLISION: State.RECOVERING,
-        Trigger.RECOVERED_TO_HOLD: State.HOLDING,
-        Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
-        Trigger.RECOVERED_TO_RETRY: State.MISSION,
-        Trigger.RECOVERED_TO_DETOUR: State.MISSION,
-        Trigger.RECOVERED_TO_RETURN: State.RETURNING,
-        Trigger.RECOVERED_TO_LAND: State.LANDING,
-        Trigger.RECOVERED_TO_ABORT: State.ABORTED,
-    },
-    State.HOLDING: {
-        Trigger.CONTROL_LOST: State.ABORTED,
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.COLLISION: State.RECOVERING,
-        Trigger.HOLD_ENDED: State.MISSION,
-    },
-    State.RETURNING: {
-        Trigger.CONTROL_LOST: State.ABORTED,
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.COLLISION: State.RECOVERING,
-        Trigger.HOME_REACHED: State.LANDING,
-        Trigger.LAND_DUE: State.LANDING,
-    },
-    State.LANDING: {
-        Trigger.CONTROL_LOST: State.ABORTED,
-        Trigger.INTERRUPTED: State.ABORTED,
-        Trigger.COLLISION: State.RECOVERING,
-        Trigger.DISARMED: State.DONE,
-    },
-    State.DONE: {},
-    State.ABORTED: {},
-}
+TABLE = StateTable[State, Trigger](
+    {
+        State.CONNECT: {
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.REFUSED: State.ABORTED,
+            Trigger.VEHICLE_READY: State.READY,
+        },
+        State.READY: {
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.REFUSED: State.ABORTED,
+            Trigger.PLAN_CONFIRMED: State.TAKEOFF,
+        },
+        State.TAKEOFF: {
+            Trigger.CONTROL_LOST: State.ABORTED,
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.REFUSED: State.ABORTED,
+            Trigger.COLLISION: State.RECOVERING,
+            Trigger.TAKEN_OFF: State.MISSION,
+        },
+        State.MISSION: {
+            Trigger.CONTROL_LOST: State.ABORTED,
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.COLLISION: State.RECOVERING,
+            Trigger.RETURN_DUE: State.RETURNING,
+            Trigger.LAND_DUE: State.LANDING,
+        },
+        State.RECOVERING: {
+            Trigger.CONTROL_LOST: State.ABORTED,
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.COLLISION: State.RECOVERING,
+            Trigger.RECOVERED_TO_HOLD: State.HOLDING,
+            Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
+            Trigger.RECOVERED_TO_RETRY: State.MISSION,
+            Trigger.RECOVERED_TO_DETOUR: State.MISSION,
+            Trigger.RECOVERED_TO_RETURN: State.RETURNING,
+            Trigger.RECOVERED_TO_LAND: State.LANDING,
+            Trigger.RECOVERED_TO_ABORT: State.ABORTED,
+        },
+        State.HOLDING: {
+            Trigger.CONTROL_LOST: State.ABORTED,
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.COLLISION: State.RECOVERING,
+            Trigger.HOLD_ENDED: State.MISSION,
+        },
+        State.RETURNING: {
+            Trigger.CONTROL_LOST: State.ABORTED,
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.COLLISION: State.RECOVERING,
+            Trigger.HOME_REACHED: State.LANDING,
+            Trigger.LAND_DUE: State.LANDING,
+        },
+        State.LANDING: {
+            Trigger.CONTROL_LOST: State.ABORTED,
+            Trigger.INTERRUPTED: State.ABORTED,
+            Trigger.COLLISION: State.RECOVERING,
+            Trigger.DISARMED: State.DONE,
+        },
+        State.DONE: {},
+        State.ABORTED: {},
+    }
+)
 
-FINAL_STATES = frozenset(state for state, row in TABLE.items() if not row)
-
-
-def moves(state: State, trigger: Trigger) -> bool:
-    """Whether the trigger means anything in this state."""
-    return trigger in TABLE[state]
-
-
-def next_state(state: State, trigger: Trigger) -> State:
-    """The table, completed by its rule for triggers that are not listed."""
-    return TABLE[state].get(trigger, state)
-
-
-def mermaid_diagram() -> str:
-    """The table as a Mermaid state diagram."""
-    lines = ["stateDiagram-v2", f"    [*] --> {State.CONNECT.value}"]
-    for state, row in TABLE.items():
-        lines += [f"    {state.value} --> {target.value}: {trigger.value}" for trigger, target in row.items()]
-    lines += [f"    {state.value} --> [*]" for state in TABLE if state in FINAL_STATES]
-    return "\n".join(lines) + "\n"
-
-
-def markdown_table() -> str:
-    """The table in Markdown, one row a transition."""
-    lines = ["| state | trigger | next state |", "|---|---|---|"]
-    for state, row in TABLE.items():
-        lines += [f"| {state.value} | {trigger.value} | {target.value} |" for trigger, target in row.items()]
-    return "\n".join(lines) + "\n"
+FINAL_STATES = TABLE.final

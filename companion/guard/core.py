@@ -106,11 +106,9 @@ def place_origin(flight: FlightContext, guard: GuardContext) -> None:
 
 def situation(core: GuardCore) -> Situation:
     """What the guard knows, for the detector; of a stranger's setpoints it knows nothing."""
-    flight, is_ours = core.flight, core.machine.state in HOLDING
-    latest, target = flight.vehicle.history.latest(), flight.target if is_ours else None
-    height_m = None
-    if latest is not None and flight.origin_ned_m is not None:
-        height_m = flight.origin_ned_m[2] - latest.position_ned_m[2]
+    flight = core.flight
+    target = flight.target if core.machine.state in HOLDING else None
+    height_m = flight.height_m
     return Situation(
         off_reason=why_not_detecting(core, height_m),
         armed=flight.vehicle.armed,

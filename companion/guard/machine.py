@@ -11,7 +11,7 @@ from companion.guard.context import Activity, GuardContext, GuardInputs, Move
 from companion.guard.holding import GiveBack, Recovering, TakeOver
 from companion.guard.override import has_moved
 from companion.guard.standing_down import StandDown
-from companion.guard.states import HOLDING, State, Trigger, moves, next_state
+from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import Connect, End, StandBy, Watch
 from companion.px4_mode import OFFBOARD, mode_name
 
@@ -58,12 +58,12 @@ class GuardMachine:
             if trigger is Trigger.HIT_BESIDE_PROGRAM and self.guard.config.beside_program == "tell":
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 self.guard.flight.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
-            elif moves(self.state, trigger):
+            elif TABLE.moves(self.state, trigger):
                 self._remember_hit(now_us)
                 record_collision(self.guard.flight, estimate, now_us)
                 self._take(Move(trigger), now_us)
         move = self.activity.step(self.guard, inputs, now_us)
-        while move is not None and moves(self.state, move.trigger):
+        while move is not None and TABLE.moves(self.state, move.trigger):
             self._take(move, now_us)
             # The answers and positions of this step belong to the state that asked for them.
             move = self.activity.step(self.guard, GuardInputs(), now_us)
@@ -87,7 +87,8 @@ class GuardMachine:
         guard = self.guard
         beside = guard.flight.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out
         beside = guard.program_elsewhere or (beside and self.state is State.WATCHING)
-        return Trigger.HIT_BESIDE_PROGRAM if beside and moves(self.state, Trigger.HIT_BESIDE_PROGRAM) else Trigger.HIT
+        beside = beside and TABLE.moves(self.state, Trigger.HIT_BESIDE_PROGRAM)
+        return Trigger.HIT_BESIDE_PROGRAM if beside else Trigger.HIT
 
     def _remember_hit(self, now_us: int) -> None:
         guard, flight = self.guard, self.guard.flight
@@ -102,7 +103,7 @@ class GuardMachine:
     def _from_outside(self, inputs: GuardInputs, now_us: int) -> Move | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         flight = self.guard.flight
-        if flight.vehicle.armed is False and moves(self.state, Trigger.DISARMED):
+        if flight.vehicle.armed is False and TABLE.moves(self.state, Trigger.DISARMED):
             return Move(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:
             lost = self._taken_by_another(inputs) or self._link_silent(now_us)
@@ -110,7 +111,7 @@ class GuardMachine:
                 return Move(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.flight.refusal is not None:
             return Move(Trigger.REFUSED, inputs.flight.refusal)
-        if inputs.flight.stop_reason is not None and moves(self.state, Trigger.STOPPED):
+        if inputs.flight.stop_reason is not None and TABLE.moves(self.state, Trigger.STOPPED):
             return Move(Trigger.STOPPED, inputs.flight.stop_reason)
         return self._position_silent() if self.state in HOLDING else None
 
@@ -149,9 +150,9 @@ class GuardMachine:
         return Move(Trigger.BLIND, f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive")
 
     def _take(self, move: Move | None, now_us: int) -> None:
-        if move is None or not moves(self.state, move.trigger):
+        if move is None or not TABLE.moves(self.state, move.trigger):
             return
-        self.state = next_state(self.state, move.trigger)
+        self.state = TABLE.next_state(self.state, move.trigger)
         guard = self.guard
         if move.text:
             guard.flight.tell(now_us, _KINDS.get(move.trigger, "guard"), move.text)

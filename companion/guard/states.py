@@ -1,7 +1,8 @@
-"""The guard's state machine: one table, everything else is derived from it."""
+"""The guard's state machine: one table, from which everything else follows."""
 
-from collections.abc import Mapping
 from enum import Enum
+
+from companion.state_table import StateTable
 
 
 class State(Enum):
@@ -39,88 +40,58 @@ class Trigger(Enum):
     ENABLED = "person enabled it again"
 
 
-# A trigger that a state does not list leaves the guard where it is.
-TABLE: Mapping[State, Mapping[Trigger, State]] = {
-    State.CONNECTING: {
-        Trigger.REFUSED: State.ENDED,
-        Trigger.STOPPED: State.ENDED,
-        Trigger.CONNECTED: State.STANDING_BY,
-    },
-    State.STANDING_BY: {
-        Trigger.STOPPED: State.ENDED,
-        Trigger.WORTH_GUARDING: State.WATCHING,
-        Trigger.STREAMS_GONE: State.CONNECTING,
-    },
-    State.WATCHING: {
-        Trigger.DISARMED: State.STANDING_BY,
-        Trigger.STOPPED: State.ENDED,
-        Trigger.HIT: State.TAKING_OVER,
-        Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
-        Trigger.NOT_TO_GUARD: State.STANDING_BY,
-    },
-    State.TAKING_OVER: {
-        Trigger.DISARMED: State.STANDING_BY,
-        Trigger.CONTROL_LOST: State.STOOD_DOWN,
-        Trigger.STOPPED: State.GIVING_BACK,
-        Trigger.HIT: State.TAKING_OVER,
-        Trigger.CONFIRMED: State.RECOVERING,
-        Trigger.NOT_CONFIRMED: State.GIVING_BACK,
-        Trigger.BLIND: State.GIVING_BACK,
-    },
-    State.RECOVERING: {
-        Trigger.DISARMED: State.STANDING_BY,
-        Trigger.CONTROL_LOST: State.STOOD_DOWN,
-        Trigger.STOPPED: State.GIVING_BACK,
-        Trigger.HIT: State.RECOVERING,
-        Trigger.BLIND: State.GIVING_BACK,
-        Trigger.CROSSED: State.GIVING_BACK,
-        Trigger.SETTLED: State.GIVING_BACK,
-    },
-    State.GIVING_BACK: {
-        Trigger.DISARMED: State.STANDING_BY,
-        Trigger.CONTROL_LOST: State.STOOD_DOWN,
-        Trigger.HIT: State.TAKING_OVER,
-        Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
-        Trigger.GIVEN_BACK: State.WATCHING,
-    },
-    State.STOOD_DOWN: {
-        Trigger.DISARMED: State.STANDING_BY,
-        Trigger.STOPPED: State.ENDED,
-        Trigger.ENABLED: State.STANDING_BY,
-    },
-    State.ENDED: {},
-}
+TABLE = StateTable[State, Trigger](
+    {
+        State.CONNECTING: {
+            Trigger.REFUSED: State.ENDED,
+            Trigger.STOPPED: State.ENDED,
+            Trigger.CONNECTED: State.STANDING_BY,
+        },
+        State.STANDING_BY: {
+            Trigger.STOPPED: State.ENDED,
+            Trigger.WORTH_GUARDING: State.WATCHING,
+            Trigger.STREAMS_GONE: State.CONNECTING,
+        },
+        State.WATCHING: {
+            Trigger.DISARMED: State.STANDING_BY,
+            Trigger.STOPPED: State.ENDED,
+            Trigger.HIT: State.TAKING_OVER,
+            Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
+            Trigger.NOT_TO_GUARD: State.STANDING_BY,
+        },
+        State.TAKING_OVER: {
+            Trigger.DISARMED: State.STANDING_BY,
+            Trigger.CONTROL_LOST: State.STOOD_DOWN,
+            Trigger.STOPPED: State.GIVING_BACK,
+            Trigger.HIT: State.TAKING_OVER,
+            Trigger.CONFIRMED: State.RECOVERING,
+            Trigger.NOT_CONFIRMED: State.GIVING_BACK,
+            Trigger.BLIND: State.GIVING_BACK,
+        },
+        State.RECOVERING: {
+            Trigger.DISARMED: State.STANDING_BY,
+            Trigger.CONTROL_LOST: State.STOOD_DOWN,
+            Trigger.STOPPED: State.GIVING_BACK,
+            Trigger.HIT: State.RECOVERING,
+            Trigger.BLIND: State.GIVING_BACK,
+            Trigger.CROSSED: State.GIVING_BACK,
+            Trigger.SETTLED: State.GIVING_BACK,
+        },
+        State.GIVING_BACK: {
+            Trigger.DISARMED: State.STANDING_BY,
+            Trigger.CONTROL_LOST: State.STOOD_DOWN,
+            Trigger.HIT: State.TAKING_OVER,
+            Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
+            Trigger.GIVEN_BACK: State.WATCHING,
+        },
+        State.STOOD_DOWN: {
+            Trigger.DISARMED: State.STANDING_BY,
+            Trigger.STOPPED: State.ENDED,
+            Trigger.ENABLED: State.STANDING_BY,
+        },
+        State.ENDED: {},
+    }
+)
 
 # While it is in one of these the vehicle flies, or is about to fly, by the guard's setpoints.
 HOLDING = frozenset({State.TAKING_OVER, State.RECOVERING, State.GIVING_BACK})
-
-
-def moves(state: State, trigger: Trigger) -> bool:
-    """Whether the trigger means anything in this state."""
-    return trigger in TABLE[state]
-
-
-def next_state(state: State, trigger: Trigger) -> State:
-    """The table, completed by its rule for triggers that are not listed."""
-    return TABLE[state].get(trigger, state)
-
-
-def mermaid_diagram() -> str:
-    """The table as a Mermaid state diagram; a state's words are one name there."""
-    lines = ["stateDiagram-v2", f"    [*] --> {_name(State.CONNECTING)}"]
-    for state, row in TABLE.items():
-        lines += [f"    {_name(state)} --> {_name(target)}: {trigger.value}" for trigger, target in row.items()]
-    lines.append(f"    {_name(State.ENDED)} --> [*]")
-    return "\n".join(lines) + "\n"
-
-
-def markdown_table() -> str:
-    """The table in Markdown, one row a transition."""
-    lines = ["| state | trigger | next state |", "|---|---|---|"]
-    for state, row in TABLE.items():
-        lines += [f"| {state.value} | {trigger.value} | {target.value} |" for trigger, target in row.items()]
-    return "\n".join(lines) + "\n"
-
-
-def _name(state: State) -> str:
-    return state.value.replace(" ", "_")

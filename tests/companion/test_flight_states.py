@@ -2,7 +2,7 @@
 
 import pytest
 
-from companion.flight.states import FINAL_STATES, TABLE, State, Trigger, markdown_table, mermaid_diagram, next_state
+from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 
 EXPECTED = {
     (State.CONNECT, Trigger.REFUSED): State.ABORTED,
@@ -51,23 +51,23 @@ EXPECTED = {
 @pytest.mark.parametrize("trigger", Trigger)
 def test_every_pair_of_state_and_trigger(state, trigger):
     """A trigger without meaning in a state changes nothing; there is no pair without an answer."""
-    assert next_state(state, trigger) is EXPECTED.get((state, trigger), state)
+    assert TABLE.next_state(state, trigger) is EXPECTED.get((state, trigger), state)
 
 
 def test_the_table_has_a_row_for_every_state():
-    assert set(TABLE) == set(State)
+    assert set(TABLE.rows) == set(State)
 
 
 def test_only_done_and_aborted_are_final_and_every_other_state_can_be_interrupted():
     assert set(FINAL_STATES) == {State.DONE, State.ABORTED}
     for state in set(State) - FINAL_STATES:
-        assert next_state(state, Trigger.INTERRUPTED) is State.ABORTED
+        assert TABLE.next_state(state, Trigger.INTERRUPTED) is State.ABORTED
 
 
 def test_every_state_is_reachable_from_connect():
     reached, frontier = {State.CONNECT}, [State.CONNECT]
     while frontier:
-        for target in TABLE[frontier.pop()].values():
+        for target in TABLE.rows[frontier.pop()].values():
             if target not in reached:
                 reached.add(target)
                 frontier.append(target)
@@ -75,7 +75,7 @@ def test_every_state_is_reachable_from_connect():
 
 
 def test_diagram_and_table_show_every_transition():
-    diagram, table = mermaid_diagram(), markdown_table()
+    diagram, table = TABLE.mermaid_diagram(), TABLE.markdown_table()
     for (state, trigger), target in EXPECTED.items():
         assert f"{state.value} --> {target.value}: {trigger.value}\n" in diagram
         assert f"| {state.value} | {trigger.value} | {target.value} |\n" in table

@@ -2,7 +2,7 @@
 
 import pytest
 
-from companion.guard.states import HOLDING, TABLE, State, Trigger, markdown_table, mermaid_diagram, next_state
+from companion.guard.states import HOLDING, TABLE, State, Trigger
 
 EXPECTED = {
     (State.CONNECTING, Trigger.REFUSED): State.ENDED,
@@ -45,14 +45,14 @@ EXPECTED = {
 @pytest.mark.parametrize("trigger", Trigger)
 def test_every_pair_of_state_and_trigger(state, trigger):
     """A trigger without meaning in a state changes nothing; there is no pair without an answer."""
-    assert next_state(state, trigger) is EXPECTED.get((state, trigger), state)
+    assert TABLE.next_state(state, trigger) is EXPECTED.get((state, trigger), state)
 
 
 def test_the_table_has_a_row_for_every_state_and_each_is_reachable():
-    assert set(TABLE) == set(State)
+    assert set(TABLE.rows) == set(State)
     reached, frontier = {State.CONNECTING}, [State.CONNECTING]
     while frontier:
-        for target in TABLE[frontier.pop()].values():
+        for target in TABLE.rows[frontier.pop()].values():
             if target not in reached:
                 reached.add(target)
                 frontier.append(target)
@@ -61,13 +61,13 @@ def test_the_table_has_a_row_for_every_state_and_each_is_reachable():
 
 def test_whoever_takes_the_vehicle_from_the_guard_has_it_and_a_hit_never_takes_it_back():
     for state in HOLDING:
-        assert next_state(state, Trigger.CONTROL_LOST) is State.STOOD_DOWN
-    assert next_state(State.STOOD_DOWN, Trigger.HIT) is State.STOOD_DOWN
-    assert next_state(State.STANDING_BY, Trigger.HIT) is State.STANDING_BY
+        assert TABLE.next_state(state, Trigger.CONTROL_LOST) is State.STOOD_DOWN
+    assert TABLE.next_state(State.STOOD_DOWN, Trigger.HIT) is State.STOOD_DOWN
+    assert TABLE.next_state(State.STANDING_BY, Trigger.HIT) is State.STANDING_BY
 
 
 def test_diagram_and_table_show_every_transition():
-    diagram, table = mermaid_diagram(), markdown_table()
+    diagram, table = TABLE.mermaid_diagram(), TABLE.markdown_table()
     for (state, trigger), target in EXPECTED.items():
         line = f"{state.value.replace(' ', '_')} --> {target.value.replace(' ', '_')}: {trigger.value}\n"
         assert line in diagram
