@@ -29,6 +29,7 @@ METRE_DEG = math.degrees(1 / 6_371_000)
 GOAL_NORTH_M = 8.0
 # After it was given back: PX4 takes 5 s to find that its position is not what it should be.
 WATCHED_AFTERWARDS_S = 8.0
+LANDED = threading.Event()
 
 
 def goto(system: Any, here: Any, speed_m_s: float) -> None:
@@ -58,9 +59,8 @@ def sticks(system: Any, here: Any, speed_m_s: float) -> None:
     manual, forward = ManualControl(system), [0.0]
 
     def hold() -> None:
-        while True:
+        while not LANDED.wait(0.05):
             manual.set_manual_control_input(forward[0], 0.0, 0.5, 0.0)
-            time.sleep(0.05)
 
     threading.Thread(target=hold, daemon=True).start()
     time.sleep(1)
@@ -100,6 +100,8 @@ def fly(options: argparse.Namespace) -> None:
         time.sleep(WATCHED_AFTERWARDS_S)
         print(f"{len(guard.collisions)} hits; {guard.state.value}; the vehicle's mode: {telemetry.flight_mode().name}")
     action.land()
+    LANDED.set()
+    time.sleep(1)
     mavsdk.destroy()
 
 
