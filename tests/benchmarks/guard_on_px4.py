@@ -148,5 +148,5 @@ if __name__ == "__main__":
             fly(chosen)
         finally:
             body.send_signal(signal.SIGINT)
-            body.wait(20)
+            body.wait(60)
         report(path)
