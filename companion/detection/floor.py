@@ -7,6 +7,8 @@ from dataclasses import dataclass
 MEAN_MEMORY_S = 0.25
 # A spread good to 5 % needs 200 samples; at the slowest useful rates it is still good to 12 %.
 SPREAD_MEMORY_S = 2.0
+# Heard for less than this, what a vehicle shakes is not known: 50 samples at 50 Hz make a spread good to a tenth.
+LEARNT_S = 1.0
 # More throttle shakes more within a second: the spread of what changes from sample to sample rises fast and falls
 # slowly. Of normal noise it then reads half too much, 1.5 standard deviations.
 JITTER_RISE_S = 0.3
@@ -39,6 +41,10 @@ class Floor:
     known_s: float = 0.0
     side_m_s2: float = 0.0  # spread on the noisier of x and y
     vertical_m_s2: float = 0.0  # spread on z
+
+    @property
+    def is_known(self) -> bool:
+        return self.known_s >= LEARNT_S
 
     def learn(self, f_x: float, f_y: float, f_z: float, elapsed_s: float) -> None:
         """Take one sample, m/s^2, ``elapsed_s`` after the last; the first ones count as a plain mean."""

@@ -24,7 +24,7 @@ from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
 from companion.detection.floor import Floor
 from companion.detection.fused_config import FusedConfig
-from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.detection.interface import ON_THE_GROUND, DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.soft import SoftTouch
 from companion.detection.thrust import ThrustGain
 from companion.estimate.rotation import body_to_ned, ned_to_body
@@ -43,8 +43,10 @@ from companion.messages import (
 # A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
 SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
-# 11 m/s^2 in one sample, nothing in the next): the next one must show it, too.
-CLEAR = 1.6
+# 11 m/s^2 in one sample, nothing in the next, up to 1.2 thresholds): the next one must show it, too.
+CLEAR = 1.3
+# Off the ground its rotors at full thrust have yet to show what they shake: as long as a rising spread needs.
+SETTLED_US = 300_000
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -91,10 +93,9 @@ class FusedDetector:
         )
 
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
-        kind = type(sample)
-        if kind is ImuSample:
-            impact = self._imu(state, sample, situation)  # type: ignore[arg-type]
-            state.soft.imu(state.last_sample_boot_us, sample.specific_force_frd_m_s2)  # type: ignore[union-attr]
+        if type(sample) is ImuSample:
+            impact = self._imu(state, sample, situation)
+            state.soft.imu(state.last_sample_boot_us, sample.specific_force_frd_m_s2)
             return state, impact
         match sample:
             case Odometry():
@@ -177,10 +178,16 @@ class FusedDetector:
         s.soft.since_boot_us = None
         self._learn(s, f, before_us)
         if s.phase is Phase.OFF:
-            s.phase, s.off_reason, s.last_loud_boot_us = Phase.QUIET, "", now_us
-            s.contact_began_boot_us = now_us
+            self._switched_on(s)
         elif s.phase is not Phase.ARMED and now_us - s.last_loud_boot_us >= self._rearm_us:
-            s.phase = Phase.ARMED
+            s.phase = Phase.ARMED if s.floor.is_known else Phase.QUIET
+
+    def _switched_on(self, s: FusedState) -> None:
+        """Quiet must follow; after standing on the ground, from a while later on."""
+        now_us = s.last_sample_boot_us
+        s.contact_began_boot_us = now_us
+        s.last_loud_boot_us = now_us + SETTLED_US if s.off_reason == ON_THE_GROUND else now_us
+        s.phase, s.off_reason = Phase.QUIET, ""
 
     def _loud(
         self, s: FusedState, sample: ImuSample, situation: Situation, force: Vector3, size: float, ratio: float
@@ -200,9 +207,9 @@ class FusedDetector:
         if s.phase is not Phase.ARMED:
             # Switched on in the middle of a shake: it is learnt too, or a threshold too low would never rise.
             if s.phase is Phase.OFF:
-                s.contact_began_boot_us = now_us
-            waited = now_us - s.contact_began_boot_us > self._longest_us
-            s.phase, s.off_reason, s.last_loud_boot_us = Phase.ARMED if waited else Phase.QUIET, "", now_us
+                self._switched_on(s)
+            waited = now_us - s.contact_began_boot_us > self._longest_us and s.floor.is_known
+            s.phase, s.last_loud_boot_us = Phase.ARMED if waited else Phase.QUIET, max(now_us, s.last_loud_boot_us)
             self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
             return None
         free_until_us = min(now_us - self._averaging_us, s.aftermath.previous_imu_us)

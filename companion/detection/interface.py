@@ -34,6 +34,10 @@ class ImpactKind(Enum):
 NO_COLLISION = frozenset({ImpactKind.LANDING, ImpactKind.CONTACT})
 
 
+# Why a detector is off that nobody switched off.
+ON_THE_GROUND = "on the ground"
+
+
 class Evidence(Enum):
     """By what an impact was found."""
 
@@ -63,7 +67,7 @@ class Situation(NamedTuple):
         """The flight's reason, or the ground: feet that stand on it shake and push."""
         if self.off_reason is not None:
             return self.off_reason
-        return "on the ground" if self.landed_state is LandedState.ON_GROUND else None
+        return ON_THE_GROUND if self.landed_state is LandedState.ON_GROUND else None
 
 
 @dataclass(frozen=True, slots=True)

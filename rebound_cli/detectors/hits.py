@@ -49,8 +49,9 @@ LEAN_MAX_DEG = 45.0
 CLIMB_DEG = (30.0, 90.0)
 CEILING_TILT_MAX_DEG = 10.0
 POLE_RADIUS_M = (0.02, 0.30)
-# Beside the middle, as a share of what still touches.
-POLE_OFFSET_SHARE = 0.8
+# Beside the middle, as a share of what still touches if a guard points there; where the vehicle slips by between two of
+# them, the same pole again, nearer to the middle.
+POLE_OFFSET_SHARES = (0.8, 0.4, 0.0)
 
 
 class NoTouch(Exception):  # noqa: N818 - reads as the sentence it is
@@ -99,7 +100,7 @@ def draw_case(family: str, seed: int, detectors: tuple[str, ...] | None = None, 
 def work_out_hit(case: HitCase) -> dict[str, Any]:
     """Fly it once, then let every detector hear it at every rate."""
     airframe = airframe_of(case)
-    recording, hit = fly_hit(case, airframe)
+    recording, hit = hit_of(case, airframe)
     return score_hit(recording, hit, airframe, case.seed, case.detectors, case.sweeps, case.link)
 
 
@@ -120,7 +121,18 @@ def built_in(name: str) -> Airframe:
     return load_built_in(name)
 
 
-def fly_hit(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
+def hit_of(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
+    """The case's flight; one past a pole is flown again nearer to its middle. Raises NoTouch."""
+    for share in POLE_OFFSET_SHARES[:-1]:
+        try:
+            return fly_hit(case, airframe, share)
+        except NoTouch:
+            if case.approach != "pole":
+                raise
+    return fly_hit(case, airframe, POLE_OFFSET_SHARES[-1])
+
+
+def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET_SHARES[0]) -> tuple[Recording, Hit]:
     """Straight on into the obstacle, or hovering until it comes, and on for a moment. Raises NoTouch."""
     rng = np.random.default_rng([case.seed, 1])
     towards = _velocity(case, airframe, rng)
@@ -128,7 +140,7 @@ def fly_hit(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
     free_s = float(rng.uniform(*FREE_FLIGHT_S))
     start = np.array([0.0, 0.0, -HEIGHT_M])
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
-    obstacle = _obstacle(case, airframe, start + free_s * velocity, towards, rng)
+    obstacle = _obstacle(case, airframe, start + free_s * velocity, towards, rng, offset_share)
     scene = Scene.model_validate(_coming(obstacle, -towards, free_s) if case.is_struck else obstacle)
     cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
     recording, interval_s = Recording(), 1e-6 * airframe.imu.integration_interval_us
@@ -173,14 +185,19 @@ def _velocity(case: HitCase, airframe: Airframe, rng: np.random.Generator) -> Fl
 
 
 def _obstacle(
-    case: HitCase, airframe: Airframe, at_ned_m: Floats, velocity: Floats, rng: np.random.Generator
+    case: HitCase,
+    airframe: Airframe,
+    at_ned_m: Floats,
+    velocity: Floats,
+    rng: np.random.Generator,
+    offset_share: float,
 ) -> Mapping[str, Any]:
     """The scene with the obstacle where the vehicle's centre then is at about `at_ned_m` when it touches."""
     heading = math.atan2(velocity[1], velocity[0])
     reach_m = airframe.geometry.reach_m
     if case.approach == "pole":
         radius_m = float(rng.uniform(*POLE_RADIUS_M))
-        offset_m = POLE_OFFSET_SHARE * (reach_m + radius_m) * float(rng.uniform(-1.0, 1.0))
+        offset_m = offset_share * (reach_m + radius_m) * float(rng.uniform(-1.0, 1.0))
         along = np.array([math.cos(heading), math.sin(heading), 0.0])
         across = np.array([-along[1], along[0], 0.0])
         foot = at_ned_m + (reach_m + radius_m) * along + offset_m * across

@@ -24,8 +24,6 @@ from rebound_cli.detectors_report.numbers import (
 )
 from rebound_cli.paper.table import markdown
 
-STRUCK_BAR = 1.0
-
 
 def _over_link(airframe: str) -> Callable[[HitCase], bool]:
     return lambda case: case.link is not None and case.airframe == airframe and case.speed_m_s >= SPEEDS_M_S[0]
@@ -36,7 +34,7 @@ def _struck(airframe: str) -> Callable[[HitCase], bool]:
 
 
 def family_bars(hits: Hits) -> list[Bar]:
-    """Over a bad link as without; a hovering vehicle that is struck always."""
+    """Over a bad link, and of a hovering vehicle that is struck, as of the hits in flight."""
     bars: list[Bar] = []
     for airframe in AIRFRAMES:
         for rate in ASKED_HZ:
@@ -46,9 +44,8 @@ def family_bars(hits: Hits) -> list[Bar]:
     for airframe in AIRFRAMES:
         for rate in ASKED_HZ:
             scored = hits.scored(DEFAULT, rate, _struck(airframe))
-            bars.append(
-                _found_bar(f"{airframe}, {rate} Hz, struck in hover at 0.5 to 3 m/s: detected", STRUCK_BAR, scored)
-            )
+            what = f"{airframe}, {rate} Hz, struck in hover at 0.5 to 3 m/s: detected"
+            bars.append(_found_bar(what, FOUND_BARS[airframe, rate], scored))
     return bars
 
 

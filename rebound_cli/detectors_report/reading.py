@@ -12,6 +12,8 @@ which ask for `HIGHRES_IMU` at 50, 100 and 250 Hz and receive what PX4's rule se
 and 246 Hz); everything else comes at the rates that the companion asks for. Every detector hears the same samples,
 with its default settings.
 
+Where a vehicle slips past a pole, the pole is put nearer to its middle.
+
 *Over a bad link* each packet waits up to 10 ms more, 1 % are lost and 1 % are overtaken (20 ms later): other hits of
 the same kinds, heard so. *Struck in hover*: the vehicle holds its place and the same obstacles come at it at 0.5 to 3
 m/s and do not stop. *In a person's hand*: the vehicle hovers (drifting at up to 0.1 m/s) and is held where it is (by
@@ -20,7 +22,8 @@ that gives no force beyond the threshold is told as nothing. Any collision told 
 it counts against the detector.
 
 *Told as a mere contact, too*: beside the collision, or instead of it, a touch was reported that is none; of a vehicle
-struck softly the collision is then often a later touch of the same obstacle.
+struck softly the collision is then often a later touch of the same obstacle. The bars for a struck hover and for a bad
+link are those for hits in flight.
 
 *Found*: a collision is reported within 0.4 s of the first touch. A touch that is classed as a landing or a hand is
 not a collision. *False before*: reports before the first touch.
@@ -44,7 +47,9 @@ one that strikes the ground. *Semi-synthetic* hits are recorded impacts (drops o
 ±200 g at 1 kHz) put into recorded flights, away from commanded descents to the ground: turned to come from any side,
 added to what the flight's accelerometer showed, each axis of each millisecond clipped at ±16 g, averaged over the
 flight's own integration intervals of 5 ms. The flight's velocity takes what its accelerometer showed of the impact,
-as PX4's estimator would; its gyroscope shows nothing of it.
+as PX4's estimator would; its gyroscope shows nothing of it. *False before*: in the five seconds before the hit, which
+are all that the detector has heard of the flight; `fused` waits for the first of them. Of the log that strikes the
+ground only the strike itself is judged: it tumbles over the ground from 0.4 s before it until 0.1 s after.
 
 *Threshold sweeps* (the picture of false alarms against detection rate): every detector again with its thresholds
 times 1/4 to 4, on a share of the hits and flights.

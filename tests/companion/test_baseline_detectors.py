@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.detection.fuzzy import FuzzyConfig, FuzzyDetector
+from companion.detection.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
 from companion.detection.registry import DETECTORS
 from companion.detection.watch import advance, start_watch
@@ -116,18 +116,25 @@ def test_a_push_longer_than_the_fixed_thresholds_window_is_told_once_when_it_is_
     assert impact.impact.contact_free_until_boot_us < HIT_US
 
 
-def test_the_response_grows_with_each_input_and_stays_a_share():
-    fuzzy = FuzzyDetector(FuzzyConfig(), 4_000)
-    weak = fuzzy.intensity(8.0, 0.0, 0.0)
-    assert weak == pytest.approx(0.2)
-    for stronger in (fuzzy.intensity(20.0, 0.0, 0.0), fuzzy.intensity(8.0, 0.5, 0.0), fuzzy.intensity(8.0, 0.0, 3.0)):
-        assert weak < stronger <= 1.0
-    assert fuzzy.intensity(60.0, 1.5, 9.0) > 0.85
+@pytest.mark.parametrize(
+    ("inputs", "response"),
+    [
+        ((0.5, 0.0, 90.0, 0.0), 0.0),  # hardly anything: level
+        ((8.0, 0.0, 90.0, 2.0), 0.5),  # hard and level, turning along the wall
+        ((8.0, 20.0, 180.0, 6.0), 0.86),  # hard, leaning towards the wall and flipping into it
+        ((8.0, -20.0, 0.0, 6.0), -0.86),  # the mirror image
+        ((8.0, 20.0, 0.0, 2.0), -0.047),  # leaning towards it, flipping away from it
+    ],
+)
+def test_the_fuzzy_response_grows_towards_the_wall_and_is_none_away_from_it(inputs, response):
+    """By the centres of the outputs; acceleration in g, degrees, rad/s."""
+    assert intensity(*inputs) == pytest.approx(response, abs=0.01)
 
 
-def test_a_flip_towards_the_obstacle_asks_for_more_than_one_away_from_it():
-    """Ahead is a wall: it pushes to the rear, and the nose goes down (q < 0) into it or up away from it."""
-    into = ImuSample(1, (-20.0, 0.0, -9.8), (0.0, -3.0, 0.0))
-    away = ImuSample(1, (-20.0, 0.0, -9.8), (0.0, 3.0, 0.0))
-    assert FuzzyDetector._flip(into, 20.0) == pytest.approx(3.0)
-    assert FuzzyDetector._flip(away, 20.0) == pytest.approx(-3.0)
+def test_the_fuzzy_inputs_are_signed_towards_the_wall():
+    north, leaning = (1.0, 0.0, 0.0), (math.cos(0.1), 0.0, math.sin(0.1), 0.0)  # nose up: thrust to the south
+    assert inclination_deg(leaning, north) == pytest.approx(math.degrees(0.2))
+    assert inclination_deg(leaning, (-1.0, 0.0, 0.0)) == pytest.approx(-math.degrees(0.2))
+    assert flip_deg((0.0, 2.0, 0.0), north) == pytest.approx(180.0)
+    assert flip_deg((0.0, -2.0, 0.0), north) == pytest.approx(0.0)
+    assert flip_deg((2.0, 0.0, 5.0), north) == pytest.approx(90.0)

@@ -222,13 +222,24 @@ def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
 
 
 def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_once():
-    once = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 4_000), noise=1.5)
+    once = Flight(pulse((0.0, 10.0, 0.0), 3_000_500, 4_000), noise=1.5)
     assert once.fly() == []
     assert once.state.threshold_m_s2 > 8.0
     twice = Flight(pulse((0.0, 13.0, 0.0), 3_000_500, 20_000), noise=1.5)
     assert [i.sample_time_boot_us for i in twice.fly()] in ([3_004_000], [3_008_000])
     strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5)
     assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
+
+
+@pytest.mark.parametrize("landed_until_us", [0, 2_500_000])
+def test_rotors_that_begin_to_shake_as_the_vehicle_leaves_the_ground_are_no_hit(landed_until_us):
+    """Given nothing learnt of them: in the air when the first sample is heard, or on the ground until then."""
+    ground = Situation(armed=True, landed_state=LandedState.ON_GROUND, height_m=0.0)
+    shaking = Flight(
+        lambda t: (0.0, 6.0 * math.sin(t * 6e-4), 0.0) if t > landed_until_us - 100_000 else (0.0, 0.0, 0.0),
+        situation=lambda t: ground if t < landed_until_us else IN_FLIGHT,
+    )
+    assert shaking.fly() == []
 
 
 @pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
