@@ -9,6 +9,8 @@ MEAN_MEMORY_S = 0.25
 SPREAD_MEMORY_S = 2.0
 # Heard for less than this, what a vehicle shakes is not known: 50 samples at 50 Hz make a spread good to a tenth.
 LEARNT_S = 1.0
+# Off the ground its rotors at full thrust have yet to show what they shake: as long as a rising spread needs.
+SETTLED_US = 300_000
 # More throttle shakes more within a second: the spread of what changes from sample to sample rises fast and falls
 # slowly. Of normal noise it then reads half too much, 1.5 standard deviations.
 JITTER_RISE_S = 0.3

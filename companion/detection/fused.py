@@ -22,7 +22,7 @@ from typing import ClassVar
 
 from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
-from companion.detection.floor import Floor
+from companion.detection.floor import SETTLED_US, Floor
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import ON_THE_GROUND, DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.soft import SoftTouch
@@ -45,8 +45,6 @@ SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
 # 11 m/s^2 in one sample, nothing in the next, up to 1.2 thresholds): the next one must show it, too.
 CLEAR = 1.3
-# Off the ground its rotors at full thrust have yet to show what they shake: as long as a rising spread needs.
-SETTLED_US = 300_000
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -184,8 +182,7 @@ class FusedDetector:
 
     def _switched_on(self, s: FusedState) -> None:
         """Quiet must follow; after standing on the ground, from a while later on."""
-        now_us = s.last_sample_boot_us
-        s.contact_began_boot_us = now_us
+        now_us = s.contact_began_boot_us = s.last_sample_boot_us
         s.last_loud_boot_us = now_us + SETTLED_US if s.off_reason == ON_THE_GROUND else now_us
         s.phase, s.off_reason = Phase.QUIET, ""
 
@@ -193,8 +190,8 @@ class FusedDetector:
         self, s: FusedState, sample: ImuSample, situation: Situation, force: Vector3, size: float, ratio: float
     ) -> Impact | None:
         now_us, soft = s.last_sample_boot_us, s.soft
-        jumps = soft.turns(now_us, s.aftermath.newest_rate_step_rad_s)
-        jumps = jumps or soft.jumps(now_us, sample.specific_force_frd_m_s2, s.threshold_m_s2)
+        f, turn = sample.specific_force_frd_m_s2, s.aftermath.newest_rate_step_rad_s
+        jumps = soft.turns(now_us, turn) or soft.jumps(now_us, f, s.threshold_m_s2)
         if s.phase is Phase.CONTACT:
             s.last_loud_boot_us = now_us
             is_another = jumps if soft.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
@@ -202,7 +199,7 @@ class FusedDetector:
                 return self._fire(s, now_us, situation, force, s.aftermath.previous_imu_us, Evidence.FORCE, 1.0)
             s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             if now_us - s.contact_began_boot_us > self._longest_us:
-                self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
+                self._learn(s, f, now_us - 1)
             return None
         if s.phase is not Phase.ARMED:
             # Switched on in the middle of a shake: it is learnt too, or a threshold too low would never rise.
@@ -210,7 +207,7 @@ class FusedDetector:
                 self._switched_on(s)
             waited = now_us - s.contact_began_boot_us > self._longest_us and s.floor.is_known
             s.phase, s.last_loud_boot_us = Phase.ARMED if waited else Phase.QUIET, max(now_us, s.last_loud_boot_us)
-            self._learn(s, sample.specific_force_frd_m_s2, now_us - 1)
+            self._learn(s, f, now_us - 1)
             return None
         free_until_us = min(now_us - self._averaging_us, s.aftermath.previous_imu_us)
         if soft.since_boot_us is not None:
