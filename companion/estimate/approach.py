@@ -47,6 +47,9 @@ UNNOTICED_US = 300_000
 BEFORE_US = 500_000
 # Three times a good velocity's noise.
 DEPARTED_M_S = 0.1
+# Noise alone departs by that now and then, and would move the place of a hit by a third of a metre: no hit that matters
+# leaves less than this.
+HIT_LEAVES_M_S = 0.15
 # An estimate that is put right after what clipping hid: the error grows from velocity to velocity, and has begun to so
 # long after the hit. What the vehicle's own sensor saw is there at once.
 GROWS = 1.5
@@ -109,6 +112,8 @@ def free_until(fixes: Sequence[VelocityFix], contact_boot_us: int) -> int:
             free_us = fix.time_boot_us
             break
         departed.append((fix.time_boot_us, off_m_s))
+    if max((off_m_s for _, off_m_s in departed), default=0.0) < HIT_LEAVES_M_S:
+        return contact_boot_us
     if len(departed) > 1 and departed[-2][1] > GROWS * departed[-1][1]:
         free_us = max(start_us, departed[-1][0] - PUT_RIGHT_US)
     elif not departed or departed[-1][0] >= contact_boot_us:

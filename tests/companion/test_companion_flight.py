@@ -126,7 +126,8 @@ def test_the_collision_report_tells_what_happened():
     assert report.outcome == "completed"
     (hit,) = report.collisions
     assert hit.detector == "fused"
-    assert hit.impact_velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.1)
+    # It has just caught up with a setpoint that sped up.
+    assert hit.impact_velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.15)
     assert hit.position_ned_m == pytest.approx((3.0, 0.0, -1.5), abs=0.05)
     assert hit.normal_ned == pytest.approx((-1.0, 0.0, 0.0))
     v_n = hit.impact_velocity_ned_m_s[0]
