@@ -12,6 +12,7 @@ from companion.detection.registry import DETECTORS
 from companion.detection.sight import Sight, heard, why_blind
 from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
+from companion.estimate.normal import prepare
 from companion.messages import AttitudeTarget, ImuSample, MessageId, Odometry, Sample, Vibration
 from companion.mission.config import CompanionConfig
 
@@ -86,6 +87,7 @@ NOTHING_SEEN = Seen((), (), ())
 
 def start_watch(config: CompanionConfig, now_us: int) -> Watch:
     """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
+    prepare()
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
     detector = DETECTORS[config.detector](getattr(config, config.detector), averaging_us)
     return Watch(config, detector, detector.initial(), ImpactEstimator(config.estimate), Sight(now_us, now_us), now_us)

@@ -30,6 +30,8 @@ CLIPPING_TOLD_US = 2_100_000
 LATE_SAMPLES = 3
 # Sums kept to look back: a contact that went unnoticed was up to 0.34 s ago, at 400 Hz.
 SUMS_KEPT = 160
+# Of these one is from before a contact, at up to 250 Hz.
+ATTITUDES_KEPT = 16
 # An obstacle's own motion may come from any side; a vehicle faster than this ran into it.
 APPROACH_M_S = 0.5
 # Cosine of 75 degrees: a clipped push further than that from where the vehicle came from has lost its direction; one
@@ -77,6 +79,7 @@ class ImpactEstimator:
     history: MotionHistory = field(default_factory=MotionHistory)
     strapdown: Strapdown = field(default_factory=Strapdown)
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
+    attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
     fixes: deque[VelocityFix] = field(default_factory=deque)
     trust: Trust = field(default_factory=Trust)
     odometry_boot_us: int | None = None
@@ -116,6 +119,9 @@ class ImpactEstimator:
             self._clipped(sample)
         elif isinstance(sample, Attitude):
             self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
+            self.attitudes.append(sample)
+            if self.push is not None:
+                self.push.hear(sample)
 
     def _clipped(self, sample: Vibration) -> None:
         """Counts that grew since the message before the contact: what was said of its size is a lower bound."""
@@ -184,6 +190,7 @@ class ImpactEstimator:
             range_m_s2=self.config.accelerometer_range_m_s2,
             started_boot_us=impact.contact_free_until_boot_us,
             earlier=self.earlier_imu,
+            attitudes=list(self.attitudes),
         )
         push.add(sample, True)
         return push
@@ -227,7 +234,10 @@ class ImpactEstimator:
 
     def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
         config = self.config
-        normal = normal_of(push.parts, velocity_ned_m_s, config.guards, config.imu_averaging_interval_s)
+        normal = unit(push.impulse_ned_m_s)
+        if config.fits_normal:
+            averaging_s = config.imu_averaging_interval_s
+            normal = normal_of(push.touch, velocity_ned_m_s, config.guards, averaging_s) or normal
         back = _back(velocity_ned_m_s)
         if not push.is_blurred or _is_along(normal, back):
             return self._pushed(normal, velocity_ned_m_s)

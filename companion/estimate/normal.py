@@ -1,219 +1,314 @@
-"""The obstacle's normal, from the course of the push and from how it turned the vehicle.
+"""The obstacle's normal, from how the first hundredths of a second of a touch pushed and turned the vehicle.
 
-Friction leans each part of the push against the sliding of the contact, by up to atan(mu): a head-on hit without
-friction and a slanting one with it push the same way. They do not turn the vehicle the same way, because the normal
-decides where a guard is touched (see `guards`). So hypotheses are tried: normals within 30 degrees of the push, on the
-one or the other guard, with a friction up to 0.3, and the little that is not known of v_c along the obstacle or of the
-moment of the touch. Each is followed from sample to sample by impulse and angular momentum
+Friction leans the push against the sliding of the contact, by up to atan(mu): a head-on hit without friction and a
+slanting one with it push the same way. They do not turn the vehicle the same way, because the normal decides where a
+guard is touched, and when the next one is. So suppositions are followed (see `guards`) and held against all that was
+measured: forces and rates, and the attitude, which tells what the samples leave out. What is supposed: the normal,
+flat or round (and then which guard met it and the radius), friction, the moment of the touch, and, near what is known
+of them, v_c, the arms' stiffness and how hard the motors brake the turning.
 
-    v' = v + J,    w' = w + K^-2 (r x J),    J = N n - min(mu N, what ends the sliding) t,
-
-N from the accelerometer, K the radii of gyration, and counts by how well it explains the direction of each sample's
-push and the change of the rates up to it. The normal is the mean of all. The first hundredths of a second count most:
-later another guard is touched, and a pole rolls.
+A coarse search chooses a few; each is then improved by least squares (Levenberg 1944, Marquardt 1963), with what was
+measured taken for less certain at first, or a sample that falls beside the touch of a second guard ends the way to it.
+The normal is the mean of what they become, weighed by exp(-misfit / 2).
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from companion.estimate.guards import foremost, pushed, touched_at
-from companion.estimate.rotation import body_to_ned
-from companion.messages import Quaternion, Vector3
+from companion.estimate import guards as g
+from companion.estimate.rotation import body_to_ned, turned
+from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.mission.config import GuardsConfig
 
 Floats = npt.NDArray[np.float64]
 
-# Friction of 0.3 leans the push by 17 degrees, the turning and the shaking of a sample by some more.
-SPAN_RAD, STEP_RAD = math.radians(30.0), math.radians(5.0)
-# Guards of plastic on a painted wall have 0.3.
-FRICTIONS = (0.0, 0.15, 0.3)
-# What v_c may be off by along the obstacle, m/s: it decides which way a head-on hit slides.
-ASIDE_M_S = (-0.06, 0.0, 0.06)
-# When in the first sample's interval the touch was, as the share that was contact, where samples leave gaps; and how
-# well (logarithm) the force from then on must agree with the next sample's.
-SHARES, AGREES = (0.2, 0.5, 0.8), 0.7
-# Where samples follow each other the force tells it; most touches are in the first window's middle part.
-USUAL_SHARE = 0.7
-# Friction changes sides within milliseconds: steps of the hypotheses' motion.
-SUB_STEP_S = 0.002
-# The direction of a sample's push: 3 degrees, and what it shakes.
-DIRECTION_RAD, SHAKING_M_S2 = 0.05, 0.4
-# The rates' change: the gyroscope's noise, the motors' own part in it, the inertia of folding arms, 6 mm of lever.
-RATE_RAD_S, MOTORS_RAD_S2, INERTIA_SHARE, LEVER_M = 0.08, 8.0, 0.15, 0.006
-# How well the impulse between two samples is known where their windows join, and where a gap is between them.
-JOINED, GAPPED = 0.12, 0.2
-# Of samples that follow each other none is worse than this: some show another guard's touch.
-WORST = 40.0
-FADING_S, LOOKED_AT_S = 0.015, 0.03
-DOWN = np.array([0.0, 0.0, 1.0])
-# Of a ceiling's normal little is level; sideways then has no meaning.
-LEAST_LEVEL = 0.2
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """One sample of the push. `since_s` after the first, `over_s` after the one before it; body FRD."""
-
-    since_s: float
-    over_s: float
-    joined: bool
-    force_frd_m_s2: Vector3
-    attitude_wxyz: Quaternion
-    rates_frd_rad_s: Vector3
-    turned_frd_rad_s: Vector3
-    """Change of the rates since the sample before."""
+# After the first sample. Later an arm has met its stop or the hub the wall, which nothing here describes.
+LOOKED_AT_US = 22_000
+# The direction of the whole push, where the search begins: what comes later counts less.
+FADING_S = 0.015
+# Friction of 0.3 leans the push by 17 degrees; a round turns it by as much again as the guard rolls.
+SPAN_RAD, STEP_RAD = math.radians(40.0), math.radians(10.0)
+FRICTIONS, RADII_M = (0.05, 0.25), (0.04, 0.15)
+# The moment of the touch, as shares of the time between the sample before and the first that shows it.
+MOMENTS = (0.15, 0.5, 0.85)
+# Of the guards, those that may meet a round: the fourth is behind the vehicle.
+FOREMOST = 3
+# Suppositions that are improved, at first and later, and how much apart those of one kind are at least.
+KEPT, APART = 12, math.cos(math.radians(18.0))
+# A round is as likely as a flat obstacle, but three guards and two radii describe it: by so much is it held back.
+ROUND_MISFIT = 2.0
+# Standard deviations of what is known: vibration and bias of a sample and a share of what it shows, for all that the
+# model leaves out; the same of the rates; the attitude against the one before the touch.
+FORCE_M_S2, FORCE_SHARE, RATE_RAD_S, RATE_SHARE, ATTITUDE_RAD = 0.3, 0.06, 0.08, 0.06, 0.01
+# v_c on an axis, arms of a kind, a controller's gain of 20 /s, poles of 4 to 20 cm.
+VELOCITY_M_S, STIFFER, BRAKING_PER_S, BRAKING_SPREAD = 0.04, 0.1, 20.0, 8.0
+RADIUS, RADIUS_SPREAD = math.log(0.1), 0.7
+# IMU_INTEG_RATE gives 4 or 5 ms.
+AVERAGING_SPREAD_S = 0.0007
+# Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
+TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
+# The search takes what was measured for so much less certain, and so do the rounds of least squares, of a few steps.
+COARSE, ROUNDS, STEPS = 2.5, (5.0, 2.0, 1.0), 4
+# What misfits by so much more than the best goes no further.
+HOPELESS = 25.0
+# Of a touch that is explained each number misfits by one or less; by this, it was not by guards on spring arms.
+BELIEVED = 3.0
+DIFFERENCES = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.02, 1.0, 0.05, 0.0002])
+DAMPING, DAMPINGS, LEAST_DAMPING, MOST_DAMPING = 1e-2, (0.1, 1.0, 10.0, 100.0), 1e-5, 1e3
+LEAST = np.array([-0.7, -0.7, -0.02, -0.2, -0.5, -0.5, -0.5, -0.7, 0.0, -4.6, 0.001])
+MOST = np.array([0.7, 0.7, 0.32, 0.0, 0.5, 0.5, 0.5, 0.7, 50.0, 0.0, 0.1])
 
 
 @dataclass(slots=True)
+class Touch:
+    """What the wire told of the first hundredths of a second."""
+
+    free_frd_m_s2: Vector3
+    """What the accelerometer would show without the contact."""
+    samples: list[ImuSample] = field(default_factory=list)
+    """The last one before it, then those that show it."""
+    attitudes: list[Attitude] = field(default_factory=list)
+    """From before the touch on, the newest last."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """A touch in numbers; times in seconds from the first sample that shows it."""
+
+    velocity_ned: Floats
+    attitude: Floats
+    rates: Floats
+    free: Floats
+    times: Floats
+    is_attitude: npt.NDArray[np.int64]
+    measured: Floats
+    spread: Floats
+    averaging_s: float
+    shape: Floats
+    push_ned: Floats
+    before_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class _Trials:
-    """Hypotheses, one a column; `normal` is each one's number among the normals."""
+    """Suppositions side by side."""
 
-    normal: npt.NDArray[np.int64]
-    normals_ned: Floats
-    guard: npt.NDArray[np.int64]
-    friction: Floats
-    share: Floats
-    aside_ned_m_s: Floats
-    misfit: Floats
+    values: Floats
+    axes: Floats
+    obstacles: npt.NDArray[np.int64]
+
+    def chosen(self, which: Sequence[int]) -> "_Trials":
+        return _Trials(self.values[which], self.axes[which], self.obstacles[which])
+
+    def normals(self, values: Floats) -> Floats:
+        """(n, 3) for as many values (n, 11)."""
+        tilts = np.tan(values[:, : g.FRICTION])
+        vectors = self.axes[:, 0] + tilts[:, :1] * self.axes[:, 1] + tilts[:, 1:] * self.axes[:, 2]
+        directions: Floats = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+        return directions
 
 
-def normal_of(parts: Sequence[Part], velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Vector3:
-    """Unit vector out of the obstacle, NED; zero where nothing pushed. `velocity_ned_m_s` is v_c."""
-    turns = [_matrix(part.attitude_wxyz) for part in parts]
-    forces = [np.array(part.force_frd_m_s2) for part in parts]
-    fading = [math.exp(-part.since_s / FADING_S) for part in parts]
-    push = sum((f * turn @ force for f, turn, force in zip(fading, turns, forces, strict=True)), np.zeros(3))
-    size = float(np.linalg.norm(push))
-    if size == 0.0:
-        return (0.0, 0.0, 0.0)
-    normals = _near(push / size)
-    trials = _trials(normals, turns[0], parts[0].joined, guards)
-    velocity = np.array(velocity_ned_m_s)
-    before = 0.0
-    for number, part in enumerate(parts):
-        force_m_s2 = float(np.linalg.norm(forces[number]))
-        after = float(np.linalg.norm(forces[1])) if len(parts) > 1 else 0.0
-        course = _course(trials, part, number == 0, force_m_s2, before, after, averaging_s)
-        misfit = _misfit(trials, part, turns[number], velocity, course, averaging_s, guards, number == 0)
-        trials.misfit += fading[number] * misfit
-        velocity = velocity + turns[number] @ forces[number] * course.mean_s
-        before = force_m_s2
-    likely = np.exp(0.5 * (trials.misfit.min() - trials.misfit))
-    mean = np.bincount(trials.normal, likely, normals.shape[1]) @ normals.T
+def normal_of(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Vector3 | None:
+    """Unit vector out of the obstacle, NED; `velocity_ned_m_s` is v_c. None where too little is known of the touch
+    or nothing explains it."""
+    known = _known(touch, velocity_ned_m_s, guards, averaging_s)
+    if known is None:
+        return None
+    trials = _distinct(known, _supposed(known))
+    trials, misfit = _improved(known, trials)
+    if misfit.min() > BELIEVED * known.measured.size:
+        return None
+    likely = np.exp(0.5 * (misfit.min() - misfit))
+    mean = likely @ trials.normals(trials.values)
     n, e, d = mean / np.linalg.norm(mean)
     return (float(n), float(e), float(d))
 
 
-def _near(middle: Floats) -> Floats:
-    """Unit vectors (3, n) around one."""
-    helper = DOWN if abs(middle[2]) < 0.8 else np.array([1.0, 0.0, 0.0])
+@lru_cache(maxsize=1)
+def prepare() -> None:
+    """Compile, or load what the last start compiled: seconds that a flight does not have."""
+    samples = [ImuSample(4_000 * number, (-float(number), 0.0, -10.0), (0.0, 0.0, 0.0)) for number in range(2)]
+    touch = Touch((0.0, 0.0, -10.0), samples, [Attitude(0, (1.0, 0.0, 0.0, 0.0))])
+    normal_of(touch, (1.0, 0.0, 0.0), GuardsConfig(), 0.004)
+
+
+def _known(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s: float) -> _Known | None:
+    if len(touch.samples) < 2:
+        return None
+    before, first = touch.samples[0], touch.samples[1]
+    zero_us, rates = first.time_boot_us, before.angular_velocity_frd_rad_s
+    earlier = [told for told in touch.attitudes if told.time_boot_us <= before.time_boot_us]
+    if not earlier:
+        return None
+    attitude = turned(earlier[-1].attitude_wxyz, rates, 1e-6 * (zero_us - earlier[-1].time_boot_us))
+    later = [told for told in touch.attitudes if zero_us <= told.time_boot_us <= zero_us + LOOKED_AT_US]
+    rows: list[tuple[int, bool, Sequence[float], tuple[float, float]]] = []
+    push, free = np.zeros(3), touch.free_frd_m_s2
+    for sample in touch.samples:
+        f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+        force, turn = math.dist(f, free), math.dist(w, rates)
+        spread = (math.hypot(FORCE_M_S2, FORCE_SHARE * force), math.hypot(RATE_RAD_S, RATE_SHARE * turn))
+        rows.append((sample.time_boot_us, False, (*f, *w), spread))
+        if sample is not before:
+            fading = math.exp(-1e-6 * (sample.time_boot_us - zero_us) / FADING_S)
+            push += fading * np.array(_pushed(attitude, f, free))
+    for told in later:
+        rows.append((told.time_boot_us, True, (*told.attitude_wxyz, 0.0, 0.0), (ATTITUDE_RAD, ATTITUDE_RAD)))
+    rows.sort(key=lambda row: row[0])
+    size = float(np.linalg.norm(push))
+    if size == 0.0:
+        return None
+    return _Known(
+        np.array(velocity),
+        np.array(attitude),
+        np.array(rates),
+        np.array(free),
+        np.array([1e-6 * (row[0] - zero_us) for row in rows]),
+        np.array([row[1] for row in rows], np.int64),
+        np.array([row[2] for row in rows], np.float64),
+        np.array([row[3] for row in rows]),
+        averaging_s,
+        _shape(guards),
+        push / size,
+        1e-6 * (before.time_boot_us - zero_us),
+    )
+
+
+def _pushed(attitude: Quaternion, f: Vector3, free: Vector3) -> Vector3:
+    return body_to_ned(attitude, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
+
+
+def _shape(guards: GuardsConfig) -> Floats:
+    """As `guards.misfits` wants it."""
+    arm = (guards.stiffness_per_s2, guards.damping_per_s, guards.travel_m)
+    return np.array([guards.centre_m, guards.radius_m, guards.height_m, *arm, *guards.gyration_frd_m])
+
+
+def _supposed(known: _Known) -> _Trials:
+    """All that the search tries: flat obstacles round the push's direction, upright rounds on the foremost guards."""
+    angles = np.arange(-SPAN_RAD, SPAN_RAD + 1e-9, STEP_RAD)
+    moments = [known.before_s * share for share in MOMENTS]
+    flat = np.array(np.meshgrid(angles, angles, FRICTIONS, moments)).reshape(4, -1).T
+    flat = flat[flat[:, 0] ** 2 + flat[:, 1] ** 2 <= SPAN_RAD**2 + 1e-9]
+    groups = [(flat, _axes(known.push_ned), g.FLAT, RADIUS)]
+    level = known.push_ned * (1.0, 1.0, 0.0)
+    if np.linalg.norm(level) > 0.5:
+        axes = _axes(level / np.linalg.norm(level))
+        upright = np.array(np.meshgrid(angles, 0.0, FRICTIONS, moments)).reshape(4, -1).T
+        for guard in _foremost(known, axes[0]):
+            groups += [(upright, axes, guard, math.log(radius_m)) for radius_m in RADII_M]
+    values = np.zeros((sum(len(tried) for tried, *_ in groups), g.SIZE))
+    values[:, : g.ERROR] = np.concatenate([tried for tried, *_ in groups])
+    values[:, g.BRAKING] = BRAKING_PER_S
+    values[:, g.AVERAGING] = known.averaging_s
+    values[:, g.RADIUS] = np.concatenate([np.full(len(tried), radius) for tried, _, _, radius in groups])
+    axes_of_all = np.concatenate([np.tile(axes, (len(tried), 1, 1)) for tried, axes, _, _ in groups])
+    return _Trials(values, axes_of_all, np.concatenate([np.full(len(tried), guard) for tried, _, guard, _ in groups]))
+
+
+def _axes(middle: Floats) -> Floats:
+    """A unit vector and two at right angles to it, the first of them level where it can be."""
+    helper = np.array([0.0, 0.0, 1.0] if abs(middle[2]) < 0.8 else [1.0, 0.0, 0.0])
     one = np.cross(helper, middle)
     one /= np.linalg.norm(one)
-    other = np.cross(middle, one)
-    tilts = np.arange(-SPAN_RAD, SPAN_RAD + 1e-9, STEP_RAD)
-    x, y = (grid.ravel() for grid in np.meshgrid(tilts, tilts))
-    inside = x * x + y * y <= SPAN_RAD**2 + 1e-9
-    x, y = np.tan(x[inside]), np.tan(y[inside])
-    vectors: Floats = middle[:, None] + one[:, None] * x + other[:, None] * y
-    directions: Floats = vectors / np.linalg.norm(vectors, axis=0)
-    return directions
+    return np.array([middle, one, np.cross(middle, one)])
 
 
-def _trials(normals: Floats, turn: Floats, joined: bool, guards: GuardsConfig) -> _Trials:
-    """All combinations; what is not known is the moment of the touch where there are gaps, the sliding where not."""
-    order, unlikely = foremost(turn.T @ normals, guards)
-    shares = np.array((USUAL_SHARE,) if joined else SHARES)
-    asides = np.array(ASIDE_M_S if joined else (0.0,))
-    axes = (np.arange(normals.shape[1]), np.arange(2), np.array(FRICTIONS), shares, asides)
-    normal, second, friction, share, aside = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
-    level = np.cross(DOWN, normals.T).T
-    level /= np.maximum(np.linalg.norm(level, axis=0), LEAST_LEVEL)
-    misfit = unlikely[normal, second] + (aside / ASIDE_M_S[-1]) ** 2
-    return _Trials(normal, normals[:, normal], order[normal, second], friction, share, aside * level[:, normal], misfit)
+def _foremost(known: _Known, normal_ned: Floats) -> list[int]:
+    """The guards that reach farthest towards an obstacle, the nearest first."""
+    w, x, y, z = known.attitude.tolist()
+    level = body_to_ned((w, -x, -y, -z), (float(normal_ned[0]), float(normal_ned[1]), float(normal_ned[2])))
+    return [int(guard) for guard in np.argsort(g.ARMS_FRD @ np.array(level))[:FOREMOST]]
 
 
-@dataclass(slots=True)
-class _Course:
-    """How hard the normal pushed since the sample before: impulses (steps, n), how long each step took (n,)."""
-
-    impulses: Sequence[Floats]
-    step_s: Floats
-    mean_s: float
-
-
-def _course(
-    trials: _Trials, part: Part, is_first: bool, force: float, before: float, after: float, averaging_s: float
-) -> _Course:
-    """Between the sample before and this one, of which the wire shows only the ends. Forces per unit mass, m/s^2."""
-    steps = max(1, math.ceil(part.over_s / SUB_STEP_S))
-    if is_first:
-        touched_s = trials.share * part.over_s
-        if part.joined:
-            height = force * part.over_s / touched_s
-        else:
-            height = force * averaging_s / np.minimum(touched_s, averaging_s)
-            if after > 0.0:
-                trials.misfit += (np.log(height / after) / AGREES) ** 2
-    else:
-        touched_s = np.full_like(trials.share, part.over_s)
-        height = np.full_like(touched_s, force)
-    step_s = touched_s / steps
-    # Friction's share of the push is the rest.
-    along = step_s / np.sqrt(1.0 + trials.friction**2)
-    impulses = []
-    for step in range(steps):
-        done = (step + 0.5) / steps
-        mean = height if is_first or part.joined else height + (before - height) * (1.0 - done)
-        impulses.append(mean * along)
-    mean_s = part.over_s if part.joined else float(touched_s.mean())
-    return _Course(impulses, step_s, mean_s)
+def _residuals(known: _Known, trials: _Trials, values: Floats, doubt: float) -> Floats:
+    """What was measured, taken for `doubt` times less certain, and what is known beforehand: (n, m)."""
+    off = g.misfits(
+        values,
+        trials.axes,
+        trials.obstacles,
+        known.velocity_ned,
+        known.attitude,
+        known.rates,
+        known.free,
+        known.times,
+        known.is_attitude,
+        known.measured,
+        doubt * known.spread,
+        known.shape,
+    )
+    friction, tilts = values[:, g.FRICTION], np.abs(values[:, : g.FRICTION])
+    down = trials.normals(values)[:, 2]
+    beforehand = [
+        *(values[:, g.ERROR : g.STIFFNESS] / VELOCITY_M_S).T,
+        values[:, g.STIFFNESS] / STIFFER,
+        (values[:, g.BRAKING] - BRAKING_PER_S) / BRAKING_SPREAD,
+        (values[:, g.RADIUS] - RADIUS) / RADIUS_SPREAD,
+        (values[:, g.AVERAGING] - known.averaging_s) / AVERAGING_SPREAD_S,
+        (friction - np.clip(friction, 0.0, g.MOST_FRICTION)) / FRICTION_SPREAD,
+        *(np.maximum(tilts - TILT_RAD, 0.0) / TILT_SPREAD).T,
+        np.where(trials.obstacles == g.FLAT, 0.0, down / UPRIGHT),
+        np.where(trials.obstacles == g.FLAT, 0.0, math.sqrt(ROUND_MISFIT)),
+    ]
+    return np.concatenate([off, np.array(beforehand).T], axis=1)
 
 
-def _misfit(
-    trials: _Trials,
-    part: Part,
-    turn: Floats,
-    velocity_ned: Floats,
-    course: _Course,
-    averaging_s: float,
-    guards: GuardsConfig,
-    is_first: bool,
-) -> Floats:
-    """Squared misfit of each hypothesis with one sample."""
-    normals = turn.T @ trials.normals_ned
-    points = touched_at(normals, trials.guard, guards)
-    gyration2 = np.square(guards.gyration_frd_m)[:, None]
-    turned = np.array(part.turned_frd_rad_s)
-    start = (np.array(part.rates_frd_rad_s) - turned)[:, None]
-    velocity = turn.T @ (velocity_ned[:, None] + trials.aside_ned_m_s)
-    rates, total, seen = start, np.zeros_like(normals), np.zeros_like(normals)
-    left = len(course.impulses)
-    for impulse in course.impulses:
-        left -= 1
-        velocity, rates, push = pushed(velocity, rates, normals, points, impulse, trials.friction, gyration2)
-        total += push
-        seen += push * np.clip((averaging_s - left * course.step_s) / course.step_s, 0.0, 1.0)
-    force = np.array(part.force_frd_m_s2)
-    size = float(np.linalg.norm(force))
-    off = (force / size)[:, None] - seen / np.sqrt((seen * seen).sum(axis=0))
-    misfit = (off * off).sum(axis=0) / (DIRECTION_RAD**2 + (SHAKING_M_S2 / size) ** 2)
-    # The rates, the whole impulse taken a little larger or smaller.
-    known = JOINED if part.joined and not is_first else GAPPED
-    lever = (total * total).sum(axis=0) * (LEVER_M / float(gyration2.max())) ** 2
-    own = RATE_RAD_S**2 + INERTIA_SHARE**2 * float(turned @ turned) + (MOTORS_RAD_S2 * part.over_s) ** 2
-    spread2, change = own + lever, rates - start
-    scale = (turned @ change / spread2 + known**-2) / ((change * change).sum(axis=0) / spread2 + known**-2)
-    off = turned[:, None] - scale * change
-    misfit += (off * off).sum(axis=0) / spread2 + ((scale - 1.0) / known) ** 2
-    bounded: Floats = misfit / (1.0 + misfit / WORST) if part.joined else misfit
-    return bounded
+def _distinct(known: _Known, trials: _Trials) -> _Trials:
+    """The few that fit best, each of another kind or with another normal than the better ones."""
+    misfit = np.square(_residuals(known, trials, trials.values, COARSE)).sum(axis=1)
+    normals = trials.normals(trials.values)
+    kept: list[int] = []
+    for one in np.argsort(misfit, kind="stable").tolist():
+        same = [other for other in kept if trials.obstacles[other] == trials.obstacles[one]]
+        if all(normals[one] @ normals[other] < APART for other in same):
+            kept.append(one)
+        if len(kept) == KEPT:
+            break
+    return trials.chosen(kept)
 
 
-def _matrix(attitude_wxyz: Quaternion) -> Floats:
-    """Body FRD to NED."""
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    return np.array([body_to_ned(attitude_wxyz, axis) for axis in axes]).T
+def _improved(known: _Known, trials: _Trials) -> tuple[_Trials, Floats]:
+    """The best of them after least squares, and their misfit."""
+    misfit = np.zeros(0)
+    for doubt in ROUNDS:
+        damping = np.full(len(trials.values), DAMPING)
+        for _ in range(STEPS):
+            values, damping, misfit = _stepped(known, trials, damping, doubt)
+            trials = _Trials(values, trials.axes, trials.obstacles)
+        near = np.flatnonzero(misfit <= misfit.min() + HOPELESS).tolist()
+        trials, misfit = trials.chosen(near), misfit[near]
+    return trials, misfit
+
+
+def _stepped(known: _Known, trials: _Trials, damping: Floats, doubt: float) -> tuple[Floats, Floats, Floats]:
+    """One step with the damping that helps most: values, dampings, misfits."""
+    values, count = trials.values, len(trials.values)
+    every = [*range(count)]
+    around = np.concatenate([values, *(values + step for step in np.diag(DIFFERENCES))])
+    residuals = _residuals(known, trials.chosen(every * (g.SIZE + 1)), around, doubt).reshape(g.SIZE + 1, count, -1)
+    here = residuals[0]
+    slopes = (residuals[1:] - here) / DIFFERENCES[:, None, None]
+    curvature, downhill = np.einsum("ank,bnk->nab", slopes, slopes), np.einsum("ank,nk->na", slopes, here)
+    scale = np.einsum("naa->na", curvature) + 1e-9
+    tried = []
+    for factor in DAMPINGS:
+        damped = curvature + (factor * damping[:, None] * scale)[:, :, None] * np.eye(g.SIZE) + 1e-9 * np.eye(g.SIZE)
+        tried.append(np.clip(values - np.linalg.solve(damped, downhill[:, :, None])[:, :, 0], LEAST, MOST))
+    candidates = np.array([*tried, values])
+    found = (
+        np.square(_residuals(known, trials.chosen(every * len(candidates)), candidates.reshape(-1, g.SIZE), doubt))
+        .sum(axis=1)
+        .reshape(len(candidates), count)
+    )
+    best = found.argmin(axis=0)
+    factors = np.array([*DAMPINGS, 10.0 * DAMPINGS[-1]])
+    return (
+        candidates[best, every],
+        np.clip(damping * factors[best], LEAST_DAMPING, MOST_DAMPING),
+        found[best, every],
+    )

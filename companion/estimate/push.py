@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, field
 
 from companion.estimate.clipping import Clipping, may_have_clipped
-from companion.estimate.normal import LOOKED_AT_S, Part
+from companion.estimate.normal import LOOKED_AT_US, Touch
 from companion.estimate.rotation import body_to_ned, turned
-from companion.messages import ImuSample, Quaternion, Vector3
+from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 
 # Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
 CONTIGUOUS = 1.5
@@ -30,6 +30,8 @@ class Push:
     """Latest time at which there was no contact."""
     earlier: ImuSample | None = None
     """The sample before the contact's first."""
+    attitudes: list[Attitude] = field(default_factory=list)
+    """From before the contact on."""
     time_boot_us: int = 0
     heard_boot_us: int = 0
     """Of the latest sample, also after the push."""
@@ -38,14 +40,13 @@ class Push:
     first_rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
     impulse_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     unconfirmed_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
-    parts: list[Part] = field(default_factory=list)
-    """Of the push until it paused, as `normal` reads them."""
+    shown: list[ImuSample] = field(default_factory=list)
+    """Those of the first hundredths of a second that did not clip."""
     last_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
     peak_m_s2: float = 0.0
     samples: int = 0
     loud_boot_us: int = 0
     closed: bool = False
-    paused: bool = False
     clipped: bool = False
     gap: bool = False
     first_size_m_s2: float = 0.0
@@ -76,8 +77,6 @@ class Push:
             p, q, r = self.rates_frd_rad_s
             mean = (0.5 * (p + w[0]), 0.5 * (q + w[1]), 0.5 * (r + w[2]))
             self.attitude_wxyz = turned(self.attitude_wxyz, mean, elapsed_us * 1e-6)
-        before = self.rates_frd_rad_s if not first else (self.earlier or sample).angular_velocity_frd_rad_s
-        turned_by = (w[0] - before[0], w[1] - before[1], w[2] - before[2])
         ned = body_to_ned(self.attitude_wxyz, frd)
         last = ned if contiguous or first else self.last_ned_m_s2
         over_s = 0.5e-6 * (min(elapsed_us, self.averaging_us) if first else elapsed_us)
@@ -88,36 +87,27 @@ class Push:
             sums[2] + over_s * (last[2] + ned[2]),
         )
         self.rates_frd_rad_s = w
-        self.paused = self.paused or not loud
-        if not self.paused:
-            self._keep(now_us, frd, turned_by)
+        if first:
+            self.first_boot_us = now_us
+        self.clipped = self.clipped or may_have_clipped(f, self.range_m_s2)
+        if not self.clipped and now_us - self.first_boot_us <= LOOKED_AT_US:
+            self.shown.append(sample)
         if loud:
-            self._confirm(now_us, f, math.sqrt(frd[0] ** 2 + frd[1] ** 2 + frd[2] ** 2), contiguous)
+            self._confirm(now_us, math.sqrt(frd[0] ** 2 + frd[1] ** 2 + frd[2] ** 2), contiguous)
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
 
-    def _keep(self, now_us: int, force_frd_m_s2: Vector3, turned_frd_rad_s: Vector3) -> None:
-        """A sample for the normal, if it is of the first hundredths of a second."""
-        before_us = self.time_boot_us
-        if before_us == 0:
-            self.first_boot_us = now_us
-            before_us = self.started_boot_us if self.earlier is None else self.earlier.time_boot_us
-        since_s, over_us = (now_us - self.first_boot_us) * 1e-6, now_us - before_us
-        if since_s > LOOKED_AT_S:
-            return
-        joined = over_us <= CONTIGUOUS * self.averaging_us
-        self.parts.append(
-            Part(
-                since_s,
-                over_us * 1e-6,
-                joined,
-                force_frd_m_s2,
-                self.attitude_wxyz,
-                self.rates_frd_rad_s,
-                turned_frd_rad_s,
-            )
-        )
+    def hear(self, attitude: Attitude) -> None:
+        """What the vehicle says of its attitude meanwhile."""
+        if attitude.time_boot_us - self.first_boot_us <= LOOKED_AT_US:
+            self.attitudes.append(attitude)
 
-    def _confirm(self, now_us: int, f: Vector3, size_m_s2: float, contiguous: bool) -> None:
+    @property
+    def touch(self) -> Touch:
+        """For the normal."""
+        earlier = [] if self.earlier is None else [self.earlier]
+        return Touch(self.free_frd_m_s2, earlier + self.shown, self.attitudes)
+
+    def _confirm(self, now_us: int, size_m_s2: float, contiguous: bool) -> None:
         """The sample and all since the last loud one belong to the contact."""
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
@@ -126,7 +116,6 @@ class Push:
         self.loud_boot_us = now_us
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
         self.gap = self.gap or not contiguous
-        self.clipped = self.clipped or may_have_clipped(f, self.range_m_s2)
         if self.samples == 1:
             self.first_size_m_s2 = size_m_s2
         elif self.samples == 2 and contiguous and size_m_s2 > 0.0:

@@ -54,8 +54,10 @@ class GuardsConfig(Written):
     centre_m: Positive = 0.145
     radius_m: Positive = 0.08
     height_m: Positive = 0.03
-    # Spring arms give: up to 30 mm, a third of that in the mean of the first hundredths of a second.
-    give_m: NotNegative = 0.01
+    # One arm, per unit mass of the vehicle, and how far it folds: half of the paper's k_s and b_s, which are two arms'.
+    stiffness_per_s2: Positive = 250.0
+    damping_per_s: NotNegative = 15.0
+    travel_m: NotNegative = 0.03
     # Radii of gyration about body x, y, z: roots of inertia over mass, 0.0034, 0.0034 and 0.0053 kg m^2 for 1.112 kg.
     gyration_frd_m: tuple[Positive, Positive, Positive] = (0.0553, 0.0553, 0.069)
 
@@ -69,6 +71,9 @@ class EstimateConfig(Written):
     # IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this.
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
     guards: GuardsConfig = GuardsConfig()
+    # The normal by what the touch did to the vehicle: some tens of milliseconds of one core, once, when a contact is
+    # over; off: the direction of the push.
+    fits_normal: bool = True
     # Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated.
     velocity_noise_m_s: Positive = 0.04
     # How long its errors last: those of optical flow and of a filter behind it change within a third of a second.

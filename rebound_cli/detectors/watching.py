@@ -50,7 +50,10 @@ def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
         return config
     own = getattr(config, detector)
     changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
-    return config.model_copy(update={detector: type(own).model_validate({**own.model_dump(), **changes})})
+    # A sweep asks only whether a hit is found.
+    estimate = config.estimate.model_copy(update={"fits_normal": False})
+    settings = type(own).model_validate({**own.model_dump(), **changes})
+    return config.model_copy(update={detector: settings, "estimate": estimate})
 
 
 def swept_fields(detector: str) -> tuple[str, ...]:
