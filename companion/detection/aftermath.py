@@ -30,6 +30,8 @@ LONGEST_DELAY_US = 40_000
 # and the floor reads half too much), over what is not seen of the 0.1 s that the velocities compared are apart, with
 # some reserve; and, with every sample seen, over what a velocity's stamp of a millisecond and a lost sample leave open.
 SHAKEN_S, STAMP_S = 0.15, 0.008
+# An output predictor's lag.
+LAG_S = 0.02
 # A step of the rates marks the gap that the contact fell into for this long: the velocity's interval and its delay.
 RATE_STEP_KEPT_US = 120_000
 
@@ -127,9 +129,10 @@ class Aftermath:
         """Of a quiet vehicle's steps, each axis; without bound until enough are known."""
         return math.sqrt(self.variance_m2_s2) if self.known >= TRUSTED else math.inf
 
-    def shaken_m_s(self, shaking_m_s2: float) -> float:
-        """What vibration of this spread may add to the velocity without the samples showing it."""
-        return shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S)
+    def unseen_m_s(self, shaking_m_s2: float, thrust_change_m_s2: float) -> float:
+        """What vibration of this spread may add to the velocity without the samples showing it, and by how much a
+        velocity that lags is behind when the thrust has just changed by so much, as in free fall."""
+        return shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S) + LAG_S * thrust_change_m_s2
 
     def rate_step_near(self, velocity_us: int) -> float:
         """The largest step of the rates from sample to sample that a jump at ``velocity_us`` may belong to."""

@@ -305,12 +305,12 @@ class FusedDetector:
         if turned and turned_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * aftermath.rate_step_s:
             # No motor did that, and the thrust has not turned for long: two signs, half as clear.
             noise_m_s, room = 0.5 * noise_m_s, 0.0
-        threshold = caution * max(least, noise_m_s) + room + aftermath.shaken_m_s(shaking)
+        room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
+        threshold = caution * max(least, noise_m_s) + room
         if size < threshold or s.phase is not Phase.ARMED:
             return None
         free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)
-        now_us = max(time_us, s.last_sample_boot_us)
-        over_s = max(now_us - free_until_us, 1) * 1e-6
+        over_s = max((now_us := max(time_us, s.last_sample_boot_us)) - free_until_us, 1) * 1e-6
         force_ned = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(aftermath.strapdown.attitude_wxyz, force_ned)
         aftermath.forget()
