@@ -50,6 +50,9 @@ DEPARTED_M_S = 0.1
 # Noise alone departs by that now and then, and would move the place of a hit by a third of a metre: no hit that matters
 # leaves less than this.
 HIT_LEAVES_M_S = 0.15
+# What accelerometer and velocities disagree by without a hit (GPS, a bias, an attitude that is off) is looked for over
+# so long before; a hit leaves clearly more than that.
+USUAL_US, CLEARLY = 3_000_000, 1.5
 # An estimate that is put right after what clipping hid: the error grows from velocity to velocity, and has begun to so
 # long after the hit. What the vehicle's own sensor saw is there at once.
 GROWS = 1.5
@@ -98,27 +101,41 @@ def free_until(fixes: Sequence[VelocityFix], contact_boot_us: int) -> int:
 
     ``fixes`` may be newer than the contact. The time is that of the last velocity that still was where the
     accelerometer leads from those of half a second before, earlier where what follows is an estimate that is being put
-    right; the contact's own where nothing contradicts it.
+    right; the contact's own where nothing contradicts it, or no more than has done so for seconds.
     """
     start_us = contact_boot_us - UNNOTICED_US
-    before = [_less_sum(fix) for fix in fixes if start_us - BEFORE_US < fix.time_boot_us <= start_us]
-    if not before:
-        return contact_boot_us
-    mean = [sum(axis) / len(before) for axis in zip(*before, strict=True)]
+    usual_m_s = _usually_departed(fixes, start_us)
     free_us, departed = start_us, list[tuple[int, float]]()
-    for fix in reversed(fixes):
-        off_m_s = math.dist(_less_sum(fix), mean)
-        if fix.time_boot_us <= start_us or off_m_s < DEPARTED_M_S:
-            free_us = fix.time_boot_us
+    for time_us, off_m_s in reversed(_departures(fixes, start_us)):
+        if off_m_s < max(DEPARTED_M_S, usual_m_s):
+            free_us = time_us
             break
-        departed.append((fix.time_boot_us, off_m_s))
-    if max((off_m_s for _, off_m_s in departed), default=0.0) < HIT_LEAVES_M_S:
+        departed.append((time_us, off_m_s))
+    if max((off_m_s for _, off_m_s in departed), default=0.0) < max(HIT_LEAVES_M_S, CLEARLY * usual_m_s):
         return contact_boot_us
     if len(departed) > 1 and departed[-2][1] > GROWS * departed[-1][1]:
         free_us = max(start_us, departed[-1][0] - PUT_RIGHT_US)
-    elif not departed or departed[-1][0] >= contact_boot_us:
+    elif departed[-1][0] >= contact_boot_us:
         return contact_boot_us
     return min(contact_boot_us, free_us - LONGEST_DELAY_US)
+
+
+def _departures(fixes: Sequence[VelocityFix], start_us: int, end_us: int | None = None) -> list[tuple[int, float]]:
+    """How far the velocities after a time are from where the accelerometer leads from those before it: (time, m/s)."""
+    before = [_less_sum(fix) for fix in fixes if start_us - BEFORE_US < fix.time_boot_us <= start_us]
+    if not before:
+        return []
+    mean = [sum(axis) / len(before) for axis in zip(*before, strict=True)]
+    after = [fix for fix in fixes if fix.time_boot_us > start_us and (end_us is None or fix.time_boot_us <= end_us)]
+    return [(fix.time_boot_us, math.dist(_less_sum(fix), mean)) for fix in after]
+
+
+def _usually_departed(fixes: Sequence[VelocityFix], end_us: int) -> float:
+    """The most that as long a look would have shown in the seconds before, m/s: noise, a bias, an estimate that is
+    corrected."""
+    ends = range(end_us, end_us - USUAL_US, -UNNOTICED_US)
+    seen = [_departures(fixes, until_us - UNNOTICED_US, until_us) for until_us in ends]
+    return max((off_m_s for departures in seen for _, off_m_s in departures), default=0.0)
 
 
 def position_at(samples: Sequence[LocalPosition], contact_boot_us: int, velocity_ned_m_s: Vector3) -> Vector3:
