@@ -44,7 +44,8 @@ class CollisionReport:
     `settled_after_s` runs from the detection to the start of the interval in which the vehicle stayed
     settled; None when it did not settle.
     `overshoot_m` is the largest distance past the setpoint, away from the obstacle, until the recovery ended.
-    `rebound_speed_m_s` is the speed back along the approach when the contact ended; 0 when it never moved back.
+    `rebound_speed_m_s` is the speed back along the approach when the contact ended; 0 when it never moved back, None
+    when the vehicle's velocity could not be believed then (a clipped hit).
     """
 
     detected_at_us: int
@@ -58,7 +59,7 @@ class CollisionReport:
     recovery_setpoint_ned_m: Vector3
     settled_after_s: float | None
     overshoot_m: float
-    rebound_speed_m_s: float
+    rebound_speed_m_s: float | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -134,7 +134,7 @@ def _collision_text(number: int, collision: Mapping[str, Any]) -> str:
         ),
         (
             "speed after",
-            _figure(collision["rebound_speed_m_s"], "m/s"),
+            _figure(collision["rebound_speed_m_s"], "m/s") or "not known",
             _figure(truth.get("rebound_speed_m_s"), "m/s"),
         ),
         ("obstacle faces (NED)", _vector(collision["normal_ned"]), _vector(truth.get("normal_ned"))),

@@ -83,7 +83,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
 
 def _collision(report: FlightReport, number: int) -> dict[str, Any]:
     collision = report.collisions[number]
-    settled_s = collision.settled_after_s
+    settled_s, rebound_m_s = collision.settled_after_s, collision.rebound_speed_m_s
     return {
         "detected_at_s": _seconds(collision.detected_at_us - report.started_at_us),
         "detector": collision.detector,
@@ -94,7 +94,7 @@ def _collision(report: FlightReport, number: int) -> dict[str, Any]:
         "recovery_setpoint_ned_m": _rounded(collision.recovery_setpoint_ned_m),
         "settled_after_s": None if settled_s is None else round(settled_s, _TIME_DIGITS),
         "overshoot_m": round(collision.overshoot_m, _DIGITS),
-        "rebound_speed_m_s": round(collision.rebound_speed_m_s, _DIGITS),
+        "rebound_speed_m_s": None if rebound_m_s is None else round(rebound_m_s, _DIGITS),
     }
 
 

@@ -93,10 +93,12 @@ class CollisionRecord:
         v = self.contact.velocity_ned_m_s
         return horizontal_unit((-v[0], -v[1], 0.0)) if math.hypot(v[0], v[1]) >= LEAST_SPEED_M_S else self.normal_ned
 
-    def rebound_speed_m_s(self) -> float:
-        """Largest speed back in the tenth of a second after the contact's last loud sample."""
+    def rebound_speed_m_s(self) -> float | None:
+        """Largest speed back in the tenth of a second after the contact's last loud sample; None where no velocity of
+        that time could be believed."""
         start, end = self.contact_ended_boot_us, self.contact_ended_boot_us + REBOUND_WINDOW_US
-        return max([0.0] + [speed for time_us, speed in self._speeds_away if start < time_us <= end])
+        speeds = [speed for time_us, speed in self._speeds_away if start < time_us <= end]
+        return max(0.0, *speeds) if speeds else None
 
     def settled_after_s(self) -> float | None:
         if self.settled_at_boot_us is None:
@@ -107,10 +109,10 @@ class CollisionRecord:
         """Of one that has settled, for people."""
         settled_after_s = self.settled_after_s()
         assert settled_after_s is not None
-        return (
-            f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {self.overshoot_m * 100:.1f} cm, "
-            f"rebound {self.rebound_speed_m_s():.2f} m/s"
-        )
+        speed_m_s = self.rebound_speed_m_s()
+        rebound = "rebound not known" if speed_m_s is None else f"rebound {speed_m_s:.2f} m/s"
+        past_cm = self.overshoot_m * 100
+        return f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {past_cm:.1f} cm, {rebound}"
 
     def report(self) -> CollisionReport:
         velocity = self.contact.velocity_ned_m_s

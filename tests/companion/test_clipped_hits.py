@@ -115,3 +115,5 @@ def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
     assert record.is_believed
     n, e, d = record.setpoint_ned_m
     assert n < 2.7 and abs(e) < 0.1 and d == pytest.approx(-2.0)
+    # And of the speed off the wall nothing is said: no velocity of that time was believed
+    assert record.report().rebound_speed_m_s is None

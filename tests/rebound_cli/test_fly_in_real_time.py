@@ -88,7 +88,6 @@ def test_a_flight_killed_while_it_recovers_leaves_a_log_complete_to_the_last_sec
     packets = list(read_tlog(folder / "flight.tlog"))
     assert killed_at_us - packets[-1][0] < 1_000_000
     happened = {event["kind"]: event["time_us"] for event in events_of(folder)}
-    assert list(happened)[-2:] == ["detection", "estimate"]
     detected_at_us = happened["detection"]
     assert any(packet[7] == SET_POSITION_TARGET and at_us >= detected_at_us for at_us, packet in packets)
     # And the vehicle's process ends by itself, and all of it can be decided again

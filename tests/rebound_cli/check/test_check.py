@@ -37,8 +37,8 @@ items:
   - wait_for: {file: go}
   - land:
 """)
-    # up at 1 m/s and 1 m/s^2; then 4 m at 2 m/s and 2 m/s^2
-    assert [way.begins_s for way in ways] == [0.0, pytest.approx(3.0), pytest.approx(6.0), pytest.approx(11.0), None]
+    # up at 1 m/s and 1 m/s^2; then 4 m at 2 m/s, speeding up with 1 m/s^2 and braking with 2
+    assert [way.begins_s for way in ways] == [0.0, pytest.approx(3.0), pytest.approx(6.5), pytest.approx(11.5), None]
     assert [way.length_m for way in ways] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
     assert ways[-1].ends_s is None, "nobody knows how long the wait is"
 
@@ -77,7 +77,7 @@ def test_obstacles_seen_from_above():
 def test_a_person_reads_what_would_be_flown(tmp_path):
     result = run("check", WALL, "--out", tmp_path)
     assert result.returncode == 0, result.stderr
-    for words in ("go to [7.00, 0.00, -1.50]", "7.0 m", "meets 'north wall'", "in all 15.5 m in 20 s", "Fence"):
+    for words in ("go to [7.00, 0.00, -1.50]", "7.0 m", "meets 'north wall'", "in all 15.5 m in 21 s", "Fence"):
         assert words in result.stdout
     picture = matplotlib.image.imread(tmp_path / "wall.png")
     assert picture.shape[0] > 500 and picture.std() > 0.05
