@@ -11,7 +11,14 @@ from rebound_cli.detectors.hits import built_in
 from rebound_cli.detectors.mishaps import FAMILIES
 from rebound_cli.detectors.pilot import Asked, Pilot, as_known
 from rebound_cli.detectors.recording import Recording
-from rebound_cli.detectors.watching import ASKED_HZ, SWEPT_FACTORS, configuration, streams_asked_hz, watch_all
+from rebound_cli.detectors.watching import (
+    ASKED_HZ,
+    SWEPT_FACTORS,
+    alarms_only,
+    configuration,
+    streams_asked_hz,
+    watch_all,
+)
 from rebound_cli.detectors.wire import Wire
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.plant import Plant
@@ -66,7 +73,7 @@ def _reports(case: FlightCase, flown: Flown, wire: Wire, rate: int) -> dict[str,
     index_at = {step.time_boot_us: step.index for step in arrived}
     detectors: dict[str, Any] = {}
     for name in case.detectors:
-        found, touches, blind = watch_all(configuration(name), arrived, situations)
+        found, touches, blind = watch_all(alarms_only(name), arrived, situations)
         entry: dict[str, Any] = {
             "alarms": [_told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.final.kind) for f in found],
             "touches": len(touches),

@@ -45,15 +45,19 @@ class Found:
 
 def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
     """Default settings but for the detector's name, and its thresholds times `factor`."""
-    config = CompanionConfig(detector=detector)
     if factor == 1.0:
-        return config
+        return CompanionConfig(detector=detector)
+    config = alarms_only(detector)
     own = getattr(config, detector)
     changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
-    # A sweep asks only whether a hit is found.
-    estimate = config.estimate.model_copy(update={"fits_normal": False})
     settings = type(own).model_validate({**own.model_dump(), **changes})
-    return config.model_copy(update={detector: settings, "estimate": estimate})
+    return config.model_copy(update={detector: settings})
+
+
+def alarms_only(detector: str) -> CompanionConfig:
+    """Default settings where nobody asks which way a collision pushed: some detectors report thousands."""
+    config = CompanionConfig(detector=detector)
+    return config.model_copy(update={"estimate": config.estimate.model_copy(update={"fits_normal": False})})
 
 
 def swept_fields(detector: str) -> tuple[str, ...]:
