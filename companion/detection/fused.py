@@ -43,8 +43,9 @@ from companion.messages import (
 # A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
 SHAKING = 2.0
 # On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
-# 11 m/s^2 in one sample, nothing in the next, up to 1.2 thresholds): the next one must show it, too.
-CLEAR = 1.3
+# 11 m/s^2 in one sample, nothing in the next, up to 1.2 thresholds): the next one must show it, too. Where it shakes so
+# much that the detector is told to be blind (see `sight`), only what is clear counts.
+CLEAR, BLIND_M_S2 = 1.3, 30.0
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -144,9 +145,10 @@ class FusedDetector:
         return self._loud(s, sample, situation, force, size, ratio)
 
     def _is_jolt(self, s: FusedState, side_m_s2: float, f_z: float) -> bool:
-        """Turned by more than motors can, and pushed."""
+        """Turned by more than motors and its own shaking can, and pushed."""
         elapsed_s = (s.aftermath.strapdown.time_boot_us - s.aftermath.previous_imu_us) * 1e-6
-        if s.aftermath.newest_rate_step_rad_s < self._config.jolt_rad_s + self._config.jolt_rad_s2 * elapsed_s:
+        turned_rad_s = s.aftermath.newest_rate_step_rad_s * self._config.side_threshold_m_s2 / s.threshold_m_s2
+        if turned_rad_s < self._config.jolt_rad_s + self._config.jolt_rad_s2 * elapsed_s:
             return False
         return side_m_s2 > 0.5 * s.threshold_m_s2 or abs(f_z - s.floor.z) > self._vertical_threshold(s)
 
@@ -218,10 +220,9 @@ class FusedDetector:
             if soft.looked_at_us(now_us, free_until_us) < self._soft_us:
                 return None
             kind = ImpactKind.CONTACT
-        elif is_doubtful and soft.looked_at_us(now_us, free_until_us) == 0:
+        elif is_doubtful and (s.threshold_m_s2 > BLIND_M_S2 or soft.looked_at_us(now_us, free_until_us) == 0):
             return None
-        confidence = min(1.0, 0.5 * ratio)
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, confidence, kind)
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
     def _fire(
         self,
@@ -311,8 +312,7 @@ class FusedDetector:
             return None
         free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)
         over_s = max((now_us := max(time_us, s.last_sample_boot_us)) - free_until_us, 1) * 1e-6
-        force_ned = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
-        force = ned_to_body(aftermath.strapdown.attitude_wxyz, force_ned)
+        force = ned_to_body(aftermath.strapdown.attitude_wxyz, (step[0] / over_s, step[1] / over_s, step[2] / over_s))
         aftermath.forget()
         confidence = min(1.0, 0.5 * size / threshold)
         v = velocity_ned_m_s

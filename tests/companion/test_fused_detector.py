@@ -231,6 +231,23 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
 
 
+def test_the_gyroscope_of_a_vehicle_that_shakes_makes_no_graze_of_its_shaking():
+    """Given rates that jump to and fro by 3 rad/s, which of a calm vehicle is more than its motors can."""
+    shaking = Flight(noise=3.0, rates=lambda t: (1.5 * (-1.0) ** (t // 4_000), 0.0, 0.0))
+    assert shaking.fly() == []
+    assert shaking.state.threshold_m_s2 > 8.0
+
+
+def test_a_vehicle_that_shakes_until_the_detector_is_blind_is_hit_only_by_what_is_clear():
+    def shaken(push_m_s2):
+        flight = Flight(pulse((0.0, push_m_s2, 0.0), 3_000_500, 20_000), noise=9.0)
+        return len(flight.fly()), flight.state.threshold_m_s2
+
+    assert shaken(0.0)[1] > 30.0
+    assert shaken(65.0)[0] == 0
+    assert shaken(120.0)[0] == 1
+
+
 @pytest.mark.parametrize("landed_until_us", [0, 2_500_000])
 def test_rotors_that_begin_to_shake_as_the_vehicle_leaves_the_ground_are_no_hit(landed_until_us):
     """Given nothing learnt of them: in the air when the first sample is heard, or on the ground until then."""
