@@ -25,6 +25,7 @@ from companion.detection.classify import kind_of
 from companion.detection.floor import SETTLED_US, Floor
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import ON_THE_GROUND, DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.detection.sight import BLIND_M_S2
 from companion.detection.soft import SoftTouch
 from companion.detection.thrust import ThrustGain
 from companion.estimate.rotation import body_to_ned, ned_to_body
@@ -42,10 +43,9 @@ from companion.messages import (
 
 # A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
 SHAKING = 2.0
-# On a vehicle that shakes, one sample below this many thresholds may be the sensor's own (once in four public logs:
-# 11 m/s^2 in one sample, nothing in the next, up to 1.2 thresholds): the next one must show it, too. Where it shakes so
-# much that the detector is told to be blind (see `sight`), only what is clear counts.
-CLEAR, BLIND_M_S2 = 1.3, 30.0
+# On a vehicle that shakes one sample below so many thresholds may be the sensor's own (once in four public logs, 1.2):
+# the next one must show it, too. Where it shakes until the detector is told to be blind, only what is clear counts.
+CLEAR = 1.3
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000

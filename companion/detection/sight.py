@@ -11,6 +11,9 @@ RATE_WINDOW_US = 1_000_000
 PROOF_SAMPLES = 5
 PROOF_US = 100_000
 
+# Least threshold of a detector that is told to be blind.
+BLIND_M_S2 = 30.0
+
 
 class SightConfig(Written):
     """When a detector counts as blind."""
@@ -21,7 +24,7 @@ class SightConfig(Written):
     min_rate_hz: Positive = 20.0
     # By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a vehicle that shakes so much that less cannot be
     # told from its shaking does not see the slower half of its hits.
-    max_threshold_m_s2: Positive = 30.0
+    max_threshold_m_s2: Positive = BLIND_M_S2
 
 
 class Sight(NamedTuple):
