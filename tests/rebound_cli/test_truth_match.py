@@ -136,6 +136,18 @@ def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contac
     assert summary["collisions"][0]["truth"]["overshoot_m"] == pytest.approx(0.04)
 
 
+def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
+    # Given a hit that was not recovered from when another was detected, 1 s later, and a way past the setpoint after that
+    path = path_of([(10.0, 3.8, -1.5), (10.9, 3.0, -1.48), (11.5, 2.5, -1.2), (12.0, 2.5, -1.2)])
+    truth = FlightTruth([hit(10_000), hit(11_000)], path, EPOCH_US)
+    # When it is summed up
+    summary = build_summary(Flown(report_of(collision(10_004, None), collision(11_004)), 0.5, truth), FACTS)
+    # Then the first hit has neither that overshoot nor that loss of height; the second has both
+    first, second = (entry["truth"] for entry in summary["collisions"])
+    assert (first["overshoot_m"], first["height_lost_m"]) == pytest.approx((0.0, 0.02))
+    assert (second["overshoot_m"], second["height_lost_m"]) == pytest.approx((0.3, 0.3))
+
+
 def test_the_summary_has_exactly_the_documented_keys():
     truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
     summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
