@@ -137,7 +137,7 @@ def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contac
 
 
 def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
-    # Given a hit that was not recovered from when another was detected, 1 s later, and a way past the setpoint after that
+    # Given a hit that was not recovered from when another was detected 1 s later, and a way past the setpoint then
     path = path_of([(10.0, 3.8, -1.5), (10.9, 3.0, -1.48), (11.5, 2.5, -1.2), (12.0, 2.5, -1.2)])
     truth = FlightTruth([hit(10_000), hit(11_000)], path, EPOCH_US)
     # When it is summed up
