@@ -9,7 +9,7 @@ that fails turns the vehicle too.
 import math
 from dataclasses import dataclass, field
 
-from companion.estimate.strapdown import ZERO, Strapdown
+from companion.estimate.strapdown import LONGEST_DELAY_US, ZERO, Strapdown
 from companion.messages import Vector3
 
 # The velocities before the newest that it is compared with: enough to halve their noise, few enough to be recent.
@@ -23,8 +23,6 @@ TRUSTED = 20
 MEMORY, RISE = 100, 10
 # Of each sample in the share of the time that is not seen: ten samples are half a second at the slowest useful rate.
 UNSEEN_SHARE = 0.1
-# A vehicle's velocity estimate lags by no more than this (optical flow with an output predictor: 20 ms).
-LONGEST_DELAY_US = 40_000
 # Vibration that falls between the samples is missing in their sum. A rotor's that beats with the stream, 87 Hz with
 # samples 8 and 12 ms apart, has one sign there for tenths of a second: its amplitude (1.4 of both axes' true spreads,
 # and the floor reads half too much), over what is not seen of the 0.1 s that the velocities compared are apart, with

@@ -17,19 +17,18 @@ before it is called a hit or a hand (see `soft`).
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import ClassVar
 
 from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
-from companion.detection.floor import SETTLED_US, Floor
+from companion.detection.floor import SETTLED_US
+from companion.detection.force_signs import is_jolt, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
-from companion.detection.interface import ON_THE_GROUND, DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.detection.fused_state import FusedState
+from companion.detection.hidden_signs import Hidden, spun, velocity_jump
+from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
-from companion.detection.soft import SoftTouch
-from companion.detection.thrust import ThrustGain
-from companion.estimate.rotation import body_to_ned, ned_to_body
-from companion.estimate.strapdown import ZERO
+from companion.estimate.rotation import body_to_ned
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -52,20 +51,6 @@ WORSE_AFTER_US = 100_000
 WORSE = 1.5
 # Velocities of ODOMETRY are taken for as long as they come; LOCAL_POSITION_NED has no reset counter.
 ODOMETRY_KEPT_US = 500_000
-
-
-@dataclass(slots=True)
-class FusedState(DetectorState):
-    """Changed in place by `FusedDetector.step`."""
-
-    floor: Floor = field(default_factory=Floor)
-    thrust: ThrustGain = field(default_factory=ThrustGain)
-    aftermath: Aftermath = field(default_factory=lambda: Aftermath(0))
-    velocity_ned_m_s: Vector3 | None = None
-    odometry_boot_us: int | None = None
-    reset_counter: int = 0
-    contact_began_boot_us: int = 0
-    soft: SoftTouch = field(default_factory=SoftTouch)
 
 
 class FusedDetector:
@@ -112,30 +97,30 @@ class FusedDetector:
     # --- force ------------------------------------------------------------------------------------------------
 
     def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
-        now_us, f, w = sample.time_boot_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+        config, now_us = self._config, sample.time_boot_us
+        f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
         s.aftermath.imu(now_us, f, w)
         before_us, s.last_sample_boot_us = s.last_sample_boot_us, now_us
         f_x, f_y, f_z = f
         off = situation.why_off
         x, y = f_x - s.floor.x, f_y - s.floor.y
         side = math.sqrt(x * x + y * y)
-        turning = abs(w[0]) + abs(w[1]) + abs(w[2])
         if side < s.threshold_m_s2 and off is None and s.phase is Phase.ARMED:
             # Nearly every sample ends here.
-            room = self._vertical_threshold(s)
-            jolted = s.aftermath.newest_rate_step_rad_s > self._config.jolt_rad_s and self._is_jolt(s, side, f_z)
-            if -s.thrust.most_m_s2(now_us) - room < f_z < room and not jolted:
+            room = vertical_threshold_m_s2(s, config)
+            if -s.thrust.most_m_s2(now_us) - room < f_z < room and not is_jolt(s, config, side, f_z):
                 s.soft.since_boot_us = None
                 self._learn(s, f, before_us)
-                return self._spun(s, situation)
+                hidden = spun(s, config)
+                return None if hidden is None else self._fire_hidden(s, now_us, situation, hidden)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
             self._learn(s, f, before_us)
             return None
-        room = self._vertical_threshold(s)
+        room = vertical_threshold_m_s2(s, config)
         below, above = f_z - room, -f_z - s.thrust.most_m_s2(now_us) - room
-        threshold = s.threshold_m_s2 + self._drag_room(s, turning)
-        jolted = s.phase is Phase.ARMED and self._is_jolt(s, side, f_z)
+        threshold = side_threshold_m_s2(s, config, w)
+        jolted = s.phase is Phase.ARMED and is_jolt(s, config, side, f_z)
         if side < threshold and below < 0.0 and above < 0.0 and not jolted:
             self._quiet(s, f, before_us)
             return None
@@ -143,25 +128,6 @@ class FusedDetector:
         size = math.sqrt(x * x + y * y + force[2] * force[2])
         ratio = CLEAR if jolted else max(side / threshold, 1.0 + max(below, above) / room)
         return self._loud(s, sample, situation, force, size, ratio)
-
-    def _is_jolt(self, s: FusedState, side_m_s2: float, f_z: float) -> bool:
-        """Turned by more than motors and its own shaking can, and pushed."""
-        elapsed_s = (s.aftermath.strapdown.time_boot_us - s.aftermath.previous_imu_us) * 1e-6
-        turned_rad_s = s.aftermath.newest_rate_step_rad_s * self._config.side_threshold_m_s2 / s.threshold_m_s2
-        if turned_rad_s < self._config.jolt_rad_s + self._config.jolt_rad_s2 * elapsed_s:
-            return False
-        return side_m_s2 > 0.5 * s.threshold_m_s2 or abs(f_z - s.floor.z) > self._vertical_threshold(s)
-
-    def _vertical_threshold(self, s: FusedState) -> float:
-        return max(self._config.vertical_threshold_m_s2, self._config.noise_factor * s.floor.vertical_m_s2)
-
-    def _drag_room(self, s: FusedState, turning_rad_s: float) -> float:
-        """Drag goes round with the vehicle while the mean stays behind."""
-        v = s.velocity_ned_m_s
-        if v is None:
-            return 0.0
-        speed = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        return self._config.drag_per_s * speed * min(2.0, 0.25 * turning_rad_s)
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
         now_us = s.last_sample_boot_us
@@ -249,19 +215,11 @@ class FusedDetector:
         s.soft.fired(now_us, kind is ImpactKind.CONTACT)
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
 
-    def _spun(self, s: FusedState, situation: Situation) -> Impact | None:
-        """Turned as no motor turns a vehicle, and nothing else to see: hit before the sample that showed it first."""
-        a, config = s.aftermath, self._config
-        if a.spun_rad_s < config.spin_rad_s or s.phase is not Phase.ARMED:
-            return None
-        free_until_us, over_s = a.earlier_imu_us, 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
-        if a.spun_rad_s < config.spin_rad_s + config.spin_rad_s2 * over_s:
-            return None
-        # Which way it was pushed does not show: as an obstacle does that is in the vehicle's way.
-        v = s.velocity_ned_m_s or ZERO
-        force = ned_to_body(a.strapdown.attitude_wxyz, (-v[0] / over_s, -v[1] / over_s, -v[2] / over_s))
-        a.forget()
-        return self._fire(s, s.last_sample_boot_us, situation, force, free_until_us, Evidence.AFTERMATH, 1.0)
+    def _fire_hidden(self, s: FusedState, now_us: int, situation: Situation, hidden: Hidden) -> Impact:
+        s.aftermath.forget()
+        force, free_until_us = hidden.specific_force_frd_m_s2, hidden.free_until_boot_us
+        before, confidence = hidden.velocity_before_ned_m_s, hidden.confidence
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence, None, before)
 
     # --- aftermath --------------------------------------------------------------------------------------------
 
@@ -296,25 +254,7 @@ class FusedDetector:
             return None
         spread_m_s = aftermath.spread_m_s
         aftermath.learn(step)
-        size = math.sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2])
-        turned_rad_s = aftermath.rate_step_near(time_us)
-        turned = turned_rad_s >= config.rate_step_rad_s
-        least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
-        p, q, _ = aftermath.strapdown.rates_frd_rad_s
-        shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
-        noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
-        if turned and turned_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * aftermath.rate_step_s:
-            # No motor did that, and the thrust has not turned for long: two signs, half as clear.
-            noise_m_s, room = 0.5 * noise_m_s, 0.0
-        room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
-        threshold = caution * max(least, noise_m_s) + room
-        if size < threshold or s.phase is not Phase.ARMED:
+        if s.phase is not Phase.ARMED:
             return None
-        free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)
-        over_s = max((now_us := max(time_us, s.last_sample_boot_us)) - free_until_us, 1) * 1e-6
-        force = ned_to_body(aftermath.strapdown.attitude_wxyz, (step[0] / over_s, step[1] / over_s, step[2] / over_s))
-        aftermath.forget()
-        confidence = min(1.0, 0.5 * size / threshold)
-        v = velocity_ned_m_s
-        before = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence, None, before)
+        hidden = velocity_jump(s, config, time_us, velocity_ned_m_s, step, spread_m_s, caution)
+        return None if hidden is None else self._fire_hidden(s, max(time_us, s.last_sample_boot_us), situation, hidden)

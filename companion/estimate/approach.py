@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from filterpy.kalman import KalmanFilter
 
+from companion.estimate.strapdown import LONGEST_DELAY_US
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
 
@@ -57,8 +58,6 @@ USUAL_US, CLEARLY = 3_000_000, 1.5
 # long after the hit. What the vehicle's own sensor saw is there at once.
 GROWS = 1.5
 PUT_RIGHT_US = 120_000
-# A vehicle's velocity estimate lags by no more than this (optical flow with an output predictor: 20 ms).
-LONGEST_DELAY_US = 40_000
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,8 @@ ZERO: Vector3 = (0.0, 0.0, 0.0)
 ATTITUDE_KEPT_S = 0.1
 # A longer silence leaves a hole in the sum: two samples of 20 Hz, the least rate of a detector that sees.
 LONGEST_GAP_US = 100_000
+# A velocity that is held against the sum lags by no more than this (optical flow with an output predictor: 20 ms).
+LONGEST_DELAY_US = 40_000
 
 
 @dataclass(slots=True)

@@ -1,0 +1,37 @@
+"""What one sample of the accelerometer shows of a contact: a push sideways, along the thrust, or a jolt.
+
+Each against what this vehicle shows in its own flight (see `fused`); the state is only read.
+"""
+
+import math
+
+from companion.detection.fused_config import FusedConfig
+from companion.detection.fused_state import FusedState
+from companion.messages import Vector3
+
+
+def side_threshold_m_s2(s: FusedState, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
+    """What a push sideways must reach: drag goes round with a vehicle that turns while its mean stays behind."""
+    v = s.velocity_ned_m_s
+    if v is None:
+        return s.threshold_m_s2
+    turning = abs(rates_frd_rad_s[0]) + abs(rates_frd_rad_s[1]) + abs(rates_frd_rad_s[2])
+    speed = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return s.threshold_m_s2 + config.drag_per_s * speed * min(2.0, 0.25 * turning)
+
+
+def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
+    """What a push along the thrust must be beyond what propellers can do."""
+    return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
+
+
+def is_jolt(s: FusedState, config: FusedConfig, side_m_s2: float, f_z: float) -> bool:
+    """Turned by more than motors and its own shaking can, and pushed."""
+    turned_rad_s = s.aftermath.newest_rate_step_rad_s
+    if turned_rad_s <= config.jolt_rad_s:
+        return False
+    elapsed_s = (s.aftermath.strapdown.time_boot_us - s.aftermath.previous_imu_us) * 1e-6
+    turned_rad_s = turned_rad_s * config.side_threshold_m_s2 / s.threshold_m_s2
+    if turned_rad_s < config.jolt_rad_s + config.jolt_rad_s2 * elapsed_s:
+        return False
+    return side_m_s2 > 0.5 * s.threshold_m_s2 or abs(f_z - s.floor.z) > vertical_threshold_m_s2(s, config)

@@ -1,0 +1,76 @@
+"""What a contact that fell between the samples leaves: a velocity that jumped, rates that no motor made.
+
+The state is only read; what is known of an impact found so is the gap it fell into and the mean push over that gap.
+"""
+
+import math
+from typing import NamedTuple
+
+from companion.detection.fused_config import FusedConfig
+from companion.detection.fused_state import FusedState
+from companion.estimate.rotation import ned_to_body
+from companion.estimate.strapdown import ZERO
+from companion.messages import Vector3
+
+
+class Hidden(NamedTuple):
+    """A contact that no sample showed: free until then, and the mean push since (body FRD)."""
+
+    free_until_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    confidence: float
+    velocity_before_ned_m_s: Vector3 | None
+
+
+def spun(s: FusedState, config: FusedConfig) -> Hidden | None:
+    """Turned as no motor turns a vehicle, and nothing else to see: hit before the sample that showed it first."""
+    a = s.aftermath
+    if a.spun_rad_s < config.spin_rad_s:
+        return None
+    over_s = 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
+    if a.spun_rad_s < config.spin_rad_s + config.spin_rad_s2 * over_s:
+        return None
+    # Which way it was pushed does not show: as an obstacle does that is in the vehicle's way.
+    v = s.velocity_ned_m_s or ZERO
+    force = ned_to_body(a.strapdown.attitude_wxyz, (-v[0] / over_s, -v[1] / over_s, -v[2] / over_s))
+    return Hidden(a.earlier_imu_us, force, 1.0, None)
+
+
+def velocity_jump(
+    s: FusedState,
+    config: FusedConfig,
+    time_us: int,
+    velocity_ned_m_s: Vector3,
+    step_m_s: Vector3,
+    spread_m_s: float,
+    caution: float,
+) -> Hidden | None:
+    """A velocity that is off by `step_m_s` from where the accelerometer leads; `caution` times the step is asked for
+    of a velocity that may jump by itself."""
+    aftermath = s.aftermath
+    size = math.sqrt(step_m_s[0] * step_m_s[0] + step_m_s[1] * step_m_s[1] + step_m_s[2] * step_m_s[2])
+    threshold = _step_asked_for_m_s(s, config, time_us, spread_m_s, caution)
+    if size < threshold:
+        return None
+    free_until_us = aftermath.contact_gap_us(time_us, config.rate_step_rad_s)
+    over_s = max(max(time_us, s.last_sample_boot_us) - free_until_us, 1) * 1e-6
+    push = (step_m_s[0] / over_s, step_m_s[1] / over_s, step_m_s[2] / over_s)
+    force = ned_to_body(aftermath.strapdown.attitude_wxyz, push)
+    v = velocity_ned_m_s
+    before = (v[0] - step_m_s[0], v[1] - step_m_s[1], v[2] - step_m_s[2])
+    return Hidden(free_until_us, force, min(1.0, 0.5 * size / threshold), before)
+
+
+def _step_asked_for_m_s(s: FusedState, config: FusedConfig, time_us: int, spread_m_s: float, caution: float) -> float:
+    aftermath = s.aftermath
+    turned_rad_s = aftermath.rate_step_near(time_us)
+    turned = turned_rad_s >= config.rate_step_rad_s
+    least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
+    p, q, _ = aftermath.strapdown.rates_frd_rad_s
+    shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
+    noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
+    if turned and turned_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * aftermath.rate_step_s:
+        # No motor did that, and the thrust has not turned for long: two signs, half as clear.
+        noise_m_s, room = 0.5 * noise_m_s, 0.0
+    room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
+    return caution * max(least, noise_m_s) + room
