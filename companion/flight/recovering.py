@@ -11,6 +11,7 @@ from companion.flight.after_hit import afterwards
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
+from companion.flight.pinned import Hanging, let_go
 from companion.flight.rebound import (
     agreed_normal,
     believable,
@@ -68,6 +69,7 @@ class Recover:
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
+        self._hanging = Hanging()
         self._thrown_m_s = 0.0
         self._take(flight, self._law.expected(self._contact), now_us)
 
@@ -79,6 +81,9 @@ class Recover:
         self._monitor = SettlingMonitor(goal, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
+        if self._hanging.since_us is not None:
+            place, leant = self._contact.position_ned_m, let_go(self._contact.normal_ned)
+            return Target(place, self._yaw_rad, REST, leant, leans_only=True, is_height_free=True)
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
         if not self._is_believed:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
@@ -93,6 +98,7 @@ class Recover:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
+        self._hang(flight, now_us)
         for sample in inputs.positions:
             if not self._believes(flight, sample):
                 continue
@@ -112,6 +118,15 @@ class Recover:
             flight.tell(now_us, "recovered", text, settled_after_s=None)
             return self._leave(flight)
         return None
+
+    def _hang(self, flight: FlightContext, now_us: int) -> None:
+        """While the vehicle hangs on what it hit, it has not left it: the way off it begins after that."""
+        attitude, normal = flight.vehicle.attitude, self._contact.normal_ned
+        if attitude is None or not self._law.is_refined or normal[2] != 0.0:
+            return
+        was_us, since_us = self._hanging.since_us, now_us - self._record.detected_at_us
+        if not self._hanging.step(attitude, normal, since_us, now_us) and was_us is not None:
+            self._way_began_us += now_us - max(was_us, self._way_began_us)
 
     def _leave(self, flight: FlightContext) -> Move:
         """What follows begins at rest at the setpoint."""
