@@ -113,6 +113,9 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
             doubtful = situation._replace(estimate_trusted=False)
             watch.state, impact = watch.detector.step(watch.state, sample, doubtful)
         if impact is not None:
+            cut_short = watch.estimator.close()
+            if cut_short is not None:
+                finished.append(cut_short)
             impacts.append(watch.estimator.begin(impact, situation))
         elif type(sample) is ImuSample:
             final = watch.estimator.follow(watch.state)

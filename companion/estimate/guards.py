@@ -27,6 +27,9 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+# Numbers in tuples stay in registers: with small arrays in their place a supposition took six times as long.
+Triple = tuple[float, float, float]
+Frame = tuple[Triple, Triple, Triple]
 
 # Of a supposition.
 SIZE = 11
@@ -44,6 +47,8 @@ ARMS_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0
 EDGE_LEAN_RAD = 0.1
 # A hoop that faces the obstacle by more than 77 degrees has no one place on its rim, and does not fold.
 LEAST_SHARE = 0.22
+# At the touch itself the depth is zero, and arms push by their damping already: rounding must not decide whether.
+ROUNDING_M = 1e-9
 # An arm at the end of its travel meets a stop that ends the motion within some milliseconds.
 STOP_PER_S2, STOP_DAMPING_PER_S = 60_000.0, 30.0
 # Motors follow within 20 ms and turn the vehicle with no more than this.
@@ -56,74 +61,83 @@ def _compiled(function: Kernel) -> Kernel:
 
 
 def _inlined(function: Kernel) -> Kernel:
-    """The same, put into whatever calls it: arrays that are handed on are counted, which takes longer than the rest."""
+    """The same, put into whatever calls it."""
     return cast(Kernel, numba.njit(cache=True, fastmath=False, forceinline=True)(function))
 
 
 @_inlined
-def _matrix(q: Floats, out: Floats) -> None:
-    """Body FRD to NED."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    out[0, 0], out[0, 1], out[0, 2] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    out[1, 0], out[1, 1], out[1, 2] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-    out[2, 0], out[2, 1], out[2, 2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @_inlined
-def _turn(q: Floats, w: Floats, over_s: float) -> None:
-    """The attitude a short time on, in place."""
+def _plus(a: Triple, times: float, b: Triple) -> Triple:
+    return a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]
+
+
+@_inlined
+def _cross(a: Triple, b: Triple) -> Triple:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@_inlined
+def _frame(q: tuple[float, float, float, float]) -> Frame:
+    """The body's axes, NED."""
+    w, x, y, z = q
+    ahead = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
+    right = (2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x))
+    return ahead, right, (2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y))
+
+
+@_inlined
+def _turned(q: tuple[float, float, float, float], w: Triple, over_s: float) -> tuple[float, float, float, float]:
+    """The attitude a short time on."""
     h = 0.5 * over_s
-    a, b, c, d = q[0], q[1], q[2], q[3]
-    q[0] += h * (-b * w[0] - c * w[1] - d * w[2])
-    q[1] += h * (a * w[0] + c * w[2] - d * w[1])
-    q[2] += h * (a * w[1] - b * w[2] + d * w[0])
-    q[3] += h * (a * w[2] + b * w[1] - c * w[0])
-    length = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    for i in range(4):
-        q[i] /= length
+    a = q[0] - h * (q[1] * w[0] + q[2] * w[1] + q[3] * w[2])
+    b = q[1] + h * (q[0] * w[0] + q[2] * w[2] - q[3] * w[1])
+    c = q[2] + h * (q[0] * w[1] - q[1] * w[2] + q[3] * w[0])
+    d = q[3] + h * (q[0] * w[2] + q[1] * w[1] - q[2] * w[0])
+    per_length = 1.0 / math.sqrt(a * a + b * b + c * c + d * d)
+    return per_length * a, per_length * b, per_length * c, per_length * d
 
 
 @_inlined
-def _farthest(guard: int, n: Floats, r: Floats, shape: Floats, out: Floats) -> float:
-    """Where a guard reaches farthest against n, from the vehicle's middle, NED, m; returns the share s."""
-    against = -(n[0] * r[0, 2] + n[1] * r[1, 2] + n[2] * r[2, 2])
+def _middle(guard: int, r: Frame, shape: Floats) -> Triple:
+    """Of a guard, from the vehicle's middle, NED, m."""
+    x, y = shape[0] * ARMS_FRD[guard, 0], shape[0] * ARMS_FRD[guard, 1]
+    return x * r[0][0] + y * r[1][0], x * r[0][1] + y * r[1][1], x * r[0][2] + y * r[1][2]
+
+
+@_inlined
+def _farthest(guard: int, n: Triple, r: Frame, shape: Floats) -> tuple[float, Triple]:
+    """The share s, and where a guard reaches farthest against n, from the vehicle's middle, NED, m."""
+    against = -_dot(n, r[2])
     share = max(math.sqrt(max(0.0, 1.0 - against * against)), LEAST_SHARE)
     edge = 0.5 * shape[2] * min(max(against / EDGE_LEAN_RAD, -1.0), 1.0)
-    for i in range(3):
-        arm = r[i, 0] * ARMS_FRD[guard, 0] + r[i, 1] * ARMS_FRD[guard, 1]
-        out[i] = shape[0] * arm + shape[1] / share * (-n[i] - against * r[i, 2]) + edge * r[i, 2]
-    return share
+    out = shape[1] / share
+    return share, _plus(_plus(_middle(guard, r, shape), -out, n), edge - out * against, r[2])
 
 
 @_inlined
-def _cross(a: Floats, b: Floats, out: Floats) -> None:
-    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@_compiled
-def _first_reach(obstacle: int, n: Floats, r: Floats, shape: Floats, radius: float, axis: Floats) -> float:
+def _first_reach(obstacle: int, n: Triple, r: Frame, shape: Floats, radius: float) -> tuple[float, Triple]:
     """How far a flat obstacle is from the middle, m, when the first guard touches; of a round its axis."""
-    point = np.empty(3)
+    if obstacle != FLAT:
+        return 0.0, _plus(_farthest(obstacle, n, r, shape)[1], -radius, n)
     far = -math.inf
     for guard in range(4):
-        if obstacle in (FLAT, guard):
-            _farthest(guard, n, r, shape, point)
-            far = max(far, -(n[0] * point[0] + n[1] * point[1] + n[2] * point[2]))
-            for i in range(3):
-                axis[i] = 0.0 if obstacle == FLAT else point[i] - radius * n[i]
-    return far if obstacle == FLAT else 0.0
+        far = max(far, -_dot(n, _farthest(guard, n, r, shape)[1]))
+    return far, (0.0, 0.0, 0.0)
 
 
 @_inlined
-def _round_normal(normal: Floats, from_axis: Floats, n: Floats) -> None:
+def _round_normal(normal: Triple, from_axis: Triple) -> Triple:
     """Of a round's surface towards a guard; its axis is upright but for what the normal at first leans."""
     lean = 1.0 / max(1.0 - normal[2] * normal[2], 1e-6)
-    level = lean * (from_axis[2] - normal[2] * (normal @ from_axis))
-    for i in range(3):
-        n[i] = from_axis[i] - level * ((1.0 if i == 2 else 0.0) - normal[2] * normal[i])
-    length = math.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) + 1e-9
-    for i in range(3):
-        n[i] /= length
+    level = lean * (from_axis[2] - normal[2] * _dot(normal, from_axis))
+    x, y = from_axis[0] + level * normal[2] * normal[0], from_axis[1] + level * normal[2] * normal[1]
+    z = from_axis[2] - level * (1.0 - normal[2] * normal[2])
+    per_length = 1.0 / (math.sqrt(x * x + y * y + z * z) + 1e-9)
+    return per_length * x, per_length * y, per_length * z
 
 
 @_inlined
@@ -136,64 +150,46 @@ def _force(fold: float, folding: float, stiffness: float, shape: Floats) -> floa
 
 
 @_inlined
-def _push(
+def _pushed(
     guard: int,
     obstacle: int,
-    surface: Floats,
-    normal: Floats,
-    friction: float,
-    stiffness: float,
-    motion: Floats,
-    r: Floats,
+    surface: tuple[Triple, float],
+    normal: Triple,
+    holds: tuple[float, float],
+    motion: Frame,
+    r: Frame,
     shape: Floats,
-    work: Floats,
-    total: Floats,
-) -> None:
-    """Add one guard's push (NED) and its moment about the middle to `total` (2, 3), per unit mass.
+) -> tuple[Triple, Triple]:
+    """One guard's push, NED, and its moment about the middle, per unit mass.
 
-    `surface`: a round's axis and radius, or how far a flat obstacle is. `motion`: place, velocity and rates, NED.
+    `surface`: a round's axis and radius, or how far a flat obstacle is. `holds`: friction and stiffness. `motion`:
+    place, velocity and rates, NED.
     """
-    point, n, along, sliding, push = work[0], work[1], work[2], work[3], work[4]
-    reach = surface[3] + shape[1] + shape[2]
-    for i in range(3):
-        n[i] = normal[i]
-        point[i] = motion[0, i] + shape[0] * (r[i, 0] * ARMS_FRD[guard, 0] + r[i, 1] * ARMS_FRD[guard, 1]) - surface[i]
-    if obstacle != FLAT:
-        _round_normal(normal, point, n)
-    if reach <= n[0] * point[0] + n[1] * point[1] + n[2] * point[2]:
-        return
-    share = _farthest(guard, n, r, shape, point)
-    depth = surface[3]
-    for i in range(3):
-        depth -= (motion[0, i] + point[i] - surface[i]) * n[i]
-    if depth <= 0.0:
-        return
-    for i in range(3):
-        point[i] += depth * n[i]
-    _cross(motion[2], point, sliding)
-    inward, speed = 0.0, 1e-9
-    for i in range(3):
-        sliding[i] += motion[1, i]
-        inward -= sliding[i] * n[i]
-    force = _force(depth / share, inward / share, stiffness, shape) / share
-    for i in range(3):
-        sliding[i] += inward * n[i]
-        speed += sliding[i] * sliding[i]
-    speed = math.sqrt(speed)
-    for i in range(3):
-        along[i] = sliding[i] / speed
-    _cross(point, along, push)
+    axis, size = surface
+    nothing = (0.0, 0.0, 0.0)
+    from_axis = _plus(_plus(motion[0], 1.0, _middle(guard, r, shape)), -1.0, axis)
+    n = normal if obstacle == FLAT else _round_normal(normal, from_axis)
+    if size + shape[1] + shape[2] <= _dot(n, from_axis):
+        return nothing, nothing
+    share, point = _farthest(guard, n, r, shape)
+    depth = size - _dot(_plus(_plus(motion[0], 1.0, point), -1.0, axis), n)
+    if depth < -ROUNDING_M:
+        return nothing, nothing
+    point = _plus(point, depth, n)
+    sliding = _plus(motion[1], 1.0, _cross(motion[2], point))
+    inward = -_dot(sliding, n)
+    force = _force(depth / share, inward / share, holds[1], shape) / share
+    sliding = _plus(sliding, inward, n)
+    speed = math.sqrt(_dot(sliding, sliding) + 1e-9)
+    along = (sliding[0] / speed, sliding[1] / speed, sliding[2] / speed)
+    turning = _cross(point, along)
     soft = 1.0
     for j in range(3):
-        lever = (r[0, j] * push[0] + r[1, j] * push[1] + r[2, j] * push[2]) / shape[6 + j]
+        lever = _dot(r[j], turning) / shape[6 + j]
         soft += lever * lever
-    held = min(friction * force, 0.7 * speed / soft / STEP_S)
-    for i in range(3):
-        push[i] = force * n[i] - held * along[i]
-        total[0, i] += push[i]
-    _cross(point, push, along)
-    for i in range(3):
-        total[1, i] += along[i]
+    held = min(holds[0] * force, 0.7 * speed / soft / STEP_S)
+    push = _plus((force * n[0], force * n[1], force * n[2]), -held, along)
+    return push, _cross(point, push)
 
 
 @_compiled
@@ -211,42 +207,47 @@ def _follow(
     attitudes: Floats,
 ) -> int:
     """Sums (steps, 6) of specific force and rates, body FRD, and attitudes (steps, 4) from the touch on; how many."""
-    normal = axes[0] + math.tan(trial[TILT]) * axes[1] + math.tan(trial[ACROSS]) * axes[2]
-    normal = normal / math.sqrt((normal * normal).sum())
-    friction, stiffness = min(max(trial[FRICTION], 0.0), MOST_FRICTION), math.exp(trial[STIFFNESS])
+    across = axes[0] + math.tan(trial[TILT]) * axes[1] + math.tan(trial[ACROSS]) * axes[2]
+    across = across / math.sqrt((across * across).sum())
+    normal = (across[0], across[1], across[2])
+    holds = (min(max(trial[FRICTION], 0.0), MOST_FRICTION), math.exp(trial[STIFFNESS]))
     radius = 0.0 if obstacle == FLAT else math.exp(trial[RADIUS])
-    q, w, motors, motion = attitude.copy(), rates.copy(), np.zeros(3), np.zeros((3, 3))
-    r, surface, total, pushed, work = np.empty((3, 3)), np.zeros(4), np.zeros((2, 3)), np.empty(3), np.empty((5, 3))
-    motion[1] = velocity + trial[ERROR : ERROR + 3]
-    _turn(q, rates, trial[TOUCH])
-    _matrix(q, r)
-    surface[3] = radius - _first_reach(obstacle, normal, r, shape, radius, surface)
+    before = (rates[0], rates[1], rates[2])
+    thrust, braking = (free[0], free[1], free[2]), (trial[BRAKING], trial[BRAKING], YAW_SHARE * trial[BRAKING])
+    place, w, motors = (0.0, 0.0, 0.0), before, (0.0, 0.0, 0.0)
+    v = (velocity[0] + trial[ERROR], velocity[1] + trial[ERROR + 1], velocity[2] + trial[ERROR + 2])
+    q = _turned((attitude[0], attitude[1], attitude[2], attitude[3]), before, trial[TOUCH])
+    r = _frame(q)
+    far, axis = _first_reach(obstacle, normal, r, shape, radius)
+    surface = (axis, radius - far)
+    inertia = (shape[6] * shape[6], shape[7] * shape[7], shape[8] * shape[8])
     steps: int = min(int((times[-1] - trial[TOUCH]) / STEP_S) + 2, sums.shape[0] - 1)
     sums[0] = 0.0
-    attitudes[0] = q
+    attitudes[0, 0], attitudes[0, 1], attitudes[0, 2], attitudes[0, 3] = q
     for step in range(steps):
-        for i in range(3):
-            motion[2, i] = r[i, 0] * w[0] + r[i, 1] * w[1] + r[i, 2] * w[2]
-        total[:] = 0.0
+        turn = _plus(_plus((w[0] * r[0][0], w[0] * r[0][1], w[0] * r[0][2]), w[1], r[1]), w[2], r[2])
+        push, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for guard in range(4):
-            _push(guard, obstacle, surface, normal, friction, stiffness, motion, r, shape, work, total)
+            one = _pushed(guard, obstacle, surface, normal, holds, (place, v, turn), r, shape)
+            push, moment = _plus(push, 1.0, one[0]), _plus(moment, 1.0, one[1])
+        felt = (thrust[0] + _dot(r[0], push), thrust[1] + _dot(r[1], push), thrust[2] + _dot(r[2], push))
         for j in range(3):
-            pushed[j] = free[j] + r[0, j] * total[0, 0] + r[1, j] * total[0, 1] + r[2, j] * total[0, 2]
-            sums[step + 1, j] = sums[step, j] + pushed[j]
+            sums[step + 1, j] = sums[step, j] + felt[j]
             sums[step + 1, 3 + j] = sums[step, 3 + j] + w[j]
-        for i in range(3):
-            gravity = GRAVITY_M_S2 if i == 2 else 0.0
-            motion[1, i] += STEP_S * (r[i, 0] * pushed[0] + r[i, 1] * pushed[1] + r[i, 2] * pushed[2] + gravity)
-            motion[0, i] += STEP_S * motion[1, i]
-        for j in range(3):
-            braking = trial[BRAKING] * (YAW_SHARE if j == 2 else 1.0)
-            asked = min(max(-braking * (w[j] - rates[j]), -MOTORS_RAD_S2), MOTORS_RAD_S2)
-            motors[j] += STEP_S / MOTORS_S * (asked - motors[j])
-            moment = r[0, j] * total[1, 0] + r[1, j] * total[1, 1] + r[2, j] * total[1, 2]
-            w[j] += STEP_S * (moment / (shape[6 + j] * shape[6 + j]) + motors[j])
-        _turn(q, w, STEP_S)
-        _matrix(q, r)
-        attitudes[step + 1] = q
+        pull = _plus(_plus(_plus((0.0, 0.0, GRAVITY_M_S2), felt[0], r[0]), felt[1], r[1]), felt[2], r[2])
+        v = _plus(v, STEP_S, pull)
+        place = _plus(place, STEP_S, v)
+        asked = (
+            min(max(-braking[0] * (w[0] - before[0]), -MOTORS_RAD_S2), MOTORS_RAD_S2),
+            min(max(-braking[1] * (w[1] - before[1]), -MOTORS_RAD_S2), MOTORS_RAD_S2),
+            min(max(-braking[2] * (w[2] - before[2]), -MOTORS_RAD_S2), MOTORS_RAD_S2),
+        )
+        motors = _plus(motors, STEP_S / MOTORS_S, _plus(asked, -1.0, motors))
+        spun = (_dot(r[0], moment) / inertia[0], _dot(r[1], moment) / inertia[1], _dot(r[2], moment) / inertia[2])
+        w = _plus(w, STEP_S, _plus(spun, 1.0, motors))
+        q = _turned(q, w, STEP_S)
+        r = _frame(q)
+        attitudes[step + 1, 0], attitudes[step + 1, 1], attitudes[step + 1, 2], attitudes[step + 1, 3] = q
     return steps
 
 

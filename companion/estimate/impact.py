@@ -9,8 +9,9 @@ from companion.detection.interface import DetectorState, Evidence, Impact, Impac
 from companion.estimate.approach import BATCH_US, VelocityFix, free_until, position_at, velocity_at
 from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
 from companion.estimate.collision import STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
+from companion.estimate.facing import normal_by, whole_normal
 from companion.estimate.history import MotionHistory
-from companion.estimate.normal import normal_of
+from companion.estimate.normal import Search, begin, further
 from companion.estimate.push import Push, unit
 from companion.estimate.rotation import body_to_ned, turned
 from companion.estimate.strapdown import Strapdown
@@ -32,13 +33,6 @@ LATE_SAMPLES = 3
 SUMS_KEPT = 160
 # Of these one is from before a contact, at up to 250 Hz.
 ATTITUDES_KEPT = 16
-# An obstacle's own motion may come from any side; a vehicle faster than this ran into it.
-APPROACH_M_S = 0.5
-# Cosine of 75 degrees: a clipped push further than that from where the vehicle came from has lost its direction; one
-# that was not clipped came from something that moved.
-GLANCING = 0.26
-# A force no larger than this, found because the rates jumped, is what drag and thrust have become after the contact.
-FAINT_M_S2 = 3.0
 # What the detector leaves open or takes for soft is not classified anew.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
@@ -88,6 +82,8 @@ class ImpactEstimator:
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
     push: Push | None = None
+    search: Search | None = None
+    is_over: bool = False
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
     clipping_counts: tuple[int, int, int] | None = None
@@ -122,6 +118,30 @@ class ImpactEstimator:
             self.attitudes.append(sample)
             if self.push is not None:
                 self.push.hear(sample)
+        else:
+            return
+        if self.push is not None:
+            self._seek(self.push)
+
+    def _seek(self, push: Push) -> None:
+        """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
+        estimate, search, config = self.estimate, self.search, self.config
+        if estimate is None or not config.fits_normal:
+            return
+        if search is None:
+            if push.is_heard or self.is_over:
+                velocity, averaging_s = estimate.velocity_ned_m_s, config.imu_averaging_interval_s
+                self.search = begin(push.touch, velocity, config.guards, averaging_s)
+        elif not search.is_over:
+            self.search = further(search)
+            if self.search.is_over:
+                self.estimate = replace(estimate, normal_ned=self._normal(push, estimate.velocity_ned_m_s))
+
+    @property
+    def _seeks(self) -> bool:
+        """Whether the normal is still to come."""
+        is_wanted = self.push is not None and self.config.fits_normal
+        return is_wanted and (self.search is None or not self.search.is_over)
 
     def _clipped(self, sample: Vibration) -> None:
         """Counts that grew since the message before the contact: what was said of its size is a lower bound."""
@@ -152,6 +172,7 @@ class ImpactEstimator:
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
         self.push = self._begin_push(impact) if impact.evidence is Evidence.FORCE else None
+        self.search, self.is_over = None, False
         self.contact_ended_boot_us = sample_us
         self.trust.doubt(sample_us)
         self.estimate = estimate = ImpactEstimate(
@@ -161,7 +182,7 @@ class ImpactEstimator:
             position_ned_m=motion.position_ned_m,
             velocity_ned_m_s=motion.velocity_ned_m_s,
             velocity_error_m_s=error_m_s,
-            normal_ned=self._pushed(unit(force_ned), motion.velocity_ned_m_s),
+            normal_ned=normal_by(self.push, unit(force_ned), motion.velocity_ned_m_s),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
@@ -196,23 +217,37 @@ class ImpactEstimator:
         return push
 
     def follow(self, state: DetectorState) -> ImpactEstimate | None:
-        """After each IMU sample: its share in the present contact; the final estimate when that is over."""
+        """After each IMU sample: its share in the present contact; once, the final estimate, when that is over and the
+        normal has been found."""
         estimate, push, sample = self.estimate, self.push, self.imu
         if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
-        self.contact_ended_boot_us = state.last_loud_boot_us
-        is_final = state.phase is not Phase.CONTACT
-        if push is not None and sample.time_boot_us > push.time_boot_us:
-            loud = state.last_loud_boot_us == sample.time_boot_us
-            push.add(sample, loud)
-            # Anew with each sample: arms may meet their stop, and clip, long after a touch that could be measured.
-            self.trust.judge(push.is_whole, sample.time_boot_us)
-            if loud or is_final:
-                estimate = self._refined(estimate, push, is_final)
-        self.estimate = replace(estimate, is_final=is_final) if is_final else estimate
-        return self.estimate if is_final else None
+        if not self.is_over:
+            self.contact_ended_boot_us = state.last_loud_boot_us
+            self.is_over = state.phase is not Phase.CONTACT
+            if push is not None and sample.time_boot_us > push.time_boot_us:
+                loud = state.last_loud_boot_us == sample.time_boot_us
+                push.add(sample, loud)
+                # Anew with each sample: arms may meet their stop, and clip, long after a touch that could be measured.
+                self.trust.judge(push.is_whole, sample.time_boot_us)
+                if loud or self.is_over:
+                    self.estimate = self._refined(estimate, push)
+        return self.close() if self.is_over and not self._seeks else None
 
-    def _refined(self, estimate: ImpactEstimate, push: Push, is_final: bool) -> ImpactEstimate:
+    def close(self) -> ImpactEstimate | None:
+        """The final estimate as it is known by now, where the contact is over and it was not told yet."""
+        if self.estimate is None or self.estimate.is_final or not self.is_over:
+            return None
+        self.estimate = replace(self.estimate, is_final=True)
+        return self.estimate
+
+    def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
+        found = None if self.search is None else self.search.normal_ned
+        if self.is_over:
+            return whole_normal(push, found, velocity_ned_m_s)
+        return normal_by(push, found or unit(push.impulse_ned_m_s), velocity_ned_m_s)
+
+    def _refined(self, estimate: ImpactEstimate, push: Push) -> ImpactEstimate:
         velocity, impulse = estimate.velocity_ned_m_s, push.impulse_ned_m_s
         begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
         if push.begun_boot_us is not None:
@@ -224,31 +259,13 @@ class ImpactEstimator:
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal_ned=self._normal(push, velocity) if is_final else self._pushed(unit(impulse), velocity),
+            normal_ned=self._normal(push, velocity),
             peak_specific_force_m_s2=push.peak_m_s2,
             impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
             is_lower_bound=push.is_lower_bound,
             may_be_clipped=push.may_be_clipped,
             kind=kind,
         )
-
-    def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
-        config = self.config
-        normal = unit(push.impulse_ned_m_s)
-        if config.fits_normal:
-            averaging_s = config.imu_averaging_interval_s
-            normal = normal_of(push.touch, velocity_ned_m_s, config.guards, averaging_s) or normal
-        back = _back(velocity_ned_m_s)
-        if not push.is_blurred or _is_along(normal, back):
-            return self._pushed(normal, velocity_ned_m_s)
-        return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
-
-    def _pushed(self, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
-        """The normal; the way back where a push went along the obstacle that clipped, each axis by itself, or that fell
-        between the samples."""
-        push, back = self.push, _back(velocity_ned_m_s)
-        is_lost = push is None or push.clipped or push.peak_m_s2 < FAINT_M_S2
-        return back if is_lost and _is_along(normal_ned, back) else normal_ned
 
     def _motion(self, contact_us: int) -> tuple[ContactMotion, float]:
         """From what was heard before this contact and after the one before it, and v_c's standard deviation."""
@@ -287,14 +304,3 @@ class ImpactEstimator:
         ahead_s = (contact_us - time_us) * 1e-6
         at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
         return velocity_at(fixes, contact_us, at_contact, self.config)
-
-
-def _back(velocity_ned_m_s: Vector3) -> Vector3:
-    """Where the vehicle came from, which is known to be free; zero for one that hardly moved."""
-    v = velocity_ned_m_s
-    return unit((-v[0], -v[1], -v[2])) if math.hypot(*v) > APPROACH_M_S else (0.0, 0.0, 0.0)
-
-
-def _is_along(normal_ned: Vector3, back_ned: Vector3) -> bool:
-    """Whether a vehicle that came from there would have met an obstacle with that normal along its surface."""
-    return back_ned != (0.0, 0.0, 0.0) and sum(n * b for n, b in zip(normal_ned, back_ned, strict=True)) < GLANCING

@@ -10,123 +10,84 @@ of them, v_c, the arms' stiffness and how hard the motors brake the turning.
 A coarse search chooses a few; each is then improved by least squares (Levenberg 1944, Marquardt 1963), with what was
 measured taken for less certain at first, or a sample that falls beside the touch of a second guard ends the way to it.
 The normal is the mean of what they become, weighed by exp(-misfit / 2).
+
+All that takes some 15 ms of a core here, which nothing that sends setpoints has to spare at once. So the search is a
+value, `Search`, and `further` takes it on by a piece: no more than so many suppositions are followed, whatever the time
+that takes, so that the same messages give the same normal at the same message in flight, in lockstep and in a replay.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from companion.estimate import guards as g
-from companion.estimate.rotation import body_to_ned, turned
-from companion.messages import Attitude, ImuSample, Quaternion, Vector3
+from companion.estimate.suppositions import Floats, Known, Touch, Trials, known_of, residuals, supposed
+from companion.messages import Attitude, ImuSample, Vector3
 from companion.mission.config import GuardsConfig
 
-Floats = npt.NDArray[np.float64]
-
-# After the first sample. Later an arm has met its stop or the hub the wall, which nothing here describes.
-LOOKED_AT_US = 22_000
-# The direction of the whole push, where the search begins: what comes later counts less.
-FADING_S = 0.015
-# Friction of 0.3 leans the push by 17 degrees; a round turns it by as much again as the guard rolls.
-SPAN_RAD, STEP_RAD = math.radians(40.0), math.radians(10.0)
-FRICTIONS, RADII_M = (0.05, 0.25), (0.04, 0.15)
-# The moment of the touch, as shares of the time between the sample before and the first that shows it.
-MOMENTS = (0.15, 0.5, 0.85)
-# Of the guards, those that may meet a round: the fourth is behind the vehicle.
-FOREMOST = 3
-# Suppositions that are improved, at first and later, and how much apart those of one kind are at least.
-KEPT, APART = 12, math.cos(math.radians(18.0))
-# A round is as likely as a flat obstacle, but three guards and two radii describe it: by so much is it held back.
-ROUND_MISFIT = 2.0
-# Standard deviations of what is known: vibration and bias of a sample and a share of what it shows, for all that the
-# model leaves out; the same of the rates; the attitude against the one before the touch.
-FORCE_M_S2, FORCE_SHARE, RATE_RAD_S, RATE_SHARE, ATTITUDE_RAD = 0.3, 0.06, 0.08, 0.06, 0.01
-# v_c on an axis, arms of a kind, a controller's gain of 20 /s, poles of 4 to 20 cm.
-VELOCITY_M_S, STIFFER, BRAKING_PER_S, BRAKING_SPREAD = 0.04, 0.1, 20.0, 8.0
-RADIUS, RADIUS_SPREAD = math.log(0.1), 0.7
-# IMU_INTEG_RATE gives 4 or 5 ms.
-AVERAGING_SPREAD_S = 0.0007
-# Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
-TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
-# The search takes what was measured for so much less certain, and so do the rounds of least squares, of a few steps.
-COARSE, ROUNDS, STEPS = 2.5, (5.0, 2.0, 1.0), 4
+# Suppositions that are followed in one piece of work: two milliseconds here. Nine messages are then enough, and the
+# normal is there before the recovery asks for it (flight.recovering), also where two hundred come in a second.
+FOLLOWED = 400
+# How much apart suppositions of one kind that are improved are at least.
+APART = math.cos(math.radians(18.0))
+# The search takes what was measured for so much less certain, and so do the rounds of least squares, in which the best
+# so many are improved by so many steps.
+COARSE, ROUNDS, STEPS = 2.5, ((5.0, 12), (2.0, 12), (1.0, 12)), 4
 # What misfits by so much more than the best goes no further.
 HOPELESS = 25.0
 # Of a touch that is explained each number misfits by one or less; by this, it was not by guards on spring arms.
 BELIEVED = 3.0
 DIFFERENCES = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.02, 1.0, 0.05, 0.0002])
 DAMPING, DAMPINGS, LEAST_DAMPING, MOST_DAMPING = 1e-2, (0.1, 1.0, 10.0, 100.0), 1e-5, 1e3
+# Of one supposition in one step: itself, its slopes, and what may become of it.
+FOLLOWED_A_STEP = 1 + g.SIZE + len(DAMPINGS)
 LEAST = np.array([-0.7, -0.7, -0.02, -0.2, -0.5, -0.5, -0.5, -0.7, 0.0, -4.6, 0.001])
 MOST = np.array([0.7, 0.7, 0.32, 0.0, 0.5, 0.5, 0.5, 0.7, 50.0, 0.0, 0.1])
 
 
-@dataclass(slots=True)
-class Touch:
-    """What the wire told of the first hundredths of a second."""
-
-    free_frd_m_s2: Vector3
-    """What the accelerometer would show without the contact."""
-    samples: list[ImuSample] = field(default_factory=list)
-    """The last one before it, then those that show it."""
-    attitudes: list[Attitude] = field(default_factory=list)
-    """From before the touch on, the newest last."""
-
-
 @dataclass(frozen=True, slots=True)
-class _Known:
-    """A touch in numbers; times in seconds from the first sample that shows it."""
+class Search:
+    """How far the search for one touch's normal has come; see `further`."""
 
-    velocity_ned: Floats
-    attitude: Floats
-    rates: Floats
-    free: Floats
-    times: Floats
-    is_attitude: npt.NDArray[np.int64]
-    measured: Floats
-    spread: Floats
-    averaging_s: float
-    shape: Floats
-    push_ned: Floats
-    before_s: float
+    known: Known | None
+    trials: Trials | None
+    misfit: Floats
+    """Of the suppositions that have been looked at."""
+    damping: Floats
+    steps: int = -1
+    """Of least squares; -1 while suppositions are looked at."""
+    is_over: bool = False
+    normal_ned: Vector3 | None = None
+    """Unit vector out of the obstacle; None where too little is known of the touch or nothing explains it."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Trials:
-    """Suppositions side by side."""
+def begin(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Search:
+    """A search of which nothing is done; `velocity_ned_m_s` is v_c."""
+    known = known_of(touch, velocity_ned_m_s, guards, averaging_s)
+    nothing = np.zeros(0)
+    if known is None:
+        return Search(None, None, nothing, nothing, is_over=True)
+    return Search(known, supposed(known), nothing, nothing)
 
-    values: Floats
-    axes: Floats
-    obstacles: npt.NDArray[np.int64]
 
-    def chosen(self, which: Sequence[int]) -> "_Trials":
-        return _Trials(self.values[which], self.axes[which], self.obstacles[which])
-
-    def normals(self, values: Floats) -> Floats:
-        """(n, 3) for as many values (n, 11)."""
-        tilts = np.tan(values[:, : g.FRICTION])
-        vectors = self.axes[:, 0] + tilts[:, :1] * self.axes[:, 1] + tilts[:, 1:] * self.axes[:, 2]
-        directions: Floats = vectors / np.linalg.norm(vectors, axis=1)[:, None]
-        return directions
+def further(search: Search) -> Search:
+    """The same search by one piece of work further; itself where it is over."""
+    known, trials = search.known, search.trials
+    if search.is_over or known is None or trials is None:
+        return search
+    if search.steps < 0:
+        return _looked(search, known, trials)
+    return _improved(search, known, trials)
 
 
 def normal_of(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Vector3 | None:
-    """Unit vector out of the obstacle, NED; `velocity_ned_m_s` is v_c. None where too little is known of the touch
-    or nothing explains it."""
-    known = _known(touch, velocity_ned_m_s, guards, averaging_s)
-    if known is None:
-        return None
-    trials = _distinct(known, _supposed(known))
-    trials, misfit = _improved(known, trials)
-    if misfit.min() > BELIEVED * known.measured.size:
-        return None
-    likely = np.exp(0.5 * (misfit.min() - misfit))
-    mean = likely @ trials.normals(trials.values)
-    n, e, d = mean / np.linalg.norm(mean)
-    return (float(n), float(e), float(d))
+    """What the search comes to, all at once."""
+    search = begin(touch, velocity_ned_m_s, guards, averaging_s)
+    while not search.is_over:
+        search = further(search)
+    return search.normal_ned
 
 
 @lru_cache(maxsize=1)
@@ -137,162 +98,68 @@ def prepare() -> None:
     normal_of(touch, (1.0, 0.0, 0.0), GuardsConfig(), 0.004)
 
 
-def _known(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s: float) -> _Known | None:
-    if len(touch.samples) < 2:
-        return None
-    before, first = touch.samples[0], touch.samples[1]
-    zero_us, rates = first.time_boot_us, before.angular_velocity_frd_rad_s
-    earlier = [told for told in touch.attitudes if told.time_boot_us <= before.time_boot_us]
-    if not earlier:
-        return None
-    attitude = turned(earlier[-1].attitude_wxyz, rates, 1e-6 * (zero_us - earlier[-1].time_boot_us))
-    later = [told for told in touch.attitudes if zero_us <= told.time_boot_us <= zero_us + LOOKED_AT_US]
-    rows: list[tuple[int, bool, Sequence[float], tuple[float, float]]] = []
-    push, free = np.zeros(3), touch.free_frd_m_s2
-    for sample in touch.samples:
-        f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-        force, turn = math.dist(f, free), math.dist(w, rates)
-        spread = (math.hypot(FORCE_M_S2, FORCE_SHARE * force), math.hypot(RATE_RAD_S, RATE_SHARE * turn))
-        rows.append((sample.time_boot_us, False, (*f, *w), spread))
-        if sample is not before:
-            fading = math.exp(-1e-6 * (sample.time_boot_us - zero_us) / FADING_S)
-            push += fading * np.array(_pushed(attitude, f, free))
-    for told in later:
-        rows.append((told.time_boot_us, True, (*told.attitude_wxyz, 0.0, 0.0), (ATTITUDE_RAD, ATTITUDE_RAD)))
-    rows.sort(key=lambda row: row[0])
-    size = float(np.linalg.norm(push))
-    if size == 0.0:
-        return None
-    return _Known(
-        np.array(velocity),
-        np.array(attitude),
-        np.array(rates),
-        np.array(free),
-        np.array([1e-6 * (row[0] - zero_us) for row in rows]),
-        np.array([row[1] for row in rows], np.int64),
-        np.array([row[2] for row in rows], np.float64),
-        np.array([row[3] for row in rows]),
-        averaging_s,
-        _shape(guards),
-        push / size,
-        1e-6 * (before.time_boot_us - zero_us),
-    )
+def _looked(search: Search, known: Known, trials: Trials) -> Search:
+    """The next of the suppositions; after the last of them the best are left."""
+    begun, count = search.misfit.size, len(trials.values)
+    part = trials.chosen(range(begun, min(begun + FOLLOWED, count)))
+    found = np.square(residuals(known, part, part.values, COARSE)).sum(axis=1)
+    misfit = np.concatenate([search.misfit, found])
+    if misfit.size < count:
+        return replace(search, misfit=misfit)
+    kept = trials.chosen(_distinct(trials, misfit))
+    return replace(search, trials=kept, damping=np.full(len(kept.values), DAMPING), steps=0)
 
 
-def _pushed(attitude: Quaternion, f: Vector3, free: Vector3) -> Vector3:
-    return body_to_ned(attitude, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
-
-
-def _shape(guards: GuardsConfig) -> Floats:
-    """As `guards.misfits` wants it."""
-    arm = (guards.stiffness_per_s2, guards.damping_per_s, guards.travel_m)
-    return np.array([guards.centre_m, guards.radius_m, guards.height_m, *arm, *guards.gyration_frd_m])
-
-
-def _supposed(known: _Known) -> _Trials:
-    """All that the search tries: flat obstacles round the push's direction, upright rounds on the foremost guards."""
-    angles = np.arange(-SPAN_RAD, SPAN_RAD + 1e-9, STEP_RAD)
-    moments = [known.before_s * share for share in MOMENTS]
-    flat = np.array(np.meshgrid(angles, angles, FRICTIONS, moments)).reshape(4, -1).T
-    flat = flat[flat[:, 0] ** 2 + flat[:, 1] ** 2 <= SPAN_RAD**2 + 1e-9]
-    groups = [(flat, _axes(known.push_ned), g.FLAT, RADIUS)]
-    level = known.push_ned * (1.0, 1.0, 0.0)
-    if np.linalg.norm(level) > 0.5:
-        axes = _axes(level / np.linalg.norm(level))
-        upright = np.array(np.meshgrid(angles, 0.0, FRICTIONS, moments)).reshape(4, -1).T
-        for guard in _foremost(known, axes[0]):
-            groups += [(upright, axes, guard, math.log(radius_m)) for radius_m in RADII_M]
-    values = np.zeros((sum(len(tried) for tried, *_ in groups), g.SIZE))
-    values[:, : g.ERROR] = np.concatenate([tried for tried, *_ in groups])
-    values[:, g.BRAKING] = BRAKING_PER_S
-    values[:, g.AVERAGING] = known.averaging_s
-    values[:, g.RADIUS] = np.concatenate([np.full(len(tried), radius) for tried, _, _, radius in groups])
-    axes_of_all = np.concatenate([np.tile(axes, (len(tried), 1, 1)) for tried, axes, _, _ in groups])
-    return _Trials(values, axes_of_all, np.concatenate([np.full(len(tried), guard) for tried, _, guard, _ in groups]))
-
-
-def _axes(middle: Floats) -> Floats:
-    """A unit vector and two at right angles to it, the first of them level where it can be."""
-    helper = np.array([0.0, 0.0, 1.0] if abs(middle[2]) < 0.8 else [1.0, 0.0, 0.0])
-    one = np.cross(helper, middle)
-    one /= np.linalg.norm(one)
-    return np.array([middle, one, np.cross(middle, one)])
-
-
-def _foremost(known: _Known, normal_ned: Floats) -> list[int]:
-    """The guards that reach farthest towards an obstacle, the nearest first."""
-    w, x, y, z = known.attitude.tolist()
-    level = body_to_ned((w, -x, -y, -z), (float(normal_ned[0]), float(normal_ned[1]), float(normal_ned[2])))
-    return [int(guard) for guard in np.argsort(g.ARMS_FRD @ np.array(level))[:FOREMOST]]
-
-
-def _residuals(known: _Known, trials: _Trials, values: Floats, doubt: float) -> Floats:
-    """What was measured, taken for `doubt` times less certain, and what is known beforehand: (n, m)."""
-    off = g.misfits(
-        values,
-        trials.axes,
-        trials.obstacles,
-        known.velocity_ned,
-        known.attitude,
-        known.rates,
-        known.free,
-        known.times,
-        known.is_attitude,
-        known.measured,
-        doubt * known.spread,
-        known.shape,
-    )
-    friction, tilts = values[:, g.FRICTION], np.abs(values[:, : g.FRICTION])
-    down = trials.normals(values)[:, 2]
-    beforehand = [
-        *(values[:, g.ERROR : g.STIFFNESS] / VELOCITY_M_S).T,
-        values[:, g.STIFFNESS] / STIFFER,
-        (values[:, g.BRAKING] - BRAKING_PER_S) / BRAKING_SPREAD,
-        (values[:, g.RADIUS] - RADIUS) / RADIUS_SPREAD,
-        (values[:, g.AVERAGING] - known.averaging_s) / AVERAGING_SPREAD_S,
-        (friction - np.clip(friction, 0.0, g.MOST_FRICTION)) / FRICTION_SPREAD,
-        *(np.maximum(tilts - TILT_RAD, 0.0) / TILT_SPREAD).T,
-        np.where(trials.obstacles == g.FLAT, 0.0, down / UPRIGHT),
-        np.where(trials.obstacles == g.FLAT, 0.0, math.sqrt(ROUND_MISFIT)),
-    ]
-    return np.concatenate([off, np.array(beforehand).T], axis=1)
-
-
-def _distinct(known: _Known, trials: _Trials) -> _Trials:
+def _distinct(trials: Trials, misfit: Floats) -> list[int]:
     """The few that fit best, each of another kind or with another normal than the better ones."""
-    misfit = np.square(_residuals(known, trials, trials.values, COARSE)).sum(axis=1)
     normals = trials.normals(trials.values)
     kept: list[int] = []
     for one in np.argsort(misfit, kind="stable").tolist():
         same = [other for other in kept if trials.obstacles[other] == trials.obstacles[one]]
         if all(normals[one] @ normals[other] < APART for other in same):
             kept.append(one)
-        if len(kept) == KEPT:
+        if len(kept) == ROUNDS[0][1]:
             break
-    return trials.chosen(kept)
+    return kept
 
 
-def _improved(known: _Known, trials: _Trials) -> tuple[_Trials, Floats]:
-    """The best of them after least squares, and their misfit."""
-    misfit = np.zeros(0)
-    for doubt in ROUNDS:
-        damping = np.full(len(trials.values), DAMPING)
-        for _ in range(STEPS):
-            values, damping, misfit = _stepped(known, trials, damping, doubt)
-            trials = _Trials(values, trials.axes, trials.obstacles)
-        near = np.flatnonzero(misfit <= misfit.min() + HOPELESS).tolist()
-        trials, misfit = trials.chosen(near), misfit[near]
-    return trials, misfit
+def _improved(search: Search, known: Known, trials: Trials) -> Search:
+    """As many steps as the piece has room for, but for one round; after a round the hopeless are left behind."""
+    doubt, _ = ROUNDS[search.steps // STEPS]
+    damping, misfit, steps = search.damping, search.misfit, search.steps
+    left = FOLLOWED // (FOLLOWED_A_STEP * len(trials.values))
+    for _ in range(max(1, left)):
+        values, damping, misfit = _stepped(known, trials, damping, doubt)
+        trials, steps = Trials(values, trials.axes, trials.obstacles), steps + 1
+        if steps % STEPS == 0:
+            break
+    else:
+        return replace(search, trials=trials, damping=damping, misfit=misfit, steps=steps)
+    if steps == STEPS * len(ROUNDS):
+        return replace(search, trials=None, is_over=True, normal_ned=_mean(known, trials, misfit))
+    most = ROUNDS[steps // STEPS][1]
+    order = np.argsort(misfit, kind="stable")[:most]
+    near = [int(one) for one in order if misfit[one] <= misfit.min() + HOPELESS]
+    return replace(search, trials=trials.chosen(near), damping=np.full(len(near), DAMPING), steps=steps)
 
 
-def _stepped(known: _Known, trials: _Trials, damping: Floats, doubt: float) -> tuple[Floats, Floats, Floats]:
+def _mean(known: Known, trials: Trials, misfit: Floats) -> Vector3 | None:
+    """Weighed by how likely each is."""
+    if misfit.min() > BELIEVED * known.measured.size:
+        return None
+    mean = np.exp(0.5 * (misfit.min() - misfit)) @ trials.normals(trials.values)
+    n, e, d = mean / np.linalg.norm(mean)
+    return (float(n), float(e), float(d))
+
+
+def _stepped(known: Known, trials: Trials, damping: Floats, doubt: float) -> tuple[Floats, Floats, Floats]:
     """One step with the damping that helps most: values, dampings, misfits."""
     values, count = trials.values, len(trials.values)
     every = [*range(count)]
     around = np.concatenate([values, *(values + step for step in np.diag(DIFFERENCES))])
-    residuals = _residuals(known, trials.chosen(every * (g.SIZE + 1)), around, doubt).reshape(g.SIZE + 1, count, -1)
-    here = residuals[0]
-    slopes = (residuals[1:] - here) / DIFFERENCES[:, None, None]
+    found = residuals(known, trials.chosen(every * (g.SIZE + 1)), around, doubt).reshape(g.SIZE + 1, count, -1)
+    here = found[0]
+    slopes = (found[1:] - here) / DIFFERENCES[:, None, None]
     curvature, downhill = np.einsum("ank,bnk->nab", slopes, slopes), np.einsum("ank,nk->na", slopes, here)
     scale = np.einsum("naa->na", curvature) + 1e-9
     tried = []
@@ -300,15 +167,12 @@ def _stepped(known: _Known, trials: _Trials, damping: Floats, doubt: float) -> t
         damped = curvature + (factor * damping[:, None] * scale)[:, :, None] * np.eye(g.SIZE) + 1e-9 * np.eye(g.SIZE)
         tried.append(np.clip(values - np.linalg.solve(damped, downhill[:, :, None])[:, :, 0], LEAST, MOST))
     candidates = np.array([*tried, values])
-    found = (
-        np.square(_residuals(known, trials.chosen(every * len(candidates)), candidates.reshape(-1, g.SIZE), doubt))
-        .sum(axis=1)
-        .reshape(len(candidates), count)
-    )
-    best = found.argmin(axis=0)
+    off = residuals(known, trials.chosen(every * len(DAMPINGS)), np.concatenate(tried), doubt)
+    misfit = np.square(np.concatenate([off, here])).sum(axis=1).reshape(len(candidates), count)
+    best = misfit.argmin(axis=0)
     factors = np.array([*DAMPINGS, 10.0 * DAMPINGS[-1]])
     return (
         candidates[best, every],
         np.clip(damping * factors[best], LEAST_DAMPING, MOST_DAMPING),
-        found[best, every],
+        misfit[best, every],
     )

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 from companion.estimate.clipping import Clipping, may_have_clipped
-from companion.estimate.normal import LOOKED_AT_US, Touch
 from companion.estimate.rotation import body_to_ned, turned
+from companion.estimate.suppositions import LOOKED_AT_US, Touch
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 
 # Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
@@ -15,6 +15,8 @@ CONTIGUOUS = 1.5
 QUIET_US = 20_000
 # A force that is over within this many samples was shorter than they can tell: its raw peak may well have been clipped.
 SHORT = 2
+# What is sent in one loop of the link comes in any order, with time stamps some milliseconds apart.
+LATE_US = 3_000
 
 
 @dataclass(slots=True)
@@ -35,6 +37,8 @@ class Push:
     time_boot_us: int = 0
     heard_boot_us: int = 0
     """Of the latest sample, also after the push."""
+    told_boot_us: int = 0
+    """Of the latest sample or attitude."""
     first_boot_us: int = 0
     rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
     first_rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
@@ -65,7 +69,7 @@ class Push:
         first = self.time_boot_us == 0
         elapsed_us = now_us - (self.started_boot_us if first else self.heard_boot_us)
         contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
-        self.heard_boot_us = now_us
+        self.heard_boot_us = self.told_boot_us = now_us
         self.clipping.add(f, frd, contiguous)
         if not first and now_us - self.loud_boot_us > max(QUIET_US, 2 * self.averaging_us):
             self.closed = True
@@ -98,8 +102,14 @@ class Push:
 
     def hear(self, attitude: Attitude) -> None:
         """What the vehicle says of its attitude meanwhile."""
+        self.told_boot_us = attitude.time_boot_us
         if attitude.time_boot_us - self.first_boot_us <= LOOKED_AT_US:
             self.attitudes.append(attitude)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether all that the normal is found by has come."""
+        return self.told_boot_us - self.first_boot_us > LOOKED_AT_US + LATE_US
 
     @property
     def touch(self) -> Touch:

@@ -33,6 +33,9 @@ def fly(watch, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WAN
     return impacts, finished, notices
 
 
+SPARSE = [(1_040_000, 0.0), (1_070_000, 0.0), (1_084_000, -30.0)]
+
+
 def hit(t):
     return -30.0 if 1_000_000 <= t < 1_020_000 else 0.0
 
@@ -47,6 +50,35 @@ def test_an_impact_comes_at_its_first_sample_and_its_final_estimate_when_the_con
     assert len(finished) == 1 and finished[0].is_final
     assert finished[0].normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
     assert watch.estimate == finished[0]
+
+
+def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_recovery_asks_for_it():
+    """Given a hit of 20 ms, when samples come at 250 Hz, then its normal is there within 80 ms, and final with it; and
+    the same if a watch in the middle of the search is copied."""
+    watch, told = start_watch(lateral(), 0), []
+    fly(watch, 1_000_000)
+    for t in range(1_000_000, 1_200_000, INTERVAL_US):
+        if t == 1_032_000:
+            search = watch.estimator.search
+            assert search is not None and not search.is_over
+            other = pickle.loads(pickle.dumps(watch))
+        told += [(t, one.normal_ned) for one in fly(watch, t + 1, hit, start_us=t)[1]]
+    ((told_us, normal_ned),) = told
+    assert watch.estimator.search.is_over and told_us <= 1_080_000
+    (final,) = fly(other, 1_200_000, hit, start_us=1_032_000)[1]
+    assert final.normal_ned == normal_ned
+
+
+def test_a_second_hit_that_cuts_a_search_short_leaves_the_first_estimate_as_it_was_known():
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000, hit)
+    fly(watch, 1_024_000, hit, start_us=1_000_000)
+    # Three bare samples in 60 ms: over, and no search has come to its end.
+    seen = [advance(watch, [ImuSample(t, (force, 0.0, -9.81), (0.0, 0.0, 0.0))], WANTED, t) for t, force in SPARSE]
+    finished = [one for step in seen for one in step.finished]
+    assert [step.impacts != () for step in seen] == [False, False, True]
+    assert [one.impact.sample_time_boot_us for one in finished] == [1_000_000]
+    assert finished[0].is_final
 
 
 def test_a_watch_survives_pickling_in_mid_flight():

@@ -9,9 +9,11 @@ import pytest
 
 from companion.detection.interface import ImpactKind, Situation
 from companion.detection.watch import advance, start_watch
+from companion.estimate import guards, normal
 from companion.estimate.approach import VelocityFix, free_until, velocity_at
-from companion.estimate.normal import Touch, normal_of
+from companion.estimate.normal import normal_of
 from companion.estimate.push import Push
+from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vibration
 from companion.mission.config import CompanionConfig, EstimateConfig, GuardsConfig
 
@@ -177,6 +179,28 @@ def test_what_was_not_pushed_or_seen_has_no_normal():
     assert normal_of(Touch(FREE), (0.0, 0.0, 0.0), GUARDS, 0.005) is None
     assert found(Touch(FREE, heard.samples[:1], heard.attitudes), 0.0) is None
     assert found(Touch(FREE, heard.samples, []), 0.0) is None
+
+
+def test_a_search_goes_on_by_pieces_of_bounded_work_and_comes_to_the_same(monkeypatch):
+    """Each message of a flight has to be answered before the next setpoint is due."""
+    followed = []
+
+    def counted(trials, *arguments, misfits=guards.misfits):
+        followed[-1] += len(trials)
+        return misfits(trials, *arguments)
+
+    monkeypatch.setattr(guards, "misfits", counted)
+    heard, _ = touch(25.0, 0.3, 0.4, every_s=0.020)
+    search = normal.begin(heard, (1.5, 0.4, 0.0), GUARDS, 0.005)
+    while not search.is_over:
+        followed.append(0)
+        before, search = search, normal.further(search)
+    assert max(followed) <= normal.FOLLOWED
+    assert len(followed) <= 10
+    assert normal.further(before).normal_ned == search.normal_ned
+    assert normal.further(search) is search
+    followed.append(0)
+    assert found(heard, 0.4) == search.normal_ned
 
 
 def imu(t_us, push, yaw_rate=0.0):

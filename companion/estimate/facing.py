@@ -1,0 +1,41 @@
+"""Which way an obstacle faces: by its normal as it was found or as it pushed, and by where the vehicle came from."""
+
+import math
+
+from companion.estimate.push import Push, unit
+from companion.messages import Vector3
+
+# An obstacle's own motion may come from any side; a vehicle faster than this ran into it.
+APPROACH_M_S = 0.5
+# Cosine of 75 degrees: a clipped push further than that from where the vehicle came from has lost its direction; one
+# that was not clipped came from something that moved.
+GLANCING = 0.26
+# A force no larger than this, found because the rates jumped, is what drag and thrust have become after the contact.
+FAINT_M_S2 = 3.0
+
+
+def whole_normal(push: Push, found_ned: Vector3 | None, velocity_ned_m_s: Vector3) -> Vector3:
+    """When the contact is over: as a search found it or it pushed; half way to the way back where that is blurred."""
+    normal, back = found_ned or unit(push.impulse_ned_m_s), _back(velocity_ned_m_s)
+    if not push.is_blurred or _is_along(normal, back):
+        return normal_by(push, normal, velocity_ned_m_s)
+    return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
+
+
+def normal_by(push: Push | None, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+    """The normal; the way back where a push went along the obstacle that clipped, each axis by itself, or that fell
+    between the samples."""
+    back = _back(velocity_ned_m_s)
+    is_lost = push is None or push.clipped or push.peak_m_s2 < FAINT_M_S2
+    return back if is_lost and _is_along(normal_ned, back) else normal_ned
+
+
+def _back(velocity_ned_m_s: Vector3) -> Vector3:
+    """Where the vehicle came from, which is known to be free; zero for one that hardly moved."""
+    v = velocity_ned_m_s
+    return unit((-v[0], -v[1], -v[2])) if math.hypot(*v) > APPROACH_M_S else (0.0, 0.0, 0.0)
+
+
+def _is_along(normal_ned: Vector3, back_ned: Vector3) -> bool:
+    """Whether a vehicle that came from there would have met an obstacle with that normal along its surface."""
+    return back_ned != (0.0, 0.0, 0.0) and sum(n * b for n, b in zip(normal_ned, back_ned, strict=True)) < GLANCING

@@ -1,0 +1,214 @@
+"""What is supposed of a touch, and how far each supposition is from what was measured and from what is known.
+
+Tried are flat obstacles round the direction of the push and upright rounds on the foremost guards, each with friction
+and a moment of the touch. Known are, more or less, v_c, the arms' stiffness, the motors, the length of a sample's mean.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.estimate import guards as g
+from companion.estimate.rotation import body_to_ned, turned
+from companion.messages import Attitude, ImuSample, Quaternion, Vector3
+from companion.mission.config import GuardsConfig
+
+Floats = npt.NDArray[np.float64]
+
+# After the first sample. Later an arm has met its stop or the hub the wall, which nothing here describes.
+LOOKED_AT_US = 22_000
+# The direction of the whole push, where the search begins: what comes later counts less.
+FADING_S = 0.015
+# Friction of 0.3 leans the push by 17 degrees; a round turns it by as much again as the guard rolls.
+SPAN_RAD, STEP_RAD = math.radians(40.0), math.radians(10.0)
+FRICTIONS, RADII_M = (0.05, 0.25), (0.04, 0.15)
+# The moment of the touch, as shares of the time between the sample before and the first that shows it.
+MOMENTS = (0.15, 0.5, 0.85)
+# Of the guards, those that may meet a round: the fourth is behind the vehicle.
+FOREMOST = 3
+# A round is as likely as a flat obstacle, but three guards and two radii describe it: by so much is it held back.
+ROUND_MISFIT = 2.0
+# Standard deviations of what is known: vibration and bias of a sample and a share of what it shows, for all that the
+# model leaves out; the same of the rates; the attitude against the one before the touch.
+FORCE_M_S2, FORCE_SHARE, RATE_RAD_S, RATE_SHARE, ATTITUDE_RAD = 0.3, 0.06, 0.08, 0.06, 0.01
+# v_c on an axis, arms of a kind, a controller's gain of 20 /s, poles of 4 to 20 cm.
+VELOCITY_M_S, STIFFER, BRAKING_PER_S, BRAKING_SPREAD = 0.04, 0.1, 20.0, 8.0
+RADIUS, RADIUS_SPREAD = math.log(0.1), 0.7
+# IMU_INTEG_RATE gives 4 or 5 ms.
+AVERAGING_SPREAD_S = 0.0007
+# Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
+TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
+
+
+@dataclass(slots=True)
+class Touch:
+    """What the wire told of the first hundredths of a second."""
+
+    free_frd_m_s2: Vector3
+    """What the accelerometer would show without the contact."""
+    samples: list[ImuSample] = field(default_factory=list)
+    """The last one before it, then those that show it."""
+    attitudes: list[Attitude] = field(default_factory=list)
+    """From before the touch on, the newest last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A touch in numbers; times in seconds from the first sample that shows it."""
+
+    velocity_ned: Floats
+    attitude: Floats
+    rates: Floats
+    free: Floats
+    times: Floats
+    is_attitude: npt.NDArray[np.int64]
+    measured: Floats
+    spread: Floats
+    averaging_s: float
+    shape: Floats
+    push_ned: Floats
+    before_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trials:
+    """Suppositions side by side."""
+
+    values: Floats
+    axes: Floats
+    obstacles: npt.NDArray[np.int64]
+
+    def chosen(self, which: Sequence[int]) -> "Trials":
+        return Trials(self.values[which], self.axes[which], self.obstacles[which])
+
+    def normals(self, values: Floats) -> Floats:
+        """(n, 3) for as many values (n, 11)."""
+        tilts = np.tan(values[:, : g.FRICTION])
+        vectors = self.axes[:, 0] + tilts[:, :1] * self.axes[:, 1] + tilts[:, 1:] * self.axes[:, 2]
+        directions: Floats = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+        return directions
+
+
+def known_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s: float) -> Known | None:
+    """None where too little was heard of it."""
+    if len(touch.samples) < 2:
+        return None
+    before, first = touch.samples[0], touch.samples[1]
+    zero_us, rates = first.time_boot_us, before.angular_velocity_frd_rad_s
+    earlier = [told for told in touch.attitudes if told.time_boot_us <= before.time_boot_us]
+    if not earlier:
+        return None
+    attitude = turned(earlier[-1].attitude_wxyz, rates, 1e-6 * (zero_us - earlier[-1].time_boot_us))
+    later = [told for told in touch.attitudes if zero_us <= told.time_boot_us <= zero_us + LOOKED_AT_US]
+    rows: list[tuple[int, bool, Sequence[float], tuple[float, float]]] = []
+    push, free = np.zeros(3), touch.free_frd_m_s2
+    for sample in touch.samples:
+        f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+        force, turn = math.dist(f, free), math.dist(w, rates)
+        spread = (math.hypot(FORCE_M_S2, FORCE_SHARE * force), math.hypot(RATE_RAD_S, RATE_SHARE * turn))
+        rows.append((sample.time_boot_us, False, (*f, *w), spread))
+        if sample is not before:
+            fading = math.exp(-1e-6 * (sample.time_boot_us - zero_us) / FADING_S)
+            push += fading * np.array(_pushed(attitude, f, free))
+    for told in later:
+        rows.append((told.time_boot_us, True, (*told.attitude_wxyz, 0.0, 0.0), (ATTITUDE_RAD, ATTITUDE_RAD)))
+    rows.sort(key=lambda row: row[0])
+    size = float(np.linalg.norm(push))
+    if size == 0.0:
+        return None
+    return Known(
+        np.array(velocity),
+        np.array(attitude),
+        np.array(rates),
+        np.array(free),
+        np.array([1e-6 * (row[0] - zero_us) for row in rows]),
+        np.array([row[1] for row in rows], np.int64),
+        np.array([row[2] for row in rows], np.float64),
+        np.array([row[3] for row in rows]),
+        averaging_s,
+        _shape(guards),
+        push / size,
+        1e-6 * (before.time_boot_us - zero_us),
+    )
+
+
+def _pushed(attitude: Quaternion, f: Vector3, free: Vector3) -> Vector3:
+    return body_to_ned(attitude, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
+
+
+def _shape(guards: GuardsConfig) -> Floats:
+    """As `guards.misfits` wants it."""
+    arm = (guards.stiffness_per_s2, guards.damping_per_s, guards.travel_m)
+    return np.array([guards.centre_m, guards.radius_m, guards.height_m, *arm, *guards.gyration_frd_m])
+
+
+def supposed(known: Known) -> Trials:
+    """All that the search tries: flat obstacles round the push's direction, upright rounds on the foremost guards."""
+    angles = np.arange(-SPAN_RAD, SPAN_RAD + 1e-9, STEP_RAD)
+    moments = [known.before_s * share for share in MOMENTS]
+    flat = np.array(np.meshgrid(angles, angles, FRICTIONS, moments)).reshape(4, -1).T
+    flat = flat[flat[:, 0] ** 2 + flat[:, 1] ** 2 <= SPAN_RAD**2 + 1e-9]
+    groups = [(flat, _axes(known.push_ned), g.FLAT, RADIUS)]
+    level = known.push_ned * (1.0, 1.0, 0.0)
+    if np.linalg.norm(level) > 0.5:
+        axes = _axes(level / np.linalg.norm(level))
+        upright = np.array(np.meshgrid(angles, 0.0, FRICTIONS, moments)).reshape(4, -1).T
+        for guard in _foremost(known, axes[0]):
+            groups += [(upright, axes, guard, math.log(radius_m)) for radius_m in RADII_M]
+    values = np.zeros((sum(len(tried) for tried, *_ in groups), g.SIZE))
+    values[:, : g.ERROR] = np.concatenate([tried for tried, *_ in groups])
+    values[:, g.BRAKING] = BRAKING_PER_S
+    values[:, g.AVERAGING] = known.averaging_s
+    values[:, g.RADIUS] = np.concatenate([np.full(len(tried), radius) for tried, _, _, radius in groups])
+    axes_of_all = np.concatenate([np.tile(axes, (len(tried), 1, 1)) for tried, axes, _, _ in groups])
+    return Trials(values, axes_of_all, np.concatenate([np.full(len(tried), guard) for tried, _, guard, _ in groups]))
+
+
+def _axes(middle: Floats) -> Floats:
+    """A unit vector and two at right angles to it, the first of them level where it can be."""
+    helper = np.array([0.0, 0.0, 1.0] if abs(middle[2]) < 0.8 else [1.0, 0.0, 0.0])
+    one = np.cross(helper, middle)
+    one /= np.linalg.norm(one)
+    return np.array([middle, one, np.cross(middle, one)])
+
+
+def _foremost(known: Known, normal_ned: Floats) -> list[int]:
+    """The guards that reach farthest towards an obstacle, the nearest first."""
+    w, x, y, z = known.attitude.tolist()
+    level = body_to_ned((w, -x, -y, -z), (float(normal_ned[0]), float(normal_ned[1]), float(normal_ned[2])))
+    return [int(guard) for guard in np.argsort(g.ARMS_FRD @ np.array(level))[:FOREMOST]]
+
+
+def residuals(known: Known, trials: Trials, values: Floats, doubt: float) -> Floats:
+    """What was measured, taken for `doubt` times less certain, and what is known beforehand: (n, m)."""
+    off = g.misfits(
+        values,
+        trials.axes,
+        trials.obstacles,
+        known.velocity_ned,
+        known.attitude,
+        known.rates,
+        known.free,
+        known.times,
+        known.is_attitude,
+        known.measured,
+        doubt * known.spread,
+        known.shape,
+    )
+    friction, tilts = values[:, g.FRICTION], np.abs(values[:, : g.FRICTION])
+    down = trials.normals(values)[:, 2]
+    beforehand = [
+        *(values[:, g.ERROR : g.STIFFNESS] / VELOCITY_M_S).T,
+        values[:, g.STIFFNESS] / STIFFER,
+        (values[:, g.BRAKING] - BRAKING_PER_S) / BRAKING_SPREAD,
+        (values[:, g.RADIUS] - RADIUS) / RADIUS_SPREAD,
+        (values[:, g.AVERAGING] - known.averaging_s) / AVERAGING_SPREAD_S,
+        (friction - np.clip(friction, 0.0, g.MOST_FRICTION)) / FRICTION_SPREAD,
+        *(np.maximum(tilts - TILT_RAD, 0.0) / TILT_SPREAD).T,
+        np.where(trials.obstacles == g.FLAT, 0.0, down / UPRIGHT),
+        np.where(trials.obstacles == g.FLAT, 0.0, math.sqrt(ROUND_MISFIT)),
+    ]
+    return np.concatenate([off, np.array(beforehand).T], axis=1)
