@@ -23,6 +23,7 @@ class _Course:
     hits: int = 0
     hits_of_step: int = 0
     going_home: bool = False
+    is_landing: bool = False
     due: str | None = None
     """What the latest hit's policy says follows the recovery, or the mission of a goal out of reach."""
     held: bool = False
@@ -55,14 +56,17 @@ class _Course:
             case "landing":
                 is_item = self.steps[self.index].name == "land" or self.going_home
                 self._expect(self.due == "land" or (self.due is None and is_item), "landed")
-                self.due = None
+                self.due, self.is_landing = None, True
 
     def _hit(self) -> None:
         self.hits += 1
         self.hits_of_step += 1
         self.held = False
         policy, hits = self.policy()
-        if hits >= policy.max_hits:
+        if self.is_landing:
+            # On the way down there is nothing else to go on with.
+            self.due = "land"
+        elif hits >= policy.max_hits:
             self.due = "land" if self.going_home else policy.after_max_hits
         else:
             self.due = "return" if self.going_home else policy.then

@@ -8,6 +8,7 @@ import pytest
 
 from rebound_cli.random_missions.contacts import Role, contacts_of
 from rebound_cli.random_missions.judge import failures
+from rebound_cli.random_missions.obedience import disobediences
 from rebound_cli.random_missions.recovered import recoveries
 from sim_vehicle.world import Wall
 from tests.rebound_cli.random_missions.made_up import (
@@ -120,6 +121,16 @@ def test_what_the_policy_says_is_no_failure(policy, after):
 )
 def test_anything_else_after_the_recovery_is_a_failure(policy, after):
     assert "not as the mission says" in causes(bounced(*after, event(DONE_S, "done"), policy=policy))
+
+
+@pytest.mark.parametrize("policy", [DETOUR, {"then": "land", "max_hits": 1, "after_max_hits": "return"}])
+def test_after_a_hit_on_the_way_down_there_is_nothing_but_the_landing(policy):
+    begun = [event(5, "armed"), event(8, "item", step=1), event(8.5, "item", step=2), event(9, "landing")]
+    hit_there = [event(10.004, "detection"), event(12, "recovered")]
+    settings = {"on_collision": policy, "hits": [hit()], "collisions": [collision()], "series": BOUNCED}
+    done = event(DONE_S, "done")
+    assert disobediences(flight([*begun, *hit_there, event(12, "landing"), done], **settings)) == []
+    assert disobediences(flight([*begun, *hit_there, event(12, "return"), event(13, "landing"), done], **settings))
 
 
 def test_an_item_left_out_is_a_failure():
