@@ -19,6 +19,9 @@ from companion.mission.items import (
     VelocityItem,
 )
 
+# What is left of the speeding up against a strong wind: 4 m/s after ten seconds.
+LEAST_SPEEDING_UP_M_S2 = 0.4
+
 # Speed, acceleration, and that while the speed grows.
 Limits: TypeAlias = tuple[float, float, float]
 
@@ -44,6 +47,13 @@ class Pace:
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
         return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration, factor=1.0)
 
+    def against(self, wind_m_s2: tuple[float, float], along: Vector3) -> "Pace":
+        """With what a head wind leaves of the lean for speeding up; `wind_m_s2` is what a hover leans against it by."""
+        way_m = math.hypot(along[0], along[1])
+        head_m_s2 = (wind_m_s2[0] * along[0] + wind_m_s2[1] * along[1]) / way_m if way_m > 0.0 else 0.0
+        least = min(LEAST_SPEEDING_UP_M_S2, self.speeding_up_m_s2)
+        return replace(self, speeding_up_m_s2=max(least, self.speeding_up_m_s2 - max(0.0, head_m_s2)))
+
     def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> Limits:
         """Speed and acceleration of an item, or else its pace's; how fast it may speed up."""
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
@@ -60,6 +70,20 @@ def climb(start_m: Vector3, height_m: float, config: FlightConfig) -> LineProfil
 def stay(place_m: Vector3) -> LineProfile:
     """A way of no length."""
     return LineProfile(place_m, place_m, 1.0, 1.0)
+
+
+def first_leg(item: Motion, start_m: Vector3) -> Vector3:
+    """Where the item goes at first; to an orbit's middle, as all directions follow."""
+    match item:
+        case VelocityItem():
+            return item.velocity_ned_m_s
+        case GoToItem():
+            first = item.position_ned_m
+        case PathItem():
+            first = item.points_ned_m[0]
+        case OrbitItem():
+            first = item.centre_ned_m
+    return (first[0] - start_m[0], first[1] - start_m[1], first[2] - start_m[2])
 
 
 def way_of(item: Motion, start_m: Vector3, pace: Pace) -> Trajectory:

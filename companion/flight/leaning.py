@@ -80,6 +80,11 @@ class Leaning:
     def forget(self) -> None:
         self.stretch, self.time_us = None, 0
 
+    @property
+    def wind_m_s2(self) -> Flat:
+        """What the vehicle leans by in vain where it is where it is to be; NED, against the wind."""
+        return self.missing_m_s2 if self.stretch is None else self.stretch.missing_m_s2
+
     def step(self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3) -> Held | None:
         """Take one sample, the attitude and the setpoint as last sent."""
         elapsed_s = self._smooth(sample, lean_of(attitude_wxyz))

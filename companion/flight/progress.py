@@ -6,7 +6,7 @@ from dataclasses import replace
 from companion.flight import expecting
 from companion.flight.around import passed, way_around
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.course import climb, stay
+from companion.flight.course import climb, first_leg, stay
 from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
@@ -79,7 +79,8 @@ class FlyItems:
         if isinstance(action, PathItem) and 0 < behind < len(action.points_ned_m):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
-        planned = way_around(action, start_m, replace(flight.pace, factor=flight.tally.pace_factor), known)
+        pace = replace(flight.pace, factor=flight.tally.pace_factor)
+        planned = way_around(action, start_m, pace.against(flight.leaning.wind_m_s2, first_leg(action, start_m)), known)
         if planned.way is None:
             self._out_of_reach = f"{describe_item(action)}: no way round what is known"
             flight.unreachable.append(flight.step.label)

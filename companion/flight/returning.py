@@ -21,7 +21,8 @@ class FlyHome:
         flight.going_home = True
         flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
-        planned = home_around(start, flight.returning_as, replace(flight.pace, factor=1.0), surroundings(flight))
+        pace = replace(flight.pace, factor=1.0).against(flight.leaning.wind_m_s2, (-start[0], -start[1], 0.0))
+        planned = home_around(start, flight.returning_as, pace, surroundings(flight))
         self._is_cut_off = planned.way is None
         self._way: Trajectory = planned.way or stay(start)
         if self._is_cut_off:

@@ -117,3 +117,15 @@ def test_straight_up_no_speed_leans_the_vehicle():
     assert up.at(0.5)[2] == (0.0, 0.0, -2.0)
     aside = LineProfile((0.0, 0.0, -1.0), (3.0, 0.0, -5.0), 2.0, 2.0, 1.0)
     assert aside.at(0.2)[2][0] == pytest.approx(1.0)
+
+
+def test_a_head_wind_takes_its_part_of_the_lean_for_speeding_up():
+    pace = Pace(1.0, 2.0, speeding_up_m_s2=1.0)
+    north = (5.0, 0.0, 0.0)
+    # Given what a hover leans by against the wind, then it is taken off along the way, and only there
+    assert pace.against((0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(0.7)
+    assert pace.against((-0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(1.0)
+    assert pace.against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.4)
+    # and a pace that is slower than that already stays what it is
+    assert Pace(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.2)
+    assert pace.against((1.2, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)

@@ -73,3 +73,16 @@ def test_a_vehicle_that_hangs_on_a_wall_is_let_go_of(tmp_path):
     assert tilt_deg.max() < 40.0
     assert (hit.ended_at_boot_us - hit.contact_at_boot_us) < 500_000
     assert series["position_ned_m"][at : at + 500, 2].max() - series["position_ned_m"][at, 2] < 0.4
+
+
+def test_against_a_wind_it_speeds_up_by_what_that_leaves_of_the_lean(tmp_path):
+    # Given a wind of 4 m/s from the north, and a way north at 3 m/s
+    ahead = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 3.0, "yaw_deg": 0}}
+    flight = flown(tmp_path, ahead, wind_ned_m_s=[-4, 0, 0])
+    series = flight.truth.series
+    north_m_s = series["velocity_ned_m_s"][:, 0]
+    begun = int(np.flatnonzero(series["position_ned_m"][:, 0] > 0.3)[0])
+    fast = begun + int(np.flatnonzero(north_m_s[begun:] > 1.8)[0])
+    # Then it leans as much as it would without the wind, for longer
+    assert tilts_deg(series["attitude_wxyz"])[begun:fast].max() < 11.0
+    assert flight.report.outcome == "completed"
