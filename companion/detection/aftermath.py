@@ -14,9 +14,11 @@ from companion.messages import Vector3
 
 # The velocities before the newest that it is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
-# Velocities further apart leave too much to a sum of samples that sees a quarter of the time, and to a filter's own
+# Velocities further apart leave more to a sum of samples that sees a quarter of the time, and to a filter's own
 # corrections: at 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
+# 10 Hz with the jitter of a log; further apart they are no measure.
+LONGEST_SLOW_STEP_US = 130_000
 # A spread of fewer steps than this is a guess: two thirds of a second at 30 Hz.
 TRUSTED = 20
 # Steps that the spread remembers, and that a rising one does: 3 s and a third of a second at 30 Hz.
@@ -47,6 +49,10 @@ class Aftermath:
     spun_rad_s: float = 0.0
     """By how much the rates stepped at the previous sample, if the newest one keeps it: the lesser of the two steps."""
     newest_rate_step_rad_s: float = 0.0
+    rate_step_before_rad_s: float = math.inf
+    """The one before the newest; without bound where that is not known."""
+    kick_rad_s: float = -math.inf
+    """By how much the rates stepped at the previous sample more than before and after it."""
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
@@ -57,6 +63,10 @@ class Aftermath:
     unseen_share: float = 0.0
     """Of the time, by the samples' distances and the length of their windows."""
     unlearnt: Vector3 | None = None
+    slow_boot_us: int = 0
+    """Of the last velocity that came longer than `LONGEST_STEP_US` after the one before."""
+    is_slow: bool = False
+    """Whether one of the velocities that the newest was compared with did."""
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
         """Take one sample, body FRD."""
@@ -70,12 +80,15 @@ class Aftermath:
             self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
             before = self.newest_rate_step_rad_s
             step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
+            self.kick_rad_s = before - self.rate_step_before_rad_s - step
+            self.rate_step_before_rad_s = before if before > 0.0 else math.inf
             self.spun_rad_s = min(before, math.dist(w, self.earlier_rates_rad_s)) if before > 0.0 else 0.0
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         else:
             self.newest_rate_step_rad_s = self.spun_rad_s = 0.0
+            self.rate_step_before_rad_s, self.kick_rad_s = math.inf, -math.inf
             self.forget()
         self.earlier_imu_us, self.previous_imu_us = self.previous_imu_us, before_us
         self.earlier_rates_rad_s = (p_0, q_0, r_0)
@@ -93,8 +106,12 @@ class Aftermath:
             # To the last digit: nothing is estimated now, and what comes after is a new beginning.
             residuals.clear()
             return None
-        if residuals and not 0 < time_us - residuals[-1][0] < LONGEST_STEP_US:
-            residuals.clear()
+        if residuals:
+            elapsed_us = time_us - residuals[-1][0]
+            if not 0 < elapsed_us < LONGEST_SLOW_STEP_US:
+                residuals.clear()
+            elif elapsed_us > LONGEST_STEP_US:
+                self.slow_boot_us = time_us
         u = self.strapdown.sum_at(time_us)
         if u is None:
             return None
@@ -103,6 +120,7 @@ class Aftermath:
         step = None
         if len(residuals) == COMPARED:
             (_, n_0, e_0, d_0), (_, n_1, e_1, d_1), (_, n_2, e_2, d_2) = residuals
+            self.is_slow = residuals[0][0] < self.slow_boot_us
             step = (n - (n_0 + n_1 + n_2) / 3, e - (e_0 + e_1 + e_2) / 3, d - (d_0 + d_1 + d_2) / 3)
             del residuals[0]
         residuals.append((time_us, n, e, d))

@@ -22,10 +22,10 @@ from typing import ClassVar
 from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
 from companion.detection.floor import SETTLED_US
-from companion.detection.force_signs import is_jolt, side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import CLEAR, is_jolt, push_of, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
-from companion.detection.hidden_signs import Hidden, spun, velocity_jump
+from companion.detection.hidden_signs import Hidden, dipped, kicked, spun, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
 from companion.estimate.rotation import body_to_ned
@@ -42,9 +42,6 @@ from companion.messages import (
 
 # A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
 SHAKING = 2.0
-# On a vehicle that shakes one sample below so many thresholds may be the sensor's own (once in four public logs, 1.2):
-# the next one must show it, too. Where it shakes until the detector is told to be blind, only what is clear counts.
-CLEAR = 1.3
 # A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -105,22 +102,23 @@ class FusedDetector:
         off = situation.why_off
         x, y = f_x - s.floor.x, f_y - s.floor.y
         side = math.sqrt(x * x + y * y)
-        if side < s.threshold_m_s2 and off is None and s.phase is Phase.ARMED:
+        room = vertical_threshold_m_s2(s, config)
+        s.push_before, s.push = s.push, push_of(s, side, f_z, room)
+        most = s.thrust.most_m_s2(now_us)
+        is_within = side < s.threshold_m_s2 and -most - room < f_z < room
+        if is_within and off is None and s.phase is Phase.ARMED and not is_jolt(s, config):
             # Nearly every sample ends here.
-            room = vertical_threshold_m_s2(s, config)
-            if -s.thrust.most_m_s2(now_us) - room < f_z < room and not is_jolt(s, config, side, f_z):
-                s.soft.since_boot_us = None
-                self._learn(s, f, before_us)
-                hidden = spun(s, config)
-                return None if hidden is None else self._fire_hidden(s, now_us, situation, hidden)
+            s.soft.since_boot_us = None
+            self._learn(s, f, before_us)
+            hidden = spun(s, config) or kicked(s, config) or dipped(s, f_z, room)
+            return None if hidden is None else self._fire_hidden(s, now_us, situation, hidden)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
             self._learn(s, f, before_us)
             return None
-        room = vertical_threshold_m_s2(s, config)
-        below, above = f_z - room, -f_z - s.thrust.most_m_s2(now_us) - room
+        below, above = f_z - room, -f_z - most - room
         threshold = side_threshold_m_s2(s, config, w)
-        jolted = s.phase is Phase.ARMED and is_jolt(s, config, side, f_z)
+        jolted = s.phase is Phase.ARMED and is_jolt(s, config)
         if side < threshold and below < 0.0 and above < 0.0 and not jolted:
             self._quiet(s, f, before_us)
             return None

@@ -19,6 +19,8 @@ class FusedConfig(Written):
     # A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six times that. A foldable vehicle's hit
     # at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long, clipping leaves the estimate 0.16.
     velocity_step_m_s: Positive = 0.12
+    # Of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz.
+    velocity_step_slow_m_s: Positive = 0.7
     # With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by 2 rad/s changes its velocity
     # by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s.
     velocity_step_turned_m_s: Positive = 0.07
@@ -34,6 +36,12 @@ class FusedConfig(Written):
     # vehicle's flips are none. A rigid vehicle that meets a leaning wall at 2 m/s steps by 15 rad/s and more.
     spin_rad_s: Positive = 2.0
     spin_rad_s2: Positive = 400.0
+    # A kick: rates that step between two samples and neither before nor after, as motors that lag do not make them:
+    # four public logs' healthy flights show 0.16 rad/s at most, simulated ones 0.2. It is a contact with a push in the
+    # two samples beside it, together this many thresholds: noise alone makes 0.4, in one of 200 such pairs 0.7.
+    kick_rad_s: Positive = 0.4
+    kick_rad_s2: Positive = 40.0
+    kick_push: Positive = 0.7
     # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
     rearm_quiet_s: Positive = 0.04
     # Longer loud than this is no contact but a new way to shake, and is learnt.

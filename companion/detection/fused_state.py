@@ -21,4 +21,7 @@ class FusedState(DetectorState):
     odometry_boot_us: int | None = None
     reset_counter: int = 0
     contact_began_boot_us: int = 0
+    push: float = 0.0
+    """Of the newest sample: the larger of its push sideways, in thresholds, and half of that along the thrust."""
+    push_before: float = 0.0
     soft: SoftTouch = field(default_factory=SoftTouch)

@@ -6,11 +6,18 @@ The state is only read; what is known of an impact found so is the gap it fell i
 import math
 from typing import NamedTuple
 
+from companion.detection.force_signs import CLEAR
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.estimate.rotation import ned_to_body
 from companion.estimate.strapdown import ZERO
 from companion.messages import Vector3
+
+# Three samples of 50 Hz with jitter: in more time thrust goes and comes back by itself.
+DIP_US = 50_000
+
+# Steps of velocities at 10 Hz are too few to know their spread well; a filter's corrections are more of them.
+SLOW_NOISE = 1.2
 
 
 class Hidden(NamedTuple):
@@ -30,6 +37,34 @@ def spun(s: FusedState, config: FusedConfig) -> Hidden | None:
     over_s = 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
     if a.spun_rad_s < config.spin_rad_s + config.spin_rad_s2 * over_s:
         return None
+    return _from_ahead(s, over_s)
+
+
+def kicked(s: FusedState, config: FusedConfig) -> Hidden | None:
+    """Turned between two samples and neither before nor after, as motors that lag cannot, and pushed a little."""
+    a = s.aftermath
+    kick_rad_s = a.kick_rad_s * config.side_threshold_m_s2 / s.threshold_m_s2
+    if kick_rad_s < config.kick_rad_s:
+        return None
+    over_s = 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
+    if kick_rad_s < config.kick_rad_s + config.kick_rad_s2 * over_s or s.push_before + s.push < config.kick_push:
+        return None
+    return _from_ahead(s, over_s)
+
+
+def dipped(s: FusedState, f_z: float, room_m_s2: float) -> Hidden | None:
+    """Thrust that was gone, or pushed back, in the sample before and is there again: a ceiling touched. Thrust cannot
+    go and come back from one sample to the next. `room_m_s2` is what f_z may depart by (see `force_signs`)."""
+    soft = s.soft
+    f_x, f_y, at_z = soft.last
+    dip_m_s2 = at_z - max(soft.before[2], f_z)
+    if dip_m_s2 < CLEAR * room_m_s2 or s.last_sample_boot_us - soft.before_us > DIP_US:
+        return None
+    return Hidden(soft.before_us, (f_x - s.floor.x, f_y - s.floor.y, dip_m_s2), 1.0, None)
+
+
+def _from_ahead(s: FusedState, over_s: float) -> Hidden:
+    a = s.aftermath
     # Which way it was pushed does not show: as an obstacle does that is in the vehicle's way.
     v = s.velocity_ned_m_s or ZERO
     force = ned_to_body(a.strapdown.attitude_wxyz, (-v[0] / over_s, -v[1] / over_s, -v[2] / over_s))
@@ -73,4 +108,6 @@ def _step_asked_for_m_s(s: FusedState, config: FusedConfig, time_us: int, spread
         # No motor did that, and the thrust has not turned for long: two signs, half as clear.
         noise_m_s, room = 0.5 * noise_m_s, 0.0
     room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
+    if aftermath.is_slow:
+        least, noise_m_s = config.velocity_step_slow_m_s, SLOW_NOISE * noise_m_s
     return caution * max(least, noise_m_s) + room

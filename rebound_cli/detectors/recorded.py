@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from companion.errors import ReboundError
 from companion.estimate.rotation import body_to_ned
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Vector3
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
 from rebound_cli.detectors.watching import alarms_only
 from rebound_cli.logs.log import Heard, Log, Told
 from rebound_cli.logs.reader import read_log
@@ -183,7 +183,7 @@ def _struck(items: list[Heard], force: Floats, hit_us: int) -> Iterator[Heard]:
             seen = averaged(own, force, 1e-6 * (sample.time_boot_us - hit_us), 1e-6 * window_us)
             velocity = velocity + np.array(body_to_ned(attitude, _triple(seen - own))) * 1e-6 * window_us
             sample = replace(sample, specific_force_frd_m_s2=_triple(seen))
-        elif isinstance(sample, LocalPosition):
+        elif isinstance(sample, LocalPosition | Odometry):
             shift = shift + velocity * 1e-6 * max(item.at_us - shifted_us, 0)
             shifted_us = max(item.at_us, hit_us)
             sample = replace(

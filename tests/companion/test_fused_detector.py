@@ -40,6 +40,7 @@ class Flight:
         self.heard = scene.pop("heard", (LocalPosition, Odometry, Attitude, AttitudeTarget))
         self.situation = scene.pop("situation", lambda t: IN_FLIGHT)
         self.lost = scene.pop("lost", lambda t: False)
+        self.slower = scene.pop("slower", 1)  # velocities come so much more seldom
         assert not scene
         self.rng = random.Random(seed)
 
@@ -61,11 +62,12 @@ class Flight:
                     sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)
                 ]
                 yield t, ImuSample(t, tuple(mean), self.rates(t))
-            if t % 20_000 == 0:
+            if t % (20_000 * self.slower) == 0:
                 yield t, LocalPosition(t, (0.0, 0.0, -5.0), seen)
+            if t % 20_000 == 0:
                 yield t, Attitude(t, (1.0, 0.0, 0.0, 0.0))
                 yield t, AttitudeTarget(t, HOVER_FRACTION * lift / GRAVITY)
-            if t % 32_000 == 0:
+            if t % (32_000 * self.slower) == 0:
                 yield t, Odometry(t, (0.0, 0.0, -5.0), seen, resets)
 
     def fly(self, until_us=4_000_000, **config):
@@ -150,6 +152,13 @@ def test_a_turn_that_no_motor_makes_needs_little_of_a_step(turn_rad_s, step_m_s,
     jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
     flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump, rates=rates)
     assert [i.evidence for i in flight.fly(until_us=3_045_000)] == [Evidence.AFTERMATH] * hits
+
+
+@pytest.mark.parametrize(("step_m_s", "hits"), [(1.5, 1), (0.6, 0)])
+def test_velocities_ten_times_a_second_show_a_large_step_that_no_sample_showed(step_m_s, hits):
+    jump = (3_002_000, (step_m_s, 0.0, 0.0), 0)
+    impacts = Flight(imu_every_us=20_000, slower=3, jump=jump).fly()
+    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
 
 
 @pytest.mark.parametrize(("counted", "heard_odometry", "hits"), [(1, True, 0), (0, True, 1), (1, False, 1)])
@@ -334,6 +343,46 @@ def test_a_gyroscope_that_shakes_to_and_fro_has_not_spun():
         aftermath.imu(4_000 * count, (0.0, 0.0, -GRAVITY), (6.0 * (-1) ** count, 0.0, 0.0))
         spun.append(aftermath.spun_rad_s)
     assert max(spun) == 0.0
+
+
+def buzzing(rates_rad_s):
+    """A gyroscope never reads the same twice."""
+    return lambda t: tuple(rate + 0.01 * (-1) ** (t // 4_000) for rate in rates_rad_s(t))
+
+
+@pytest.mark.parametrize(
+    ("turn_in_us", "push_m_s2", "hits"),
+    [(1_000, -1.2, 1), (80_000, -1.2, 0), (1_000, -0.3, 0)],
+    ids=["touched", "turned by its motors", "not pushed"],
+)
+def test_a_light_touch_that_turns_the_vehicle_at_once_is_a_hit(turn_in_us, push_m_s2, hits):
+    """A wall leaned on at 0.6 m/s, heard at 50 Hz: 1.2 m/s^2 are no hit by themselves, nor is a turn of 2.5 rad/s."""
+
+    def rates(t):
+        return (0.0, 2.5 * min(max(t - 3_005_000, 0) / turn_in_us, 1.0), 0.0)
+
+    lean = pulse((push_m_s2, 0.0, 0.0), start_us=3_005_000, length_us=400_000)
+    impacts = Flight(lean, imu_every_us=20_000, rates=buzzing(rates), noise=0.05).fly(3_100_000)
+    assert [(i.sample_time_boot_us, i.contact_free_until_boot_us) for i in impacts] == hits * [(3_040_000, 3_000_000)]
+
+
+def test_what_pushed_the_sample_before_explains_a_turn_that_no_motor_makes():
+    """A window that ended in the middle of a stiff contact holds little of it; the turn comes with the next."""
+
+    def rates(t):
+        return (0.0, 6.0, 0.0) if t > 3_004_000 else (0.0, 0.0, 0.0)
+
+    grazed = pulse((5.0, 0.0, 0.0), start_us=3_003_000, length_us=1_000)
+    assert [i.sample_time_boot_us for i in Flight(grazed, rates=rates, noise=0.05).fly(3_020_000)] == [3_008_000]
+    assert Flight(rates=rates, noise=0.05).fly(3_008_000 + 1) == []
+
+
+@pytest.mark.parametrize(("lost_for_us", "hits"), [(5_000, 1), (500_000, 0)], ids=["ceiling", "motor"])
+def test_thrust_that_is_gone_for_one_sample_was_a_ceiling(lost_for_us, hits):
+    """Nine tenths of it: no push down by itself, because propellers that stop do the same, and stay so."""
+    dip = pulse((0.0, 0.0, 8.8), start_us=3_004_000, length_us=lost_for_us)
+    impacts = Flight(dip, imu_every_us=8_000, velocity=(0.0, 0.0, -0.7)).fly(3_030_000)
+    assert [(i.sample_time_boot_us, i.kind) for i in impacts] == hits * [(3_016_000, ImpactKind.CEILING)]
 
 
 # --- phases -------------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry
 from rebound_cli.detectors import flights
 from rebound_cli.detectors.flights import FlightCase, fly_healthy
 from rebound_cli.detectors.recorded import DataError, averaged, data_files, turned, with_impact
@@ -86,6 +86,7 @@ def test_a_flight_with_an_impact_in_it_differs_from_then_on_only(tmp_path):
         heard.append(Heard(at_us, ImuSample(at_us, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))))
         if number % 20 == 0:
             heard.append(Heard(at_us, LocalPosition(at_us, (0.0, 0.0, -5.0), (0.0, 0.0, 0.0))))
+            heard.append(Heard(at_us, Odometry(at_us, (0.0, 0.0, -5.0), (0.0, 0.0, 0.0), 0)))
             heard.append(Heard(at_us, Attitude(at_us, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)))))
     log = Log(tmp_path, "", 0, tuple(heard), ())
     # When something pushes it from the front for 10 ms
@@ -98,9 +99,10 @@ def test_a_flight_with_an_impact_in_it_differs_from_then_on_only(tmp_path):
     assert min(item.at_us for item in struck.heard if isinstance(item.sample, ImuSample)) == 500_000
     assert struck.heard[0].at_us == 0
     # And afterwards it moves west at the impulse's speed, as an estimator that believes its sensor has it
-    last = [item.sample for item in struck.heard if isinstance(item.sample, LocalPosition)][-1]
-    assert last.velocity_ned_m_s == pytest.approx((0.0, -1.0, 0.0), abs=1e-9)
-    assert last.position_ned_m[1] < -0.3
+    for told in (LocalPosition, Odometry):
+        last = [item.sample for item in struck.heard if isinstance(item.sample, told)][-1]
+        assert last.velocity_ned_m_s == pytest.approx((0.0, -1.0, 0.0), abs=1e-9)
+        assert last.position_ned_m[1] < -0.3
 
 
 def test_a_folder_without_the_data_is_one_sentence(tmp_path):
