@@ -43,6 +43,7 @@ class CollisionRecord:
     impulse_m_s: float
     doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
     inherits_doubt: bool = False  # from an earlier hit
+    is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
     may_be_clipped: bool = True
     is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
@@ -63,7 +64,8 @@ class CollisionRecord:
             return
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-        self.normal_ned = away_from(estimate.normal_ned)
+        if not self.is_behind:
+            self.normal_ned = away_from(estimate.normal_ned)
         self.impulse_m_s = estimate.impulse_m_s
         self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
         self.is_clipped = estimate.is_lower_bound

@@ -104,6 +104,13 @@ class Expectation:
     detail: str = ""
 
 
+class Touched(NamedTuple):
+    """A push too soft for a collision, NED: something is there."""
+
+    time_boot_us: int
+    push_ned_m_s2: Vector3
+
+
 @dataclass(slots=True)
 class FlightContext:
     """Shared and changed by the flight's parts within a step; nothing else holds or changes it."""
@@ -137,6 +144,7 @@ class FlightContext:
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
+    touch: Touched | None = None  # the latest that was no collision
     blind_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None

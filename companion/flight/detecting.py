@@ -6,8 +6,8 @@ from companion.detection import watch
 from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.detection.watch import Watch
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.rotation import ned_to_body
-from companion.flight.context import FlightContext
+from companion.estimate.rotation import body_to_ned, ned_to_body
+from companion.flight.context import FlightContext, Touched
 from companion.flight.leaning import Held
 from companion.messages import Attitude, LocalPosition, Sample
 
@@ -87,3 +87,7 @@ def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) 
     kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
     text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
     flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
+    attitude = flight.vehicle.attitude
+    if attitude is not None:
+        push_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
+        flight.touch = Touched(estimate.impact.sample_time_boot_us, push_ned)

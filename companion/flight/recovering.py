@@ -8,6 +8,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards
+from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, overtaken
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
@@ -20,7 +21,7 @@ from companion.flight.rebound import (
 )
 from companion.flight.remembering import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
-from companion.recovery.direction import away_from, split
+from companion.recovery.direction import away_from, plus, split
 from companion.recovery.envelope import Envelope
 from companion.recovery.height import BRAKED_US, NO_BRAKING, THROWN_US, brake, level, thrown_down_m_s
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
@@ -44,12 +45,6 @@ SPINNING_MOST_US = 1_000_000
 # Coasting leaves room to brake in before the fence: half a second's way.
 COASTED_S = 0.5
 ROUNDING_M = 1e-3
-# A contact that still pushes this long after it began is no hit but something that carries the vehicle along.
-CARRIED_AFTER_US = 250_000
-# It pushes still when it pushed within this: a few IMU samples of the slowest stream.
-STILL_PUSHING_US = 60_000
-# The place to recover to is then found anew, ten times a second.
-CARRIED_EVERY_US = 100_000
 
 
 class Recover:
@@ -158,11 +153,12 @@ class Recover:
         if self._law.is_refined and self._after_ned_m_s is not None:
             normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
             self._contact = replace(self._contact, normal_ned=normal)
-        if not self._is_refined and since_us >= REBOUND_KNOWN_US:
+        was_refined = self._is_refined
+        if not was_refined and since_us >= REBOUND_KNOWN_US:
             self._is_refined = not self._coasts(flight, sample, since_us, now_us)
             if not self._is_refined:
                 return
-        elif not self._is_carried(sample, since_us):
+        elif not self._is_carried(flight, sample, now_us):
             return
         else:
             self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
@@ -170,11 +166,22 @@ class Recover:
         motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
         if motion is None:
             return
+        if was_refined:
+            # From what pushes it along a vehicle comes clear only if it flies faster.
+            motion = replace(
+                motion, velocity_ned_m_s=plus(motion.velocity_ned_m_s, CLEAR_M_S, self._contact.normal_ned)
+            )
         record.setpoint_ned_m = _setpoint(flight, self._law, self._contact, motion, flight.collisions[:-1])
         self._take(flight, motion, now_us)
         off_m_s, place = split(motion.velocity_ned_m_s, self._contact.normal_ned)[0], record.setpoint_ned_m
         text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
         flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+    def _is_carried(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> bool:
+        if not self._law.is_refined or sample.time_boot_us - self._refined_boot_us < CARRIED_EVERY_US:
+            return False
+        asked = self._way.at((now_us - self._way_began_us) * 1e-6)
+        return is_carried(flight, self._record, self._contact.normal_ned, sample, asked)
 
     def _brake_unseen(self, flight: FlightContext, sample: LocalPosition) -> None:
         """By what the gyroscopes show of the hit: they do not clip."""
@@ -218,15 +225,6 @@ class Recover:
         self._way, self._way_began_us = way, now_us
         return True
 
-    def _is_carried(self, sample: LocalPosition, since_us: int) -> bool:
-        now_us, record = sample.time_boot_us, self._record
-        return (
-            self._law.is_refined
-            and since_us > CARRIED_AFTER_US
-            and now_us - record.contact_ended_boot_us < STILL_PUSHING_US
-            and now_us - self._refined_boot_us >= CARRIED_EVERY_US
-        )
-
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """A new collision: what was known just before it, and from that the setpoint."""
@@ -234,9 +232,12 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     normal = away_from(estimate.normal_ned)
     law = _law(flight)
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
-    doubted = _doubted(flight)
+    doubted, behind = _doubted(flight), overtaken(flight, impact.specific_force_frd_m_s2, estimate.velocity_ned_m_s)
+    if behind is not None:
+        normal = behind
     if law.is_refined:
-        contact = replace(contact, normal_ned=half_way(normal, way_back(contact.velocity_ned_m_s)))
+        believed = behind or half_way(normal, way_back(contact.velocity_ned_m_s))
+        contact = replace(contact, normal_ned=believed)
         if doubted is not None:
             # Place and velocity now are as wrong as the estimate.
             contact = replace(doubted.contact, time_boot_us=estimate.time_boot_us)
@@ -253,6 +254,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         may_be_clipped=not estimate.is_final or estimate.may_be_clipped,
         doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
         inherits_doubt=doubted is not None,
+        is_behind=behind is not None,
     )
     flight.collisions.append(record)
     _tell_detection(flight, record, now_us)

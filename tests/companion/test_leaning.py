@@ -145,3 +145,15 @@ def test_gusts_of_five_metres_a_second_are_nothing_in_the_way(tmp_path):
     slow = {"go_to": {"position_ned_m": [1, 0, -1.5], "speed_m_s": 0.2}}
     flight, told = flown(tmp_path, [{"hold": {"duration_s": 8}}, slow], wind_ned_m_s=[2, 1, 0], faults=gusts)
     assert told == [] and flight.report.collisions == ()
+
+
+@pytest.mark.parametrize("speed_m_s", [0.8, 1.3])
+def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(tmp_path, speed_m_s):
+    # Given a hovering vehicle, struck by what goes on for two metres more
+    cart = screen(1.0, velocity_ned_m_s=[-speed_m_s, 0, 0], from_s=9.5, until_s=12.5)
+    flight, _ = flown(tmp_path, [{"hold": {"duration_s": 8}}], walls=cart)
+    assert len(flight.truth.hits) > 1, "it touches the vehicle again"
+    # Then the vehicle gives way, and never leans on it
+    assert flight.report.outcome == "completed"
+    assert most_tilt_deg(flight) < 25.0
+    assert all(collision.settled_after_s is not None for collision in flight.report.collisions[-1:])
