@@ -1,9 +1,11 @@
 """What the survey says, item by item: good, doubtful or bad, and the exact remedy."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
+from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.preflight.survey import LISTENING_US, Survey, spread
 
 
@@ -33,6 +35,8 @@ LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
 LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
 # A vehicle whose companion died in front of a wall must not go on for longer.
 LONGEST_LOSS_S = 1.0
+# The least that PX4 documents: a lean of 11 degrees; beyond 10 a hit at 3 m/s tips a vehicle onto what it hits.
+LEAST_ACC_HOR_M_S2 = 2.0
 # Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
 LEAST_INTEG_HZ = 200
 # A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
@@ -59,6 +63,7 @@ def findings(survey: Survey) -> list[Finding]:
         *_offboard_loss(survey),
         *_radio(survey),
         *_termination(survey),
+        *_speeding_up(survey),
         *_estimate(survey),
         *_vibration(survey),
         *_time(survey),
@@ -151,6 +156,21 @@ def _termination(survey: Survey) -> Iterator[Finding]:
         found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
         remedy = f"CBRK_FLIGHTTERM = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
         yield Finding("CBRK_FLIGHTTERM", Verdict.DOUBTFUL, found, remedy, ("CBRK_FLIGHTTERM", FLIGHTTERM_OFF))
+
+
+def _speeding_up(survey: Survey) -> Iterator[Finding]:
+    """Of PX4's own modes, as `rebound guard` watches them; the companion's setpoints have their own limit."""
+    most_m_s2 = survey.parameters.get("MPC_ACC_HOR")
+    if most_m_s2 is None:
+        yield _unread("MPC_ACC_HOR")
+        return
+    lean_deg = math.degrees(math.atan(most_m_s2 / GRAVITY_M_S2))
+    found = f"{most_m_s2:g} m/s^2: PX4's own modes lean by {lean_deg:.0f} degrees as they speed up"
+    if most_m_s2 > LEAST_ACC_HOR_M_S2:
+        remedy = f"MPC_ACC_HOR = {LEAST_ACC_HOR_M_S2:g} for `rebound guard`: a vehicle that leans in tips where it hits"
+        yield Finding("MPC_ACC_HOR", Verdict.DOUBTFUL, found, remedy, ("MPC_ACC_HOR", LEAST_ACC_HOR_M_S2))
+    else:
+        yield Finding("MPC_ACC_HOR", Verdict.GOOD, found)
 
 
 def _estimate(survey: Survey) -> Iterator[Finding]:

@@ -39,7 +39,7 @@ PARAMETERS = (
     "COM_RCL_EXCEPT",
     "CBRK_FLIGHTTERM",
     "IMU_INTEG_RATE",
-    "MPC_XY_VEL_MAX",
+    "MPC_ACC_HOR",
 )
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000

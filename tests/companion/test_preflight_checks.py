@@ -26,7 +26,7 @@ HEALTHY = {
     "COM_RCL_EXCEPT": 0,
     "CBRK_FLIGHTTERM": 121212,
     "IMU_INTEG_RATE": 250,
-    "MPC_XY_VEL_MAX": 12.0,
+    "MPC_ACC_HOR": 2.0,
 }
 
 
@@ -73,6 +73,7 @@ def test_a_healthy_vehicle_has_nothing_to_mend():
         ("COM_OBL_RC_ACT", 7, Verdict.BAD, 4),
         ("CBRK_FLIGHTTERM", 0, Verdict.DOUBTFUL, 121212),
         ("IMU_INTEG_RATE", 100, Verdict.DOUBTFUL, 200),
+        ("MPC_ACC_HOR", 3.0, Verdict.DOUBTFUL, 2.0),
     ],
 )
 def test_a_parameter_that_endangers_a_recovery_is_named_with_its_remedy(name, value, verdict, mended):
