@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from companion.estimate.rotation import body_to_ned
+from companion.flight.context import FlightContext
 from companion.messages import Attitude, Vector3
 
 # Sines: of a lean into the obstacle that no hit needs, and of one from which a vehicle is free of it.
@@ -23,6 +24,9 @@ BEGUN_US = 200_000
 FALL_M_S2 = 4.9
 # Away from the obstacle: with that thrust a lean of 30 degrees.
 AWAY_M_S2 = 2.8
+# What a fall is stopped with, hovering at 78 % of the thrust and not yet level, and what is to be left of the height.
+STOPPING_M_S2 = 2.0
+LEFT_M = 0.3
 # A vehicle that has not come free by then lies on what it hit, or on the ground.
 LONGEST_US = 1_000_000
 
@@ -47,6 +51,15 @@ class Hanging:
         return self.since_us is not None
 
 
-def let_go(normal_ned: Vector3) -> Vector3:
-    """The acceleration to ask for meanwhile, NED."""
-    return (AWAY_M_S2 * normal_ned[0], AWAY_M_S2 * normal_ned[1], FALL_M_S2)
+def has_room_below(flight: FlightContext) -> bool:
+    """Whether a fall can still be stopped above the ground."""
+    latest, height_m = flight.vehicle.history.latest(), flight.height_m
+    if latest is None or height_m is None:
+        return False
+    down_m_s = max(0.0, latest.velocity_ned_m_s[2])
+    return height_m > LEFT_M + 0.5 * down_m_s**2 / STOPPING_M_S2
+
+
+def let_go(normal_ned: Vector3, may_fall: bool) -> Vector3:
+    """The acceleration to ask for meanwhile, NED; without a fall, of a setpoint at a height."""
+    return (AWAY_M_S2 * normal_ned[0], AWAY_M_S2 * normal_ned[1], FALL_M_S2 if may_fall else 0.0)

@@ -12,7 +12,7 @@ from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, ov
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
-from companion.flight.pinned import Hanging, let_go
+from companion.flight.pinned import Hanging, has_room_below, let_go
 from companion.flight.rebound import (
     agreed_normal,
     believable,
@@ -64,7 +64,7 @@ class Recover:
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
-        self._hanging = Hanging()
+        self._hanging, self._may_fall = Hanging(), True
         self._thrown_m_s = 0.0
         self._take(flight, self._law.expected(self._contact), now_us)
 
@@ -77,8 +77,8 @@ class Recover:
 
     def target(self, now_us: int) -> Target | None:
         if self._hanging.since_us is not None:
-            place, leant = self._contact.position_ned_m, let_go(self._contact.normal_ned)
-            return Target(place, self._yaw_rad, REST, leant, leans_only=True, is_height_free=True)
+            place, leant = self._record.setpoint_ned_m, let_go(self._contact.normal_ned, self._may_fall)
+            return Target(place, self._yaw_rad, REST, leant, leans_only=True, is_height_free=self._may_fall)
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
         if not self._is_believed:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
@@ -119,6 +119,7 @@ class Recover:
         attitude, normal = flight.vehicle.attitude, self._contact.normal_ned
         if attitude is None or not self._law.is_refined or normal[2] != 0.0:
             return
+        self._may_fall = has_room_below(flight)
         was_us, since_us = self._hanging.since_us, now_us - self._record.detected_at_us
         if not self._hanging.step(attitude, normal, since_us, now_us) and was_us is not None:
             self._way_began_us += now_us - max(was_us, self._way_began_us)

@@ -4,8 +4,11 @@ import math
 
 import pytest
 
-from companion.flight.pinned import BEGUN_US, LONGEST_US, Hanging, let_go
-from companion.messages import Attitude
+from companion.core import start
+from companion.flight.hearing import hear
+from companion.flight.pinned import BEGUN_US, LONGEST_US, Hanging, has_room_below, let_go
+from companion.messages import Attitude, Heartbeat, LocalPosition
+from companion.mission.model import Mission
 
 WALL_IN_THE_NORTH = (-1.0, 0.0, 0.0)
 
@@ -41,6 +44,22 @@ def test_it_hangs_until_it_is_nearly_level_or_for_too_long():
     assert not hanging.step(leaning_north(70.0), WALL_IN_THE_NORTH, 1_200_000, 2_000_001 + LONGEST_US)
 
 
-def test_little_thrust_away_from_the_wall_is_asked_for():
-    away, _, down = let_go(WALL_IN_THE_NORTH)
+def test_little_thrust_away_from_the_wall_is_asked_for_and_none_less_near_the_ground():
+    away, _, down = let_go(WALL_IN_THE_NORTH, may_fall=True)
     assert away < 0.0 and 0.0 < down < 9.81
+    assert let_go(WALL_IN_THE_NORTH, may_fall=False)[2] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("height_m", "down_m_s", "has_room"),
+    [(1.0, 0.0, True), (1.0, 1.5, True), (1.0, 2.0, False), (3.0, 2.0, True), (0.25, 0.0, False), (0.5, -2.0, True)],
+)
+def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, has_room):
+    flight = start(
+        Mission.model_validate({"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}), 0
+    ).flight
+    flight.origin_ned_m = (0.0, 0.0, -0.1)
+    assert not has_room_below(flight), "nothing is known of the height"
+    hear(flight, [Heartbeat(1, 1, 2, 12, True, 0, 3)], 0)
+    hear(flight, [LocalPosition(1_000, (0.0, 0.0, -0.1 - height_m), (0.0, 0.0, down_m_s))], 1_000)
+    assert has_room_below(flight) is has_room

@@ -29,7 +29,11 @@ def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_op
     found = {finding.item: finding for finding in preflight.findings()}
     assert preflight.survey.identity is not None
     assert not [item for item, finding in found.items() if finding.verdict is Verdict.BAD]
-    assert [item for item, finding in found.items() if finding.fix] == ["COM_OBL_RC_ACT", "COM_RCL_EXCEPT", "MPC_ACC_HOR"]
+    assert [item for item, finding in found.items() if finding.fix] == [
+        "COM_OBL_RC_ACT",
+        "COM_RCL_EXCEPT",
+        "MPC_ACC_HOR",
+    ]
     # and 247 of the 250 samples a second arrive: PX4's link loses 1.2 %
     assert found["HIGHRES_IMU"].found.startswith("247 Hz")
 
