@@ -186,7 +186,7 @@ class ImpactEstimator:
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
-            may_be_clipped=self.push is not None,
+            may_be_clipped=True,
             kind=impact.kind,
             confidence=impact.confidence,
             is_final=False,

@@ -16,8 +16,9 @@ from companion.estimate.approach import VelocityFix
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import split
 
-# An estimate that shows a tenth of the approach as rebound has seen the hit: arms and frames give back 0.15 and more.
-LEAST_REBOUND = 0.1
+# An estimate that shows this share of the approach as rebound has seen the hit: arms that meet their stops, and frames,
+# give back 0.3 and more. With a tenth, arms that had clipped were believed while 0.3 to 0.7 m/s were missing.
+LEAST_REBOUND = 0.3
 # Being put right begins after 0.14 s and is steep for a third of a second.
 CORRECTED_US = 140_000
 EARLIEST_US = 500_000

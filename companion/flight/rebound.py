@@ -12,6 +12,9 @@ from companion.recovery.interface import Contact, Moving
 # A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
 REBOUND_SLACK_M_S = 0.5
 REBOUND_SLACK_M = 0.2
+# Slow contacts go on for up to 0.2 s, and what slides off an edge or a pole flies on for a while: the rebound is there
+# only when the vehicle flies off. A contact's last push, up to 0.02 s of it unheard, is in the estimate after this.
+LEFT_US = 50_000
 # A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
 TELLING_CHANGE_M_S = 1.0
 # Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
@@ -41,6 +44,12 @@ def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: V
     if size < TELLING_CHANGE_M_S or sum(p * m for p, m in zip(pushed_ned, moved, strict=True)) > AGREEING:
         return pushed_ned
     return moved
+
+
+def flies_off(sample: LocalPosition, contact: Contact, ended_boot_us: int) -> bool:
+    """Whether nothing pushes any more and the vehicle leaves the obstacle."""
+    off_m_s = split(sample.velocity_ned_m_s, contact.normal_ned)[0]
+    return off_m_s > 0.0 and sample.time_boot_us - ended_boot_us >= LEFT_US
 
 
 def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, since_s: float) -> Moving | None:

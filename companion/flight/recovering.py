@@ -16,10 +16,12 @@ from companion.flight.pinned import Hanging, has_room_below, let_go
 from companion.flight.rebound import (
     agreed_normal,
     believable,
+    flies_off,
     spin_rad_s,
     way_back,
 )
 from companion.flight.remembering import remembered_surfaces
+from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
 from companion.recovery.envelope import Envelope
@@ -61,6 +63,7 @@ class Recover:
         self._is_refined = not self._law.is_refined
         self._after_ned_m_s: Vector3 | None = None  # the first velocity after the contact
         self._refined_boot_us = self._record.sample_time_boot_us
+        self._leaves = True  # at the last refinement the contact was over, and the vehicle on its way off
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
@@ -145,7 +148,8 @@ class Recover:
         return self._is_believed
 
     def _refine(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """With the motion after the contact, once; while something goes on pushing, again and again."""
+        """With the motion after the contact, and again when it is over; while something pushes for long, ten times a
+        second."""
         record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
         if self._after_ned_m_s is None and since_us >= REBOUND_KNOWN_US:
@@ -154,20 +158,21 @@ class Recover:
         if self._law.is_refined and self._after_ned_m_s is not None:
             normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
             self._contact = replace(self._contact, normal_ned=normal)
-        was_refined = self._is_refined
-        if not was_refined and since_us >= REBOUND_KNOWN_US:
+        carried = self._is_refined and self._is_carried(flight, sample, now_us)
+        leaves = flies_off(sample, self._contact, record.contact_ended_boot_us)
+        if not self._is_refined and since_us >= REBOUND_KNOWN_US:
             self._is_refined = not self._coasts(flight, sample, since_us, now_us)
             if not self._is_refined:
                 return
-        elif not self._is_carried(flight, sample, now_us):
-            return
-        else:
+        elif carried:
             self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
-        self._refined_boot_us = sample.time_boot_us
+        elif self._leaves or not leaves:
+            return
+        self._refined_boot_us, self._leaves = sample.time_boot_us, leaves or carried
         motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
         if motion is None:
             return
-        if was_refined:
+        if carried:
             # From what pushes it along a vehicle comes clear only if it flies faster.
             motion = replace(
                 motion, velocity_ned_m_s=plus(motion.velocity_ned_m_s, CLEAR_M_S, self._contact.normal_ned)
@@ -258,7 +263,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         is_behind=behind is not None,
     )
     flight.collisions.append(record)
-    _tell_detection(flight, record, now_us)
+    tell_detection(flight, record, now_us)
 
 
 def _doubted(flight: FlightContext) -> CollisionRecord | None:
@@ -295,26 +300,3 @@ def _surfaces(law: RecoveryLaw, earlier: Sequence[CollisionRecord]) -> list[Surf
         distance_m = max(0.0, touched.off_m(wanted), touched.off_m(record.setpoint_ned_m))
         surfaces.append(replace(touched, distance_m=distance_m))
     return surfaces
-
-
-def _tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:
-    report = record.report()
-    text = (
-        f"hit {len(flight.collisions)}: {report.peak_specific_force_m_s2:.1f} m/s^2, v_c "
-        f"{as_text(report.impact_velocity_ned_m_s)} ({report.impact_speed_m_s:.2f} m/s) at "
-        f"{as_text(flight.mission_ned_m(report.position_ned_m))}; recovery setpoint "
-        f"{as_text(flight.mission_ned_m(record.setpoint_ned_m))}"
-    )
-    flight.tell(
-        now_us,
-        "detection",
-        text,
-        detector=report.detector,
-        sample_time_boot_us=report.sample_time_boot_us,
-        impact_velocity_ned_m_s=report.impact_velocity_ned_m_s,
-        impact_speed_m_s=report.impact_speed_m_s,
-        normal_ned=report.normal_ned,
-        specific_force_m_s2=report.peak_specific_force_m_s2,
-        position_ned_m=report.position_ned_m,
-        recovery_setpoint_ned_m=report.recovery_setpoint_ned_m,
-    )

@@ -8,7 +8,7 @@ From the motion x, v that follows the contact, with u = v . n the speed off the 
 that is, d_0 (clearance_m), and what a normal good to 10 degrees may take of it along the obstacle, or t_0 |v_c . n|
 (clearance_s) off the obstacle, further where the rebound would carry the vehicle further before it could stop, and
 along the obstacle where it comes to rest. v T / 2 is the length of a glide that only brakes. The way is a quintic from
-x, v to rest (way.Glide), sent with its velocity and acceleration, and T the shortest duration of at least 1 s for which
+x, v to rest (way.Glide), sent with its velocity and acceleration, and T the shortest duration from 1.25 s on for which
 its acceleration stays within a_max. At first the motion is the one expected: x(t_c), u = e |v_c . n| with the
 airframe's restitution e, v_t of the approach. It is measured once the contact is over, and goal and way found anew.
 """

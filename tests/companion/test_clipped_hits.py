@@ -4,7 +4,9 @@ import math
 
 import pytest
 
+from companion.detection.interface import Evidence, Impact, ImpactKind, Situation
 from companion.estimate.approach import VelocityFix
+from companion.estimate.impact import ImpactEstimator
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
@@ -12,6 +14,7 @@ from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
+from companion.mission.config import EstimateConfig
 from companion.mission.model import Mission
 from companion.recovery.height import NO_BRAKING, brake, level, thrown_down_m_s
 from companion.recovery.interface import Contact
@@ -32,9 +35,42 @@ def fixes(missing_m_s, until_us, every_us=33_000):
 
 
 def test_an_estimate_that_shows_the_rebound_is_believed_at_once_and_one_that_flies_into_the_wall_is_not():
-    assert is_believed(said(-0.6), (2.0, 0.0, 0.0), [SOUTH], (), 60_000)
+    assert is_believed(said(-0.7), (2.0, 0.0, 0.0), [SOUTH], (), 60_000)
     assert not is_believed(said(2.0), (2.0, 0.0, 0.0), [SOUTH], (), 60_000)
     assert not is_believed(said(-0.1), (2.0, 0.0, 0.0), [SOUTH], (), 60_000), "less than arms give back"
+    assert not is_believed(said(-0.4), (2.0, 0.0, 0.0), [SOUTH], (), 60_000), "arms that met their stops give back more"
+
+
+def test_a_hit_whose_push_was_not_seen_may_have_been_clipped():
+    estimator = ImpactEstimator(EstimateConfig())
+    impact = Impact(1_000_000, 980_000, (-5.0, 0.0, 0.0), ImpactKind.UNKNOWN, 1.0, Evidence.AFTERMATH)
+    assert estimator.begin(impact, Situation()).may_be_clipped
+
+
+def test_the_glide_begins_anew_when_a_slow_contact_is_over():
+    # Given arms that push for 0.15 s, while which the vehicle still flies in
+    slow = Mission.model_validate({"name": "slow", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
+    flight = FlightContext(slow, Vehicle(), StreamMonitor(slow.companion.streams))
+    flight.origin_ned_m = (0.0, 0.0, 0.0)
+    wall = Contact(1_000_000, (3.0, 0.0, -2.0), (1.0, 0.0, 0.0), SOUTH)
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.6, 0.0, -2.0), SOUTH, 20.0, 1_080_000, 1.2)
+    record.may_be_clipped = False
+    flight.collisions.append(record)
+    recover = Recover(flight, 0)
+
+    def hears(at_us, north_m, north_m_s):
+        sample = LocalPosition(1_000_000 + at_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
+        recover.step(flight, Inputs(positions=[sample]), at_us)
+        return recover.target(at_us)
+
+    assert hears(80_000, 3.05, 0.2).velocity_ned_m_s[0] == 0.0, "towards the wall is never asked for"
+    # When it has left the wall: not with the first sign of it, but when nothing pushes any more
+    record.contact_ended_boot_us = 1_150_000
+    assert hears(160_000, 3.02, -0.3).position_ned_m[0] > 3.04
+    anew = hears(220_000, 2.99, -0.5)
+    # Then the way goes on from there, once
+    assert (anew.position_ned_m[0], anew.velocity_ned_m_s[0]) == (pytest.approx(2.99), pytest.approx(-0.5))
+    assert hears(300_000, 2.90, -0.9).velocity_ned_m_s[0] > -0.7
 
 
 def test_while_the_estimate_is_put_right_it_is_not_believed_whatever_it_says():
