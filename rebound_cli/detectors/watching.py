@@ -30,6 +30,10 @@ SWEPT_FIELDS = {
         "rate_step_rad_s",
         "jolt_rad_s",
         "jolt_rad_s2",
+        "kick_rad_s",
+        "kick_rad_s2",
+        "spin_rad_s",
+        "spin_rad_s2",
     ),
 }
 
