@@ -235,14 +235,20 @@ class ImpactEstimator:
         return self.close() if self.is_over and not self._seeks else None
 
     def close(self) -> ImpactEstimate | None:
-        """The final estimate as it is known by now, where the contact is over and it was not told yet."""
+        """The final estimate, where the contact is over and it was not told yet: another hit does not wait, and what is
+        left of the search is done at once."""
         if self.estimate is None or self.estimate.is_final or not self.is_over:
             return None
+        while self.push is not None and self._seeks:
+            self._seek(self.push)
         self.estimate = replace(self.estimate, is_final=True)
         return self.estimate
 
     def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
         found = None if self.search is None else self.search.normal_ned
+        if found is not None and not push.clipped_at_once:
+            # What explains forces and turning before anything clipped does not need the way back.
+            return found
         if self.is_over:
             return whole_normal(push, found, velocity_ned_m_s)
         return normal_by(push, found or unit(push.impulse_ned_m_s), velocity_ned_m_s)

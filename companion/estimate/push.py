@@ -45,13 +45,14 @@ class Push:
     impulse_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     unconfirmed_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     shown: list[ImuSample] = field(default_factory=list)
-    """Those of the first hundredths of a second that did not clip."""
+    """Those of the first hundredths of a second, until one may have clipped; all of them where the first one may."""
     last_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
     peak_m_s2: float = 0.0
     samples: int = 0
     loud_boot_us: int = 0
     closed: bool = False
     clipped: bool = False
+    clipped_at_once: bool = False
     gap: bool = False
     first_size_m_s2: float = 0.0
     begun_boot_us: int | None = None
@@ -94,7 +95,8 @@ class Push:
         if first:
             self.first_boot_us = now_us
         self.clipped = self.clipped or may_have_clipped(f, self.range_m_s2)
-        if not self.clipped and now_us - self.first_boot_us <= LOOKED_AT_US:
+        self.clipped_at_once = self.clipped_at_once or (first and self.clipped)
+        if (not self.clipped or self.clipped_at_once) and now_us - self.first_boot_us <= LOOKED_AT_US:
             self.shown.append(sample)
         if loud:
             self._confirm(now_us, math.sqrt(frd[0] ** 2 + frd[1] ** 2 + frd[2] ** 2), contiguous)
@@ -115,7 +117,7 @@ class Push:
     def touch(self) -> Touch:
         """For the normal."""
         earlier = [] if self.earlier is None else [self.earlier]
-        return Touch(self.free_frd_m_s2, earlier + self.shown, self.attitudes)
+        return Touch(self.free_frd_m_s2, earlier + self.shown, self.attitudes, self.clipped_at_once)
 
     def _confirm(self, now_us: int, size_m_s2: float, contiguous: bool) -> None:
         """The sample and all since the last loud one belong to the contact."""

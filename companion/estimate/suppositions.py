@@ -26,7 +26,7 @@ FADING_S = 0.015
 SPAN_RAD, STEP_RAD = math.radians(40.0), math.radians(10.0)
 FRICTIONS, RADII_M = (0.05, 0.25), (0.04, 0.15)
 # The moment of the touch, as shares of the time between the sample before and the first that shows it.
-MOMENTS = (0.15, 0.5, 0.85)
+MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 # Of the guards, those that may meet a round: the fourth is behind the vehicle.
 FOREMOST = 3
 # A round is as likely as a flat obstacle, but three guards and two radii describe it: by so much is it held back.
@@ -41,6 +41,10 @@ RADIUS, RADIUS_SPREAD = math.log(0.1), 0.7
 AVERAGING_SPREAD_S = 0.0007
 # Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
 TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
+# Plastic on walls, wood and steel: rarely slippery, seldom beyond what the guards are made for.
+LIKELY_FRICTION, LIKELY_SPREAD = 0.25, 0.15
+# Of a force that may have been larger; the gyroscopes have shown what it turned, all the same.
+CLIPPED_SHARE = 0.3
 
 
 @dataclass(slots=True)
@@ -53,6 +57,8 @@ class Touch:
     """The last one before it, then those that show it."""
     attitudes: list[Attitude] = field(default_factory=list)
     """From before the touch on, the newest last."""
+    is_clipped: bool = False
+    """Whether the first of them that shows it may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,10 +111,11 @@ def known_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s:
     later = [told for told in touch.attitudes if zero_us <= told.time_boot_us <= zero_us + LOOKED_AT_US]
     rows: list[tuple[int, bool, Sequence[float], tuple[float, float]]] = []
     push, free = np.zeros(3), touch.free_frd_m_s2
+    share = CLIPPED_SHARE if touch.is_clipped else FORCE_SHARE
     for sample in touch.samples:
         f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
         force, turn = math.dist(f, free), math.dist(w, rates)
-        spread = (math.hypot(FORCE_M_S2, FORCE_SHARE * force), math.hypot(RATE_RAD_S, RATE_SHARE * turn))
+        spread = (math.hypot(FORCE_M_S2, share * force), math.hypot(RATE_RAD_S, RATE_SHARE * turn))
         rows.append((sample.time_boot_us, False, (*f, *w), spread))
         if sample is not before:
             fading = math.exp(-1e-6 * (sample.time_boot_us - zero_us) / FADING_S)
@@ -207,6 +214,7 @@ def residuals(known: Known, trials: Trials, values: Floats, doubt: float) -> Flo
         (values[:, g.RADIUS] - RADIUS) / RADIUS_SPREAD,
         (values[:, g.AVERAGING] - known.averaging_s) / AVERAGING_SPREAD_S,
         (friction - np.clip(friction, 0.0, g.MOST_FRICTION)) / FRICTION_SPREAD,
+        (friction - LIKELY_FRICTION) / LIKELY_SPREAD,
         *(np.maximum(tilts - TILT_RAD, 0.0) / TILT_SPREAD).T,
         np.where(trials.obstacles == g.FLAT, 0.0, down / UPRIGHT),
         np.where(trials.obstacles == g.FLAT, 0.0, math.sqrt(ROUND_MISFIT)),

@@ -71,8 +71,8 @@ class EstimateConfig(Written):
     # IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this.
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
     guards: GuardsConfig = GuardsConfig()
-    # The normal by what the touch did to the vehicle: some tens of milliseconds of one core, once, when a contact is
-    # over; off: the direction of the push.
+    # The normal by what the touch did to the vehicle: after a hit, some milliseconds of one core with each of the next
+    # ten messages; off: the direction of the push.
     fits_normal: bool = True
     # Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated.
     velocity_noise_m_s: Positive = 0.04

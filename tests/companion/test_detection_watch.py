@@ -69,7 +69,7 @@ def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_
     assert final.normal_ned == normal_ned
 
 
-def test_a_second_hit_that_cuts_a_search_short_leaves_the_first_estimate_as_it_was_known():
+def test_a_second_hit_before_a_search_is_over_has_it_ended_and_the_first_estimate_told():
     watch = start_watch(lateral(), 0)
     fly(watch, 1_000_000, hit)
     fly(watch, 1_024_000, hit, start_us=1_000_000)
@@ -78,7 +78,7 @@ def test_a_second_hit_that_cuts_a_search_short_leaves_the_first_estimate_as_it_w
     finished = [one for step in seen for one in step.finished]
     assert [step.impacts != () for step in seen] == [False, False, True]
     assert [one.impact.sample_time_boot_us for one in finished] == [1_000_000]
-    assert finished[0].is_final
+    assert finished[0].is_final and not watch.estimate.is_final
 
 
 def test_a_watch_survives_pickling_in_mid_flight():

@@ -174,6 +174,25 @@ def test_a_leaning_walls_normal_is_found_though_friction_holds_what_slides_along
     assert off_deg(found(heard, 0.0), true) < 10.0
 
 
+@pytest.mark.parametrize("slant_deg", [15.0, 25.0])
+def test_where_the_first_sample_may_have_clipped_the_turning_still_tells_the_normal(slant_deg):
+    """Given forces cut to half of what they were, when that is known to be possible, then they are not relied on."""
+    heard, true = touch(slant_deg, 0.3, 0.0)
+    forces = [sample.specific_force_frd_m_s2 for sample in heard.samples]
+    halved = [(0.5 * x, y, z) for x, y, z in forces]
+    cut = [replace(s, specific_force_frd_m_s2=f) for s, f in zip(heard.samples, halved, strict=True)]
+    assert off_deg(found(replace(heard, samples=cut, is_clipped=True), 0.0), true) < 10.0
+    relied_on = found(replace(heard, samples=cut), 0.0)
+    assert relied_on is None or off_deg(relied_on, true) > 10.0
+
+
+def test_a_push_that_may_have_clipped_is_looked_at_until_then_or_whole_where_it_did_at_once():
+    later = pushed([(-20.0, True), (-60.0, True), (-20.0, True)])
+    at_once = pushed([(-60.0, True), (-60.0, True), (-20.0, True)])
+    assert (len(later.touch.samples), later.touch.is_clipped) == (1, False)
+    assert (len(at_once.touch.samples), at_once.touch.is_clipped) == (3, True)
+
+
 def test_what_was_not_pushed_or_seen_has_no_normal():
     heard, _ = touch(15.0, 0.3, 0.0)
     assert normal_of(Touch(FREE), (0.0, 0.0, 0.0), GUARDS, 0.005) is None
@@ -252,7 +271,8 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
 
 def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_counts_to_heart():
     """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms; the sensor says a second later it clipped."""
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    # A push that is the same all the time is no spring arm's: nothing to fit.
+    watch = start_watch(CompanionConfig(detector="fused", estimate={"fits_normal": False}), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     finished, hit_us = [], 3_002_000
     for t in range(4_000, 4_400_000, 4_000):
