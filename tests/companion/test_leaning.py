@@ -147,6 +147,21 @@ def test_gusts_of_five_metres_a_second_are_nothing_in_the_way(tmp_path):
     assert told == [] and flight.report.collisions == ()
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85},
+        {"kind": "estimator_reset", "at_s": 10, "position_jump_ned_m": [0.8, 0, 0]},
+    ],
+    ids=["weak motor", "place that jumps"],
+)
+def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(tmp_path, fault):
+    slow = {"go_to": {"position_ned_m": [1, 0, -1.5], "speed_m_s": 0.3}}
+    flight, told = flown(tmp_path, [{"hold": {"duration_s": 3}}, slow], wind_ned_m_s=[2, 1, 0], faults=[fault])
+    assert flight.report.outcome == "completed"
+    assert told == [] and flight.report.collisions == ()
+
+
 @pytest.mark.parametrize("speed_m_s", [0.8, 1.3])
 def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(tmp_path, speed_m_s):
     # Given a hovering vehicle, struck by what goes on for two metres more
