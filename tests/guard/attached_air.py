@@ -21,8 +21,8 @@ from tests.guard.flying import ARM, EPOCH_US, SET_MODE, TAKEOFF, VELOCITY_ONLY, 
 
 # As MAVSDK's ground station.
 PROGRAM = (245, 190)
-# MAVSDK's Offboard repeats its last setpoint so often, for ever.
-REPEATED_EVERY_S = 0.05
+# MAVSDK's Offboard repeats its last setpoint every 50 ms, for ever; in whole intervals of 4 ms.
+REPEATED_EVERY_S = 0.052
 
 
 class AttachedAir:
