@@ -22,8 +22,8 @@ AHEAD_S = 0.1
 BEGUN_US = 200_000
 # Down, half of gravity: leaves thrust to steer with.
 FALL_M_S2 = 4.9
-# Away from the obstacle: with that thrust a lean of 30 degrees.
-AWAY_M_S2 = 2.8
+# Away from the obstacle: a lean of 30 degrees, as PX4 leans as if it hovered (MPC_ACC_DECOUPLE).
+AWAY_M_S2 = 5.6
 # What a fall is stopped with, hovering at 78 % of the thrust and not yet level, and what is to be left of the height.
 STOPPING_M_S2 = 2.0
 LEFT_M = 0.3

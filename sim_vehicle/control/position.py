@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Asked, Gains, State
-from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
+from sim_vehicle.physics.rotation import yaw_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -16,28 +16,33 @@ POSITION_LOOP_HZ = 100
 # from heading, and the vehicle flies off; so R_d asks for at most this much turn at a time.
 YAW_STEP_MAX_RAD = 0.5
 
+# Of all thrust, PX4's MPC_THR_MIN and MPC_THR_XY_MARG: with what a vehicle that is asked to fall still steers, and what
+# one that is asked to climb keeps for leaning.
+THRUST_MIN = 0.12
+HORIZONTAL_MARGIN = 0.3
+
 # Rows of `Asked`.
 ASK_POSITION, ASK_VELOCITY, ASK_ACCELERATION = range(3)
 
 
 @njit
-def position_control(state: State, mass_kg: float, asked: Asked, gains: Gains) -> None:
+def position_control(state: State, mass_kg: float, motor_max_n: float, asked: Asked, gains: Gains) -> None:
     """Set thrust f and attitude R_d of ``state`` from what is asked (NED, SI).
 
     The D acts on the measured slope only: the paper's d/dt e_v would kick at every new setpoint.
-    Eq. 6 gives a scalar f for the height; its three-axis form turns the asked acceleration into the
-    thrust direction, as in the paper's reference for the attitude (Lee et al., 2010).
+    Eq. 6 gives a scalar f for the height; its three-axis form becomes thrust and direction as PX4 has it.
     """
     step_s = 1.0 / POSITION_LOOP_HZ
     acceleration = np.empty(3)
     for axis in range(3):
         acceleration[axis] = _axis_acceleration(axis, state, asked, gains)
-    _limit_tilt(acceleration, gains.tilt_max_rad)
     if asked.yaw[1]:
         state.yaw_setpoint_rad = asked.yaw[0]
     else:
         state.yaw_setpoint_rad += asked.yaw[2] * step_s
-    _thrust_and_attitude(state, mass_kg, acceleration)
+    _thrust(acceleration, gains.tilt_max_rad, 4 * motor_max_n / mass_kg)
+    state.collective_n = mass_kg * math.sqrt(acceleration @ acceleration)
+    _attitude(state, acceleration)
 
 
 @njit
@@ -67,29 +72,28 @@ def _axis_acceleration(axis: int, state: State, asked: Asked, gains: Gains) -> f
 
 
 @njit
-def _limit_tilt(acceleration: Floats, tilt_max_rad: float) -> None:
-    """Scale the horizontal part so that the thrust leans at most ``tilt_max_rad``; height comes first."""
-    # Half of gravity: a vehicle must keep thrust to steer with even when asked to fall.
-    acceleration[2] = min(acceleration[2], 0.5 * GRAVITY_M_S2)
-    most = (GRAVITY_M_S2 - acceleration[2]) * math.tan(tilt_max_rad)
+def _thrust(acceleration: Floats, tilt_max_rad: float, most_m_s2: float) -> None:
+    """Turn what is asked into thrust over mass, of ``most_m_s2`` at most, NED; as `PositionControl.cpp` of PX4.
+
+    It leans as if it hovered (MPC_ACC_DECOUPLE) and thrusts so as to hold the height once it leans so, not as it leans
+    now: tipped onto a wall it presses with all of its weight. Where there is too little thrust, height comes first.
+    """
     horizontal = math.hypot(acceleration[0], acceleration[1])
-    if horizontal > most:
-        acceleration[0] *= most / horizontal
-        acceleration[1] *= most / horizontal
+    leant = min(horizontal / GRAVITY_M_S2, math.tan(tilt_max_rad))
+    up = max(GRAVITY_M_S2 - acceleration[2], THRUST_MIN * most_m_s2 / math.hypot(1.0, leant))
+    aside = up * leant
+    up = min(up, math.sqrt(most_m_s2**2 - min(aside, HORIZONTAL_MARGIN * most_m_s2) ** 2))
+    aside = min(aside, math.sqrt(max(most_m_s2**2 - up**2, 0.0)))
+    scale = aside / max(horizontal, 1e-9)
+    acceleration[0] *= scale
+    acceleration[1] *= scale
+    acceleration[2] = -up
 
 
 @njit
-def _thrust_and_attitude(state: State, mass_kg: float, acceleration: Floats) -> None:
-    """f = m (g e3 - a) . R e3 and R_d with b3 along g e3 - a and the nose towards the asked yaw."""
-    rotation = np.empty((3, 3))
-    matrix_from_quaternion(state.estimate, rotation)
-    b3 = np.empty(3)
-    for i in range(3):
-        b3[i] = -acceleration[i]
-    b3[2] += GRAVITY_M_S2
-    along = b3[0] * rotation[0, 2] + b3[1] * rotation[1, 2] + b3[2] * rotation[2, 2]
-    state.collective_n = max(0.0, mass_kg * along)
-    b3 /= math.sqrt(b3[0] * b3[0] + b3[1] * b3[1] + b3[2] * b3[2])
+def _attitude(state: State, thrust: Floats) -> None:
+    """R_d with b3 against the thrust and the nose towards the asked yaw."""
+    b3 = -thrust / math.sqrt(thrust @ thrust)
     yaw_now = yaw_of(state.estimate)
     error = state.yaw_setpoint_rad - yaw_now
     error -= 2 * math.pi * math.floor((error + math.pi) / (2 * math.pi))

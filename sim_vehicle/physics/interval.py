@@ -155,7 +155,7 @@ def run_loops(state: State, asked: Asked, constants: Constants) -> None:
         rest_loops(state)
     elif time_us * POSITION_LOOP_HZ >= state.position_loops * 1_000_000:
         state.position_loops = time_us * POSITION_LOOP_HZ // 1_000_000 + 1
-        position_control(state, constants.mass_kg, asked, constants)
+        position_control(state, constants.mass_kg, constants.motor_max_n, asked, constants)
     if time_us * ATTITUDE_LOOP_HZ >= state.attitude_loops * 1_000_000:
         state.attitude_loops = time_us * ATTITUDE_LOOP_HZ // 1_000_000 + 1
         if asked.level != ASKED_TRAJECTORY:

@@ -21,7 +21,8 @@ def trim(
 ) -> None:
     """Write the steady flight through a position (NED, m) at a velocity (NED, m/s) into the state.
 
-    The thrust carries the weight and the drag: R e3 lies along g e3 - a with m a = drag (eqs. 1 and 6).
+    The thrust carries the weight and the drag: R e3 lies along g e3 - a with m a = drag (eqs. 1 and 6). To lean so, a
+    vehicle that thrusts more than its weight is asked for less (`control.position`).
     """
     velocity = np.array(velocity_ned_m_s)
     acceleration = constants.drag_n_s_m * (velocity - disturbance.wind_ned_m_s) / constants.mass_kg
@@ -29,6 +30,7 @@ def trim(
     rotation = _leaning(upheld, yaw_rad)
     state.body[:] = [*position_ned_m, *velocity_ned_m_s, *_quaternion(rotation), 0.0, 0.0, 0.0]
     state.velocity_integral[:] = acceleration
+    state.velocity_integral[0:2] *= GRAVITY_M_S2 / upheld[2]
     state.attitude_setpoint[:] = rotation
     state.yaw_setpoint_rad = yaw_rad
     state.collective_n = constants.mass_kg * float(np.linalg.norm(upheld))

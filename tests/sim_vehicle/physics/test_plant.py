@@ -53,6 +53,27 @@ def test_it_holds_a_setpoint_and_a_heading(yaw_deg: float) -> None:
     assert abs(plant.state.body[6:10] @ [math.cos(half), 0, 0, math.sin(half)]) > 0.9999
 
 
+def test_a_tipped_vehicle_thrusts_as_it_would_to_hover() -> None:
+    """As PX4: the thrust is what holds the height once the vehicle leans as asked, not what does so now."""
+    plant = hovering(quiet(load_built_in("foldable")))
+    half = math.radians(75) / 2
+    plant.state.body[6:10] = [math.cos(half), 0, -math.sin(half), 0]
+    plant.state.body[10:13] = 0
+    flown(plant, at(0, 0, -2), 0.012)
+    assert plant.state.collective_n == pytest.approx(1.112 * 9.81, rel=0.05)
+
+
+@pytest.mark.parametrize(("down_m_s2", "leant_m_s2", "thrust_n"), [(20.0, 0.0, 0.12 * 14.016), (-20.0, 1.0, 14.016)])
+def test_thrust_ends_where_px4s_does(down_m_s2: float, leant_m_s2: float, thrust_n: float) -> None:
+    """MPC_THR_MIN of all thrust when asked to fall; all of it when asked to climb, and then it still leans a little."""
+    plant = hovering(quiet(load_built_in("foldable")))
+    asked = TrajectorySetpoint(NONE, NONE, (leant_m_s2, 0.0, down_m_s2), 0.0)
+    flown(plant, asked, 0.012)
+    assert plant.state.collective_n == pytest.approx(thrust_n, rel=0.01)
+    lean = plant.state.attitude_setpoint[0, 2] / plant.state.attitude_setpoint[2, 2]
+    assert (lean < -0.05) == (leant_m_s2 > 0.0)
+
+
 def test_a_step_of_the_setpoint_does_not_overshoot() -> None:
     plant = hovering(quiet(load_built_in("foldable")))
     flown(plant, at(1.0, 0, -2), 6)
