@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
+from companion.estimate.strapdown import Strapdown
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from
+from companion.recovery.height import Climb
 from companion.recovery.interface import Contact
 from companion.report import CollisionReport
 
@@ -41,6 +43,7 @@ class CollisionRecord:
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     impulse_m_s: float
+    climb: Climb
     doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
     inherits_doubt: bool = False  # from an earlier hit
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
@@ -52,6 +55,17 @@ class CollisionRecord:
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
+
+    def follow_climb(self, strapdown: Strapdown) -> bool:
+        """What accelerometer and gyroscopes show while the estimate is not believed; whether to brake it at once."""
+        if self.is_believed or not self.may_be_clipped:
+            return False
+        told_m_s = None
+        if self.fixes:
+            fix = self.fixes[-1]
+            told_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
+        self.climb.hear(strapdown, self.contact_ended_boot_us - self.sample_time_boot_us, told_m_s)
+        return self.climb.is_pressing
 
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()

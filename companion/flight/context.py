@@ -122,6 +122,7 @@ class FlightContext:
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
     target: Target | None = None  # as last streamed
+    is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold

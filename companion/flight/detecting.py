@@ -79,7 +79,9 @@ def _tell_held(flight: FlightContext, held: Held, sample: LocalPosition, now_us:
 def follow_contact(flight: FlightContext, watching: Watch) -> None:
     """Let the latest collision's record see the contact's course."""
     if flight.collisions:
-        flight.collisions[-1].follow_contact(watching.state, watching.estimate, watching.estimator.fixes)
+        record, estimator = flight.collisions[-1], watching.estimator
+        record.follow_contact(watching.state, watching.estimate, estimator.fixes)
+        flight.is_pressing = record.follow_climb(estimator.strapdown)
 
 
 def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

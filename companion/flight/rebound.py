@@ -7,7 +7,9 @@ from companion.flight.collision import horizontal_unit
 from companion.flight.context import FlightContext
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
-from companion.recovery.interface import Contact, Moving
+from companion.recovery.height import Climb
+from companion.recovery.interface import Contact, Moving, RecoveryLaw
+from companion.recovery.way import REST
 
 # A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
 REBOUND_SLACK_M_S = 0.5
@@ -19,6 +21,10 @@ LEFT_US = 50_000
 TELLING_CHANGE_M_S = 1.0
 # Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
 AGREEING = 0.87
+# Of a steady flight the speed up or down is known better by what was asked than by one estimate, four times its noise.
+AS_ASKED_M_S = 0.12
+# A guard that comes along the obstacle faster than this slides on it, and what the rates say of a throw is not so.
+LEVEL_M_S = 0.3
 
 
 def spin_rad_s(flight: FlightContext) -> float:
@@ -66,3 +72,16 @@ def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, sinc
     off_m_s, along = split(sample.velocity_ned_m_s, contact.normal_ned)
     # Still in contact, or the estimate is late: towards the obstacle is never asked for.
     return Moving(sample.position_ned_m, plus(along, max(0.0, off_m_s), contact.normal_ned))
+
+
+def climb_of(flight: FlightContext, law: RecoveryLaw, contact: Contact, hit_boot_us: int) -> Climb:
+    """How the vehicle moves up or down from a contact on; 0 m/s^2 upwards where nothing holds the height after it."""
+    mission = flight.mission
+    is_upright = law.is_refined and law.holds_height and contact.normal_ned[2] == 0.0
+    asked = flight.target.velocity_ned_m_s if flight.target is not None else None
+    asked_m_s, speed_m_s = (asked or REST)[2], contact.velocity_ned_m_s[2]
+    if abs(speed_m_s - asked_m_s) < AS_ASKED_M_S:
+        speed_m_s = asked_m_s
+    is_upright &= abs(speed_m_s) < LEVEL_M_S
+    upwards_m_s2 = mission.recovery.vertical_acceleration_m_s2 if is_upright else 0.0
+    return Climb(hit_boot_us, contact.normal_ned, mission.companion.estimate.reach_m, upwards_m_s2, speed_m_s)

@@ -16,6 +16,7 @@ from companion.flight.pinned import Hanging, has_room_below, let_go
 from companion.flight.rebound import (
     agreed_normal,
     believable,
+    climb_of,
     flies_off,
     spin_rad_s,
     way_back,
@@ -25,7 +26,7 @@ from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
 from companion.recovery.envelope import Envelope
-from companion.recovery.height import BRAKED_US, NO_BRAKING, THROWN_US, brake, level, thrown_down_m_s
+from companion.recovery.height import BRAKED_US, NO_BRAKING, brake, level
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
@@ -68,7 +69,6 @@ class Recover:
         self._is_believed = not self._law.is_refined
         self._spins = False
         self._hanging, self._may_fall = Hanging(), True
-        self._thrown_m_s = 0.0
         self._take(flight, self._law.expected(self._contact), now_us)
 
     def _take(self, flight: FlightContext, motion: Moving, now_us: int) -> None:
@@ -81,15 +81,18 @@ class Recover:
     def target(self, now_us: int) -> Target | None:
         if self._hanging.since_us is not None:
             place, leant = self._record.setpoint_ned_m, let_go(self._contact.normal_ned, self._may_fall)
+            self._record.climb.hold(leant[2])
             return Target(place, self._yaw_rad, REST, leant, leans_only=True, is_height_free=self._may_fall)
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
         if not self._is_believed:
-            motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
-            a, b, braking = motion.acceleration_ned_m_s2 or REST
+            climb = self._record.climb
+            braking = climb.braking_m_s2() if climb.is_reckoned else 0.0
+            is_new = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
+            motion = level(motion, self._record.setpoint_ned_m[2], braking)
+            a, b, _ = motion.acceleration_ned_m_s2 or REST
             leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
-            is_thrown = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
             velocity = motion.velocity_ned_m_s or REST
-            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_thrown)
+            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_new or climb.is_reckoned)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
         return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, motion.acceleration_ned_m_s2)
@@ -138,7 +141,7 @@ class Recover:
         if not self._law.is_refined or record.is_believed:
             return True
         if record.may_be_clipped:
-            self._brake_unseen(flight, sample)
+            self._look_at_spin(flight)
             since_us = sample.time_boot_us - record.doubted_since_boot_us
             normals = (self._contact.normal_ned, record.normal_ned)
             record.is_believed = since_us >= HEIGHT_KNOWN_US and is_believed(
@@ -189,20 +192,11 @@ class Recover:
         asked = self._way.at((now_us - self._way_began_us) * 1e-6)
         return is_carried(flight, self._record, self._contact.normal_ned, sample, asked)
 
-    def _brake_unseen(self, flight: FlightContext, sample: LocalPosition) -> None:
-        """By what the gyroscopes show of the hit: they do not clip."""
+    def _look_at_spin(self, flight: FlightContext) -> None:
         attitude = flight.vehicle.attitude
-        if attitude is None or attitude.angular_velocity_frd_rad_s is None:
-            return
-        rates_ned = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)
-        self._spins = abs(rates_ned[2]) > SPINNING_RAD_S
-        since_us = attitude.time_boot_us - self._record.sample_time_boot_us
-        climb = thrown_down_m_s(rates_ned, self._contact.normal_ned, flight.mission.companion.estimate.reach_m)
-        # Of a touch that follows, the turn is the first one's.
-        is_first = not self._record.inherits_doubt
-        if is_first and 0 < since_us <= THROWN_US and abs(climb) > abs(self._thrown_m_s):
-            self._thrown_m_s = climb
-            self._braking = brake(climb, flight.mission.recovery.vertical_acceleration_m_s2, self._started_us, 0.0)
+        if attitude is not None and attitude.angular_velocity_frd_rad_s is not None:
+            rates_ned = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)
+            self._spins = abs(rates_ned[2]) > SPINNING_RAD_S
 
     def _hold_height(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
         """From the first estimate on that can show what the hit did; the accelerometer, which it clips, cannot."""
@@ -260,6 +254,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         may_be_clipped=not estimate.is_final or estimate.may_be_clipped,
         doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
         inherits_doubt=doubted is not None,
+        climb=climb_of(flight, law, contact, impact.sample_time_boot_us) if doubted is None else doubted.climb,
         is_behind=behind is not None,
     )
     flight.collisions.append(record)

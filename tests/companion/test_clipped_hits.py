@@ -1,12 +1,14 @@
 """A hit that the accelerometer could not show whole: what is believed of the estimate, and when."""
 
 import math
+from collections.abc import Callable
 
 import pytest
 
 from companion.detection.interface import Evidence, Impact, ImpactKind, Situation
 from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import ImpactEstimator
+from companion.estimate.strapdown import Strapdown
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
@@ -16,7 +18,7 @@ from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
 from companion.mission.config import EstimateConfig
 from companion.mission.model import Mission
-from companion.recovery.height import NO_BRAKING, brake, level, thrown_down_m_s
+from companion.recovery.height import FALLING_MOST_M_S2, FOLDED_SHARE, NO_BRAKING, Climb, brake, level, thrown_down_m_s
 from companion.recovery.interface import Contact
 from companion.recovery.way import Motion
 
@@ -128,6 +130,72 @@ def test_a_nose_thrown_down_at_a_wall_ahead_throws_the_vehicle_up():
     assert thrown_down_m_s((3.5, 0.0, 0.0), (0.0, -1.0, 0.0), 0.2) == pytest.approx(-0.7)
 
 
+def climbing(upwards_m_s2: float = 3.0) -> Climb:
+    return Climb(1_000_000, SOUTH, 0.2, upwards_m_s2, 0.0)
+
+
+def heard(
+    climb: Climb, down_m_s2: Callable[[int], float], until_us: int = 600_000, told_m_s: float = 0.0
+) -> list[float]:
+    """What is asked for every 4 ms after a hit whose arms fold for 12 ms and throw the nose down at 3 rad/s."""
+    strapdown, asked, speed_m_s = Strapdown(), [], 0.0
+    for since_us in range(0, until_us, 4000):
+        speed_m_s += 0.004 * down_m_s2(since_us)
+        nose_rad_s = -3.0 * min(1.0, since_us / 12_000) * math.exp(-max(0, since_us - 12_000) / 50_000)
+        strapdown.time_boot_us, strapdown.rates_frd_rad_s = 1_000_000 + since_us, (0.0, nose_rad_s, 0.0)
+        # What the accelerometer makes of a contact that it clips counts for nothing.
+        strapdown.acceleration_ned_m_s2 = (-150.0 if since_us <= 12_000 else -3.0, 0.0, 0.0)
+        strapdown.sum_ned_m_s = (0.0, 0.0, speed_m_s + (40.0 * min(since_us, 12_000) * 1e-6))
+        climb.hear(strapdown, min(since_us, 12_000), told_m_s)
+        asked.append(climb.braking_m_s2())
+    return asked
+
+
+def test_a_throw_that_clipping_hid_is_braked_as_hard_as_a_vehicle_falls_and_no_longer():
+    """The vehicle does what it is asked with 0.03 s of lag: the climb ends, and no fall comes of it."""
+    climb, thrown_m_s = climbing(), -FOLDED_SHARE * 0.2 * 3.0
+    asked: list[float] = []
+    done = [0.0]
+
+    def follows(since_us: int) -> float:
+        done[0] += 4 / 30 * ((climb.asked_m_s2) - done[0])
+        asked.append(climb.asked_m_s2)
+        return done[0] if since_us > 12_000 else 0.0
+
+    heard(climb, follows, until_us=440_000)
+    assert climb.thrown_m_s == pytest.approx(thrown_m_s)
+    assert max(asked) == FALLING_MOST_M_S2
+    assert abs(climb.speed_m_s) < 0.03
+    assert -0.04 < climb.fallen_m < -0.01
+    assert asked[-1] == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_brake_cannot_wait_for_the_next_setpoints_turn():
+    climb = climbing()
+    strapdown = Strapdown(time_boot_us=1_008_000, rates_frd_rad_s=(0.0, -3.0, 0.0))
+    climb.hear(strapdown, 8_000)
+    assert climb.is_pressing
+    climb.braking_m_s2()
+    assert not climb.is_pressing
+
+
+def test_a_climb_that_is_not_to_be_braked_is_not():
+    climb = climbing(upwards_m_s2=0.0)
+    climb.hear(Strapdown(time_boot_us=1_008_000, rates_frd_rad_s=(0.0, -3.0, 0.0)), 8_000)
+    assert not climb.is_reckoned
+    assert not climb.is_pressing
+
+
+def test_half_a_second_later_the_estimate_counts_again():
+    """What was reckoned of the hit may be wrong by 0.1 m/s, which grows to a decimetre."""
+    climb = climbing()
+    heard(climb, lambda _: 0.0, until_us=440_000)
+    reckoned_m_s = climb.speed_m_s
+    heard(again := climbing(), lambda _: 0.0, until_us=900_000, told_m_s=0.0)
+    assert reckoned_m_s < -0.3
+    assert abs(again.speed_m_s) < 0.5 * abs(reckoned_m_s)
+
+
 def test_height_is_the_only_thing_that_levelling_changes():
     motion = Motion((1.0, 2.0, -3.0), (0.5, 0.6, 0.7), (0.1, 0.2, 0.3))
     assert level(motion, -2.0, 1.5) == Motion((1.0, 2.0, -2.0), (0.5, 0.6, 0.0), (0.1, 0.2, 1.5))
@@ -140,7 +208,7 @@ def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
     flight = FlightContext(falling, Vehicle(), StreamMonitor(falling.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
     wall = Contact(1_000_000, (3.0, 0.0, -2.0), (2.0, 0.0, 0.0), SOUTH)
-    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.0, 0.0, -2.0), SOUTH, 150.0, 1_000_000, 2.0)
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.0, 0.0, -2.0), SOUTH, 150.0, 1_000_000, 2.0, climbing())
     record.doubted_since_boot_us = 1_000_000
     flight.collisions.append(record)
     recover = Recover(flight, 0)
