@@ -22,8 +22,8 @@ class RecoveryConfig(Written):
     # wavering of a hover on optical flow takes 5 cm.
     clearance_m: Positive = 0.35
     # More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
-    # trimmed against the drag of its approach stops short by, up to 0.04 s times v_c in simulation.
-    clearance_s: NotNegative = 0.29
+    # trimmed against the drag of its approach stops short by, up to 0.06 s times v_c in simulation.
+    clearance_s: NotNegative = 0.31
     # PX4's MPC_ACC_HOR: a tilt of 17 degrees, which leaves a vehicle that hovers at 78 % of its thrust its height.
     acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 3.0
     # Besides the vehicle's own loop, against climbing or falling after a hit. Hovering at 78 % of the thrust leaves

@@ -55,7 +55,7 @@ def test_the_glide_begins_anew_when_a_slow_contact_is_over():
     flight = FlightContext(slow, Vehicle(), StreamMonitor(slow.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
     wall = Contact(1_000_000, (3.0, 0.0, -2.0), (1.0, 0.0, 0.0), SOUTH)
-    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.6, 0.0, -2.0), SOUTH, 20.0, 1_080_000, 1.2)
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.6, 0.0, -2.0), SOUTH, 20.0, 1_080_000, 1.2, climbing())
     record.may_be_clipped = False
     flight.collisions.append(record)
     recover = Recover(flight, 0)

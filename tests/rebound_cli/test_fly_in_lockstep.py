@@ -70,7 +70,7 @@ def test_the_companion_sees_the_hit_and_the_setpoint_goes_back_from_it(wall_flig
     at_target = abs(log.setpoint_ned_m - target).max(axis=1) < 0.002
     # Then the recovery setpoint was sent for some seconds, half a second times 2 m/s in front of the hit
     assert at_target.sum() > 50
-    assert log.position_ned_m[:, 0].max() - target[0] == pytest.approx(0.29 * 2.0, abs=0.1)
+    assert log.position_ned_m[:, 0].max() - target[0] == pytest.approx(0.31 * 2.0, abs=0.1)
 
 
 def test_the_usual_tools_read_the_log(wall_flight):
