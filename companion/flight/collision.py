@@ -58,7 +58,7 @@ class CollisionRecord:
 
     def follow_climb(self, strapdown: Strapdown) -> bool:
         """What accelerometer and gyroscopes show while the estimate is not believed; whether to brake it at once."""
-        if self.is_believed or not self.may_be_clipped:
+        if self.is_believed or self.is_over or not self.may_be_clipped:
             return False
         told_m_s = None
         if self.fixes:
