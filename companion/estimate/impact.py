@@ -246,11 +246,10 @@ class ImpactEstimator:
 
     def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
         found = None if self.search is None else self.search.normal_ned
-        if found is not None and not push.clipped_at_once:
-            # What explains forces and turning before anything clipped does not need the way back.
-            return found
-        if self.is_over:
+        explains_alone = found is not None and not push.clipped_at_once
+        if self.is_over and not explains_alone:
             return whole_normal(push, found, velocity_ned_m_s)
+        # What explains forces and turning before anything clipped is not averaged with the way back.
         return normal_by(push, found or unit(push.impulse_ned_m_s), velocity_ned_m_s)
 
     def _refined(self, estimate: ImpactEstimate, push: Push) -> ImpactEstimate:

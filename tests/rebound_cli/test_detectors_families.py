@@ -143,3 +143,12 @@ def test_the_default_detector_finds_them_and_lets_hands_be():
     for at_rate in work_out_hand(draw_hand(6, ("fused",)))["rates"].values():
         entry = at_rate["detectors"]["fused"]
         assert entry["collisions"] == [] and entry["told_after_ms"] is not None
+
+
+def test_the_echo_of_a_stiff_hit_does_not_turn_the_obstacle_round():
+    # Given a rigid frame's head-on hit of 2.7 m/s that fell between the samples of 50 Hz but for a faint echo
+    scored = work_out_hit(draw_case("plain", 11, ("fused",)))
+    fused = scored["rates"]["50"]["detectors"]["fused"]
+    # Then it is found, and the normal is that of something in the vehicle's way, whatever the echo would explain
+    assert fused["evidence"] == "force" and scored["off_head_on_deg"] < 5.0
+    assert fused["normal_error_deg"] < 20.0
