@@ -35,6 +35,13 @@ def push_of(s: FusedState, side_m_s2: float, f_z: float, room_m_s2: float) -> fl
     return side if side > along else along
 
 
+def pushes_on(s: FusedState, force_frd_m_s2: Vector3) -> bool:
+    """Whether the sample before was pushed the same way, as by a contact; what shakes goes to and fro."""
+    x, y, z = s.soft.last
+    f_x, f_y, f_z = force_frd_m_s2
+    return (x - s.floor.x) * f_x + (y - s.floor.y) * f_y + (z - s.floor.z) * f_z > 0.0
+
+
 def is_jolt(s: FusedState, config: FusedConfig) -> bool:
     """Turned by more than motors and its own shaking can, and pushed, or pushed in the sample before: its window may
     have ended in the middle of the contact."""

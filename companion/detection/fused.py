@@ -22,7 +22,14 @@ from typing import ClassVar
 from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
 from companion.detection.floor import SETTLED_US
-from companion.detection.force_signs import CLEAR, is_jolt, push_of, side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import (
+    CLEAR,
+    is_jolt,
+    push_of,
+    pushes_on,
+    side_threshold_m_s2,
+    vertical_threshold_m_s2,
+)
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.hidden_signs import Hidden, dipped, kicked, spun, velocity_jump
@@ -184,8 +191,10 @@ class FusedDetector:
             if soft.looked_at_us(now_us, free_until_us) < self._soft_us:
                 return None
             kind = ImpactKind.CONTACT
-        elif is_doubtful and (s.threshold_m_s2 > BLIND_M_S2 or soft.looked_at_us(now_us, free_until_us) == 0):
-            return None
+        elif is_doubtful:
+            is_first = soft.looked_at_us(now_us, free_until_us) == 0
+            if is_first or s.threshold_m_s2 > BLIND_M_S2 or not pushes_on(s, force):
+                return None
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
     def _fire(

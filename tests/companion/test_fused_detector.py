@@ -238,6 +238,8 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert [i.sample_time_boot_us for i in twice.fly()] in ([3_004_000], [3_008_000])
     strong = Flight(pulse((0.0, 100.0, 0.0), 3_000_500, 4_000), noise=1.5)
     assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
+    to_and_fro = Flight(lambda t: (0.0, {750: 10.0, 751: -10.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
+    assert to_and_fro.fly() == []
 
 
 def test_the_gyroscope_of_a_vehicle_that_shakes_makes_no_graze_of_its_shaking():
