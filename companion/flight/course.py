@@ -21,6 +21,8 @@ from companion.mission.items import (
 
 # What is left of the speeding up against a strong wind: 4 m/s after ten seconds.
 LEAST_SPEEDING_UP_M_S2 = 0.4
+# Another try that is slower than this may touch without being noticed, and push until its time is over.
+LEAST_TRY_M_S = 0.3
 
 # Speed, acceleration, and that while the speed grows.
 Limits: TypeAlias = tuple[float, float, float]
@@ -58,7 +60,11 @@ class Pace:
         """Speed and acceleration of an item, or else its pace's; how fast it may speed up."""
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
         acceleration = self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
-        return speed * self.factor, acceleration, self.speeding_up_m_s2
+        return self.slowed_m_s(speed), acceleration, self.speeding_up_m_s2
+
+    def slowed_m_s(self, speed_m_s: float) -> float:
+        """A speed in another try."""
+        return max(speed_m_s * self.factor, min(speed_m_s, LEAST_TRY_M_S))
 
 
 def climb(start_m: Vector3, height_m: float, config: FlightConfig) -> LineProfile:
@@ -108,7 +114,7 @@ def _with_velocity(item: VelocityItem, start_m: Vector3, pace: Pace) -> LineProf
     growth = min(braking, speeding_up / math.hypot(n, e)) if (n, e) != (0.0, 0.0) else braking
     # With ramps of top / acceleration at both ends; a time too short for the speed is all ramps.
     ramps_s2_per_m = 0.5 / growth + 0.5 / braking
-    top = min(speed * pace.factor, 0.5 * item.duration_s / ramps_s2_per_m)
+    top = min(pace.slowed_m_s(speed), 0.5 * item.duration_s / ramps_s2_per_m)
     length = top * (item.duration_s - top * ramps_s2_per_m)
     target = (start_m[0] + n * length, start_m[1] + e * length, start_m[2] + d * length)
     return LineProfile(start_m, target, top, braking, speeding_up)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from companion.flight import expecting
 from companion.flight.around import passed, way_around
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.course import climb, first_leg, stay
+from companion.flight.course import LEAST_TRY_M_S, climb, first_leg, stay
 from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
@@ -63,7 +63,8 @@ class FlyItems:
                 self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
             case SetSpeedItem():
                 flight.pace = flight.pace.changed_to(self._action)
-        again = "" if flight.tally.pace_factor == 1.0 else f", at {flight.tally.pace_factor:.0%} of the speed"
+        factor = flight.tally.pace_factor
+        again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
         flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)

@@ -397,6 +397,15 @@ def test_on_the_ground_nothing_is_a_hit():
     assert flight.state.describe() == "off (on the ground)"
 
 
+@pytest.mark.parametrize(("step_m_s", "impacts"), [(0.25, 1), (0.6, 2)])
+def test_what_an_estimator_puts_right_after_a_hit_is_no_second_one(step_m_s, impacts):
+    # Given a hit, and velocities that 0.4 s later step without a force: by what had been missed, or as a hit makes them
+    hit = Flight(pulse((-60.0, 0.0, 0.0), length_us=20_000), jump=(3_400_000, (step_m_s, 0.0, 0.0), 0))
+    assert len(hit.fly()) == impacts
+    # Then without the hit either step is one
+    assert len(Flight(jump=(3_400_000, (step_m_s, 0.0, 0.0), 0)).fly()) == 1
+
+
 def test_one_contact_is_one_impact_and_a_shaking_that_stays_is_learnt():
     loud = Flight(lambda t: (20.0 * math.sin(t * 1e-3), 0.0, 0.0) if t > HIT_US else (0.0, 0.0, 0.0))
     assert len(loud.fly(8_000_000)) == 1

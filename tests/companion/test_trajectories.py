@@ -129,3 +129,11 @@ def test_a_head_wind_takes_its_part_of_the_lean_for_speeding_up():
     # and a pace that is slower than that already stays what it is
     assert Pace(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.2)
     assert pace.against((1.2, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("speed_m_s", "tried_m_s"), [(2.0, 0.5), (0.8, 0.3), (0.2, 0.2)])
+def test_another_try_is_slower_but_not_so_slow_that_nobody_notices_the_touch(speed_m_s, tried_m_s):
+    assert Pace(speed_m_s, 2.0, factor=0.25).limits(None, None)[0] == pytest.approx(tried_m_s)
+    velocity = VelocityItem(velocity_ned_m_s=(speed_m_s, 0.0, 0.0), duration_s=20.0)
+    way = way_of(velocity, (0.0, 0.0, -2.0), Pace(1.0, 2.0, factor=0.25))
+    assert way.at(10.0)[1][0] == pytest.approx(tried_m_s)
