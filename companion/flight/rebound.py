@@ -3,11 +3,12 @@
 import math
 
 from companion.detection.classify import HOVER_M_S
+from companion.estimate.rotation import body_to_ned
 from companion.flight.collision import horizontal_unit
 from companion.flight.context import FlightContext
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
-from companion.recovery.height import Climb
+from companion.recovery.height import Climb, most_thrown_m_s
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.way import REST
 
@@ -84,4 +85,8 @@ def climb_of(flight: FlightContext, law: RecoveryLaw, contact: Contact, hit_boot
         speed_m_s = asked_m_s
     is_upright &= abs(speed_m_s) < LEVEL_M_S
     upwards_m_s2 = mission.recovery.vertical_acceleration_m_s2 if is_upright else 0.0
-    return Climb(hit_boot_us, contact.normal_ned, mission.companion.estimate.reach_m, upwards_m_s2, speed_m_s)
+    reach_m, most_m_s = mission.companion.estimate.reach_m, math.inf
+    if flight.vehicle.attitude is not None:
+        thrust_ned = body_to_ned(flight.vehicle.attitude.attitude_wxyz, (0.0, 0.0, -1.0))
+        most_m_s = most_thrown_m_s(*(-split(v, contact.normal_ned)[0] for v in (contact.velocity_ned_m_s, thrust_ned)))
+    return Climb(hit_boot_us, contact.normal_ned, reach_m, upwards_m_s2, speed_m_s, most_m_s)

@@ -18,7 +18,16 @@ from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
 from companion.mission.config import EstimateConfig
 from companion.mission.model import Mission
-from companion.recovery.height import FALLING_MOST_M_S2, FOLDED_SHARE, NO_BRAKING, Climb, brake, level, thrown_down_m_s
+from companion.recovery.height import (
+    FALLING_MOST_M_S2,
+    FOLDED_SHARE,
+    NO_BRAKING,
+    Climb,
+    brake,
+    level,
+    most_thrown_m_s,
+    thrown_down_m_s,
+)
 from companion.recovery.interface import Contact
 from companion.recovery.way import Motion
 
@@ -168,6 +177,18 @@ def test_a_throw_that_clipping_hid_is_braked_as_hard_as_a_vehicle_falls_and_no_l
     assert abs(climb.speed_m_s) < 0.03
     assert -0.04 < climb.fallen_m < -0.01
     assert asked[-1] == pytest.approx(0.0, abs=0.5)
+
+
+def test_a_pole_that_spins_the_vehicle_does_not_make_it_fall():
+    # Given a hit of 1.4 m/s at a lean of 15 degrees on one guard, whose rates look like a throw of 0.4 m/s
+    climb = climbing()
+    climb.most_m_s = most_thrown_m_s(1.4, 0.26)
+    heard(climb, lambda _: 0.0, until_us=40_000)
+    # Then no more is taken for a throw than so soft a hit makes; a vehicle that did not lean was not thrown up at all
+    assert climb.thrown_m_s == pytest.approx(-climb.most_m_s) and climb.most_m_s < 0.15
+    assert most_thrown_m_s(5.0, -0.1) == most_thrown_m_s(0.0, 0.2) < 0.06
+    # and the throw of a hit at 5 m/s is not cut
+    assert most_thrown_m_s(4.9, 0.156) > 0.6
 
 
 def test_a_brake_cannot_wait_for_the_next_setpoints_turn():

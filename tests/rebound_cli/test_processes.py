@@ -24,7 +24,9 @@ def test_results_come_in_the_order_of_the_items():
 
 def test_ctrl_c_ends_everything_and_only_the_first_process_hears_it(tmp_path):
     (tmp_path / "waiting.py").write_text(WORK)
-    program = "import waiting\nfrom rebound_cli.processes import in_processes\n"
+    # A shell lets what it runs in the background ignore Ctrl-C, these tests too; this program is not to inherit that.
+    program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program += "import waiting\nfrom rebound_cli.processes import in_processes\n"
     program += "if __name__ == '__main__':\n    in_processes(waiting.wait, [0, 60, 60, 60], 2)\n"
     (tmp_path / "program.py").write_text(program)
     path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
