@@ -17,12 +17,8 @@ def in_processes(work: Callable[[Item], Result], items: Sequence[Item], jobs: in
     results = [work(items[0])]
     with ctrl_c_waiting() as pressed:
         pool = multiprocessing.get_context("spawn").Pool(jobs)
-    try:
+    with pool:
         if pressed:
             raise KeyboardInterrupt
         results.extend(with_progress(pool.imap(work, items[1:]), len(items) - 1))
-    finally:
-        # A second Ctrl-C must not cut the end short: the pool would begin new processes for those that were ended.
-        with ctrl_c_waiting():
-            pool.terminate()
     return results
