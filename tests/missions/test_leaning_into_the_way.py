@@ -6,6 +6,7 @@ from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.random_missions.campaign import MissionCase, work_out_mission
 from rebound_cli.random_missions.crashes import tilts_deg
 from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
@@ -86,3 +87,11 @@ def test_against_a_wind_it_speeds_up_by_what_that_leaves_of_the_lean(tmp_path):
     # Then it leans as much as it would without the wind, for longer
     assert tilts_deg(series["attitude_wxyz"])[begun:fast].max() < 11.0
     assert flight.report.outcome == "completed"
+
+
+def test_a_pole_that_spins_a_rigid_vehicle_is_not_braked_as_a_throw():
+    # Given a random mission in which a pole meets one guard at 1.5 m/s and a lean of 15 degrees
+    hit = work_out_mission(MissionCase(seed=11905, airframe="rigid", feed_forward=True))["hits"][0]
+    assert hit["kind"] == "pole" and 1.3 < hit["speed_m_s"] < 1.6
+    # Then the height stays: taken for a throw of 0.8 m/s, the spin would be braked into a fall of 0.36 m
+    assert hit["lost_m"] < 0.1 and hit["risen_m"] < 0.1
