@@ -28,12 +28,6 @@ AS_ASKED_M_S = 0.12
 LEVEL_M_S = 0.3
 
 
-def spin_rad_s(flight: FlightContext) -> float:
-    attitude = flight.vehicle.attitude
-    rates = None if attitude is None else attitude.angular_velocity_frd_rad_s
-    return 0.0 if rates is None else abs(rates[2])
-
-
 def way_back(velocity_ned_m_s: Vector3) -> Vector3:
     """Where a vehicle that flew with this velocity came from; zero for one that hovered."""
     n, e, _ = velocity_ned_m_s

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards
 from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, overtaken
@@ -18,10 +17,10 @@ from companion.flight.rebound import (
     believable,
     climb_of,
     flies_off,
-    spin_rad_s,
     way_back,
 )
 from companion.flight.remembering import remembered_surfaces
+from companion.flight.spinning import Steering, coming_to_rest, is_spinning
 from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
@@ -30,7 +29,7 @@ from companion.recovery.height import BRAKED_US, NO_BRAKING, brake, level
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
-from companion.recovery.way import REST, Coast, Way
+from companion.recovery.way import REST, Way
 
 # The motion after the contact is read this long after the hit's first sample. Head-on, spring arms push for 15 ms at
 # 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
@@ -40,14 +39,6 @@ REBOUND_KNOWN_US = 80_000
 REBOUND_LATEST_US = 200_000
 # A vehicle's estimate is up to 0.02 s late (see estimate.approach).
 HEIGHT_KNOWN_US = 15_000
-# A glancing hit on one guard spins the vehicle, at 5 m/s with up to 16 rad/s. What it leans to is then turned away from
-# what was asked by rate times lag: 6 rad/s times 0.2 s are 70 degrees. Braking so would throw it about and let it fall
-# by metres; it coasts until it spins slower, which takes up to a second.
-SPINNING_RAD_S = 6.0
-SPINNING_MOST_US = 1_000_000
-# Coasting leaves room to brake in before the fence: half a second's way.
-COASTED_S = 0.5
-ROUNDING_M = 1e-3
 
 
 class Recover:
@@ -68,6 +59,7 @@ class Recover:
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
+        self._steering: Steering | None = None  # while it spins
         self._hanging, self._may_fall = Hanging(), True
         self._take(flight, self._law.expected(self._contact), now_us)
 
@@ -83,6 +75,10 @@ class Recover:
             place, leant = self._record.setpoint_ned_m, let_go(self._contact.normal_ned, self._may_fall)
             self._record.climb.hold(leant[2])
             return Target(place, self._yaw_rad, REST, leant, leans_only=True, is_height_free=self._may_fall)
+        if self._steering is not None:
+            a, b = self._steering.acceleration_m_s2
+            leant = (a, b, self._braking.at(now_us))
+            return Target(self._record.setpoint_ned_m, self._yaw_rad, REST, leant, leans_only=True)
         motion = self._way.at((now_us - self._way_began_us) * 1e-6)
         if not self._is_believed:
             climb = self._record.climb
@@ -107,7 +103,7 @@ class Recover:
             self._hold_height(flight, sample, now_us)
             self._refine(flight, sample, now_us)
             since_us = self._monitor.settled_since(sample)
-            if since_us is not None:
+            if since_us is not None and self._steering is None:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.tell(now_us, "recovered", record.recovered_text(), **figures)
@@ -141,7 +137,7 @@ class Recover:
         if not self._law.is_refined or record.is_believed:
             return True
         if record.may_be_clipped:
-            self._look_at_spin(flight)
+            self._spins = is_spinning(flight)
             since_us = sample.time_boot_us - record.doubted_since_boot_us
             normals = (self._contact.normal_ned, record.normal_ned)
             record.is_believed = since_us >= HEIGHT_KNOWN_US and is_believed(
@@ -163,10 +159,11 @@ class Recover:
             self._contact = replace(self._contact, normal_ned=normal)
         carried = self._is_refined and self._is_carried(flight, sample, now_us)
         leaves = flies_off(sample, self._contact, record.contact_ended_boot_us)
+        if self._law.is_refined and since_us >= REBOUND_KNOWN_US and self._steers(flight, sample, since_us, now_us):
+            self._is_refined = False
+            return
         if not self._is_refined and since_us >= REBOUND_KNOWN_US:
-            self._is_refined = not self._coasts(flight, sample, since_us, now_us)
-            if not self._is_refined:
-                return
+            self._is_refined = True
         elif carried:
             self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
         elif self._leaves or not leaves:
@@ -192,12 +189,6 @@ class Recover:
         asked = self._way.at((now_us - self._way_began_us) * 1e-6)
         return is_carried(flight, self._record, self._contact.normal_ned, sample, asked)
 
-    def _look_at_spin(self, flight: FlightContext) -> None:
-        attitude = flight.vehicle.attitude
-        if attitude is not None and attitude.angular_velocity_frd_rad_s is not None:
-            rates_ned = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)
-            self._spins = abs(rates_ned[2]) > SPINNING_RAD_S
-
     def _hold_height(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
         """From the first estimate on that can show what the hit did; the accelerometer, which it clips, cannot."""
         record = self._record
@@ -208,21 +199,21 @@ class Recover:
             most_m_s2 = flight.mission.recovery.vertical_acceleration_m_s2
             self._braking = brake(sample.velocity_ned_m_s[2], most_m_s2, now_us)
 
-    def _coasts(self, flight: FlightContext, sample: LocalPosition, since_us: int, now_us: int) -> bool:
-        """Go on as it flies, level and inside the fence, while the vehicle spins."""
-        origin = flight.origin_ned_m
-        if spin_rad_s(flight) < SPINNING_RAD_S or since_us >= SPINNING_MOST_US or origin is None:
+    def _steers(self, flight: FlightContext, sample: LocalPosition, since_us: int, now_us: int) -> bool:
+        """Gently to rest while the vehicle spins."""
+        attitude, record = flight.vehicle.attitude, self._record
+        if attitude is None or not is_spinning(flight):
+            self._steering = None
             return False
-        motion = believable(sample, self._contact, self._record.impulse_m_s, since_us * 1e-6)
-        if motion is None:
-            return False
-        (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
-        start, velocity = (n, e, self._contact.position_ned_m[2]), (u, v, 0.0)
-        way = Coast(start, velocity, self._record.setpoint_ned_m)
-        ahead = way.at(COASTED_S).position_ned_m
-        if math.dist(Envelope(origin, flight.mission.fence).clamp(start, ahead), ahead) > ROUNDING_M:
-            return False
-        self._way, self._way_began_us = way, now_us
+        if self._steering is None:
+            motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
+            if motion is None:
+                return False
+            rest = coming_to_rest(motion.position_ned_m, motion.velocity_ned_m_s, self._contact.position_ned_m[2])
+            record.setpoint_ned_m = _allowed(flight, self._law, self._contact, rest, flight.collisions[:-1])
+            self._steering = Steering(record.setpoint_ned_m)
+            self._take(flight, motion, now_us)
+        self._steering.step(sample, attitude)
         return True
 
 
@@ -276,11 +267,17 @@ def _law(flight: FlightContext) -> RecoveryLaw:
 def _setpoint(
     flight: FlightContext, law: RecoveryLaw, contact: Contact, motion: Moving, earlier: Sequence[CollisionRecord]
 ) -> Vector3:
-    """The law's goal, as what is around lets it be."""
+    return _allowed(flight, law, contact, law.goal_ned_m(contact, motion), earlier)
+
+
+def _allowed(
+    flight: FlightContext, law: RecoveryLaw, contact: Contact, goal: Vector3, earlier: Sequence[CollisionRecord]
+) -> Vector3:
+    """The goal, as what is around lets it be."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
     surfaces = [*_surfaces(law, earlier), *remembered_surfaces(flight, contact)]
     room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), surfaces)
-    return room.goal(contact.position_ned_m, contact.normal_ned, law.goal_ned_m(contact, motion))
+    return room.goal(contact.position_ned_m, contact.normal_ned, goal)
 
 
 def _surfaces(law: RecoveryLaw, earlier: Sequence[CollisionRecord]) -> list[Surface]:

@@ -51,20 +51,6 @@ class AtOnce:
 
 
 @dataclass(frozen=True, slots=True)
-class Coast:
-    """On as it flies, so that nothing is asked of the thrust but to carry the vehicle."""
-
-    start_ned_m: Vector3
-    velocity_ned_m_s: Vector3
-    goal_ned_m: Vector3
-
-    def at(self, elapsed_s: float) -> Motion:
-        (x, y, z), (u, v, w) = self.start_ned_m, self.velocity_ned_m_s
-        place = (x + elapsed_s * u, y + elapsed_s * v, z + elapsed_s * w)
-        return Motion(place, self.velocity_ned_m_s, REST)
-
-
-@dataclass(frozen=True, slots=True)
 class Glide:
     """From x_0 with velocity v_0 to rest at the goal x_1 after T, without acceleration at either end.
 
