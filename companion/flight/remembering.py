@@ -78,7 +78,9 @@ def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[
     touches = []
     for record in records:
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
-        touch = touch_of(centre, velocity, record.normal_ned, record.is_clipped, reach_m, record.detected_at_us)
+        touch = touch_of(
+            centre, velocity, record.normal_ned, record.is_clipped, reach_m, record.detected_at_us, record.is_behind
+        )
         touches += [] if touch is None else [touch]
     return touches
 

@@ -20,6 +20,9 @@ LEAST_CLIPPED = 0.5
 # Slower than this a hit came to the vehicle: it moves, or blew past, and will not stand there as a wall does. It is
 # remembered where it was, and believed to be no larger.
 LEAST_SPEED_M_S = 0.3
+# So does what pushes the vehicle on the way it flies: within 60 degrees of it no obstacle that stands can push, and a
+# push of which clipping left no direction has been turned round by then (see estimate.facing).
+FROM_BEHIND = -0.5
 
 
 def touch_of(
@@ -29,27 +32,34 @@ def touch_of(
     is_clipped: bool,
     reach_m: float,
     found_at_us: int,
+    is_behind: bool = False,
 ) -> Touch | None:
     """The touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
 
     ``normal_ned`` is horizontal, steep or zero (see recovery.direction). ``reach_m``: centre to the guards' rim.
+    ``is_behind``: what was hit is known to have come after the vehicle.
     """
     n, e, d = velocity_ned_m_s
-    speed_m_s = math.sqrt(n * n + e * e + d * d)
-    against = away_from((-n, -e, -d)) if speed_m_s >= LEAST_SPEED_M_S else (0.0, 0.0, 0.0)
-    normal, error_rad = _direction(normal_ned, against, is_clipped)
+    is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
+    against = away_from((-n, -e, -d)) if is_fast else (0.0, 0.0, 0.0)
+    is_behind = is_behind or _agreement(normal_ned, against) < FROM_BEHIND
+    normal, error_rad = (normal_ned, ERROR_RAD) if is_behind else _direction(normal_ned, against, is_clipped)
     if normal == (0.0, 0.0, 0.0):
         return None
     place = tuple(c - reach_m * x for c, x in zip(centre_ned_m, normal, strict=True))
-    reaches_m = REACHES_M if speed_m_s >= LEAST_SPEED_M_S else 0.0
+    reaches_m = REACHES_M if is_fast and not is_behind else 0.0
     return Touch((place[0], place[1], place[2]), normal, error_rad, reaches_m, found_at_us)
+
+
+def _agreement(normal: Vector3, against: Vector3) -> float:
+    return sum(a * b for a, b in zip(normal, against, strict=True))
 
 
 def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vector3, float]:
     """The normal to believe and its error: between the push and the way back where the push is not to be trusted."""
     if against == (0.0, 0.0, 0.0):
         return normal, CLIPPED_ERROR_RAD
-    agreement = sum(a * b for a, b in zip(normal, against, strict=True))
+    agreement = _agreement(normal, against)
     if normal == (0.0, 0.0, 0.0) or agreement < (LEAST_CLIPPED if is_clipped else LEAST_AGAINST):
         return against, APPROACH_ERROR_RAD
     if not is_clipped:

@@ -10,7 +10,7 @@ from companion.memory.stored import KnownPatch, ObstacleFile, as_data, describe,
 from companion.memory.touching import LEAST_SPEED_M_S, touch_of
 
 CLEARANCE_M = 0.55
-SOUTH = (-1.0, 0.0, 0.0)
+SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 
 
 def wall_touch(
@@ -36,11 +36,25 @@ def test_the_surface_is_a_guards_reach_ahead_of_the_centre():
     assert touch.normal_ned == SOUTH and touch.reaches_m == REACHES_M and touch.found_at_us == 7
 
 
-def test_a_normal_that_points_along_the_approach_is_not_believed():
-    """A wall cannot push a vehicle on into itself."""
-    touch = touch_of((0, 0, -1.5), (2.0, 0.0, 0.0), (1.0, 0.0, 0.0), False, 0.2, 0)
+def test_a_normal_that_points_across_the_approach_and_beyond_is_not_believed():
+    """A wall that is grazed pushes aside or back, never on."""
+    touch = touch_of((0, 0, -1.5), (2.0, 0.0, 0.0), turned(110.0), False, 0.2, 0)
     assert touch.normal_ned == pytest.approx(SOUTH)
     assert deg(touch.normal_error_rad) == pytest.approx(45.0)
+
+
+def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
+    """A screen that overtakes is behind the vehicle, where it comes from, and not in its way."""
+    touch = touch_of((3.0, 1.0, -1.5), (1.0, 0.0, 0.0), NORTH, True, 0.2, 0)
+    assert touch.place_ned_m == pytest.approx((2.8, 1.0, -1.5))
+    assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
+
+
+def test_what_is_known_to_have_come_after_the_vehicle_keeps_its_side():
+    """Pushed off to the north by a cart the vehicle drifts east, fast: the cart is south of it all the same."""
+    touch = touch_of((3.0, 1.0, -1.5), (0.2, 1.0, 0.0), NORTH, False, 0.2, 0, is_behind=True)
+    assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
+    assert touch.place_ned_m == pytest.approx((2.8, 1.0, -1.5))
 
 
 def test_a_clipped_normal_is_met_half_way_and_less_sure():
