@@ -16,7 +16,7 @@ PositionNed = tuple[Coordinate, Coordinate, Coordinate]
 class Written(BaseModel):
     """Base of everything a person writes: unknown keys are errors, values never change afterwards."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, use_attribute_docstrings=True)
 
 
 def with_bare_keys(data: object, keys: Container[str]) -> object:

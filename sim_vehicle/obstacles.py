@@ -17,23 +17,29 @@ Length = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 class Part(BaseModel):
     """What a person writes: no unknown keys, no changes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class Waypoint(Part):
     """Where an obstacle is at a moment, against where it was described."""
 
     at_s: NotNegative
+    """By the vehicle's boot clock."""
     offset_ned_m: Point
+    """Against where the obstacle was described."""
 
 
 class MotionSpec(Part):
     """How an obstacle moves: at a velocity for a while, or along a path; seconds of the vehicle's boot clock."""
 
     velocity_ned_m_s: Point | None = None
+    """From from_s until until_s."""
     from_s: NotNegative = 0.0
+    """Begins to move."""
     until_s: NotNegative = 3600.0
+    """Stands from then on."""
     path: tuple[Waypoint, ...] = ()
+    """Instead of a velocity: straight from one to the next."""
 
     @model_validator(mode="after")
     def _moves_one_way(self) -> Self:
@@ -60,7 +66,9 @@ class ObstacleSpec(Part):
     """What every obstacle may have."""
 
     name: str | None = None
+    """As reports and pictures have it."""
     motion: MotionSpec | None = None
+    """Of an obstacle that does not stand still."""
 
     def _motion(self) -> Motion | None:
         return None if self.motion is None else self.motion.motion()
@@ -70,10 +78,15 @@ class WallSpec(ObstacleSpec):
     """A solid plate: its front face's centre, the direction it faces, its size. Level ones are ceilings and floors."""
 
     point_ned_m: Point
+    """Centre of its front face."""
     normal_ned: Point
+    """The direction that the face looks, of any length."""
     width_m: Length = 10.0
+    """Along its level edges."""
     height_m: Length = 10.0
+    """Along the other two."""
     thickness_m: Length = 0.1
+    """Behind the face."""
 
     @model_validator(mode="after")
     def _has_direction(self) -> Self:
@@ -98,9 +111,13 @@ class PoleSpec(ObstacleSpec):
     """A round bar: where it stands, which way it goes from there, how far and how thick."""
 
     point_ned_m: Point
+    """Where it stands."""
     axis_ned: Point = (0.0, 0.0, -1.0)
+    """Which way it goes from there, of any length."""
     height_m: Length = 5.0
+    """Its length."""
     radius_m: Annotated[float, Field(ge=0.005, le=100, allow_inf_nan=False)] = 0.1
+    """Its half thickness."""
 
     @model_validator(mode="after")
     def _has_direction(self) -> Self:
@@ -124,8 +141,11 @@ class BoxSpec(ObstacleSpec):
     """A level box: its middle, its size before it is turned, and its heading."""
 
     centre_ned_m: Point
+    """Its middle."""
     size_m: tuple[Length, Length, Length]
+    """North, east and down before it is turned."""
     yaw_deg: Finite = 0.0
+    """By which it is turned, clockwise."""
 
     def box(self, number: int) -> Box:
         """The same as a value, with a name if it had none."""

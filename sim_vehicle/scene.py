@@ -15,7 +15,9 @@ class Start(Part):
     """Where the vehicle stands on the ground before it is armed; z is the ground's, 0."""
 
     position_ned_m: Point = (0.0, 0.0, 0.0)
+    """In the world; z is 0."""
     yaw_deg: Finite = 0.0
+    """Clockwise from north."""
 
     @model_validator(mode="after")
     def _on_the_ground(self) -> "Start":
@@ -28,13 +30,20 @@ class Scene(Part):
     """Everything about the simulated world that a mission file may state."""
 
     airframe: str = "foldable"
+    """foldable, rigid, or the path of an airframe file."""
     seed: Annotated[int, Field(ge=0)] = 1
+    """Of every random number of the simulated vehicle."""
     start: Start = Start()
     wind_ned_m_s: Point = (0.0, 0.0, 0.0)
+    """Steady; the direction it blows to."""
     walls: tuple[WallSpec, ...] = ()
+    """Plates; level ones are ceilings and floors."""
     poles: tuple[PoleSpec, ...] = ()
+    """Round bars."""
     boxes: tuple[BoxSpec, ...] = ()
+    """Level boxes."""
     faults: tuple[Fault, ...] = ()
+    """What goes wrong, and when."""
 
     @model_validator(mode="after")
     def _faults_fit(self) -> "Scene":

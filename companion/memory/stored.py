@@ -20,14 +20,15 @@ class KnownPatch(Written):
     """A surface: where it was touched, and the direction out of it. NED from the arming position, metres."""
 
     touches_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1)]
-    # Of any length; a wall's counts as horizontal, see recovery.direction.
+    """Places on the surface; of a wall two near its ends."""
     normal_ned: PositionNed
-    # One standard deviation; the normal of one whole contact.
+    """Of any length; a wall's counts as horizontal, see recovery.direction."""
     normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
-    # How far it is believed to reach beyond its touches, at least.
+    """One standard deviation; the normal of one whole contact."""
     reaches_m: NotNegative = REACHES_M
-    # When it was first touched, by the clock of the flight that did.
+    """How far it is believed to reach beyond its touches, at least."""
     found_at_us: Annotated[int, Field(strict=True, ge=0)] = 0
+    """When it was first touched, by the clock of the flight that did."""
 
     @model_validator(mode="after")
     def _has_direction(self) -> Self:
@@ -49,19 +50,21 @@ class ObstacleFile(Written):
     """The whole of an `obstacles.json`."""
 
     patches: tuple[KnownPatch, ...]
+    """One for each surface."""
 
 
 class ObstaclesConfig(Written):
     """The mission's `obstacles:` part: what is known beforehand, and what follows where that leaves no way."""
 
-    # A file of them, such as the obstacles.json of an earlier run; beside the mission file, or an absolute path.
     file: Annotated[str, Field(min_length=1)] | None = None
+    """A file of them, such as the obstacles.json of an earlier run; beside the mission file, or an absolute path."""
     known: tuple[KnownPatch, ...] = ()
-    # Between the guards and what is known. As recovery.clearance_m: guards 0.3 m clear, and 5 cm for the wavering of
-    # a hover on optical flow.
+    """The same, written out here."""
     margin_m: Positive = 0.35
-    # continue: with the next item; abort: hand the vehicle over as `on_interrupt` says.
+    """Between the guards and what is known. As recovery.clearance_m: guards 0.3 m clear, and 5 cm for the wavering of
+    a hover on optical flow."""
     on_unreachable: OnUnreachable = "land"
+    """continue: with the next item; abort: hand the vehicle over as `on_interrupt` says."""
 
     @model_validator(mode="after")
     def _is_read(self) -> Self:

@@ -21,69 +21,76 @@ Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.
 class StreamsConfig(Written):
     """Rates asked for, and the least measured rates with which a flight begins, in Hz."""
 
-    # PX4 rounds the interval to whole IMU samples: 200 gives 124, 250 gives all of them (measured on SITL).
     highres_imu_hz: Rate = 250.0
-    # Twenty-five velocities in the half second before a contact are enough for v_c (see estimate.collision).
+    """PX4 rounds the interval to whole IMU samples: 200 gives 124, 250 gives all of them (measured on SITL)."""
     local_position_hz: Rate = 50.0
+    """Twenty-five velocities in the half second before a contact are enough for v_c (see estimate.collision)."""
     attitude_hz: Rate = 50.0
-    # Take-off and touchdown last longer than a second.
+    """Which way the thrust points, and how the vehicle turns."""
     extended_sys_state_hz: Rate = 5.0
-    # The thrust asked for changes by less than a third of the greatest within 33 ms (see detection.thrust). Asked for
-    # only by a detector that uses it.
+    """Take-off and touchdown last longer than a second."""
     attitude_target_hz: Rate = 30.0
-    # PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of.
+    """The thrust asked for changes by less than a third of the greatest within 33 ms (see detection.thrust). Asked for
+    only by a detector that uses it."""
     odometry_hz: Rate = 30.0
-    # Cumulative counts; twice a second is PX4's own rate.
+    """PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of."""
     vibration_hz: Rate = 1.0
-    # Mode changes are acted on within a tenth of a second.
+    """Cumulative counts; twice a second is PX4's own rate."""
     current_mode_hz: Rate = 10.0
-    # Long enough to see 80 samples of the slowest acceptable IMU stream.
+    """Mode changes are acted on within a tenth of a second."""
     window_s: Positive = 2.0
-    # PX4's onboard default is 50 Hz; below 40 Hz more than 80 % of a 25 ms contact can fall between samples.
+    """Long enough to see 80 samples of the slowest acceptable IMU stream."""
     min_highres_imu_hz: NotNegative = 40.0
-    # A tenth of a second between positions is 0.2 m at 2 m/s, the most a setpoint may be wrong by.
+    """PX4's onboard default is 50 Hz; below 40 Hz more than 80 % of a 25 ms contact can fall between samples."""
     min_local_position_hz: Positive = 10.0
+    """A tenth of a second between positions is 0.2 m at 2 m/s, the most a setpoint may be wrong by."""
     min_attitude_hz: Positive = 10.0
+    """A tenth of a second of turning at 1 rad/s is 6 degrees."""
 
 
 class GuardsConfig(Written):
     """Where the vehicle's guards are and how a push turns it: from the direction of a push and the turning it makes
     follows where the vehicle was touched. The defaults are the paper's vehicle, arms out."""
 
-    # From the vehicle's middle to each guard's, a quad-x.
     centre_m: Positive = 0.145
+    """From the vehicle's middle to each guard's, a quad-x."""
     radius_m: Positive = 0.08
+    """Of a guard, seen from above."""
     height_m: Positive = 0.03
-    # One arm, per unit mass of the vehicle, and how far it folds: half of the paper's k_s and b_s, which are two arms'.
+    """Of a guard's rim."""
     stiffness_per_s2: Positive = 250.0
+    """Of one arm, per unit mass of the vehicle: half of the paper's k_s, which is two arms'."""
     damping_per_s: NotNegative = 15.0
+    """The same of the paper's b_s."""
     travel_m: NotNegative = 0.03
-    # Radii of gyration about body x, y, z: roots of inertia over mass, 0.0034, 0.0034 and 0.0053 kg m^2 for 1.112 kg.
+    """How far an arm folds."""
     gyration_frd_m: tuple[Positive, Positive, Positive] = (0.0553, 0.0553, 0.069)
+    """Radii of gyration about body x, y, z: roots of inertia over mass, 0.0034, 0.0034, 0.0053 kg m^2 for 1.112 kg."""
 
 
 class EstimateConfig(Written):
     """Numbers of the estimate of a collision."""
 
-    # v_c with the accelerometer's help (see estimate.approach); off: from positions and velocities alone.
     inertial: bool = True
+    """v_c with the accelerometer's help (see estimate.approach); off: from positions and velocities alone."""
 
-    # IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this.
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
+    """IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this."""
     guards: GuardsConfig = GuardsConfig()
-    # The normal by what the touch did to the vehicle: after a hit, some milliseconds of one core with each of the next
-    # ten messages; off: the direction of the push.
     fits_normal: bool = True
-    # Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated.
+    """The normal by what the touch did to the vehicle: after a hit, some milliseconds of one core with each of the next
+    ten messages; off: the direction of the push."""
     velocity_noise_m_s: Positive = 0.04
-    # How long its errors last: those of optical flow and of a filter behind it change within a third of a second.
+    """Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated."""
     velocity_correlation_s: Positive = 0.3
-    # +-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g.
+    """How long its errors last: those of optical flow and of a filter behind it change within a third of a second."""
     accelerometer_range_m_s2: Positive = 156.9
+    """+-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g."""
     position_noise_m: Positive = 0.03
-    # White-jerk density: a go_to's 2 m/s^2 may come or go within any second, (2 m/s^2)^2 / 1 s. It leaves
-    # 0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s.
+    """Of a good flow or motion-capture estimate, within the half second that v_c is found from."""
     jerk_density_m2_s5: Positive = 4.0
+    """White-jerk density: a go_to's 2 m/s^2 may come or go within any second, (2 m/s^2)^2 / 1 s. It leaves
+    0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s."""
 
     @property
     def reach_m(self) -> float:
@@ -95,67 +102,73 @@ class SettledConfig(Written):
     """When a recovery has ended."""
 
     distance_m: Positive = 0.10
+    """So near to the recovery setpoint,"""
     speed_m_s: Positive = 0.10
+    """so slow,"""
     duration_s: Positive = 0.5
-    # A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it.
+    """for so long."""
     timeout_s: Positive = 10.0
-    # Mean over about five samples at 50 Hz: brings a 0.03 m/s RMS velocity noise per axis to 0.01 m/s, so that
-    # the speed of a vehicle at rest stays clear of `speed_m_s` for the whole of `duration_s`.
+    """A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it."""
     smoothing_s: NotNegative = 0.1
+    """Mean over about five samples at 50 Hz: brings a 0.03 m/s RMS velocity noise per axis to 0.01 m/s, so that
+    the speed of a vehicle at rest stays clear of `speed_m_s` for the whole of `duration_s`."""
 
 
 class LinkConfig(Written):
     """Patience with the other end."""
 
-    # PX4 announces itself once a second; ten misses are not bad luck.
     heartbeat_wait_s: Positive = 10.0
-    # More than the one-second HEARTBEAT interval, so that a lost packet is not a lost link, and still sooner
-    # than anyone notices a vehicle flying on its own.
+    """PX4 announces itself once a second; ten misses are not bad luck."""
     silence_s: Annotated[Positive, Field(ge=0.2)] = 1.5
-    # A position this old is 2 m wrong at 2 m/s: nothing flown on it is safe.
+    """More than the one-second HEARTBEAT interval, so that a lost packet is not a lost link, and still sooner
+    than anyone notices a vehicle flying on its own."""
     position_silence_s: Annotated[Positive, Field(ge=0.1)] = 1.0
+    """A position this old is 2 m wrong at 2 m/s: nothing flown on it is safe."""
 
 
 class FlightConfig(Written):
     """How the flight itself is flown."""
 
-    # Well above the 2 Hz that holds OFFBOARD; 50 Hz so that a moving setpoint advances 4 cm a step at 2 m/s.
     setpoint_hz: Annotated[Rate, Field(ge=20.0)] = 50.0
-    # PX4 wants to see the stream before the switch; its documentation asks for more than a second of it.
+    """Well above the 2 Hz that holds OFFBOARD; 50 Hz so that a moving setpoint advances 4 cm a step at 2 m/s."""
     setpoint_lead_s: Annotated[Positive, Field(ge=1.0)] = 1.0
-    # Below PX4's MPC_Z_VEL_MAX_UP of 3 m/s and near its MPC_TKO_SPEED of 1.5 m/s.
+    """PX4 wants to see the stream before the switch; its documentation asks for more than a second of it."""
     takeoff_speed_m_s: Annotated[Positive, Field(le=3.0)] = 1.0
+    """Below PX4's MPC_Z_VEL_MAX_UP of 3 m/s and near its MPC_TKO_SPEED of 1.5 m/s."""
     takeoff_acceleration_m_s2: Annotated[Positive, Field(le=5.0)] = 1.0
-    # Of items that state no speed: a quick walk, at which a hit does no harm to an airframe with guards.
+    """Of the beginning and the end of the climb."""
     cruise_speed_m_s: Annotated[Positive, Field(le=12.0)] = 1.0
-    # A tilt of 11 degrees, well inside every multicopter's.
+    """Of items that state no speed: a quick walk, at which a hit does no harm to an airframe with guards."""
     cruise_acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 2.0
-    # The most, of any item's acceleration, with which the horizontal speed grows. A vehicle that leans into its way is
-    # hit below its centre and tips: beyond 10 degrees at 3 m/s, or 16 at 1 m/s, its thrust then pins it to the obstacle
-    # (docs/recovery.md). This leans it by 6, and what a head wind leans it by is taken off it; drag comes on top.
-    # Braking leans it the other way.
+    """A tilt of 11 degrees, well inside every multicopter's."""
     speeding_up_m_s2: Annotated[Positive, Field(le=9.81)] = 1.0
-    # A waypoint is passed, not settled on. A PX4 that flies by GPS wanders by this much around a setpoint (its own
-    # simulator's noise moves a hover by 0.5 m); a quarter of it could be missed for a long time.
+    """The most, of any item's acceleration, with which the horizontal speed grows. A vehicle that leans into its way is
+    hit below its centre and tips: beyond 10 degrees at 3 m/s, or 16 at 1 m/s, its thrust then pins it to the obstacle
+    (docs/recovery.md). This leans it by 6, and what a head wind leans it by is taken off it; drag comes on top.
+    Braking leans it the other way."""
     acceptance_radius_m: Positive = 0.5
-    # Time allowed to arrive after the profile has ended: a wind or a drag it did not know of.
+    """A waypoint is passed, not settled on. A PX4 that flies by GPS wanders by this much around a setpoint (its own
+    simulator's noise moves a hover by 0.5 m); a quarter of it could be missed for a long time."""
     arrival_timeout_s: Positive = 15.0
+    """Time allowed to arrive after the profile has ended: a wind or a drag it did not know of."""
 
 
 class OperatorConfig(Written):
     """What a ground station is told; nothing of it is needed to fly."""
 
     status_texts: bool = True
-    # Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none.
+    """Hits, recoveries, limits and the outcome, as STATUSTEXT."""
     values_hz: Annotated[NotNegative, Field(le=50.0)] = 2.0
+    """Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none."""
 
 
 class CompanionConfig(Written):
     """All settings of the companion."""
 
     detector: str = "fused"
-    # Ground handling, landing gear and ground effect are below this height above the arming position.
+    """Its own settings are those under its name."""
     min_detection_height_m: NotNegative = 0.5
+    """Ground handling, landing gear and ground effect are below this height above the arming position."""
     fused: FusedConfig = FusedConfig()
     fuzzy: FuzzyConfig = FuzzyConfig()
     hybrid: HybridConfig = HybridConfig()

@@ -22,10 +22,13 @@ class Fence(Written):
     """
 
     radius_m: Positive | None = None
+    """Of a circle round the arming position; 15 where there is no polygon either."""
     polygon_ne_m: Annotated[tuple[NorthEast, ...], Field(min_length=3)] | None = None
+    """Corners [north, east] round an area with the arming position in it."""
     max_height_m: Positive = 6.0
-    # Guards and landing gear reach 0.1 m below the centre of a small vehicle; as much again for its wavering.
+    """Above the arming position."""
     min_height_m: NotNegative = 0.2
+    """Guards and landing gear reach 0.1 m below the centre of a small vehicle; as much again for its wavering."""
 
     @model_validator(mode="before")
     @classmethod

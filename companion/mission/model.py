@@ -41,13 +41,20 @@ class RepeatItem(Written):
     """Fly the items one after the other, `times` times."""
 
     times: Annotated[int, Field(strict=True, ge=1, le=1000)]
+    """How often in all."""
     items: Annotated[tuple["MissionItem", ...], Field(min_length=1)]
+    """What is repeated."""
 
 
 class MissionItem(Written):
     """One step: a map with exactly one action, and beside it what shall be different for this item."""
 
-    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": [name]} for name in ACTIONS]})
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [{"required": [name]} for name in ACTIONS],
+            "dependentRequired": {"on_timeout": ["timeout_s"]},
+        }
+    )
 
     takeoff: TakeoffItem | None = None
     go_to: GoToItem | None = None
@@ -64,8 +71,11 @@ class MissionItem(Written):
     land: LandItem | None = None
 
     on_collision: OnCollision | None = None
+    """What follows a hit in this item; without one the mission's policy."""
     timeout_s: Positive | None = None
+    """How long the item may take, recoveries included."""
     on_timeout: OnTimeout = "abort"
+    """What follows then; abort hands the vehicle over as on_interrupt says."""
 
     @model_validator(mode="before")
     @classmethod
@@ -105,15 +115,20 @@ class Mission(Written):
     """A whole mission file. `sim` belongs to the simulated vehicle and is ignored in a real flight."""
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9._-]+$")]
+    """Letters, digits, dots, - and _; names the folder of the run."""
     description: str = ""
+    """A line for people."""
     fence: Fence = Fence()
     limits: Limits = Limits()
     items: Annotated[tuple[MissionItem, ...], Field(min_length=2)]
+    """Flown in order; take-off first, land or return last."""
     on_collision: OnCollision = OnCollision()
+    """What follows a hit, where the item says nothing else."""
     recovery: RecoveryConfig = RecoveryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
     on_interrupt: Handover = "hold"
+    """What the vehicle is told to do when the flight ends early."""
     companion: CompanionConfig = CompanionConfig()
     resume: Resume | None = None
     sim: dict[str, object] | None = None

@@ -14,23 +14,24 @@ class RecoveryConfig(Written):
     """The mission's `recovery:` part; `gamma` in seconds, one number or one for each horizontal axis."""
 
     law: str = "adaptive"
-    # Laws `paper` and `normal`. The paper's flights have 0.5 s.
+    """adaptive, normal or paper."""
     gamma: Positive | tuple[Positive, Positive] = 0.5
-    # Laws `normal` and `adaptive`: what becomes of the motion along the obstacle.
+    """Laws `paper` and `normal`. The paper's flights have 0.5 s."""
     tangential: Literal["damped", "kept"] = "damped"
-    # Law `adaptive`, but for the vertical acceleration, which `normal` has too. The guards stay 0.3 m clear; the
-    # wavering of a hover on optical flow takes 5 cm.
+    """Laws `normal` and `adaptive`: what becomes of the motion along the obstacle."""
     clearance_m: Positive = 0.35
-    # More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
-    # trimmed against the drag of its approach stops short by, up to 0.06 s times v_c in simulation.
+    """Law `adaptive`, but for the vertical acceleration, which `normal` has too. The guards stay 0.3 m clear; the
+    wavering of a hover on optical flow takes 5 cm."""
     clearance_s: NotNegative = 0.31
-    # PX4's MPC_ACC_HOR: a tilt of 17 degrees, which leaves a vehicle that hovers at 78 % of its thrust its height.
+    """More where the hit was harder: half of eq. 3's distance with the paper's gamma, 0.25 s, and what a vehicle still
+    trimmed against the drag of its approach stops short by, up to 0.06 s times v_c in simulation."""
     acceleration_m_s2: Annotated[Positive, Field(le=9.81)] = 3.0
-    # Besides the vehicle's own loop, against climbing or falling after a hit. Hovering at 78 % of the thrust leaves
-    # 2.8 m/s^2 upwards. 0: none.
+    """PX4's MPC_ACC_HOR: a tilt of 17 degrees, which leaves a vehicle that hovers at 78 % of its thrust its height."""
     vertical_acceleration_m_s2: Annotated[NotNegative, Field(le=9.81)] = 3.0
-    # Of the speed into the obstacle, until the rebound has been measured: spring arms, 0.15 to 0.3 in simulation.
+    """Besides the vehicle's own loop, against climbing or falling after a hit. Hovering at 78 % of the thrust leaves
+    2.8 m/s^2 upwards. 0: none."""
     restitution: Annotated[NotNegative, Field(le=1.0)] = 0.2
+    """Of the speed into the obstacle, until the rebound has been measured: spring arms, 0.15 to 0.3 in simulation."""
 
     @property
     def gamma_per_axis(self) -> tuple[float, float]:

@@ -2,7 +2,9 @@
 
 from typing import Any
 
+from companion.detection.registry import DETECTORS
 from companion.mission.model import Mission
+from companion.recovery.registry import RECOVERY_LAWS
 from sim_vehicle.scene import Scene
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -17,4 +19,18 @@ def mission_schema() -> dict[str, Any]:
         assert definitions.setdefault(name, definition) == definition, f"two parts of the schema are called {name}"
     definitions["Scene"] = scene
     schema["properties"]["sim"] = {"anyOf": [{"$ref": "#/$defs/Scene"}, {"type": "null"}], "default": None}
+    schema["properties"]["items"]["prefixItems"] = [{"$ref": "#/$defs/MissionItem", "required": ["takeoff"]}]
+    definitions["RecoveryConfig"]["properties"]["law"]["enum"] = sorted(RECOVERY_LAWS)
+    definitions["CompanionConfig"]["properties"]["detector"]["enum"] = sorted(DETECTORS)
+    for part in (schema, *definitions.values()):
+        for written in part.get("properties", {}).values():
+            _describe_by_part(written, part, definitions)
     return {"$schema": DRAFT, **schema, "title": "Mission file of px4-rebound"}
+
+
+def _describe_by_part(written: dict[str, Any], part: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """A key that is nothing but a part of its own, or names its kind, is described by what is said of that part."""
+    parts = [choice["$ref"] for choice in written.get("anyOf", [written]) if "$ref" in choice]
+    described = part if "const" in written else definitions[parts[0].rpartition("/")[2]] if len(parts) == 1 else {}
+    if "description" in described:
+        written.setdefault("description", described["description"])

@@ -18,7 +18,9 @@ class Timed(Part):
     """When a fault acts: from a moment on, or between two."""
 
     at_s: NotNegative | None = None
+    """From then on, or the moment of what happens once; seconds of the vehicle's boot clock."""
     between_s: tuple[NotNegative, NotNegative] | None = None
+    """[from, until], by the same clock."""
 
     @model_validator(mode="after")
     def _has_one_time(self) -> Self:

@@ -116,12 +116,45 @@ def test_every_shipped_mission_names_the_schema_and_keeps_to_it(path):
         {"hold": {"duration_s": 1}, "land": {}},
         {"on_collision": {"then": "hold"}},
         {"repeat": {"times": 2, "items": [{"hold": {"duration_s": -1}}]}},
+        {"expect": {}},
+        {"wait_for": {"hit": True, "flight_time_s": 3}},
+        {"hold": {"duration_s": 1}, "on_timeout": "land"},
     ],
 )
 def test_the_schema_refuses_what_the_model_refuses(item):
     mission = {"name": "t", "items": [{"takeoff": {"height_m": 1}}, item, {"land": None}]}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(mission, mission_schema())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"items": [{"hold": {"duration_s": 1}}, {"land": None}]},
+        {"recovery": {"law": "papr"}},
+        {"companion": {"detector": "fuse"}},
+    ],
+)
+def test_the_schema_knows_names_and_what_comes_first(changes):
+    sound = {"name": "t", "items": [{"takeoff": {"height_m": 1}}, {"land": None}]}
+    jsonschema.validate(sound, mission_schema())
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**sound, **changes}, mission_schema())
+
+
+def test_an_editor_has_a_word_for_every_key_of_a_mission():
+    """But for the numbers of detectors and faults, which nobody writes without the documents."""
+    schema = mission_schema()
+    parts = {"Mission": schema, **schema["$defs"]}
+    detectors = schema["$defs"]["CompanionConfig"]["properties"]["detector"]["enum"]
+    own = {f"{name.capitalize()}Config" for name in detectors} | {"SightConfig"}
+    wordless = [
+        f"{name}.{key}"
+        for name, part in parts.items()
+        for key, written in part.get("properties", {}).items()
+        if name not in own and "kind" not in part["properties"] and "description" not in written
+    ]
+    assert wordless == []
 
 
 def test_the_schema_knows_all_actions_and_the_world():
