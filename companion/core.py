@@ -23,6 +23,7 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
+    LandedState,
     LocalPosition,
     OnboardHeartbeat,
     Sample,
@@ -91,12 +92,22 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     """
     try:
         refusal = hear(core.flight, samples, now_us)
+        note_height(core)
         impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
         moved = fly(core, samples, impacts, refusal, now_us)
         follow_contact(core.flight, core.watch)
     except Exception as error:
         return core.machine.fail(error, now_us)
     return moved
+
+
+def note_height(core: Core) -> None:
+    """Whether the vehicle has left the ground behind; a hit that throws it down again does not bring that back."""
+    flight, height_m = core.flight, core.flight.height_m
+    if height_m is None or flight.vehicle.landed is LandedState.ON_GROUND:
+        flight.has_climbed = False
+    elif height_m >= flight.mission.companion.min_detection_height_m:
+        flight.has_climbed = True
 
 
 def situation(core: Core) -> Situation:
@@ -115,9 +126,12 @@ def situation(core: Core) -> Situation:
 
 
 def why_not_detecting(core: Core, height_m: float | None) -> str | None:
-    """The ground shakes a vehicle as a hit does."""
-    if core.machine.state not in DETECTING_STATES:
-        return core.machine.state.value
+    """The ground shakes a vehicle as a hit does, until it has left it and where it goes down to it."""
+    state = core.machine.state
+    if state not in DETECTING_STATES:
+        return state.value
+    if core.flight.has_climbed and state is not State.LANDING:
+        return None
     least_m = core.flight.mission.companion.min_detection_height_m
     return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
 

@@ -41,12 +41,15 @@ def spun(s: FusedState, config: FusedConfig) -> Hidden | None:
 
 
 def kicked(s: FusedState, config: FusedConfig) -> Hidden | None:
-    """Turned between two samples and neither before nor after, as motors that lag cannot, and pushed a little."""
+    """Turned between two samples and neither before nor after, as motors that lag cannot, and pushed a little; or by
+    more than motors could that do not lag."""
     a = s.aftermath
     kick_rad_s = a.kick_rad_s * config.side_threshold_m_s2 / s.threshold_m_s2
     if kick_rad_s < config.kick_rad_s:
         return None
     over_s = 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
+    if kick_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * over_s:
+        return _from_ahead(s, over_s)
     if kick_rad_s < config.kick_rad_s + config.kick_rad_s2 * over_s or s.push_before + s.push < config.kick_push:
         return None
     return _from_ahead(s, over_s)

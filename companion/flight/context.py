@@ -145,6 +145,7 @@ class FlightContext:
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
+    has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     touch: Touched | None = None  # the latest that was no collision
     blind_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False

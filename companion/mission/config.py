@@ -168,7 +168,8 @@ class CompanionConfig(Written):
     detector: str = "fused"
     """Its own settings are those under its name."""
     min_detection_height_m: NotNegative = 0.5
-    """Ground handling, landing gear and ground effect are below this height above the arming position."""
+    """Ground handling, landing gear and ground effect are below this height above the arming position: nothing is
+    detected before a take-off has reached it, nor below it in a landing. In between a low flight is a flight."""
     fused: FusedConfig = FusedConfig()
     fuzzy: FuzzyConfig = FuzzyConfig()
     hybrid: HybridConfig = HybridConfig()

@@ -282,6 +282,21 @@ def test_below_the_minimum_height_nothing_is_detected():
     assert f.companion.report().collisions == ()
 
 
+def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
+    """A hit that threw the vehicle down, or an item that leads low, takes no hit that follows."""
+    down = {"go_to": {"position_ned_m": [0, 0, -0.35]}}
+    low = [{"takeoff": {"height_m": 1.5}}, down, {"hold": {"duration_s": 3}}, {"land": {}}]
+    f = flight(items=low)
+    f.run_to("mission")
+    f.run_until(lambda: f.vehicle.position[2] > -0.4)
+    assert f.state in ("mission", "holding")
+    strike(f, 12.0, 0.0)
+    (hit,) = f.companion.report().collisions
+    assert hit.position_ned_m[2] > -0.5
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
 def test_the_detector_says_armed_in_flight():
     f = flight()
     f.run_to("mission")
