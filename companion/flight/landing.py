@@ -53,9 +53,12 @@ class TakeBack:
 
     def __init__(self, flight: FlightContext, recovery: Activity, now_us: int) -> None:
         self._recovery = recovery
-        self._ask_us = now_us + LEAD_US
-        self._is_taken = self._is_asked = False
-        flight.commander.cancel()
+        self._is_taken = False
+        # Of a second hit the first one's request may be on its way.
+        self._is_asked = flight.commander.requested_mode == OFFBOARD
+        self._ask_us = now_us + (0 if self._is_asked else LEAD_US)
+        if not self._is_asked:
+            flight.commander.cancel()
 
     def target(self, now_us: int) -> Target | None:
         return self._recovery.target(now_us)

@@ -282,6 +282,20 @@ def test_below_the_minimum_height_nothing_is_detected():
     assert f.companion.report().collisions == ()
 
 
+@pytest.mark.parametrize("after_s", [0.05, 0.2])
+def test_a_second_hit_in_the_descent_does_not_forget_what_the_first_has_asked_for(after_s):
+    """Given the order out of the land mode on its way, when it is hit again: the mode that comes is no pilot's."""
+    f = flight(items=[{"takeoff": {"height_m": 4}}, {"land": {}}])
+    f.run_to("landing")
+    f.run_until(lambda: f.vehicle.position[2] > -3.0)
+    strike(f, 12.0, 0.0)
+    f.run_for(after_s)
+    strike(f, 25.0, 0.0)
+    assert len(f.companion.report().collisions) == 2
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
 def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
     """A hit that threw the vehicle down, or an item that leads low, takes no hit that follows."""
     down = {"go_to": {"position_ned_m": [0, 0, -0.35]}}
