@@ -9,7 +9,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.estimate.rotation import body_to_ned, ned_to_body
 from companion.flight.context import FlightContext, Touched
 from companion.flight.leaning import Held
-from companion.messages import Attitude, LocalPosition, Sample
+from companion.messages import Attitude, ImuSample, LocalPosition, Sample
 
 
 def collisions(
@@ -38,7 +38,9 @@ def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation
         leaning.forget()
         return None
     for sample in samples:
-        if isinstance(sample, LocalPosition):
+        if type(sample) is ImuSample:
+            leaning.feel(sample.specific_force_frd_m_s2)
+        elif isinstance(sample, LocalPosition):
             held = leaning.step(sample, attitude.attitude_wxyz, flown_to)
             if held is not None:
                 _tell_held(flight, held, sample, now_us)

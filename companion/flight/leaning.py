@@ -2,8 +2,8 @@
 
 A vehicle that meets something slowly feels no hit. Its loops lean it on, by the error and, for ever, by the error's
 integral, until it slips off or is tipped on and pinned by its own thrust: a wall met at 0.2 m/s had it on the ground
-three seconds later. What holds it shows in what does not follow: in free air a lean that grows by g tan(a) is an
-acceleration that grows so, but for what the wind takes of it.
+three seconds later. What holds it shows in what does not follow: in free air a thrust that leans is an acceleration,
+but for what the wind takes of it. The thrust is what the accelerometer shows along body z.
 """
 
 import math
@@ -25,6 +25,8 @@ NEARER_M = 0.05
 STEADY_M_S = 0.12
 # Lean and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
+# Begun anew the means say at first, of a vehicle that speeds up, what no wind has said; after so long by a twentieth.
+SETTLED_US = 600_000
 # An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet.
 LEAST_US = 300_000
 # What the lean has to do in vain, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes 1.1 m/s^2 of
@@ -72,7 +74,11 @@ class Leaning:
     """Looked at with each position while setpoints are flown; begun anew with `forget`."""
 
     stretch: _Stretch | None = None
+    began_us: int = 0
     time_us: int = 0
+    thrust_m_s2: float = GRAVITY_M_S2
+    felt: int = 0
+    """So many samples have gone into the thrust since the last position."""
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     lean_m_s2: Flat = (0.0, 0.0)
     missing_m_s2: Flat = (0.0, 0.0)
@@ -85,9 +91,17 @@ class Leaning:
         """What the vehicle leans by in vain where it is where it is to be; NED, against the wind."""
         return self.missing_m_s2 if self.stretch is None else self.stretch.missing_m_s2
 
+    def feel(self, specific_force_frd_m_s2: Vector3) -> None:
+        """Take one sample of the accelerometer; the mean of those between two positions counts."""
+        self.felt += 1
+        self.thrust_m_s2 += (-specific_force_frd_m_s2[2] - self.thrust_m_s2) / self.felt
+
     def step(self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3) -> Held | None:
         """Take one sample, the attitude and the setpoint as last sent."""
-        elapsed_s = self._smooth(sample, lean_of(attitude_wxyz))
+        elapsed_s = self._smooth(sample, lean_of(attitude_wxyz, self.thrust_m_s2))
+        self.felt = 0
+        if sample.time_boot_us - self.began_us < SETTLED_US:
+            return None
         north, east = goal_ned_m[0] - sample.position_ned_m[0], goal_ned_m[1] - sample.position_ned_m[1]
         error_m = math.hypot(north, east)
         stretch, (u, v, _) = self.stretch, self.velocity_m_s
@@ -114,6 +128,7 @@ class Leaning:
     def _smooth(self, sample: LocalPosition, lean_m_s2: Flat) -> float:
         """Means, and the lean's acceleration less the velocity's, which is the change of its mean; the time since."""
         if self.time_us == 0:
+            self.began_us = self.time_us = sample.time_boot_us
             self.velocity_m_s, self.lean_m_s2 = sample.velocity_ned_m_s, lean_m_s2
         elapsed_s = (sample.time_boot_us - self.time_us) * 1e-6
         weight = elapsed_s / (SMOOTHING_S + elapsed_s)
@@ -126,8 +141,10 @@ class Leaning:
         return elapsed_s
 
 
-def lean_of(attitude_wxyz: Quaternion) -> Flat:
-    """The horizontal acceleration of a vehicle that leans so and keeps its height, NED; endless on its side."""
+def lean_of(attitude_wxyz: Quaternion, thrust_m_s2: float | None = None) -> Flat:
+    """The horizontal acceleration that a thrust gives which leans so, NED; where it is not known, one that carries the
+    vehicle: endless on its side."""
     n, e, d = body_to_ned(attitude_wxyz, (0.0, 0.0, -1.0))
-    up = max(-d, 0.05)
-    return (GRAVITY_M_S2 * n / up, GRAVITY_M_S2 * e / up)
+    if thrust_m_s2 is None:
+        thrust_m_s2 = GRAVITY_M_S2 / max(-d, 0.05)
+    return (thrust_m_s2 * n, thrust_m_s2 * e)

@@ -30,6 +30,7 @@ def watched(seconds, north_m, speed_m_s, lean_m_s2, goal_north_m=1.0):
     for step in range(round(seconds / EVERY_S)):
         t = step * EVERY_S
         sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m(t), 0.0, -1.5), (speed_m_s(t), 0.0, 0.0))
+        leaning.feel((0.0, 0.0, -math.hypot(9.80665, lean_m_s2(t))))
         held = leaning.step(sample, leaning_north(lean_m_s2(t)), (goal_north_m, 0.0, -1.5))
         if held is not None:
             return t, held
@@ -39,13 +40,16 @@ def watched(seconds, north_m, speed_m_s, lean_m_s2, goal_north_m=1.0):
 def test_the_lean_is_the_acceleration_that_it_gives_in_free_air():
     assert lean_of((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0))
     assert lean_of(leaning_north(2.0)) == pytest.approx((2.0, 0.0))
+    assert lean_of(leaning_north(2.0), math.hypot(9.80665, 2.0)) == pytest.approx((2.0, 0.0))
+    # Also where the thrust does not carry the vehicle
+    assert lean_of(leaning_north(2.0), 0.8 * math.hypot(9.80665, 2.0)) == pytest.approx((1.6, 0.0))
 
 
 def test_a_vehicle_that_stands_still_and_leans_more_and_more_is_kept_off_its_goal():
-    # Given a lean that the integral of a metre's error makes, when nothing moves
-    at_s, held = watched(5.0, lambda t: 0.0, lambda t: 0.0, lambda t: 1.0 + 0.8 * t)
+    # Given a lean that the integral of a metre's error makes from the first second on, when nothing moves
+    at_s, held = watched(5.0, lambda t: 0.0, lambda t: 0.0, lambda t: 1.0 + 0.8 * max(0.0, t - 1.0))
     # Then it is told as soon as that much has had no effect, with the way out
-    assert 0.8 * (at_s - 0.3) == pytest.approx(HELD_M_S2, abs=0.2)
+    assert 0.8 * (at_s - 1.3) == pytest.approx(HELD_M_S2, abs=0.2)
     assert held.normal_ned == pytest.approx((-1.0, 0.0, 0.0))
 
 
@@ -53,6 +57,21 @@ def test_a_lean_that_moves_the_vehicle_is_kept_from_nothing():
     accelerating = watched(3.0, lambda t: 0.5 * t * t, lambda t: t, lambda t: min(1.0, 5.0 * t), goal_north_m=9.0)
     braking = watched(2.0, lambda t: t - 0.5 * t * t, lambda t: 1.0 - t, lambda t: -1.0, goal_north_m=9.0)
     assert accelerating is None and braking is None
+
+
+def test_what_is_begun_with_in_the_middle_of_speeding_up_is_no_wind():
+    """Given a glide that is taken up while the vehicle speeds up away from what it hit, when it brakes past its goal.
+    A tail wind gives it 0.7 m/s^2 all the while."""
+
+    def lean_m_s2(t):
+        return 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24)
+
+    def speed_m_s(t):
+        braking_s = max(0.0, t - 0.24)
+        begun_s = min(t, 0.24)
+        return 0.95 + 2.2 * begun_s - 7.5 * begun_s**2 - 1.4 * braking_s - 2.0 * braking_s**2
+
+    assert watched(0.7, lambda t: 1.0 + 0.55 * t, speed_m_s, lean_m_s2) is None
 
 
 def test_a_steady_wind_is_no_wall_however_far_the_vehicle_is_from_its_goal():
@@ -77,8 +96,9 @@ def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new
     leaning, found = Leaning(), []
     for step in range(200):
         t = step * EVERY_S
-        lean = min(0.8 * t, 1.8) if not found else max(0.0, 1.8 - 2.0 * (t - found[0]))
+        lean = min(0.8 * max(0.0, t - 0.6), 1.8) if not found else max(0.0, 1.8 - 2.0 * (t - found[0]))
         sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, 0.0, -1.5), (0.0, 0.0, 0.0))
+        leaning.feel((0.0, 0.0, -math.hypot(9.80665, lean)))
         goal = (-0.35 if found else 1.0, 0.0, -1.5)
         if leaning.step(sample, leaning_north(lean), goal) is not None:
             found.append(t)
