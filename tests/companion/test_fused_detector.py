@@ -368,6 +368,22 @@ def test_a_light_touch_that_turns_the_vehicle_at_once_is_a_hit(turn_in_us, push_
     assert [(i.sample_time_boot_us, i.contact_free_until_boot_us) for i in impacts] == hits * [(3_040_000, 3_000_000)]
 
 
+@pytest.mark.parametrize(
+    ("turn_rad_s", "turn_in_us", "hits"),
+    [(6.0, 1_000, 1), (6.0, 45_000, 0), (3.5, 1_000, 0)],
+    ids=["touched", "turned by its motors", "as motors might"],
+)
+def test_a_turn_at_once_by_more_than_motors_have_in_them_needs_no_push(turn_rad_s, turn_in_us, hits):
+    """A beam met by one guard's edge in a climb, heard at 50 Hz: motors turn it back from there on."""
+
+    def rates(t):
+        since_us = max(t - 3_005_000, 0)
+        return (0.0, turn_rad_s * min(since_us / turn_in_us, 1.0) - 40e-6 * max(since_us - 20_000, 0), 0.0)
+
+    impacts = Flight(imu_every_us=20_000, rates=buzzing(rates), noise=0.05).fly(3_100_000)
+    assert [(i.sample_time_boot_us, i.contact_free_until_boot_us) for i in impacts] == hits * [(3_040_000, 3_000_000)]
+
+
 def test_what_pushed_the_sample_before_explains_a_turn_that_no_motor_makes():
     """A window that ended in the middle of a stiff contact holds little of it; the turn comes with the next."""
 
