@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.report import CollisionReport
+from rebound_cli.random_missions.crashes import heights_m
 from rebound_cli.random_missions.flight import JudgedFlight
 from rebound_cli.random_missions.phases import Phase, phases_of
 from sim_vehicle.truth import Hit
@@ -19,6 +20,8 @@ Floats = npt.NDArray[np.float64]
 SEEN_AFTER_US = 100_000
 # A guard that bounces, before the companion has told of the first touch or while nobody has noticed it: one hit.
 FOLLOWS_WITHIN_US = 250_000
+# A fall at 5 m/s comes so far from one row of the path to the next.
+ON_GROUND_M = 0.025
 # Cosine between normals above which two faces of an obstacle are one surface to someone who touches them.
 SAME_SURFACE = 0.5
 
@@ -92,5 +95,12 @@ def _covers(hit: Hit, collision: CollisionReport) -> bool:
 
 
 def without_contact(flight: JudgedFlight) -> list[CollisionReport]:
-    """The companion's collisions that were none."""
-    return [c for c in flight.report.collisions if not any(_covers(hit, c) for hit in flight.truth.hits)]
+    """The companion's collisions that were none: with nothing in the room, nor with the ground."""
+    time_us, on_ground = flight.truth.series["time_boot_us"], heights_m(flight) < ON_GROUND_M
+
+    def meets_ground(collision: CollisionReport) -> bool:
+        at_us = collision.sample_time_boot_us
+        return bool(on_ground[(time_us >= at_us - SEEN_AFTER_US) & (time_us <= at_us)].any())
+
+    found = [c for c in flight.report.collisions if not any(_covers(hit, c) for hit in flight.truth.hits)]
+    return [collision for collision in found if not meets_ground(collision)]

@@ -12,7 +12,7 @@ Floats = npt.NDArray[np.float64]
 
 # MPC_LAND_SPEED is 0.7 m/s; half as much again is a gust. More is a fall.
 LANDING_SPEED_MOST_M_S = 1.2
-# On the ground: the feet this near to it.
+# On the ground: the feet, or a guard of a vehicle that leans, this near to it.
 TOUCHING_M = 0.01
 # In the air: the first time the feet are this high.
 AIRBORNE_M = 0.3
@@ -23,7 +23,7 @@ OUTSIDE_MOST_M = 1.0
 def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
     """Cause and details of each kind that happened."""
     series = flight.truth.series
-    time_us, height_m = series["time_boot_us"], -series["position_ned_m"][:, 2] - flight.standing_m
+    time_us, height_m = series["time_boot_us"], heights_m(flight)
     tilt_deg = tilts_deg(series["attitude_wxyz"])
     if tilt_deg.max() > 90.0:
         yield "tumbled", f"leant by {tilt_deg.max():.0f} deg {_at(flight, time_us[int(tilt_deg.argmax())])}"
@@ -44,6 +44,17 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
     outside_m = max(fence.outside_by_m((float(n), float(e), float(d))) for n, e, d in places)
     if outside_m > OUTSIDE_MOST_M:
         yield "left the fence", f"by {outside_m:.1f} m"
+
+
+def heights_m(flight: JudgedFlight) -> Floats:
+    """Of the lowest part above the ground, (n,): the feet, or where the vehicle leans by more the rim of a guard."""
+    series = flight.truth.series
+    w, x, y, z = series["attitude_wxyz"].T
+    # By how much a metre along body x and y is lower.
+    along_x, along_y = np.abs(2.0 * (x * z - w * y)), np.abs(2.0 * (y * z + w * x))
+    depth_m = flight.arm_m * np.sqrt(0.5) * (along_x + along_y) + flight.guard_m * np.hypot(along_x, along_y)
+    heights: Floats = -series["position_ned_m"][:, 2] - np.maximum(flight.standing_m, depth_m)
+    return heights
 
 
 def tilts_deg(attitude_wxyz: Floats) -> Floats:

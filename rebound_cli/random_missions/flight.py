@@ -28,6 +28,9 @@ class JudgedFlight:
     start_ned_m: Vector3 = (0.0, 0.0, 0.0)
     standing_m: float = 0.08
     """Height of the centre when the vehicle stands on the ground."""
+    arm_m: float = 0.0
+    """From the centre to a motor's axis, about which a guard goes round with `guard_m`."""
+    guard_m: float = 0.0
     obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
     """By name."""
 
@@ -46,6 +49,7 @@ def fly(case: MissionCase, drawn: RandomMission) -> JudgedFlight:
         finally:
             recorder.close()
     assert flown.truth is not None, "a lockstep flight has its truth"
-    standing_m = airframe.geometry.foot_depth_m
+    frame = airframe.geometry
+    parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m
     start, obstacles = scene.start.position_ned_m, {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
-    return JudgedFlight(mission, flown.report, tuple(recorder.events), flown.truth, start, standing_m, obstacles)
+    return JudgedFlight(mission, flown.report, tuple(recorder.events), flown.truth, start, *parts, obstacles)

@@ -10,6 +10,7 @@ from sim_vehicle.truth import Hit
 from sim_vehicle.world import Wall
 
 EPOCH_US = 1_000_000_000
+ARM_M, GUARD_M = 0.145, 0.1
 STANDING_M = 0.08
 # Seconds: armed, up, there, told to land, stands.
 ARMED_S, UP_S, THERE_S, LANDING_S, DONE_S = 5.0, 8.0, 12.0, 12.1, 17.0
@@ -126,4 +127,5 @@ def flight(
     events = tuple(plain_events() if events is None else events)
     wall = Wall("wall", (2.2, 0.0, -2.0), (-1.0, 0.0, 0.0), 10.0, 10.0, 0.1)
     told = mission(**mission_changes)
-    return JudgedFlight(told, report, events, truth, standing_m=STANDING_M, obstacles={"wall": wall})
+    parts = {"standing_m": STANDING_M, "arm_m": ARM_M, "guard_m": GUARD_M}
+    return JudgedFlight(told, report, events, truth, **parts, obstacles={"wall": wall})

@@ -72,6 +72,19 @@ def test_the_ground_touched_while_an_item_is_flown_is_a_crash():
     assert causes(flight(series=dips)) == ["touched the ground"]
 
 
+def test_a_guard_of_a_leaning_vehicle_touches_the_ground_before_its_feet():
+    dips = path(
+        (0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 0.1), (12, 4, 0, 2), (15.5, 4, 0, 0), (17, 4, 0, 0)
+    )
+    assert causes(flight(series=dips)) == []
+    at_the_lowest = int(np.argmin(np.abs(dips["time_boot_us"] - 10e6)))
+    half = math.radians(75.0) / 2
+    dips["attitude_wxyz"][at_the_lowest] = [math.cos(half), math.sin(half), 0.0, 0.0]
+    assert causes(flight(series=dips)) == ["touched the ground"]
+    # Who answers that has answered a hit
+    assert "answered a hit that was none" not in causes(flight(series=dips, collisions=[collision()]))
+
+
 def test_a_metre_and_more_outside_the_fence_is_a_failure():
     assert causes(flight(fence={"radius_m": 4.0})) == []
     flies_past = path(
