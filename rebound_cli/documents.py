@@ -229,6 +229,10 @@ def _sentence(model: type[BaseModel], path: DocumentPath, error: Any) -> str:
         return _unknown_key(str(path[-1]) if path else "?", keys_allowed_at(model, path[:-1]))
     if kind == "missing":
         return "is missing; add it"
+    if kind in ("too_short", "too_long"):
+        least, most = (error["ctx"].get(name) for name in ("min_length", "max_length"))
+        bound = f"at least {least}" if kind == "too_short" else f"at most {most}"
+        return f"needs {bound} of them, and has {error['ctx']['actual_length']}"
     message = str(error["msg"])
     for lead in ("Value error, ", "Assertion failed, "):
         message = message.removeprefix(lead)

@@ -27,7 +27,7 @@ def describe(item: ExpectItem) -> str:
             return "no hit from here on" if for_s is None else f"no hit for {for_s:g} s"
         case ExpectHits() as hits:
             if hits.exactly is not None:
-                return f"{hits.exactly} hits so far"
+                return f"{hits.exactly} {'hit' if hits.exactly == 1 else 'hits'} so far"
             return f"hits so far{_bounds(hits.at_least, hits.at_most, '')}"
         case ExpectRecovered() as recovered:
             within = "" if recovered.within_s is None else f" within {recovered.within_s:g} s"

@@ -27,6 +27,12 @@ _READERS: dict[str, Callable[[Any], Sample | None]] = {
 HEARD = frozenset(_READERS)
 
 
+def command_name(number: int) -> str:
+    """A command as MAVLink calls it, for people: "176 (DO_SET_MODE)"."""
+    entry = dialect.enums["MAV_CMD"].get(number)
+    return str(number) if entry is None else f"{number} ({entry.name.removeprefix('MAV_CMD_')})"
+
+
 def sample_from(name: str, source: tuple[int, int], fields: Fields) -> Sample | None:
     """The sample; None where the message has none, or its fields are not those of this dialect.
 

@@ -152,7 +152,7 @@ class ReturnItem(Written):
     """Fly home and land: up to `height_m` first if the vehicle is lower, a straight line to above the start, land."""
 
     height_m: Positive | None = None
-    """Above the arming position, at least, on the way home."""
+    """Above the arming position, at least, on the way home; never above the fence."""
     speed_m_s: Speed | None = None
     """Of the way home."""
 

@@ -17,6 +17,10 @@ BESIDE_THE_WAY = frozenset(
     {195, 196, 197, 200, 201, 203, 204, 205, 206, 214, 530, 531, 532, 1000, 2000, 2001, 2500, 2501}
 )
 
+# MAV_TYPE: what QGroundControl writes for any multicopter is a quadrotor.
+QUADROTOR = 2
+MULTICOPTERS = frozenset({QUADROTOR, 3, 4, 13, 14, 15, 29, 35, 43})
+
 FRAME_ABOVE_SEA = (0, 5)
 FRAME_ABOVE_HOME = (3, 6)
 FRAME_WITHOUT_PLACE = 2

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.errors import ConfigurationError
+from companion.mavlink.fields import command_name
 from companion.messages import Vector3
 from companion.mission.items import MAX_SPEED_M_S
 from rebound_cli.plan import commands
@@ -80,9 +81,18 @@ def mission_of_plan(plan: Any, name: str) -> tuple[dict[str, Any], Sequence[str]
     if not ({"land", "return"} & mission.items[-1].keys()):
         mission.items.append({"return": {}})
         mission.notes.append("the plan does not land: a return was put at its end")
+    mission.notes += _left_out(plan)
     fence, fence_notes = fence_of_plan(plan.get("geoFence"), mission.origin, mission.furthest_m, mission.highest_m)
     data = {"name": name, "items": mission.items, "fence": fence}
     return data, [*mission.notes, *fence_notes]
+
+
+def _left_out(plan: dict[str, Any]) -> Iterator[str]:
+    """What of a plan is not of its items."""
+    if (plan.get("rallyPoints") or {}).get("points"):
+        yield "left out: rally points; a mission returns to where the vehicle was armed"
+    if (plan["mission"].get("vehicleType") or commands.QUADROTOR) not in commands.MULTICOPTERS:
+        yield "the plan was made for another kind of vehicle: only multicopters are flown"
 
 
 def _home(mission: dict[str, Any]) -> Place:
@@ -161,9 +171,11 @@ def _add(mission: _Mission, item: PlanItem) -> None:
                 mission.go_to((place[0], place[1], mission.place_ned_m[2]))
             mission.items.append({"land": {}})
         case command if command in commands.BESIDE_THE_WAY:
-            mission.notes.append(f"left out: item {item.jump_id}, command {command} for camera or gimbal")
+            mission.notes.append(f"left out: item {item.jump_id}, command {command_name(command)} for camera or gimbal")
         case command:
-            raise PlanError(f"item {item.jump_id} of the plan is command {command}, which a mission cannot do.")
+            raise PlanError(
+                f"item {item.jump_id} of the plan is command {command_name(command)}, which a mission cannot do."
+            )
 
 
 def _add_takeoff(mission: _Mission, item: PlanItem) -> None:

@@ -43,6 +43,7 @@ class Item(SimpleItem):
 class MissionPart(_Part):
     plannedHomePosition: Annotated[list[Number], Field(max_length=3)] | None = None  # noqa: N815
     hoverSpeed: Number | None = None  # noqa: N815
+    vehicleType: Whole | None = None  # noqa: N815
     items: list[Item] = []
 
 
@@ -66,9 +67,14 @@ class GeoFence(_Part):
     polygons: list[PolygonFence] = []
 
 
+class RallyPoints(_Part):
+    points: list[list[Number]] = []
+
+
 class PlanShape(_Part):
     mission: MissionPart
     geoFence: GeoFence | None = None  # noqa: N815
+    rallyPoints: RallyPoints | None = None  # noqa: N815
 
 
 def fault_of(plan: object) -> str | None:

@@ -49,6 +49,11 @@ def test_a_missing_key_is_named_at_the_part_that_lacks_it():
     assert text == "demo.yaml:4: items.1.go_to.position_ned_m: is missing; add it."
 
 
+def test_a_list_that_is_too_short_says_how_many_it_needs():
+    text = complaint(mission_from, document(sets=["items.1={path: {points_ned_m: []}}"]))
+    assert "items.1.path.points_ned_m: needs at least 1 of them, and has 0." in text
+
+
 def test_a_rule_about_the_whole_mission_points_at_the_item():
     text = complaint(mission_from, document("[1, 0, -1.5]", "[99, 0, -1.5]"))
     assert text.startswith("demo.yaml:4: ") and "fence.radius_m" in text

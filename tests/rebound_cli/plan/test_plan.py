@@ -118,13 +118,27 @@ def test_a_survey_is_the_items_that_it_is_made_of_without_its_camera():
     assert [step.name for step in mission.items] == ["takeoff", "set_speed", "go_to", "go_to", "return"]
     assert mission.items[1].set_speed.speed_m_s == 12.0
     text = " ".join(notes)
-    assert "command 206" in text and "does not take off" in text and "return was put" in text and "12 m/s" in text
+    assert (
+        "command 206 (DO_SET_CAM_TRIGG_DIST)" in text
+        and "does not take off" in text
+        and "return was put" in text
+        and "12 m/s" in text
+    )
+
+
+def test_what_else_is_left_out_of_a_plan_is_told():
+    written = plan(TAKEOFF, waypoint(), item(20, *[0] * 7), vehicleType=1)
+    written["rallyPoints"] = {"points": [[HOME.latitude_deg, HOME.longitude_deg, 10.0]], "version": 2}
+    text = " ".join(mission_of_plan(written, "t")[1])
+    assert "rally points" in text and "another kind of vehicle" in text
+    assert "left out" not in " ".join(read(TAKEOFF, waypoint(), item(20, *[0] * 7), vehicleType=2)[2])
 
 
 @pytest.mark.parametrize(
     ("part", "words"),
     [
-        (item(84, *[0] * 7), "command 84, which a mission cannot do"),
+        (item(84, *[0] * 7), r"command 84 \(NAV_VTOL_TAKEOFF\), which a mission cannot do"),
+        (item(31999, *[0] * 7), "command 31999, which a mission cannot do"),
         (item(16, 0, 0, 0, None, 47.3977, 8.5456, 5.0, frame=10), "above the terrain"),
         (item(177, 9, 1, *[0] * 5), "jumps forwards"),
         (item(177, 2, -1, *[0] * 5), "for ever"),
