@@ -6,16 +6,15 @@ on links with MAV_x_FORWARD, or over the ground station's own link to the compan
 
 import math
 from collections.abc import Callable, Mapping
+from enum import Enum
 
 from companion.detection.interface import Phase
 from companion.detection.watch import Watch
 from companion.flight.collision import CollisionRecord
-from companion.flight.states import State
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
 from companion.report import Event, JsonValue
 
-# Numbers for plots: the place of a state, or a phase, in its list.
-_STATE_NUMBER = {state: number for number, state in enumerate(State)}
+# Numbers for plots.
 _PHASE_NUMBER = {Phase.OFF: 0.0, Phase.QUIET: 1.0, Phase.ARMED: 2.0, Phase.CONTACT: 3.0}
 _BLIND = -1.0
 
@@ -88,12 +87,12 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
 
 
 def values(
-    state: State, watch: Watch, latest: CollisionRecord | None, hits: int, time_us: int
+    state: Enum, watch: Watch, latest: CollisionRecord | None, hits: int, time_us: int
 ) -> list[NamedValue | DebugVector]:
-    """The detector's numbers: phase, threshold and the latest hit's; and where the flight is."""
+    """The detector's numbers: phase, threshold and the latest hit's; and the state's, its place among all states."""
     phase = _PHASE_NUMBER[watch.state.phase] if watch.blind_reason is None else _BLIND
     sent: list[NamedValue | DebugVector] = [
-        NamedValue(time_us, "rb_state", float(_STATE_NUMBER[state])),
+        NamedValue(time_us, "rb_state", float(list(type(state)).index(state))),
         NamedValue(time_us, "rb_phase", phase),
         NamedValue(time_us, "rb_thresh", watch.state.threshold_m_s2),
         NamedValue(time_us, "rb_hits", float(hits)),

@@ -10,7 +10,7 @@ from companion.flight.context import FlightContext, Inputs
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.hearing import hear
 from companion.flight.limiting import Limiter
-from companion.flight.operator import status_text
+from companion.flight.operator import status_text, values
 from companion.flight.outputs import Outputs, collect
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext, GuardInputs
@@ -45,6 +45,7 @@ class GuardCore:
     now_us: int
     heartbeat_due_us: int
     setpoint_due_us: int
+    values_due_us: int
     stop_reason: str | None = None
     is_enabled: bool = False  # asked for, and not yet taken up
     limiter: Limiter = field(default_factory=Limiter)
@@ -65,7 +66,7 @@ def start(config: GuardConfig, keeps_others_out: bool, now_us: int) -> GuardCore
     streams = StreamMonitor(companion.streams, tuple(watching.detector.losses))
     flight = FlightContext(config.as_mission(), Vehicle(), streams)
     machine = GuardMachine(GuardContext(config, flight, keeps_others_out), Connect(now_us))
-    return GuardCore(machine, watching, now_us, now_us, now_us, now_us)
+    return GuardCore(machine, watching, now_us, now_us, now_us, now_us, now_us)
 
 
 def advance(core: GuardCore, samples: Sequence[Sample], now_us: int) -> Outputs:
@@ -74,7 +75,7 @@ def advance(core: GuardCore, samples: Sequence[Sample], now_us: int) -> Outputs:
     moved = react(core, samples, now_us)
     stream_setpoint(core, moved, now_us)
     beat(core, now_us)
-    inform(core)
+    inform(core, now_us)
     return collect(core.flight)
 
 
@@ -182,13 +183,19 @@ def beat(core: GuardCore, now_us: int) -> None:
     core.flight.outbox.append(OnboardHeartbeat(core.machine.state is not State.CONNECTING))
 
 
-def inform(core: GuardCore) -> None:
-    """The operator's texts, as things happen; once there is somebody to tell."""
-    flight = core.flight
-    if flight.vehicle.identity is None or not core.guard.config.companion.operator.status_texts:
+def inform(core: GuardCore, now_us: int) -> None:
+    """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
+    flight, operator = core.flight, core.guard.config.companion.operator
+    if flight.vehicle.identity is None:
         return
-    texts = [status_text(event, flight.mission.name, len(flight.collisions)) for event in flight.events]
-    flight.outbox += [text for text in texts if text is not None]
+    hits = len(flight.collisions)
+    if operator.status_texts:
+        texts = [status_text(event, flight.mission.name, hits) for event in flight.events]
+        flight.outbox += [text for text in texts if text is not None]
+    if operator.values_hz and now_us >= core.values_due_us and core.machine.state is not State.ENDED:
+        core.values_due_us = now_us + round(1e6 / operator.values_hz)
+        latest = flight.collisions[-1] if flight.collisions else None
+        flight.outbox += values(core.machine.state, core.watch, latest, hits, now_us - core.started_at_us)
 
 
 def next_deadline_us(core: GuardCore) -> int:

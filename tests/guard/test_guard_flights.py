@@ -68,6 +68,20 @@ def test_a_hit_flown_by_sticks_is_recovered_from_and_the_sticks_are_given_back(h
     assert not air.event("recovered").data["settled_after_s"] > 4.0
 
 
+def test_the_guards_state_and_its_detectors_are_there_to_plot_twice_a_second(hit_in_posctl):
+    air = hit_in_posctl
+    hit_s = 1e-6 * air.event("detection").time_us % 1_600_000_000
+    sent = [(at, m) for at, who, m in air.on_wire if who == "guard" and m.get_type() == "NAMED_VALUE_FLOAT"]
+    states = [(at, m.value) for at, m in sent if m.name == "rb_state"]
+    assert len([at for at, _ in states if hit_s - 2.0 < at <= hit_s]) == pytest.approx(4, abs=1)
+    assert {value for _, value in states} >= {float(list(State).index(s)) for s in (State.WATCHING, State.RECOVERING)}
+    assert [m.value for _, m in sent if m.name == "rb_hits"][-1] == 1.0
+    (v_c, *_) = [
+        m for _, who, m in air.on_wire if who == "guard" and m.get_type() == "DEBUG_VECT" and m.name == "rb_v_c"
+    ]
+    assert v_c.x == pytest.approx(air.event("detection").data["impact_velocity_ned_m_s"][0], abs=1e-3)
+
+
 def test_the_first_recovery_setpoint_leaves_with_the_datagram_that_shows_the_hit_and_the_mode_with_it(hit_in_posctl):
     air = hit_in_posctl
     hit_s = 1e-6 * air.event("detection").time_us % 1_600_000_000
@@ -236,7 +250,7 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     air.run(0.5)
     assert air.state is State.WATCHING
     kinds = {m.get_type() for at, who, m in air.on_wire if who == "guard" and at >= hit_s}
-    assert kinds <= {"HEARTBEAT", "STATUSTEXT", "TIMESYNC"}
+    assert kinds <= {"HEARTBEAT", "STATUSTEXT", "TIMESYNC", "NAMED_VALUE_FLOAT"}
 
 
 def test_beside_a_program_on_another_link_the_vehicle_is_led_clear_by_a_command_where_that_is_wanted():
