@@ -4,6 +4,8 @@ import pytest
 
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
+from companion.mission.config import EstimateConfig
+from tests.companion.fake_vehicle import LAND as LAND_MODE
 from tests.companion.fake_vehicle import LOITER, FakeVehicle, Flight, flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}
@@ -51,6 +53,16 @@ def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     report = f.companion.report()
     assert report.outcome == "completed" and "not flown from item 2 on" in report.reason
     assert f.vehicle.position[:2] == pytest.approx([0, 0], abs=0.3)
+
+
+def test_a_hit_while_it_recovers_makes_the_next_try_no_slower():
+    f = at_wall({**INTO_WALL, "on_collision": {"then": "retry", "max_hits": 3}})
+    f.run_to("recovering")
+    f.run_for(0.4)
+    strike(f)
+    f.run_to("mission")
+    assert len(f.companion.report().collisions) == 2
+    assert "at 50% of the speed" in f.event("item", 1).text
 
 
 def test_the_next_item_is_flown_at_its_full_speed_again():
@@ -116,6 +128,36 @@ def test_giving_up_hands_the_vehicle_over_once_it_has_settled(abort):
     report = f.companion.report()
     assert report.outcome == "aborted"
     assert "of at most 1" in report.reason or "hit_above_m_s = 1.5" in report.reason
+
+
+def test_a_landing_is_not_put_off_for_more_hits_than_the_limit():
+    f = flight(FakeVehicle(), items=[{"takeoff": {"height_m": 4}}, LAND], on_collision={"max_hits": 1})
+    f.run_to("landing")
+    f.run_for(0.5)
+    strike(f)
+    assert f.state == "recovering"
+    f.run_to("landing")
+    f.run_for(1.5)
+    strike(f)
+    f.run_for(0.1)
+    assert f.state == "landing" and f.vehicle.mode == LAND_MODE
+    f.run_to_end()
+    assert len(f.companion.report().collisions) == 1
+
+
+def test_a_recovery_keeps_off_what_is_known_behind_it():
+    """The gap between two walls is less than the law asks for: the middle is kept, though only one has been touched."""
+    slowly = {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 1.0}}
+    behind = {"touches_ned_m": [[-0.2, -1, -1.5], [-0.2, 1, -1.5]], "normal_ned": [1, 0, 0], "normal_error_deg": 5}
+    norths = []
+    for known in ([], [behind]):
+        f = flight(FakeVehicle(wall_north_m=0.6), items=[TAKEOFF, slowly, LAND], obstacles={"known": known})
+        f.run_to("recovering")
+        f.run_until(lambda f=f: "recovered" in f.kinds())
+        norths.append(f.companion.report().collisions[0].recovery_setpoint_ned_m[0])
+    middle_m = 0.5 * (0.6 - 0.2 + EstimateConfig().reach_m)
+    assert norths[0] < middle_m - 0.04
+    assert norths[1] == pytest.approx(middle_m, abs=0.02)
 
 
 def test_a_softer_hit_than_the_limit_is_no_reason_to_give_up():

@@ -89,6 +89,14 @@ def test_a_vehicle_inside_what_is_remembered_knows_that_it_is_not_there():
     """A door that was opened, or a place estimate that has drifted."""
     known = around(wall(0.0))
     assert route(known, (4.05, 0.0, -1.5), GOAL) == (GOAL,)
+    beside = (3.85, 0.0, -1.5)
+    assert route(known, (4.05, 0.0, -1.5), beside) == (beside,)
+
+
+def test_what_reaches_no_further_than_its_touch_is_still_as_wide_as_it_is_thick():
+    cart = Patch(((4.0, 0.0, -1.5),), (-1.0, 0.0, 0.0), ERROR_RAD, 0.0, 0)
+    assert core(cart).bounds == pytest.approx((3.9, -0.1, 4.0, 0.1), abs=0.11) and core(cart).area > 0.005
+    assert around(cart).block((START, GOAL))
 
 
 def test_a_goal_in_the_wall_cannot_be_reached_one_beside_it_can():

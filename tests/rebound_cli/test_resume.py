@@ -38,6 +38,11 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
     assert fly("--resume", second) == 1 and "nothing to resume" in capsys.readouterr().err
     assert fly("--set", "items.1.go_to.speed_m_s=1", "--resume", first) == 1
     assert "its items are others" in capsys.readouterr().err
+    # An item that a hit has ended is left behind, though no other had begun
+    whole = (first / EVENTS_NAME).read_text()
+    (first / EVENTS_NAME).write_text(whole.replace('"next_step": 3', '"next_step": 4'))
+    assert resume_of(first, mission_from(load_mission_document(SQUARE, QUICK[1:])))["at_step"] == 4
+    (first / EVENTS_NAME).write_text(whole)
     # A process that was killed leaves no word of an end, and perhaps half a line
     events = (first / EVENTS_NAME).read_text().splitlines(keepends=True)
     cut = [line for line in events if '"aborted"' not in line and '"mode"' not in line]
