@@ -34,6 +34,7 @@ def resume_of(run: Path, mission: Mission) -> dict[str, Any]:
             "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
             "armed_at_us": armed["time_us"],
             "armed_boot_us": armed["data"]["time_boot_us"],
+            "hits": sum(event["kind"] == "detection" for event in events) + (flown.resume.hits if flown.resume else 0),
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ResumeError(f"{run / EVENTS_NAME}: not the events of a flight; the file is damaged.") from error

@@ -51,7 +51,8 @@ def begin(flight: FlightContext, label: str, item: ExpectItem, now_us: int) -> N
         case ExpectHit() | ExpectNoHit():
             return
         case ExpectHits() as hits:
-            met, detail = _count(hits, len(flight.collisions))
+            resume = flight.mission.resume
+            met, detail = _count(hits, len(flight.collisions) + (0 if resume is None else resume.hits))
         case ExpectRecovered() as recovered:
             met, detail = _recovered(recovered, [record.report() for record in flight.collisions])
         case ExpectFlightTime(at_most_s=at_most_s):

@@ -70,3 +70,5 @@ class Resume(Written):
     """By the companion's clock."""
     armed_boot_us: Annotated[int, Field(strict=True, ge=0)]
     """By the vehicle's clock."""
+    hits: Annotated[int, Field(strict=True, ge=0)] = 0
+    """So many before; the mission's expectations count them."""

@@ -67,6 +67,15 @@ def test_an_interrupted_flight_says_where_to_go_on_and_a_resumed_one_too():
     assert f.event("aborted").data["next_step"] == 5
 
 
+def test_the_hits_of_before_count_for_what_the_mission_expects():
+    items = [*ITEMS[:-1], {"expect": {"collisions": {"exactly": 1}}}, ITEMS[-1]]
+    resume = {"at_step": 6, **FIRST, "armed_boot_us": 5_000_000, "hits": 1}
+    f = flight(FakeVehicle(start_ned_m=(12.0, 5.0, 0.0), time_us=605_000_000), items=items, resume=resume)
+    f.run_to_end()
+    assert f.event("expect").data["met"] is True
+    assert f.companion.report().outcome == "completed"
+
+
 def test_the_person_is_told_before():
     f = resumed(5, 5_000_000, confirmed=False)
     f.run_until(f.companion.plan_is_ready)

@@ -48,6 +48,7 @@ def test_a_flight_that_is_resumed_still_knows(tmp_path):
     # When it goes on, then round what it has found
     assert fly("--set", "on_collision.then=detour", "--resume", first, "--out", second) == 0
     assert json.loads((second / "summary.json").read_text())["collisions"] == []
+    assert yaml.safe_load((second / "resolved.yaml").read_text())["resume"]["hits"] == 1
 
 
 def test_the_file_in_a_mission_lies_beside_it(tmp_path):
