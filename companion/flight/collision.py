@@ -8,9 +8,9 @@ from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
-from companion.messages import LocalPosition, Vector3
+from companion.messages import Attitude, LocalPosition, Vector3
+from companion.recovery.climb import Climb
 from companion.recovery.direction import away_from
-from companion.recovery.height import Climb
 from companion.recovery.interface import Contact
 from companion.report import CollisionReport
 
@@ -56,15 +56,12 @@ class CollisionRecord:
     overshoot_m: float = 0.0
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
-    def follow_climb(self, strapdown: Strapdown) -> bool:
-        """What accelerometer and gyroscopes show while the estimate is not believed; whether to brake it at once."""
-        if self.is_believed or self.is_over or not self.may_be_clipped:
+    def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
+        """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
+        if self.is_believed or self.is_over or not self.may_be_clipped or told is None:
             return False
-        told_m_s = None
-        if self.fixes:
-            fix = self.fixes[-1]
-            told_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
-        self.climb.hear(strapdown, self.contact_ended_boot_us - self.sample_time_boot_us, told_m_s)
+        pushed_us = self.contact_ended_boot_us - self.sample_time_boot_us
+        self.climb.hear(strapdown, turns, pushed_us, self.normal_ned, told)
         return self.climb.is_pressing
 
     def follow_contact(

@@ -83,7 +83,8 @@ def follow_contact(flight: FlightContext, watching: Watch) -> None:
     if flight.collisions:
         record, estimator = flight.collisions[-1], watching.estimator
         record.follow_contact(watching.state, watching.estimate, estimator.fixes)
-        flight.is_pressing = record.follow_climb(estimator.strapdown)
+        told = flight.vehicle.history.latest()
+        flight.is_pressing = record.follow_climb(estimator.strapdown, estimator.attitudes, told)
 
 
 def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

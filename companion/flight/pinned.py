@@ -10,8 +10,10 @@ import math
 from dataclasses import dataclass
 
 from companion.estimate.rotation import body_to_ned
-from companion.flight.context import FlightContext
+from companion.flight.collision import CollisionRecord
+from companion.flight.context import FlightContext, Target
 from companion.messages import Attitude, Vector3
+from companion.recovery.way import REST
 
 # Sines: of a lean into the obstacle that no hit needs, and of one from which a vehicle is free of it.
 HANGING = math.sin(math.radians(20.0))
@@ -33,14 +35,19 @@ LONGEST_US = 1_000_000
 
 @dataclass(slots=True)
 class Hanging:
-    """Followed from the hit on; `since_us` on the clock of `step`'s ``now_us``, None while the vehicle does not."""
+    """Followed from the hit on; `since_us` on the clock of `step`'s ``now_us``, None while the vehicle does not.
+
+    One that is only about to keeps its height: the turn that most hits give is soon over, and to go away is enough.
+    """
 
     since_us: int | None = None
+    is_leant: bool = False  # by so much already
 
     def step(self, attitude: Attitude, normal_ned: Vector3, since_hit_us: int, now_us: int) -> bool:
         """Whether the vehicle hangs on an obstacle with this horizontal normal."""
         n, e, d = body_to_ned(attitude.attitude_wxyz, (0.0, 0.0, -1.0))
         into = -(n * normal_ned[0] + e * normal_ned[1])
+        self.is_leant = into > HANGING
         if attitude.angular_velocity_frd_rad_s is not None:
             p, q, r = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)
             into -= AHEAD_S * ((q * d - r * e) * normal_ned[0] + (r * n - p * d) * normal_ned[1])
@@ -60,6 +67,12 @@ def has_room_below(flight: FlightContext) -> bool:
     return height_m > LEFT_M + 0.5 * down_m_s**2 / STOPPING_M_S2
 
 
-def let_go(normal_ned: Vector3, may_fall: bool) -> Vector3:
-    """The acceleration to ask for meanwhile, NED; without a fall, of a setpoint at a height."""
-    return (AWAY_M_S2 * normal_ned[0], AWAY_M_S2 * normal_ned[1], FALL_M_S2 if may_fall else 0.0)
+def let_go(record: CollisionRecord, normal_ned: Vector3, yaw_rad: float | None, falls: bool, reckons: bool) -> Target:
+    """What to ask for meanwhile: away, and either a fall or the height, as reckoned where the estimate is not it."""
+    climb = record.climb
+    reckons &= climb.is_reckoned
+    if falls:
+        climb.hold(FALL_M_S2)
+    down_m_s2 = FALL_M_S2 if falls else climb.braking_m_s2() if reckons else 0.0
+    away = (AWAY_M_S2 * normal_ned[0], AWAY_M_S2 * normal_ned[1], down_m_s2)
+    return Target(record.setpoint_ned_m, yaw_rad, REST, away, leans_only=True, is_height_free=falls or reckons)

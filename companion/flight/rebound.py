@@ -3,12 +3,11 @@
 import math
 
 from companion.detection.classify import HOVER_M_S
-from companion.estimate.rotation import body_to_ned
 from companion.flight.collision import horizontal_unit
 from companion.flight.context import FlightContext
 from companion.messages import LocalPosition, Vector3
+from companion.recovery.climb import Climb
 from companion.recovery.direction import away_from, plus, split
-from companion.recovery.height import Climb, most_thrown_m_s
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.way import REST
 
@@ -69,7 +68,9 @@ def believable(sample: LocalPosition, contact: Contact, impulse_m_s: float, sinc
     return Moving(sample.position_ned_m, plus(along, max(0.0, off_m_s), contact.normal_ned))
 
 
-def climb_of(flight: FlightContext, law: RecoveryLaw, contact: Contact, hit_boot_us: int) -> Climb:
+def climb_of(
+    flight: FlightContext, law: RecoveryLaw, contact: Contact, hit_boot_us: int, free_until_boot_us: int
+) -> Climb:
     """How the vehicle moves up or down from a contact on; 0 m/s^2 upwards where nothing holds the height after it."""
     mission = flight.mission
     is_upright = law.is_refined and law.holds_height and contact.normal_ned[2] == 0.0
@@ -78,9 +79,12 @@ def climb_of(flight: FlightContext, law: RecoveryLaw, contact: Contact, hit_boot
     if abs(speed_m_s - asked_m_s) < AS_ASKED_M_S:
         speed_m_s = asked_m_s
     is_upright &= abs(speed_m_s) < LEVEL_M_S
-    upwards_m_s2 = mission.recovery.vertical_acceleration_m_s2 if is_upright else 0.0
-    reach_m, most_m_s = mission.companion.estimate.reach_m, math.inf
-    if flight.vehicle.attitude is not None:
-        thrust_ned = body_to_ned(flight.vehicle.attitude.attitude_wxyz, (0.0, 0.0, -1.0))
-        most_m_s = most_thrown_m_s(*(-split(v, contact.normal_ned)[0] for v in (contact.velocity_ned_m_s, thrust_ned)))
-    return Climb(hit_boot_us, contact.normal_ned, reach_m, upwards_m_s2, speed_m_s, most_m_s)
+    return Climb(
+        hit_boot_us=hit_boot_us,
+        free_until_boot_us=free_until_boot_us,
+        velocity_ned_m_s=contact.velocity_ned_m_s,
+        guards=mission.companion.estimate.guards,
+        upwards_m_s2=mission.recovery.vertical_acceleration_m_s2 if is_upright else 0.0,
+        speed_m_s=speed_m_s,
+        height_down_m=contact.position_ned_m[2],
+    )

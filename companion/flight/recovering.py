@@ -72,9 +72,8 @@ class Recover:
 
     def target(self, now_us: int) -> Target | None:
         if self._hanging.since_us is not None:
-            place, leant = self._record.setpoint_ned_m, let_go(self._contact.normal_ned, self._may_fall)
-            self._record.climb.hold(leant[2])
-            return Target(place, self._yaw_rad, REST, leant, leans_only=True, is_height_free=self._may_fall)
+            falls, reckons = self._may_fall and self._hanging.is_leant, not self._is_believed
+            return let_go(self._record, self._contact.normal_ned, self._yaw_rad, falls, reckons)
         if self._steering is not None:
             a, b = self._steering.acceleration_m_s2
             leant = (a, b, self._braking.at(now_us))
@@ -232,9 +231,15 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         if doubted is not None:
             # Place and velocity now are as wrong as the estimate.
             contact = replace(doubted.contact, time_boot_us=estimate.time_boot_us)
+    hit_boot_us = impact.sample_time_boot_us
+    if doubted is None:
+        climb = climb_of(flight, law, contact, hit_boot_us, estimate.time_boot_us - estimate.time_error_us)
+    else:
+        climb = doubted.climb
+        climb.struck_again(hit_boot_us)
     record = CollisionRecord(
         detected_at_us=now_us,
-        sample_time_boot_us=impact.sample_time_boot_us,
+        sample_time_boot_us=hit_boot_us,
         detector=mission.companion.detector,
         contact=contact,
         setpoint_ned_m=_setpoint(flight, law, contact, law.expected(contact), flight.collisions),
@@ -245,7 +250,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         may_be_clipped=not estimate.is_final or estimate.may_be_clipped,
         doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
         inherits_doubt=doubted is not None,
-        climb=climb_of(flight, law, contact, impact.sample_time_boot_us) if doubted is None else doubted.climb,
+        climb=climb,
         is_behind=behind is not None,
     )
     flight.collisions.append(record)

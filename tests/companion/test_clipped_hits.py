@@ -1,14 +1,12 @@
 """A hit that the accelerometer could not show whole: what is believed of the estimate, and when."""
 
 import math
-from collections.abc import Callable
 
 import pytest
 
 from companion.detection.interface import Evidence, Impact, ImpactKind, Situation
 from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import ImpactEstimator
-from companion.estimate.strapdown import Strapdown
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
@@ -16,23 +14,14 @@ from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
-from companion.mission.config import EstimateConfig
+from companion.mission.config import EstimateConfig, GuardsConfig
 from companion.mission.model import Mission
-from companion.recovery.height import (
-    FALLING_MOST_M_S2,
-    FOLDED_SHARE,
-    NO_BRAKING,
-    Climb,
-    brake,
-    level,
-    most_thrown_m_s,
-    thrown_down_m_s,
-)
+from companion.recovery.climb import Climb
 from companion.recovery.interface import Contact
-from companion.recovery.way import Motion
 
 NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
 ZERO = (0.0, 0.0, 0.0)
+NOT_KNOWN = Climb(1_000_000, 998_000, (1.0, 0.0, 0.0), GuardsConfig(), 3.0)
 
 
 def said(north_m_s, at_us=0):
@@ -64,7 +53,7 @@ def test_the_glide_begins_anew_when_a_slow_contact_is_over():
     flight = FlightContext(slow, Vehicle(), StreamMonitor(slow.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
     wall = Contact(1_000_000, (3.0, 0.0, -2.0), (1.0, 0.0, 0.0), SOUTH)
-    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.6, 0.0, -2.0), SOUTH, 20.0, 1_080_000, 1.2, climbing())
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.6, 0.0, -2.0), SOUTH, 20.0, 1_080_000, 1.2, NOT_KNOWN)
     record.may_be_clipped = False
     flight.collisions.append(record)
     recover = Recover(flight, 0)
@@ -114,122 +103,13 @@ def test_the_way_out_lies_between_a_clipped_push_and_the_way_back():
     assert half_way(turned, ZERO) == turned, "a vehicle that hovered has no way back"
 
 
-@pytest.mark.parametrize("speed_m_s", [-0.6, -0.3, 0.4])
-def test_braking_ends_when_the_vehicle_has_stopped(speed_m_s):
-    """Given the vehicle's own loop, w' = -4 w, and a motor's and the estimate's 0.04 s before it acts."""
-    braking = brake(speed_m_s, 3.0, 0)
-    assert math.copysign(1.0, braking.acceleration_down_m_s2) == -math.copysign(1.0, speed_m_s)
-    w, way = speed_m_s, 0.0
-    for step in range(200):
-        late = step * 0.002 >= 0.04
-        w += 0.002 * (-4.0 * w + (braking.at(round(1e6 * (step * 0.002 - 0.04))) if late else 0.0))
-        way += 0.002 * w
-    assert abs(w) < 0.1, "neither on nor back"
-    assert abs(way) < abs(speed_m_s) / 4.0, "less than without"
-
-
-def test_nothing_is_braked_that_is_slow_or_unwanted():
-    assert brake(0.05, 3.0, 0) == NO_BRAKING
-    assert brake(1.0, 0.0, 0) == NO_BRAKING
-
-
-def test_a_nose_thrown_down_at_a_wall_ahead_throws_the_vehicle_up():
-    assert thrown_down_m_s((0.0, -3.5, 0.0), SOUTH, 0.2) == pytest.approx(-0.7)
-    # the same hit flown east: nose down is a turn about south
-    assert thrown_down_m_s((3.5, 0.0, 0.0), (0.0, -1.0, 0.0), 0.2) == pytest.approx(-0.7)
-
-
-def climbing(upwards_m_s2: float = 3.0) -> Climb:
-    return Climb(1_000_000, SOUTH, 0.2, upwards_m_s2, 0.0)
-
-
-def heard(
-    climb: Climb, down_m_s2: Callable[[int], float], until_us: int = 600_000, told_m_s: float = 0.0
-) -> list[float]:
-    """What is asked for every 4 ms after a hit whose arms fold for 12 ms and throw the nose down at 3 rad/s."""
-    strapdown, asked, speed_m_s = Strapdown(), [], 0.0
-    for since_us in range(0, until_us, 4000):
-        speed_m_s += 0.004 * down_m_s2(since_us)
-        nose_rad_s = -3.0 * min(1.0, since_us / 12_000) * math.exp(-max(0, since_us - 12_000) / 50_000)
-        strapdown.time_boot_us, strapdown.rates_frd_rad_s = 1_000_000 + since_us, (0.0, nose_rad_s, 0.0)
-        # What the accelerometer makes of a contact that it clips counts for nothing.
-        strapdown.acceleration_ned_m_s2 = (-150.0 if since_us <= 12_000 else -3.0, 0.0, 0.0)
-        strapdown.sum_ned_m_s = (0.0, 0.0, speed_m_s + (40.0 * min(since_us, 12_000) * 1e-6))
-        climb.hear(strapdown, min(since_us, 12_000), told_m_s)
-        asked.append(climb.braking_m_s2())
-    return asked
-
-
-def test_a_throw_that_clipping_hid_is_braked_as_hard_as_a_vehicle_falls_and_no_longer():
-    """The vehicle does what it is asked with 0.03 s of lag: the climb ends, and no fall comes of it."""
-    climb, thrown_m_s = climbing(), -FOLDED_SHARE * 0.2 * 3.0
-    asked: list[float] = []
-    done = [0.0]
-
-    def follows(since_us: int) -> float:
-        done[0] += 4 / 30 * ((climb.asked_m_s2) - done[0])
-        asked.append(climb.asked_m_s2)
-        return done[0] if since_us > 12_000 else 0.0
-
-    heard(climb, follows, until_us=440_000)
-    assert climb.thrown_m_s == pytest.approx(thrown_m_s)
-    assert max(asked) == FALLING_MOST_M_S2
-    assert abs(climb.speed_m_s) < 0.03
-    assert -0.04 < climb.fallen_m < -0.01
-    assert asked[-1] == pytest.approx(0.0, abs=0.5)
-
-
-def test_a_pole_that_spins_the_vehicle_does_not_make_it_fall():
-    # Given a hit of 1.4 m/s at a lean of 15 degrees on one guard, whose rates look like a throw of 0.4 m/s
-    climb = climbing()
-    climb.most_m_s = most_thrown_m_s(1.4, 0.26)
-    heard(climb, lambda _: 0.0, until_us=40_000)
-    # Then no more is taken for a throw than so soft a hit makes; a vehicle that did not lean was not thrown up at all
-    assert climb.thrown_m_s == pytest.approx(-climb.most_m_s) and climb.most_m_s < 0.15
-    assert most_thrown_m_s(5.0, -0.1) == most_thrown_m_s(0.0, 0.2) < 0.06
-    # and the throw of a hit at 5 m/s is not cut
-    assert most_thrown_m_s(4.9, 0.156) > 0.6
-
-
-def test_a_brake_cannot_wait_for_the_next_setpoints_turn():
-    climb = climbing()
-    strapdown = Strapdown(time_boot_us=1_008_000, rates_frd_rad_s=(0.0, -3.0, 0.0))
-    climb.hear(strapdown, 8_000)
-    assert climb.is_pressing
-    climb.braking_m_s2()
-    assert not climb.is_pressing
-
-
-def test_a_climb_that_is_not_to_be_braked_is_not():
-    climb = climbing(upwards_m_s2=0.0)
-    climb.hear(Strapdown(time_boot_us=1_008_000, rates_frd_rad_s=(0.0, -3.0, 0.0)), 8_000)
-    assert not climb.is_reckoned
-    assert not climb.is_pressing
-
-
-def test_half_a_second_later_the_estimate_counts_again():
-    """What was reckoned of the hit may be wrong by 0.1 m/s, which grows to a decimetre."""
-    climb = climbing()
-    heard(climb, lambda _: 0.0, until_us=440_000)
-    reckoned_m_s = climb.speed_m_s
-    heard(again := climbing(), lambda _: 0.0, until_us=900_000, told_m_s=0.0)
-    assert reckoned_m_s < -0.3
-    assert abs(again.speed_m_s) < 0.5 * abs(reckoned_m_s)
-
-
-def test_height_is_the_only_thing_that_levelling_changes():
-    motion = Motion((1.0, 2.0, -3.0), (0.5, 0.6, 0.7), (0.1, 0.2, 0.3))
-    assert level(motion, -2.0, 1.5) == Motion((1.0, 2.0, -2.0), (0.5, 0.6, 0.0), (0.1, 0.2, 1.5))
-    assert level(Motion((1.0, 2.0, -3.0)), -2.0, 0.0) == Motion((1.0, 2.0, -2.0))
-
-
 def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
     # Given a clipped hit square into a wall, whose estimate is believed only when it must be
     falling = Mission.model_validate({"name": "fall", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
     flight = FlightContext(falling, Vehicle(), StreamMonitor(falling.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
     wall = Contact(1_000_000, (3.0, 0.0, -2.0), (2.0, 0.0, 0.0), SOUTH)
-    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.0, 0.0, -2.0), SOUTH, 150.0, 1_000_000, 2.0, climbing())
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.0, 0.0, -2.0), SOUTH, 150.0, 1_000_000, 2.0, NOT_KNOWN)
     record.doubted_since_boot_us = 1_000_000
     flight.collisions.append(record)
     recover = Recover(flight, 0)

@@ -5,10 +5,14 @@ import math
 import pytest
 
 from companion.core import start
+from companion.flight.collision import CollisionRecord
 from companion.flight.hearing import hear
 from companion.flight.pinned import BEGUN_US, LONGEST_US, Hanging, has_room_below, let_go
 from companion.messages import Attitude, Heartbeat, LocalPosition
+from companion.mission.config import GuardsConfig
 from companion.mission.model import Mission
+from companion.recovery.climb import Climb
+from companion.recovery.interface import Contact
 
 WALL_IN_THE_NORTH = (-1.0, 0.0, 0.0)
 
@@ -44,10 +48,26 @@ def test_it_hangs_until_it_is_nearly_level_or_for_too_long():
     assert not hanging.step(leaning_north(70.0), WALL_IN_THE_NORTH, 1_200_000, 2_000_001 + LONGEST_US)
 
 
-def test_little_thrust_away_from_the_wall_is_asked_for_and_none_less_near_the_ground():
-    away, _, down = let_go(WALL_IN_THE_NORTH, may_fall=True)
-    assert away < 0.0 and 0.0 < down < 9.81
-    assert let_go(WALL_IN_THE_NORTH, may_fall=False)[2] == 0.0
+def test_little_thrust_away_from_the_wall_is_asked_for_and_its_height_of_what_does_not_lean_yet():
+    # Given a hit that the estimate does not know, and that has made the vehicle fall with 0.05 m/s
+    climb = Climb(1_000_000, 998_000, (2.0, 0.0, 0.0), GuardsConfig(), 3.0, speed_m_s=0.05)
+    contact = Contact(1_000_000, (3.0, 0.0, -2.0), (2.0, 0.0, 0.0), WALL_IN_THE_NORTH)
+    record = CollisionRecord(
+        0, 1_000_000, "d", contact, (2.0, 0.0, -2.0), WALL_IN_THE_NORTH, 9.0, 1_000_000, 2.0, climb
+    )
+    wanted = [(falls, reckons) for falls in (True, False) for reckons in (True, False)]
+    asked = {each: let_go(record, WALL_IN_THE_NORTH, None, *each) for each in wanted}
+    assert all(target.acceleration_ned_m_s2[0] < -3.0 and target.leans_only for target in asked.values())
+    # Then one that hangs falls, and one that is about to is held as reckoned, or at the setpoint's height
+    assert 0.0 < asked[True, True].acceleration_ned_m_s2[2] == asked[True, False].acceleration_ned_m_s2[2] < 9.81
+    assert asked[False, True].acceleration_ned_m_s2[2] < 0.0 and asked[False, True].is_height_free
+    assert asked[False, False].acceleration_ned_m_s2[2] == 0.0 and not asked[False, False].is_height_free
+
+
+def test_what_is_about_to_hang_does_not_lean_yet():
+    hanging = Hanging()
+    assert hanging.step(leaning_north(10.0, 5.0), WALL_IN_THE_NORTH, 20_000, 1_000_000) and not hanging.is_leant
+    assert hanging.step(leaning_north(25.0, 2.0), WALL_IN_THE_NORTH, 60_000, 1_040_000) and hanging.is_leant
 
 
 @pytest.mark.parametrize(
