@@ -39,6 +39,9 @@ POLL_INTERVAL_US = 50_000
 ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
 # Off the ground, which is the detector's affair by height, a hit in the climb or the descent is a hit too.
 DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
+# A vehicle that has come down lower than this, and was not told to, drags itself along the ground: nothing of that is a
+# hit to recover from. Its feet are a tenth of a metre below it, and where it leans they are not what touches.
+SCRAPING_M = 0.1
 
 
 @dataclass(slots=True)
@@ -127,12 +130,11 @@ def situation(core: Core) -> Situation:
 
 def why_not_detecting(core: Core, height_m: float | None) -> str | None:
     """The ground shakes a vehicle as a hit does, until it has left it and where it goes down to it."""
-    state = core.machine.state
+    state, least_m = core.machine.state, core.flight.mission.companion.min_detection_height_m
     if state not in DETECTING_STATES:
         return state.value
     if core.flight.has_climbed and state is not State.LANDING:
-        return None
-    least_m = core.flight.mission.companion.min_detection_height_m
+        least_m = min(least_m, SCRAPING_M)
     return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
 
 

@@ -311,6 +311,17 @@ def test_a_low_flight_is_on_the_watch_once_it_has_been_up():
     assert f.companion.report().outcome == "completed"
 
 
+def test_a_vehicle_that_drags_itself_along_the_ground_is_not_hit_by_it():
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 5}}, {"land": {}}])
+    f.run_to("mission")
+    f.run_for(0.5)
+    f.vehicle.position[2] = -0.05
+    f.run_for(0.05)
+    assert f.companion.status().detector == "off (below 0.1 m)"
+    strike(f, 12.0, 0.0)
+    assert f.companion.report().collisions == ()
+
+
 def test_the_detector_says_armed_in_flight():
     f = flight()
     f.run_to("mission")
