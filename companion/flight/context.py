@@ -9,6 +9,7 @@ from companion.flight.collision import CollisionRecord
 from companion.flight.commander import Commander, CommandOutcome
 from companion.flight.course import Pace
 from companion.flight.leaning import Leaning
+from companion.flight.pressing import Pressing
 from companion.flight.states import Trigger
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
@@ -146,6 +147,7 @@ class FlightContext:
     unreachable: list[str] = field(default_factory=list)
     leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
+    pressing: Pressing = field(default_factory=Pressing)
     touch: Touched | None = None  # the latest that was no collision
     blind_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False

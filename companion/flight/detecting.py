@@ -9,7 +9,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.estimate.rotation import body_to_ned, ned_to_body
 from companion.flight.context import FlightContext, Touched
 from companion.flight.leaning import Held
-from companion.messages import Attitude, ImuSample, LocalPosition, Sample
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 
 
 def collisions(
@@ -30,18 +30,22 @@ def collisions(
 
 
 def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation, now_us: int) -> ImpactEstimate | None:
-    """What no detector feels: that the vehicle leans on something, where it is to fly to a place by setpoints."""
-    target, attitude, leaning = flight.target, flight.vehicle.attitude, flight.leaning
+    """What no detector feels: that the vehicle leans or presses on something, where it is to fly to a place."""
+    target, attitude, leaning, pressing = flight.target, flight.vehicle.attitude, flight.leaning, flight.pressing
     flown_to = situation.setpoint_position_ned_m
     is_off = situation.off_reason is not None or situation.descent_commanded
     if is_off or flown_to is None or target is None or target.leans_only or attitude is None:
         leaning.forget()
+        pressing.forget()
         return None
     for sample in samples:
         if type(sample) is ImuSample:
             leaning.feel(sample.specific_force_frd_m_s2)
+        elif type(sample) is AttitudeTarget:
+            pressing.tell(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, LocalPosition):
             held = leaning.step(sample, attitude.attitude_wxyz, flown_to)
+            held = pressing.step(sample, leaning.thrust_m_s2, flown_to[2]) or held
             if held is not None:
                 _tell_held(flight, held, sample, now_us)
                 return _estimate_of(held, sample, attitude)
@@ -50,8 +54,8 @@ def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation
 
 def _estimate_of(held: Held, sample: LocalPosition, attitude: Attitude) -> ImpactEstimate:
     """As of a hit: by a vehicle that hardly moves, and as sure of the normal as a lean is steady."""
-    n, e, _ = held.normal_ned
-    push_ned = (held.push_m_s2 * n, held.push_m_s2 * e, 0.0)
+    n, e, d = held.normal_ned
+    push_ned = (held.push_m_s2 * n, held.push_m_s2 * e, held.push_m_s2 * d)
     force = ned_to_body(attitude.attitude_wxyz, push_ned)
     lasted_us = sample.time_boot_us - held.since_boot_us
     return ImpactEstimate(
@@ -74,7 +78,8 @@ def _estimate_of(held: Held, sample: LocalPosition, attitude: Attitude) -> Impac
 
 def _tell_held(flight: FlightContext, held: Held, sample: LocalPosition, now_us: int) -> None:
     lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
-    text = f"something is in the way: leant on it for {lasted_s:.1f} s, by {held.push_m_s2:.1f} m/s^2 more"
+    does = "leant" if held.normal_ned[2] == 0.0 else "pressed up"
+    text = f"something is in the way: {does} on it for {lasted_s:.1f} s, by {held.push_m_s2:.1f} m/s^2 more"
     flight.tell(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.push_m_s2, lasted_s=lasted_s)
 
 

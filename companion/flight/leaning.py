@@ -41,7 +41,7 @@ NEARING_M_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Something is in the way; local NED, horizontal.
+    """Something is in the way; local NED.
 
     `normal_ned` is away from it, `push_m_s2` what it takes of the lean's acceleration, since `since_boot_us`.
     """
