@@ -10,6 +10,9 @@ from companion.recovery.envelope import Envelope
 # Cosine between two normals below which surfaces face each other, as in a corridor: away from one is towards the
 # other, and where there is not room enough for both distances the middle is kept. Walls of a corner are at 0.
 FACING_EACH_OTHER = -0.5
+# Where the vehicle is, is free: behind a surface by more than an estimate's drift and a touch's depth, the surface is not
+# where its normal, as it was thought to be, has it. A hit that only brushed a guard may show it 70 degrees beside.
+BEHIND_M = 0.2
 # In a corner of an acute angle, away from one wall is towards the other: that converges in a few rounds or not at all.
 ROUNDS = 5
 
@@ -47,9 +50,11 @@ class Room:
 
 def _clear_of(surface: Surface, contact: Vector3, normal: Vector3, goal: Vector3) -> Vector3:
     """The goal, off the surface by its distance or, between surfaces that face each other, by half of the room."""
-    wanted_m = surface.distance_m
+    wanted_m, room_m = surface.distance_m, surface.off_m(contact)
+    if room_m < -BEHIND_M:
+        return goal
     cosine = sum(a * b for a, b in zip(normal, surface.normal_ned, strict=True))
     if cosine < FACING_EACH_OTHER:
-        wanted_m = min(wanted_m, 0.5 * max(0.0, surface.off_m(contact)))
+        wanted_m = min(wanted_m, 0.5 * max(0.0, room_m))
     short_m = wanted_m - surface.off_m(goal)
     return goal if short_m <= 0.0 else plus(goal, short_m, surface.normal_ned)

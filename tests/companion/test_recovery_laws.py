@@ -195,6 +195,18 @@ def test_out_of_a_corner_the_goal_is_clear_of_both_walls():
     assert Room(ROOM, (NORTH_WALL,)).goal(east_wall.position_ned_m, east_wall.normal_ned, further) == further
 
 
+def test_a_surface_that_the_vehicle_is_behind_is_not_there():
+    """Of a wall that was brushed the normal was 70 degrees wrong: the vehicle flew on along it, behind what was found."""
+    brushed = Surface((3.0, 2.0, -1.5), (-1.0, 0.0, 0.0), 0.5)
+    # Given a hit on the same wall half a metre behind that surface, and a goal off the wall
+    hit = Contact(0, (3.5, 4.0, -1.5), (0.5, 0.9, 0.0), (0.34, -0.94, 0.0))
+    wanted = (3.6, 3.7, -1.5)
+    # Then it is not moved through where the vehicle is, back into the wall
+    assert Room(ROOM, (brushed,)).goal(hit.position_ned_m, hit.normal_ned, wanted) == wanted
+    # but a touch that lies a decimetre deeper than the surface is the estimate's
+    assert Room(ROOM, (brushed,)).goal((3.1, 4.0, -1.5), hit.normal_ned, wanted)[0] == pytest.approx(2.5)
+
+
 @pytest.mark.parametrize(("gap_m", "north_m"), [(3.0, 1.0), (1.2, 2.5), (0.6, 2.7)])
 def test_between_walls_that_face_each_other_the_goal_stays_between(gap_m, north_m):
     """The south wall is touched `gap_m` south of where the north wall was; away from it is towards the north wall."""
