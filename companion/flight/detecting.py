@@ -97,6 +97,7 @@ def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) 
     kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
     text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
     flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
+    flight.leaning.touch(estimate.impact.sample_time_boot_us)
     attitude = flight.vehicle.attitude
     if attitude is not None:
         push_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)

@@ -10,8 +10,8 @@ from companion.recovery.envelope import Envelope
 # Cosine between two normals below which surfaces face each other, as in a corridor: away from one is towards the
 # other, and where there is not room enough for both distances the middle is kept. Walls of a corner are at 0.
 FACING_EACH_OTHER = -0.5
-# Where the vehicle is, is free: behind a surface by more than an estimate's drift and a touch's depth, the surface is not
-# where its normal, as it was thought to be, has it. A hit that only brushed a guard may show it 70 degrees beside.
+# Where the vehicle is, is free: behind a surface by more than an estimate's drift and a touch's depth, the surface is
+# not where it was thought to be. A hit that only brushed a guard may show its normal 70 degrees beside.
 BEHIND_M = 0.2
 # In a corner of an acute angle, away from one wall is towards the other: that converges in a few rounds or not at all.
 ROUNDS = 5

@@ -196,7 +196,7 @@ def test_out_of_a_corner_the_goal_is_clear_of_both_walls():
 
 
 def test_a_surface_that_the_vehicle_is_behind_is_not_there():
-    """Of a wall that was brushed the normal was 70 degrees wrong: the vehicle flew on along it, behind what was found."""
+    """Of a wall that was brushed the normal was 70 degrees wrong, and the vehicle flew on along it, behind that."""
     brushed = Surface((3.0, 2.0, -1.5), (-1.0, 0.0, 0.0), 0.5)
     # Given a hit on the same wall half a metre behind that surface, and a goal off the wall
     hit = Contact(0, (3.5, 4.0, -1.5), (0.5, 0.9, 0.0), (0.34, -0.94, 0.0))
