@@ -6,6 +6,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from companion.flight.collision import LEAST_WAY_M
+from companion.recovery.direction import away_from
+from companion.report import CollisionReport
 from rebound_cli.campaign.plan import Json
 from rebound_cli.random_missions.contacts import Contact, Role
 from rebound_cli.random_missions.crashes import tilts_deg
@@ -13,14 +16,19 @@ from rebound_cli.random_missions.flight import JudgedFlight
 from rebound_cli.random_missions.phases import phases_of
 from rebound_cli.summary import LONGEST_RECOVERY_S
 from rebound_cli.truth_match import Vector3
+from sim_vehicle.truth import Hit
 from sim_vehicle.world import Obstacle
 
 Rows = npt.NDArray[np.intp]
+Floats = npt.NDArray[np.float64]
 
 # The vehicle is watched at rest for this long, unless it flies on earlier.
 RESTING_S = 0.5
 # A vehicle that leaves a surface does not come nearer again by this; else a touch is another guard swinging in.
 CAME_BACK_M = 0.02
+# Nor does one that is still on its way in, from one guard to the next, before anything sent can have turned it.
+UNANSWERED_US = 100_000
+MOVED_M = 1e-3
 # A vehicle at rest moves by a millimetre in so many rows of truth.
 _LOOK_EVERY = 10
 _DIGITS = 4
@@ -51,7 +59,7 @@ def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
         "seen": first.collision is not None,
         "again": sum(contact.role is Role.AGAIN for contact in episode),
         "others": sum(contact.role is Role.NEXT for contact in episode),
-        "returned": sum(_returned(flight, before, touch) for before, touch in pairwise(episode)),
+        "returned": sum(_returned(flight, first, before, touch) for before, touch in pairwise(episode)),
     }
     if first.collision is not None:
         collision = flight.report.collisions[first.collision]
@@ -62,38 +70,61 @@ def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
 
 
 def _recovery(flight: JudgedFlight, contact: Contact, episode: Sequence[Contact]) -> Json:
-    """After the last hit of an episode that was seen: its setpoint is the one that is flown to."""
-    assert contact.collision is not None
-    collision, hit = flight.report.collisions[contact.collision], contact.hit
-    series = flight.truth.series
+    """After the last hit of an episode that was seen, to the setpoint that is flown to in the end."""
+    hit, series = contact.hit, flight.truth.series
+    collision, ended_us = _last_of_recovery(flight, contact)
     since_s = 1e-6 * (series["time_boot_us"] - hit.contact_at_boot_us)
     settled_s = collision.settled_after_s
     if settled_s is not None:
         settled_s += 1e-6 * (collision.sample_time_boot_us - hit.contact_at_boot_us)
     until_s = LONGEST_RECOVERY_S if settled_s is None else settled_s + flight.mission.companion.settled.duration_s
     # A recovery that was given up, or that the mission's end cut short, is over when something else begins.
-    detected_boot_us = collision.detected_at_us - flight.truth.epoch_at_boot_us
-    ended_us = phases_of(flight.events, flight.truth.epoch_at_boot_us).end_of(detected_boot_us + 1.0)
     if ended_us is not None:
         until_s = min(until_s, 1e-6 * (ended_us - hit.contact_at_boot_us))
-    until_boot_us = hit.contact_at_boot_us + 1e6 * until_s
-    past_m, lost_m = flight.truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, until_boot_us)
     during = (since_s >= 0.0) & (since_s <= until_s)
+    past_m = _past_m(hit, collision, series["position_ned_m"][during])
     resting = (since_s >= until_s - RESTING_S) & (since_s <= until_s)
     clear_m = None if settled_s is None else _clear_m(flight, episode, np.flatnonzero(resting))
     height_m = hit.contact_position_ned_m[2] - series["position_ned_m"][during, 2]
-    risen_m = float(height_m.max()) if during.any() else 0.0
+    risen_m, lost_m = (float(height_m.max()), -float(height_m.min())) if during.any() else (0.0, 0.0)
     return {
         "settled_s": None if settled_s is None else round(settled_s, _DIGITS),
         "past_m": round(past_m, _DIGITS),
-        "lost_m": round(lost_m, _DIGITS),
+        "lost_m": round(max(0.0, lost_m), _DIGITS),
         "risen_m": round(max(0.0, risen_m), _DIGITS),
         "leant_deg": round(float(tilts_deg(series["attitude_wxyz"][during]).max(initial=0.0)), 1),
         "clear_m": None if clear_m is None else round(clear_m, _DIGITS),
     }
 
 
-def _returned(flight: JudgedFlight, before: Contact, touch: Contact) -> bool:
+def _past_m(hit: Hit, collision: CollisionReport, positions_ned_m: Floats) -> float:
+    """Furthest beyond the setpoint, in the direction in which it lies from the contact; level where the height is held.
+
+    Behind what it has slid past, a vehicle recovers to the other side of the surface that it touched. The setpoint's
+    place is where the vehicle's own frame was at the contact.
+    """
+    place_ned_m = np.array(collision.recovery_setpoint_ned_m) - np.array(hit.frame_offset_ned_m)
+    way, normal = place_ned_m - np.array(hit.contact_position_ned_m), np.array(hit.normal_ned)
+    if away_from(hit.normal_ned)[2] == 0.0:
+        way[2] = 0.0
+    length_m = float(np.linalg.norm(way))
+    direction = way / length_m if length_m > LEAST_WAY_M else normal
+    return max(0.0, float(((positions_ned_m - place_ned_m) @ direction).max(initial=0.0)))
+
+
+def _last_of_recovery(flight: JudgedFlight, contact: Contact) -> tuple[CollisionReport, float | None]:
+    """What the companion told last in the recovery from a contact, and the boot time at which that was over.
+
+    Of a contact that goes on, from one wall of a corner to the other, it can tell more than once.
+    """
+    assert contact.collision is not None
+    epoch_us, collisions = flight.truth.epoch_at_boot_us, flight.report.collisions[contact.collision :]
+    ended_us = phases_of(flight.events, epoch_us).end_of(collisions[0].detected_at_us - epoch_us + 1.0)
+    told = [c for c in collisions if ended_us is None or c.detected_at_us - epoch_us < ended_us]
+    return told[-1], ended_us
+
+
+def _returned(flight: JudgedFlight, first: Contact, before: Contact, touch: Contact) -> bool:
     """Whether the centre had come back to a surface that is touched again; one that goes from corner to corner has."""
     if touch.role is not Role.AGAIN:
         return False
@@ -103,7 +134,9 @@ def _returned(flight: JudgedFlight, before: Contact, touch: Contact) -> bool:
         return False
     rows = [*between[::_LOOK_EVERY], between[-1]]
     off_m = [_distance_m(obstacle, flight.truth.series["position_ned_m"][row], time_us[row]) for row in rows]
-    return max(off_m) - off_m[-1] > CAME_BACK_M
+    has_left = max(off_m) - off_m[0] > MOVED_M
+    is_answered = touch.hit.contact_at_boot_us - first.hit.contact_at_boot_us > UNANSWERED_US
+    return (has_left or is_answered) and max(off_m) - off_m[-1] > CAME_BACK_M
 
 
 def _clear_m(flight: JudgedFlight, episode: Sequence[Contact], resting: Rows) -> float | None:

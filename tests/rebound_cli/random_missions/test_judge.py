@@ -251,14 +251,41 @@ def test_a_guard_that_swings_in_while_the_vehicle_leaves_is_counted_apart_and_en
     assert figures["past_m"] == pytest.approx(0.2, abs=0.02)
     assert figures["clear_m"] == pytest.approx(0.46, abs=0.01), "from where that guard touched"
     # and one whose centre comes back for it
-    back = path((0, 0, 0, 0), (10, 2, 0, 2), (10.05, 1.95, 0, 2), (10.08, 1.98, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
-    (figures,) = recoveries(*_touched_again(back))
+    back = path((0, 0, 0, 0), (10, 2, 0, 2), (10.2, 1.9, 0, 2), (10.3, 1.96, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(back, at_s=10.3))
     assert (figures["again"], figures["returned"]) == (1, 1)
 
 
-def _touched_again(series):
-    judged = bounced(series=series, hits=[hit(), hit(at_s=10.08, place=(1.96, 0.0, -2.08))])
+@pytest.mark.parametrize(("at_s", "returned"), [(10.08, 0), (10.2, 1)])
+def test_what_slides_on_to_its_next_guard_has_come_back_only_where_it_could_have_been_turned(at_s, returned):
+    inwards = path((0, 0, 0, 0), (10, 1.8, 0, 2), (at_s, 1.96, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(inwards, at_s))
+    assert (figures["again"], figures["returned"]) == (1, returned)
+
+
+def _touched_again(series, at_s=10.08):
+    judged = bounced(series=series, hits=[hit(), hit(at_s=at_s, place=(1.96, 0.0, -2.08))])
     return judged, contacts_of(judged)
+
+
+def test_a_recovery_goes_to_the_setpoint_that_was_told_last():
+    # Given a contact that went on from one wall of a corner to the other, of which the companion told twice
+    told = [collision(setpoint=(1.8, 0.0, -2.08), settled_s=None), collision(at_s=10.02)]
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    judged = flight(events_with_hit(*LANDS_THERE), series, [hit()], told)
+    (figures,) = recoveries(judged, contacts_of(judged))
+    assert figures["past_m"] == pytest.approx(0.0, abs=0.01), "0.3 m past the one that was given up"
+    assert figures["settled_s"] == pytest.approx(1.02)
+    assert figures["latency_ms"] == pytest.approx(4.0)
+
+
+def test_past_is_beyond_the_setpoint_as_seen_from_the_contact():
+    # Given a vehicle that slid past an edge and came to rest behind it, 0.1 m beyond its setpoint
+    told = [collision(setpoint=(3.0, 0.0, -2.08))]
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 3.1, 0, 2), (17, 3.1, 0, 2))
+    judged = flight(events_with_hit(*LANDS_THERE), series, [hit()], told)
+    (figures,) = recoveries(judged, contacts_of(judged))
+    assert figures["past_m"] == pytest.approx(0.1, abs=0.01)
 
 
 def test_clear_is_the_nearest_of_the_last_half_second():
