@@ -20,6 +20,8 @@ _WAY = "tab:orange"
 _FENCE = "tab:green"
 _OBSTACLE = "tab:brown"
 _MEETING = "tab:red"
+# Numbers of items: not on the way itself.
+_BESIDE: Any = {"fontsize": 8, "xytext": (4, 4), "textcoords": "offset points"}
 # A wait whose end nobody knows is drawn this long.
 _UNKNOWN_S = 5.0
 
@@ -47,10 +49,10 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
     for number, way in enumerate(ways):
         points = way.points_ned_m
         axis.plot(points[:, 1], points[:, 0], color=_WAY, linewidth=1.6, label="way" if number == 0 else None)
-        if way.length_m:
-            axis.annotate(way.leg.step.label.partition(" ")[0], points[-1, 1::-1], fontsize=8)
         if way.meets:
             axis.plot(*points[way.meets.index, 1::-1], "x", color=_MEETING)
+    for (north, east), numbers in ends(ways).items():
+        axis.annotate(", ".join(numbers), (east, north), **_BESIDE)
     axis.plot([0.0], [0.0], "^", color="black", label="arming position")
     axis.set_title("From above; numbers are items")
     axis.set_xlabel("east [m]")
@@ -58,6 +60,17 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(alpha=0.3)
     axis.legend(loc="best", fontsize=8)
+
+
+def ends(ways: Sequence[Way]) -> dict[tuple[float, float], list[str]]:
+    """Where ways end, to 0.1 m, with the items that end there; each lap of a repeat ends where the one before did."""
+    found: dict[tuple[float, float], list[str]] = {}
+    for way in ways:
+        north, east = (round(float(axis), 1) for axis in way.points_ned_m[-1, :2])
+        number, there = way.leg.step.label.partition(" ")[0], found.setdefault((north, east), [])
+        if way.length_m and number not in there:
+            there.append(number)
+    return found
 
 
 def _draw_fence(axis: Any, fence: Fence) -> None:
@@ -82,7 +95,7 @@ def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
         resting_to = 0.0 if way.leg.step.name in ("land", "return") else heights[-1]
         axis.plot([times[-1], begins_s + lasts_s], [heights[-1], resting_to], color=_WAY, linewidth=1.6)
         if lasts_s:
-            axis.annotate(way.leg.step.label.partition(" ")[0], (begins_s + 0.5 * lasts_s, heights[-1]), fontsize=8)
+            axis.annotate(way.leg.step.label.partition(" ")[0], (begins_s + 0.5 * lasts_s, heights[-1]), **_BESIDE)
         if way.meets:
             met_s, height_m = times[way.meets.index], heights[way.meets.index]
             axis.plot([met_s], [height_m], "x", color=_MEETING)

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from companion.mission.model import ACTIONS
+from rebound_cli.check.picture import ends
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.check.ways import planned_ways
 from rebound_cli.documents import parse_document
@@ -58,6 +59,17 @@ sim:
     assert [way.meets.name if way.meets else None for way in ways] == [None, "far wall", "mast", "mast"]
     # a reach before the wall
     assert ways[1].points_ned_m[ways[1].meets.index][0] == pytest.approx(3.8, abs=0.15)
+
+
+def test_items_that_end_in_one_place_are_named_together_and_once():
+    ways = planned("""
+name: t
+items:
+  - takeoff: {height_m: 2}
+  - repeat: {times: 2, items: [{go_to: {position_ned_m: [4, 0, -2]}}, {go_to: {position_ned_m: [0, 0, -2]}}]}
+  - land:
+""")
+    assert ends(ways) == {(0.0, 0.0): ["1", "2.2"], (4.0, 0.0): ["2.1"]}
 
 
 def test_obstacles_seen_from_above():
