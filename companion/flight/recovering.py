@@ -161,22 +161,21 @@ class Recover:
         if self._law.is_refined and since_us >= REBOUND_KNOWN_US and self._steers(flight, sample, since_us, now_us):
             self._is_refined = False
             return
-        if not self._is_refined and since_us >= REBOUND_KNOWN_US:
-            self._is_refined = True
-        elif carried:
+        if carried:
             self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
-        elif self._leaves or not leaves:
+        elif since_us < REBOUND_KNOWN_US or (self._is_refined and (self._leaves or not leaves)):
             return
-        self._refined_boot_us, self._leaves = sample.time_boot_us, leaves or carried
         motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
         if motion is None:
             return
+        self._is_refined, self._refined_boot_us, self._leaves = True, sample.time_boot_us, leaves or carried
         if carried:
             # From what pushes it along a vehicle comes clear only if it flies faster.
             motion = replace(
                 motion, velocity_ned_m_s=plus(motion.velocity_ned_m_s, CLEAR_M_S, self._contact.normal_ned)
             )
         record.setpoint_ned_m = _setpoint(flight, self._law, self._contact, motion, flight.collisions[:-1])
+        record.overshoot_m = 0.0  # that past the setpoint expected is none
         self._take(flight, motion, now_us)
         off_m_s, place = split(motion.velocity_ned_m_s, self._contact.normal_ned)[0], record.setpoint_ned_m
         text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
