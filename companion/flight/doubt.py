@@ -10,8 +10,10 @@ rebound seen at once ends the doubt, and so does a steady estimate half a second
 must not do is to take the estimator's correction for a second hit.
 """
 
+import math
 from collections.abc import Sequence
 
+from companion.detection.classify import HOVER_M_S
 from companion.estimate.approach import VelocityFix
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import split
@@ -19,6 +21,10 @@ from companion.recovery.direction import split
 # An estimate that shows this share of the approach as rebound has seen the hit: arms that meet their stops, and frames,
 # give back 0.3 and more. With a tenth, arms that had clipped were believed while 0.3 to 0.7 m/s were missing.
 LEAST_REBOUND = 0.3
+# Along a normal that is wrong by 60 degrees or more there is no approach to compare with, and an estimate that has
+# missed the hit would do: it must have changed by that share of all the speed. For a vehicle that hovered, by twice
+# what an estimate has been seen to show of a hit that it missed.
+STRUCK_M_S = 0.5
 # Being put right begins after 0.14 s and is steep for a third of a second.
 CORRECTED_US = 140_000
 EARLIEST_US = 500_000
@@ -46,8 +52,10 @@ def is_believed(
 
 
 def _rebounds(sample: LocalPosition, before_ned_m_s: Vector3, normal_ned: Vector3) -> bool:
-    into_m_s = -split(before_ned_m_s, normal_ned)[0]
-    return split(sample.velocity_ned_m_s, normal_ned)[0] >= LEAST_REBOUND * max(0.0, into_m_s)
+    into_m_s, off_m_s = (split(v, normal_ned)[0] for v in (before_ned_m_s, sample.velocity_ned_m_s))
+    speed_m_s = math.hypot(*before_ned_m_s)
+    least_m_s = LEAST_REBOUND * speed_m_s if speed_m_s >= HOVER_M_S else STRUCK_M_S
+    return off_m_s >= -LEAST_REBOUND * min(0.0, into_m_s) and off_m_s - into_m_s >= least_m_s
 
 
 def is_steady(fixes: Sequence[VelocityFix], boot_us: int) -> bool:

@@ -16,7 +16,8 @@ from companion.flight.rebound import (
     agreed_normal,
     believable,
     climb_of,
-    flies_off,
+    is_free,
+    lean_left,
     way_back,
 )
 from companion.flight.remembering import remembered_surfaces
@@ -29,7 +30,7 @@ from companion.recovery.height import BRAKED_US, NO_BRAKING, brake, level
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
-from companion.recovery.way import REST, Way
+from companion.recovery.way import REST, Way, damped
 
 # The motion after the contact is read this long after the hit's first sample. Head-on, spring arms push for 15 ms at
 # 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
@@ -55,7 +56,7 @@ class Recover:
         self._is_refined = not self._law.is_refined
         self._after_ned_m_s: Vector3 | None = None  # the first velocity after the contact
         self._refined_boot_us = self._record.sample_time_boot_us
-        self._leaves = True  # at the last refinement the contact was over, and the vehicle on its way off
+        self._leaves = True  # at the last refinement the contact was over
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
@@ -90,7 +91,7 @@ class Recover:
             return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_new or climb.is_reckoned)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
-        return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, motion.acceleration_ned_m_s2)
+        return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, damped(motion))
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record = self._record
@@ -157,23 +158,24 @@ class Recover:
             normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
             self._contact = replace(self._contact, normal_ned=normal)
         carried = self._is_refined and self._is_carried(flight, sample, now_us)
-        leaves = flies_off(sample, self._contact, record.contact_ended_boot_us)
+        leaves = is_free(sample, self._contact, record.contact_ended_boot_us)
         if self._law.is_refined and since_us >= REBOUND_KNOWN_US and self._steers(flight, sample, since_us, now_us):
             self._is_refined = False
             return
+        self._leaves &= record.contact_ended_boot_us <= self._refined_boot_us  # or it has been touched again since
         if carried:
             self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
         elif since_us < REBOUND_KNOWN_US or (self._is_refined and (self._leaves or not leaves)):
             return
-        motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
+        lean = lean_left(record.fixes, sample.time_boot_us) if leaves else None
+        motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6, lean)
         if motion is None:
             return
         self._is_refined, self._refined_boot_us, self._leaves = True, sample.time_boot_us, leaves or carried
         if carried:
             # From what pushes it along a vehicle comes clear only if it flies faster.
-            motion = replace(
-                motion, velocity_ned_m_s=plus(motion.velocity_ned_m_s, CLEAR_M_S, self._contact.normal_ned)
-            )
+            faster = plus(motion.velocity_ned_m_s, CLEAR_M_S, self._contact.normal_ned)
+            motion = replace(motion, velocity_ned_m_s=faster)
         record.setpoint_ned_m = _setpoint(flight, self._law, self._contact, motion, flight.collisions[:-1])
         record.overshoot_m = 0.0  # that past the setpoint expected is none
         self._take(flight, motion, now_us)

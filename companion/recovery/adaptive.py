@@ -1,15 +1,16 @@
 """Recovery law `adaptive`: as near as is safe, by a way that the vehicle can follow.
 
-From the motion x, v that follows the contact, with u = v . n the speed off the obstacle and v_t the rest of v:
+From the motion x, v, a that follows the contact, with v_t the part of v along the obstacle, of normal n:
 
-    D   = max(d_0 + sin(10 deg) |v_t| T / 2,  t_0 |v_c . n|,  (x - x(t_c)) . n + u T / 2)
-    x_d = x + (D - (x - x(t_c)) . n) n + v_t T / 2,  height x_3(t_c) unless the obstacle is steep
+    r   = v T / 2 + a T^2 / 12,  r_t what of it is along the obstacle
+    D   = max(d_0 + sin(10 deg) |v_t| T / 2,  t_0 |v_c . n|,  (x - x(t_c) + r) . n)
+    x_d = x + (D - (x - x(t_c)) . n) n + r_t,  height x_3(t_c) unless the obstacle is steep
 
 that is, d_0 (clearance_m), and what a normal good to 10 degrees may take of it along the obstacle, or t_0 |v_c . n|
 (clearance_s) off the obstacle, further where the rebound would carry the vehicle further before it could stop, and
 along the obstacle where it comes to rest. v T / 2 is the length of a glide that only brakes. The way is a quintic from
-x, v to rest (way.Glide), sent with its velocity and acceleration, and T the shortest duration from 1.25 s on for which
-its acceleration stays within a_max. At first the motion is the one expected: x(t_c), u = e |v_c . n| with the
+x, v, a to rest (way.Glide), sent with its velocity and acceleration, and T the shortest duration from 1.25 s on for
+which its acceleration stays within a_max. At first the motion is the one expected: x(t_c), u = e |v_c . n| with the
 airframe's restitution e, v_t of the approach. It is measured once the contact is over, and goal and way found anew.
 """
 
@@ -47,12 +48,15 @@ class AdaptiveLaw:
         harder_m, along_m_s = config.clearance_s * abs(into_m_s), math.hypot(*tangential)
         if normal[2] == 0.0:
             tangential = (tangential[0], tangential[1], 0.0)
+        leant = motion.acceleration_ned_m_s2
+        leant_m_s2, leant_along = split(leant, normal)
         duration_s, way = SHORTEST_S, REST
         while True:
             clear_m = max(config.clearance_m + NORMAL_SINE * 0.5 * along_m_s * duration_s, harder_m)
-            off = plus(REST, max(clear_m - off_m, 0.5 * off_m_s * duration_s), normal)
-            way = plus(off, 0.5 * duration_s, tangential)
-            if most_of(way, motion.velocity_ned_m_s, duration_s) <= config.acceleration_m_s2:
+            stops_m = 0.5 * off_m_s * duration_s + leant_m_s2 * duration_s**2 / 12.0
+            off = plus(REST, max(clear_m - off_m, stops_m), normal)
+            way = plus(plus(off, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)
+            if most_of(way, motion.velocity_ned_m_s, leant, duration_s) <= config.acceleration_m_s2:
                 break
             duration_s *= STEP
         if config.tangential == "kept":
@@ -61,7 +65,8 @@ class AdaptiveLaw:
         return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])
 
     def way(self, motion: Moving, goal_ned_m: Vector3) -> Way:
-        return glide(motion.position_ned_m, motion.velocity_ned_m_s, goal_ned_m, self._config.acceleration_m_s2)
+        leant, most_m_s2 = motion.acceleration_ned_m_s2, self._config.acceleration_m_s2
+        return glide(motion.position_ned_m, motion.velocity_ned_m_s, leant, goal_ned_m, most_m_s2)
 
 
 def _difference(a: Vector3, b: Vector3) -> Vector3:

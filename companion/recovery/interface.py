@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Protocol
 from pydantic import Field
 
 from companion.messages import Vector3
-from companion.recovery.way import Way
+from companion.recovery.way import REST, Way
 from companion.written import NotNegative, Positive, Written
 
 
@@ -53,10 +53,11 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """Where the vehicle is and how it moves, local NED."""
+    """Where the vehicle is and how it moves, local NED; the acceleration where nothing but its own thrust makes it."""
 
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3 = REST
 
 
 class RecoveryLaw(Protocol):

@@ -41,6 +41,15 @@ def test_an_estimate_that_shows_the_rebound_is_believed_at_once_and_one_that_fli
     assert not is_believed(said(-0.4), (2.0, 0.0, 0.0), [SOUTH], (), 60_000), "arms that met their stops give back more"
 
 
+def test_an_estimate_that_missed_the_hit_is_not_believed_for_want_of_an_approach():
+    # Along a normal that is wrong by 85 degrees nothing came near, so nothing need come back
+    aside = (math.cos(math.radians(85.0)), math.sin(math.radians(85.0)), 0.0)
+    assert not is_believed(said(2.0), (2.0, 0.0, 0.0), [aside], (), 60_000)
+    # nor has a vehicle that hovered come near
+    assert not is_believed(said(-0.3), ZERO, [SOUTH], (), 60_000)
+    assert is_believed(said(-1.8), ZERO, [SOUTH], (), 60_000)
+
+
 def test_a_hit_whose_push_was_not_seen_may_have_been_clipped():
     estimator = ImpactEstimator(EstimateConfig())
     impact = Impact(1_000_000, 980_000, (-5.0, 0.0, 0.0), ImpactKind.UNKNOWN, 1.0, Evidence.AFTERMATH)
