@@ -54,10 +54,14 @@ class CollisionRecord:
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
+    estimated_down_m_s: float = 0.0  # by the vehicle's own estimate at this moment, be it right or wrong
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
     def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
         """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
+        if self.fixes:
+            fix = self.fixes[-1]
+            self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
         if self.is_believed or self.is_over or not self.may_be_clipped or told is None:
             return False
         pushed_us = self.contact_ended_boot_us - self.sample_time_boot_us

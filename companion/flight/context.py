@@ -27,8 +27,8 @@ from companion.report import Event, JsonValue, Outcome
 class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
-    `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; of the
-    height, too, where `is_height_free`.
+    `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; and of the
+    height only velocity and acceleration, where `is_height_free`.
     """
 
     position_ned_m: Vector3

@@ -13,6 +13,7 @@ from companion.estimate.rotation import body_to_ned
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Target
 from companion.messages import Attitude, Vector3
+from companion.recovery.height import as_it_moves
 from companion.recovery.way import REST
 
 # Sines: of a lean into the obstacle that no hit needs, and of one from which a vehicle is free of it.
@@ -75,4 +76,6 @@ def let_go(record: CollisionRecord, normal_ned: Vector3, yaw_rad: float | None, 
         climb.hold(FALL_M_S2)
     down_m_s2 = FALL_M_S2 if falls else climb.braking_m_s2() if reckons else 0.0
     away = (AWAY_M_S2 * normal_ned[0], AWAY_M_S2 * normal_ned[1], down_m_s2)
-    return Target(record.setpoint_ned_m, yaw_rad, REST, away, leans_only=True, is_height_free=falls or reckons)
+    is_free = falls or reckons
+    velocity = as_it_moves(record.estimated_down_m_s) if is_free else REST
+    return Target(record.setpoint_ned_m, yaw_rad, velocity, away, leans_only=True, is_height_free=is_free)

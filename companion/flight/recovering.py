@@ -12,21 +12,14 @@ from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
 from companion.flight.pinned import Hanging, has_room_below, let_go
-from companion.flight.rebound import (
-    agreed_normal,
-    believable,
-    climb_of,
-    is_free,
-    lean_left,
-    way_back,
-)
+from companion.flight.rebound import agreed_normal, believable, climb_of, is_free, lean_left, way_back
 from companion.flight.remembering import remembered_surfaces
 from companion.flight.spinning import Steering, coming_to_rest, is_spinning
 from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import away_from, plus, split
 from companion.recovery.envelope import Envelope
-from companion.recovery.height import BRAKED_US, NO_BRAKING, brake, level
+from companion.recovery.height import BRAKED_US, NO_BRAKING, as_it_moves, brake, level
 from companion.recovery.interface import Contact, Moving, RecoveryLaw
 from companion.recovery.registry import RECOVERY_LAWS
 from companion.recovery.room import Room, Surface
@@ -87,8 +80,9 @@ class Recover:
             motion = level(motion, self._record.setpoint_ned_m[2], braking)
             a, b, _ = motion.acceleration_ned_m_s2 or REST
             leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
-            velocity = motion.velocity_ned_m_s or REST
-            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_new or climb.is_reckoned)
+            is_free = is_new or climb.is_reckoned
+            velocity = as_it_moves(self._record.estimated_down_m_s) if is_free else REST
+            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_free)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
         return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, damped(motion))

@@ -32,7 +32,7 @@ DEFAULT_SYSTEM_ID = 1
 # POSITION_TARGET_TYPEMASK: a set bit tells the vehicle to ignore the part.
 IGNORE_VELOCITY = 0x038
 IGNORE_NORTH_AND_EAST = 0x01B  # place and velocity
-IGNORE_DOWN = 0x024
+IGNORE_HEIGHT = 0x004
 IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
@@ -149,8 +149,8 @@ class Encoder:
             type_mask |= IGNORE_NORTH_AND_EAST
             place, velocity = (NAN, NAN, place[2]), (NAN, NAN, velocity[2])
         if setpoint.is_height_free:
-            type_mask |= IGNORE_DOWN
-            place, velocity = (*place[:2], NAN), (*velocity[:2], NAN)
+            type_mask |= IGNORE_HEIGHT
+            place = (*place[:2], NAN)
         yaw = setpoint.yaw_rad
         if yaw is None:
             type_mask |= IGNORE_YAW

@@ -65,7 +65,7 @@ class PositionSetpoint:
     """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
 
     `leans_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
-    `is_height_free`: and down, too.
+    `is_height_free`: down by velocity and acceleration, whatever height is given.
     """
 
     time_us: int

@@ -27,8 +27,9 @@ ESTIMATE_LATE_US = 20_000
 LOUD_M_S2 = 50.0
 # Motors follow with 0.02 s, and what is asked waits 0.01 s for the vehicle's position loop.
 LAG_S = 0.03
-# What is left of a climb is to end within this: a setpoint's interval.
-WITHIN_S = 0.03
+# What is left of a climb is to end within this, at first a setpoint's interval. A throw is braked after 0.12 s; to end
+# so fast what is left then would ask for far more than is to be kept up, should nothing come any more.
+WITHIN_S, AT_FIRST_US, LATER_WITHIN_S = 0.03, 120_000, 0.1
 # As PX4's MPC_Z_P.
 HEIGHT_PER_S = 1.0
 # Setpoints leave at their rate; a brake that is wrong by this costs 2 cm/s in half an interval.
@@ -162,7 +163,8 @@ class Climb:
         self.unseen.told(1e-6 * (at_us - self.hit_boot_us), speed_m_s, way_m)
 
     def _wanted_m_s2(self) -> float:
-        wanted = -(self.speed_m_s + self.coming_m_s + HEIGHT_PER_S * self.fallen_m) / WITHIN_S
+        within_s = WITHIN_S if self.time_boot_us - self.hit_boot_us <= AT_FIRST_US else LATER_WITHIN_S
+        wanted = -(self.speed_m_s + self.coming_m_s + HEIGHT_PER_S * self.fallen_m) / within_s
         return min(max(wanted, -self.upwards_m_s2), FALLING_MOST_M_S2)
 
     def braking_m_s2(self) -> float:

@@ -10,6 +10,7 @@ asked for nothing but its height, brakes that as w' = -k w and rises w / k. With
 import math
 from dataclasses import dataclass
 
+from companion.messages import Vector3
 from companion.recovery.way import REST, Motion
 
 # PX4's MPC_Z_VEL_P_ACC.
@@ -46,6 +47,16 @@ def brake(speed_down_m_s: float, acceleration_m_s2: float, now_us: int) -> Braki
     if lasts_s <= 0.0:
         return NO_BRAKING
     return Braking(-math.copysign(acceleration_m_s2, speed_down_m_s), now_us + round(lasts_s * 1e6))
+
+
+def as_it_moves(estimated_down_m_s: float) -> Vector3:
+    """The velocity to ask for beside an acceleration up or down that is to be had as it is.
+
+    It is what the vehicle takes for its own, right or wrong, so its velocity loop adds nothing. And where nothing comes
+    any more, the loop ends what was asked for last at acceleration / gain besides: after 8 m/s^2 a vehicle sinks with
+    2 m/s until PX4 misses its setpoints (COM_OF_LOSS_T, 1 s), and not with 8.
+    """
+    return (0.0, 0.0, estimated_down_m_s)
 
 
 def level(motion: Motion, down_m: float, braking_down_m_s2: float) -> Motion:
