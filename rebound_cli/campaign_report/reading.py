@@ -23,9 +23,11 @@ by the rules of [missions.md](missions.md), not by the companion's own state. A 
 touched the ground, rose again and finished its mission has crashed all the same.
 
 *Hits* count by their first contact; its speed is that against the obstacle. *Noticed*: of hits that went into the
-surface with 0.5 m/s and more. *Past*: beyond the recovery setpoint, along the surface's normal. *Again*: another
-contact with the same surface before the vehicle had recovered. *Other surface*: one with something else. *Clear*:
-how much further from what was touched than at the touch, the nearest in the last half second of the recovery.
+surface with 0.5 m/s and more. *Past*: beyond the recovery setpoint told last, in the direction in which it lies from
+the contact. *Again*: another contact with the same surface before the vehicle had recovered; *had come back* where the
+centre had, and was not still on its way in, from one guard to the next, less than 0.1 s after the first. *Other
+surface*: one with something else. *Clear*: how much further from what was touched than at the touch, the nearest in
+the last half second of the recovery.
 *Height*, lost or gained against the contact's: of level flights (0.3 m/s) into something upright that met nothing
 else. *The feed-forward of the height* is an acceleration that brakes a climb or a fall after a hit; every fifth
 mission is flown again without it (`recovery: {vertical_acceleration_m_s2: 0}`), and first hits are compared, which
