@@ -265,3 +265,10 @@ def test_a_foldable_flight_at_one_metre_per_second_neither_returns_nor_overshoot
 def test_a_count_that_makes_no_sense_is_refused():
     result = run("paper", "--seeds", "0")
     assert result.returncode != 0 and "whole number" in result.stderr and "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    "flight", [flight for flight in causes.flights(1) if flight.seed == 1], ids=lambda f: str(f.key)
+)
+def test_whatever_is_changed_the_vehicle_reaches_its_wall(flight):
+    assert fly(dataclasses.replace(flight, is_drawn=False)).contacts
