@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from companion.core import Core, advance, next_deadline_us, start
+from companion.core import Core, advance, fault, next_deadline_us, start
 from companion.flight.plan import plan_text
 from companion.flight.remembering import all_known
 from companion.flight.states import State
@@ -46,7 +46,7 @@ class Companion:
         samples = [sample for _, sample in frames if sample is not None]
         outputs = advance(core, samples, now_us)
         self._address(core)
-        sent = tuple([packet for message in outputs.messages for packet in self._encoder.packets(message)])
+        sent = self._encoder.all_packets(outputs.messages, lambda error: fault(core, error, now_us))
         return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
 
     def _begin(self, now_us: int) -> Core:
@@ -155,4 +155,5 @@ class Companion:
             ),
             obstacles=all_known(flight),
             unreachable=tuple(flight.unreachable),
+            refused_messages=dict(flight.refusals.counts),
         )

@@ -84,8 +84,17 @@ def advance(core: Core, samples: Sequence[Sample], now_us: int) -> Outputs:
     moved = react(core, samples, now_us)
     stream_setpoint(core, moved, now_us)
     beat(core, now_us)
-    inform(core, now_us)
+    try:
+        inform(core, now_us)
+    except Exception as error:
+        fault(core, error, now_us)
     return collect(core.flight)
+
+
+def fault(core: Core, error: Exception, now_us: int) -> None:
+    """A fault in what leaves a step. The first gives the vehicle away; later ones find that under way."""
+    if not core.flight.fault:
+        core.machine.fail(error, now_us)
 
 
 def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
@@ -162,15 +171,16 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
     core.setpoint_due_us = due_us if not at_once and due_us > now_us else now_us + core.setpoint_interval_us
     try:
         wanted = core.machine.activity.target(now_us)
+        if wanted is None:
+            return
+        has_floor = core.machine.state in ON_THE_WAY
+        target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)
     except Exception as error:
-        core.machine.fail(error, now_us)
-        wanted = core.flight.target
-    if wanted is None:
-        return
-    has_floor = core.machine.state in ON_THE_WAY
-    target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)
-    time_us = now_us - core.started_at_us
-    core.flight.outbox.append(target.setpoint(time_us))
+        fault(core, error, now_us)
+        if core.limiter.last is None:
+            return
+        target = core.flight.target = core.limiter.last.at_rest()
+    core.flight.outbox.append(target.setpoint(now_us - core.started_at_us))
 
 
 def beat(core: Core, now_us: int) -> None:

@@ -1,7 +1,7 @@
 """What a flight tells: events as they happen, a live status, and the report at the end."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from companion.memory.patch import Patch
@@ -81,7 +81,8 @@ class FlightReport:
     `aborted`: it began, or was stopped by the person, and ended before the mission did.
     `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission coordinates.
     `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits, in mission
-    coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
+    coordinates. `unreachable` are the labels of items, or "home", to which that left no way. `refused_messages` counts
+    the vehicle's messages that were not believed, by name.
     """
 
     outcome: Outcome
@@ -96,3 +97,4 @@ class FlightReport:
     expectations: tuple[ExpectationReport, ...] = ()
     obstacles: tuple[Patch, ...] = ()
     unreachable: tuple[str, ...] = ()
+    refused_messages: Mapping[str, int] = field(default_factory=dict)

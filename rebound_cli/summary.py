@@ -62,6 +62,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         "wall_clock_s": round(flown.wall_clock_s, 3),
         "realtime_factor": round(duration_s / flown.wall_clock_s, 3) if flown.wall_clock_s > 0 else None,
         "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
+        "refused_messages": dict(report.refused_messages),
         "false_detections": matches.false_detections if matches else None,
         "missed_contacts": matches.missed_contacts if matches else None,
         "recontacts": matches.recontacts if matches else None,

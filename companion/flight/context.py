@@ -11,6 +11,7 @@ from companion.flight.course import Pace
 from companion.flight.leaning import Leaning
 from companion.flight.pressing import Pressing
 from companion.flight.states import Trigger
+from companion.link.refusals import Refusals
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.memory.patch import Patch
@@ -37,6 +38,10 @@ class Target:
     acceleration_ned_m_s2: Vector3 | None = None
     leans_only: bool = False
     is_height_free: bool = False
+
+    def at_rest(self) -> "Target":
+        """Its place alone, which is safe to hold for as long as nobody says more."""
+        return Target(self.position_ned_m, self.yaw_rad)
 
     def setpoint(self, time_us: int) -> PositionSetpoint:
         """As it is sent."""
@@ -142,6 +147,7 @@ class FlightContext:
     file_is_there: bool = False
     expectations: list[Expectation] = field(default_factory=list)
     collisions: list[CollisionRecord] = field(default_factory=list)
+    refusals: Refusals = field(default_factory=Refusals)
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)

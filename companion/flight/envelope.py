@@ -1,4 +1,10 @@
-"""The safety envelope: every setpoint passes through it on its way out, whoever asked for it."""
+"""The safety envelope: every setpoint passes through it on its way out, whoever asked for it.
+
+It bounds all that a setpoint holds: place, step, velocity, acceleration, tilt, yaw, and where the setpoint leads up and
+down when nothing follows it. A companion that dies sends nothing more, and PX4 flies its last setpoint on until
+COM_OF_LOSS_T. An acceleration a beside a velocity v ends, by PX4's velocity loop, at v + a / MPC_Z_VEL_P_ACC. That
+velocity beside a height ends, by PX4's height loop, at v / MPC_Z_P from it.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -8,14 +14,26 @@ from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
 
+GRAVITY_M_S2 = 9.80665
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
+# PX4's defaults: COM_OF_LOSS_T, MPC_Z_VEL_P_ACC and MPC_Z_P.
+HELD_S = 1.0
+VELOCITY_GAIN_PER_S = 4.0
+HEIGHT_GAIN_PER_S = 1.0
+# How far from a height a velocity beside it leads within HELD_S, over that velocity.
+_LEADS_S = (1.0 - math.exp(-HEIGHT_GAIN_PER_S * HELD_S)) / HEIGHT_GAIN_PER_S
+
+
+class SetpointError(Exception):
+    """A setpoint with a value that is not finite: a fault of this program."""
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What the envelope is measured from; local NED. No origin before arming, no floor while climbing from it.
+    """What the envelope is measured from; local NED. No origin before arming.
 
+    `has_floor`: the fence's floor counts; without it the ground at the origin does, as while climbing from it.
     `last_ned_m`, the place sent `since_last_s` ago, is None where the flight has turned to something else, as after
     a hit: there alone may the setpoint jump.
     """
@@ -31,29 +49,110 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) 
     """The setpoint as it may be sent, and which limits changed it, for people; "" for none.
 
     A place that is moved loses its velocity and acceleration: the vehicle stops there. The fence has the last word.
+    Raises SetpointError for a setpoint with a value that is not finite.
     """
-    place, reasons = target.position_ned_m, []
-    if around.last_ned_m is not None:
+    if not is_finite(target):
+        raise SetpointError(f"a value of the setpoint is not finite: {target}")
+    reasons: list[str] = []
+    target = _with_place(target, around, fence, limits, reasons)
+    target = _with_velocity(target, limits, reasons)
+    target = _with_acceleration(target, limits, reasons)
+    target = _with_height(target, around, fence, reasons)
+    if target.yaw_rad is not None and abs(target.yaw_rad) > math.pi:
+        target = replace(target, yaw_rad=math.remainder(target.yaw_rad, math.tau))
+    return target, ", ".join(reasons)
+
+
+def is_finite(target: Target) -> bool:
+    """Whether every number of the setpoint is."""
+    parts = (target.position_ned_m, target.velocity_ned_m_s or (), target.acceleration_ned_m_s2 or ())
+    values = [value for part in parts for value in part]
+    return all(map(math.isfinite, values)) and (target.yaw_rad is None or math.isfinite(target.yaw_rad))
+
+
+def _with_place(target: Target, around: Surroundings, fence: Fence, limits: Limits, reasons: list[str]) -> Target:
+    """The place within the step and the fence. What of it is not asked for, as of a lean, is left alone."""
+    if target.leans_only and target.is_height_free:
+        return target
+    place, vehicle = target.position_ned_m, around.vehicle_ned_m
+    if target.leans_only and vehicle is not None:
+        # Only the height is asked for.
+        place = (vehicle[0], vehicle[1], place[2])
+    asked = place
+    if around.last_ned_m is not None and not target.leans_only:
         most_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
         place, is_fast = _within_step(place, around.last_ned_m, most_m)
         reasons += [f"moves faster than {limits.max_speed_m_s:g} m/s"] if is_fast else []
-    if around.vehicle_ned_m is not None:
-        place, is_far = _within_step(place, around.vehicle_ned_m, limits.max_step_m)
+    if vehicle is not None:
+        place, is_far = _within_step(place, vehicle, limits.max_step_m)
         reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if is_far else []
     if around.origin_ned_m is not None:
         inside = _within_fence(place, around.origin_ned_m, fence, around.has_floor)
+        if target.leans_only:
+            inside = (place[0], place[1], inside[2])
         reasons += ["outside the fence"] if math.dist(inside, place) > _ROUNDING_M else []
         place = inside if math.dist(inside, place) > _ROUNDING_M else place
-    if place != target.position_ned_m:
-        target = Target(place, target.yaw_rad)
-    speed_m_s = 0.0 if target.velocity_ned_m_s is None else math.hypot(*target.velocity_ned_m_s)
-    if target.velocity_ned_m_s is not None and speed_m_s > limits.max_speed_m_s:
-        scale = limits.max_speed_m_s / speed_m_s
-        n, e, d = target.velocity_ned_m_s
-        slower = (n * scale, e * scale, d * scale)
-        target = replace(target, velocity_ned_m_s=slower, acceleration_ned_m_s2=None)
-        reasons.append(f"velocity above {limits.max_speed_m_s:g} m/s")
-    return target, ", ".join(reasons)
+    if place == asked:
+        return target
+    if target.leans_only:
+        return replace(target, position_ned_m=(*target.position_ned_m[:2], place[2]))
+    return Target(place, target.yaw_rad)
+
+
+def _with_velocity(target: Target, limits: Limits, reasons: list[str]) -> Target:
+    """A velocity that is too fast, in its own direction; the acceleration that leads to it is left out."""
+    velocity, most_m_s = target.velocity_ned_m_s, limits.max_speed_m_s
+    if velocity is None or math.hypot(*velocity) <= most_m_s:
+        return target
+    reasons.append(f"velocity above {most_m_s:g} m/s")
+    scale = most_m_s / math.hypot(*velocity)
+    n, e, d = velocity
+    acceleration = target.acceleration_ned_m_s2 if target.leans_only else None
+    return replace(target, velocity_ned_m_s=(n * scale, e * scale, d * scale), acceleration_ned_m_s2=acceleration)
+
+
+def _with_acceleration(target: Target, limits: Limits, reasons: list[str]) -> Target:
+    """Sideways what the tilt allows in hover; down what gravity gives, and as much up."""
+    if target.acceleration_ned_m_s2 is None:
+        return target
+    n, e, d = target.acceleration_ned_m_s2
+    most_m_s2, sideways_m_s2 = GRAVITY_M_S2 * math.tan(math.radians(limits.max_tilt_deg)), math.hypot(n, e)
+    if sideways_m_s2 > most_m_s2:
+        reasons.append(f"tilt above {limits.max_tilt_deg:g} degrees")
+        n, e = n * most_m_s2 / sideways_m_s2, e * most_m_s2 / sideways_m_s2
+    if abs(d) > GRAVITY_M_S2:
+        reasons.append("acceleration up or down above gravity's")
+        d = math.copysign(GRAVITY_M_S2, d)
+    return replace(target, acceleration_ned_m_s2=(n, e, d))
+
+
+def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: list[str]) -> Target:
+    """Velocity and acceleration up and down, so that they lead neither below the floor nor out of the top."""
+    velocity, acceleration = target.velocity_ned_m_s, target.acceleration_ned_m_s2
+    if around.origin_ned_m is None or (velocity is None and acceleration is None):
+        return target
+    if not target.is_height_free:
+        start_down_m, leads_s = target.position_ned_m[2], _LEADS_S
+    elif around.vehicle_ned_m is not None:
+        start_down_m, leads_s = around.vehicle_ned_m[2], HELD_S
+    else:
+        return target
+    top_m, floor_m = _heights(around.origin_ned_m, fence, around.has_floor)
+    least_m_s = min(0.0, (top_m - start_down_m) / leads_s)
+    most_m_s = max(0.0, (floor_m - start_down_m) / leads_s)
+    down_m_s = 0.0 if velocity is None else velocity[2]
+    down_m_s2 = 0.0 if acceleration is None else acceleration[2]
+    leads_m_s = down_m_s + down_m_s2 / VELOCITY_GAIN_PER_S
+    if least_m_s <= leads_m_s <= most_m_s:
+        return target
+    reasons.append("leads below the floor" if leads_m_s > most_m_s else "leads out of the top")
+    if velocity is not None:
+        down_m_s = min(max(down_m_s, least_m_s), most_m_s)
+        velocity = (velocity[0], velocity[1], down_m_s)
+    if acceleration is not None:
+        room = (VELOCITY_GAIN_PER_S * (least_m_s - down_m_s), VELOCITY_GAIN_PER_S * (most_m_s - down_m_s))
+        acceleration = (acceleration[0], acceleration[1], min(max(down_m_s2, room[0]), room[1]))
+    return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
 
 
 def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3, bool]:
@@ -68,7 +167,10 @@ def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3
 
 def _within_fence(place: Vector3, origin: Vector3, fence: Fence, has_floor: bool) -> Vector3:
     north_m, east_m = fence.nearest_inside(place[0] - origin[0], place[1] - origin[1])
-    down_m = max(place[2] - origin[2], -fence.max_height_m)
-    if has_floor:
-        down_m = min(down_m, -fence.min_height_m)
-    return (origin[0] + north_m, origin[1] + east_m, origin[2] + down_m)
+    top_m, floor_m = _heights(origin, fence, has_floor)
+    return (origin[0] + north_m, origin[1] + east_m, min(max(place[2], top_m), floor_m))
+
+
+def _heights(origin: Vector3, fence: Fence, has_floor: bool) -> tuple[float, float]:
+    """The fence's top and its floor, or the ground's, as down of the local frame."""
+    return origin[2] - fence.max_height_m, origin[2] - (fence.min_height_m if has_floor else 0.0)

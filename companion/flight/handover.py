@@ -28,7 +28,7 @@ class HandOver:
 
     def __init__(self, flight: FlightContext) -> None:
         self.finished = False
-        self._target = flight.target
+        self._target = None if flight.target is None else flight.target.at_rest()
         self._previous_mode = flight.expected_mode
         self._mode = AUTO_LAND if flight.mission.on_interrupt == "land" else AUTO_LOITER
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.

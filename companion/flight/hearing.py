@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
 from companion.link.identity import identify, is_autopilot
-from companion.messages import Heartbeat, Sample, TimeSyncReply, TimeSyncRequest
+from companion.messages import Heartbeat, Refused, Sample, TimeSyncReply, TimeSyncRequest
 from companion.px4_mode import mode_name
 
 
@@ -23,6 +23,11 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
                 vehicle.identity = identity
             if sample.system_id != vehicle.identity.system_id:
                 continue
+        elif isinstance(sample, Refused):
+            text = flight.refusals.add(sample, now_us)
+            if text is not None:
+                flight.tell(now_us, "implausible", text, message=sample.message)
+            continue
         elif isinstance(sample, TimeSyncRequest):
             flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         vehicle.hear(sample, now_us)

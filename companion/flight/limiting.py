@@ -12,15 +12,19 @@ LEAST_BETWEEN_LIMITS_US = 1_000_000
 
 @dataclass(slots=True)
 class Limiter:
-    """The place last sent, and what was last said about it."""
+    """What was last sent, and what was last said about it."""
 
+    last: Target | None = None
     last_ned_m: Vector3 | None = None
     last_us: int = 0
     limited_by: str = ""
     told_us: int = 0
 
     def passed(self, flight: FlightContext, wanted: Target, has_floor: bool, moved: bool, now_us: int) -> Target:
-        """The setpoint as the fence and the limits let it pass. `moved`: the flight has turned to something else."""
+        """The setpoint as the fence and the limits let it pass. `moved`: the flight has turned to something else.
+
+        Raises SetpointError where it is not finite.
+        """
         latest = flight.vehicle.history.latest()
         around = Surroundings(
             vehicle_ned_m=None if latest is None else latest.position_ned_m,
@@ -34,6 +38,7 @@ class Limiter:
             self.limited_by, self.told_us = reason, now_us
             text = f"setpoint held back: {reason}" if reason else "setpoint free again"
             flight.tell(now_us, "envelope", text, reason=reason)
+        self.last = target
         # A place that is not asked for is no step from it to the next.
         self.last_ned_m, self.last_us = None if target.leans_only else target.position_ned_m, now_us
         return target

@@ -64,7 +64,13 @@ class Machine:
             # even handing over fails: silence lets the vehicle's own failsafe act
             self.activity = LetGo()
         flight.fault = text
-        self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
+        try:
+            self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
+        except Exception as second:
+            # what ends a flight fails, too
+            flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
+            self.state, self.activity = State.ABORTED, LetGo()
+            flight.outcome, flight.reason = "failed", text
         return self.activity is not before
 
     def _take(self, move: Move | None, now_us: int) -> None:

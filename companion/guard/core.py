@@ -75,8 +75,17 @@ def advance(core: GuardCore, samples: Sequence[Sample], now_us: int) -> Outputs:
     moved = react(core, samples, now_us)
     stream_setpoint(core, moved, now_us)
     beat(core, now_us)
-    inform(core, now_us)
+    try:
+        inform(core, now_us)
+    except Exception as error:
+        fault(core, error, now_us)
     return collect(core.flight)
+
+
+def fault(core: GuardCore, error: Exception, now_us: int) -> None:
+    """A fault in what leaves a step. The first gives the vehicle away; later ones find that under way."""
+    if not core.flight.fault:
+        core.machine.fail(error, now_us)
 
 
 def react(core: GuardCore, samples: Sequence[Sample], now_us: int) -> bool:
@@ -163,16 +172,19 @@ def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
     core.setpoint_due_us = now_us + round(1e6 / rate_hz)
     try:
         wanted = core.machine.activity.target(now_us)
+        if wanted is None:
+            return
+        # What leads the way is the place of a vehicle that others fly, wherever they fly it.
+        target = core.limiter.passed(core.flight, wanted, True, moved, now_us) if is_ours else wanted
     except Exception as error:
-        core.machine.fail(error, now_us)
-        wanted = core.flight.target
-    if wanted is None:
-        return
+        fault(core, error, now_us)
+        if core.limiter.last is None:
+            return
+        target = core.limiter.last.at_rest()
     if is_ours:
-        wanted = core.flight.target = core.limiter.passed(core.flight, wanted, True, moved, now_us)
-        core.guard.sent_ned_m.append((now_us, None if wanted.leans_only else wanted.position_ned_m))
-    time_us = now_us - core.started_at_us
-    core.flight.outbox.append(wanted.setpoint(time_us))
+        core.flight.target = target
+        core.guard.sent_ned_m.append((now_us, None if target.leans_only else target.position_ned_m))
+    core.flight.outbox.append(target.setpoint(now_us - core.started_at_us))
 
 
 def beat(core: GuardCore, now_us: int) -> None:

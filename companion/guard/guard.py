@@ -4,7 +4,7 @@ import math
 
 from companion.companion import StepResult
 from companion.guard.config import GuardConfig
-from companion.guard.core import GuardCore, advance, next_deadline_us, start
+from companion.guard.core import GuardCore, advance, fault, next_deadline_us, start
 from companion.guard.states import State
 from companion.mavlink.decode import LONE_GUARD_CONVERTERS, Decoder
 from companion.mavlink.encode import Encoder
@@ -37,7 +37,7 @@ class Guard:
             self._addressed = True
             self._decoder.listen_to(identity.system_id, identity.component_id)
             self._encoder.speak_to(identity.system_id, identity.component_id)
-        sent = tuple([packet for message in outputs.messages for packet in self._encoder.packets(message)])
+        sent = self._encoder.all_packets(outputs.messages, lambda error: fault(core, error, now_us))
         return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
 
     def _begin(self, now_us: int) -> GuardCore:

@@ -94,7 +94,7 @@ class GiveBack:
         if guard.config.then == "previous" and not guard.then_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [AUTO_LOITER, AUTO_LAND]
-        self._target = Target(flight.target.position_ned_m, flight.target.yaw_rad) if flight.target else None
+        self._target = flight.target.at_rest() if flight.target else None
         self._aside: StepAside | None = None
         if beside_program:
             self._target = None

@@ -79,7 +79,12 @@ class GuardMachine:
             # even giving back fails: silence lets the vehicle's own failsafe act
             self.state, self.activity, self.outcome = State.ENDED, End(), text
         flight.fault = text
-        self._take(Move(Trigger.STOPPED, text), now_us)
+        try:
+            self._take(Move(Trigger.STOPPED, text), now_us)
+        except Exception as second:
+            # what gives back fails, too
+            flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
+            self.state, self.activity, self.outcome = State.ENDED, End(), text
         return self.activity is not before
 
     def _trigger_of_hit(self) -> Trigger:

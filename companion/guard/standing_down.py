@@ -21,7 +21,7 @@ class StandDown:
         self._until_us = now_us + HAND_OVER_US
         self._target: Target | None = None
         if for_sticks and flight.vehicle.custom_mode == OFFBOARD and flight.target is not None:
-            self._target = Target(flight.target.position_ned_m, flight.target.yaw_rad)
+            self._target = flight.target.at_rest()
             flight.commander.begin(SetMode(POSCTL))
 
     @property

@@ -4,6 +4,7 @@ Packets are found by their header here, so that the many the companion has no us
 rest, checksums included, is pymavlink's.
 """
 
+import math
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -12,8 +13,17 @@ from typing import Any
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
+from companion.mavlink.bounds import (
+    ANGULAR_VELOCITY_RAD_S,
+    POSITION_M,
+    SPECIFIC_FORCE_M_S2,
+    THRUST_FRACTION,
+    TIME_US,
+    is_rotation,
+    within,
+)
 from companion.mavlink.encode import COMPONENT_ID
-from companion.mavlink.frequent import FREQUENT, finite
+from companion.mavlink.frequent import FREQUENT
 from companion.mavlink.packet import (
     HEADER_V1,
     HEADER_V2,
@@ -41,6 +51,7 @@ from companion.messages import (
     LocalPosition,
     Parameter,
     PositionTarget,
+    Refused,
     Sample,
     Sticks,
     TimeSyncAnswer,
@@ -63,24 +74,30 @@ def _heartbeat(m: Any) -> Heartbeat:
     )
 
 
-def _attitude_target(m: Any) -> AttitudeTarget | None:
-    if m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE or not finite(m.thrust):
+def _attitude_target(m: Any) -> AttitudeTarget | Refused | None:
+    if m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE:
         return None
-    given = not m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and finite(*m.q)
+    if not 0.0 <= m.thrust <= THRUST_FRACTION:
+        return Refused("ATTITUDE_TARGET", f"thrust {m.thrust:g}")
     w, x, y, z = m.q
+    given = not m.type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and is_rotation(w, x, y, z)
     return AttitudeTarget(m.time_boot_ms * 1000, m.thrust, (w, x, y, z) if given else None)
 
 
-def _vibration(m: Any) -> Vibration | None:
-    if not finite(m.vibration_y, m.vibration_z):
-        return None
+def _vibration(m: Any) -> Vibration | Refused:
+    # How much a sample may differ from the one before: no more than the ranges.
+    within_ranges = within(2.0 * ANGULAR_VELOCITY_RAD_S, m.vibration_y) and within(
+        2.0 * SPECIFIC_FORCE_M_S2, m.vibration_z
+    )
+    if not within_ranges or m.time_usec >= TIME_US:
+        return Refused("VIBRATION", f"{m.vibration_y:g} rad/s, {m.vibration_z:g} m/s^2")
     counts = (m.clipping_0, m.clipping_1, m.clipping_2)
     return Vibration(m.time_usec, m.vibration_y, m.vibration_z, counts)
 
 
 def _battery(m: Any) -> Battery | None:
     # -1: the autopilot does not know.
-    return Battery(m.battery_remaining) if m.battery_remaining >= 0 else None
+    return Battery(m.battery_remaining) if 0 <= m.battery_remaining <= 100 else None
 
 
 def _extended_state(m: Any) -> ExtendedState | None:
@@ -108,10 +125,14 @@ def _parameter(m: Any) -> Parameter | None:
     # PX4 has two kinds; the bytes of a whole number travel in the float's place.
     if m.param_type == dialect.MAV_PARAM_TYPE_INT32:
         return Parameter(m.param_id, struct.unpack("<i", struct.pack("<f", m.param_value))[0])
-    return Parameter(m.param_id, m.param_value) if m.param_type == dialect.MAV_PARAM_TYPE_REAL32 else None
+    is_real = m.param_type == dialect.MAV_PARAM_TYPE_REAL32 and math.isfinite(m.param_value)
+    return Parameter(m.param_id, m.param_value) if is_real else None
 
 
-def _estimator_status(m: Any) -> EstimatorStatus:
+def _estimator_status(m: Any) -> EstimatorStatus | Refused:
+    ratios = (m.vel_ratio, m.pos_horiz_ratio, m.pos_vert_ratio)
+    if not all(map(math.isfinite, ratios)):
+        return Refused("ESTIMATOR_STATUS", "ratios {:g} {:g} {:g}".format(*ratios))
     return EstimatorStatus(
         m.vel_ratio,
         m.pos_horiz_ratio,
@@ -143,16 +164,20 @@ CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
 
 
 def _position_target(m: Any) -> PositionTarget:
-    known = not m.type_mask & POSITION_IGNORED and finite(m.x, m.y, m.z)
+    known = not m.type_mask & POSITION_IGNORED and within(POSITION_M, m.x, m.y, m.z)
     return PositionTarget((m.x, m.y, m.z) if known else None)
 
 
-def _global_position(m: Any) -> GlobalPosition:
+def _global_position(m: Any) -> GlobalPosition | Refused:
+    if not (within(90e7, m.lat) and within(180e7, m.lon)):
+        return Refused("GLOBAL_POSITION_INT", f"latitude {m.lat}, longitude {m.lon} (1e-7 deg)")
     return GlobalPosition(m.lat * 1e-7, m.lon * 1e-7, m.alt * 1e-3)
 
 
-def _sticks(m: Any) -> Sticks:
+def _sticks(m: Any) -> Sticks | Refused:
     # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp).
+    if not (max(abs(m.x), abs(m.y), abs(m.r)) <= 1000 and 0 <= m.z <= 1000):
+        return Refused("MANUAL_CONTROL", f"sticks {m.x} {m.y} {m.z} {m.r}")
     return Sticks((m.x / 1000.0, m.y / 1000.0, m.z / 500.0 - 1.0, m.r / 1000.0))
 
 
@@ -172,6 +197,8 @@ LONE_GUARD_CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
 
 class Decoder:
     """A byte stream in any chunks, with any damage, to packets; never raises on what it is fed.
+
+    What no vehicle can truly say becomes `Refused` (bounds.py).
 
     Until `listen_to` names the vehicle only heartbeats are converted; then only what that component sent.
     """

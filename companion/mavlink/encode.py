@@ -1,6 +1,7 @@
 """Typed commands to MAVLink 2 bytes. Sequence numbers, type masks and NaN exist only here."""
 
 import struct
+from collections.abc import Callable, Iterable
 from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
@@ -71,6 +72,16 @@ class Encoder:
     def packets(self, outgoing: Outgoing) -> list[bytes]:
         """All that it takes; of most messages one."""
         return [self._pack(message) for message in self.messages(outgoing)]
+
+    def all_packets(self, outgoing: Iterable[Outgoing], on_fault: Callable[[Exception], None]) -> tuple[bytes, ...]:
+        """Of all messages that can be packed; what cannot be is left out and told to `on_fault`."""
+        packets: list[bytes] = []
+        for message in outgoing:
+            try:
+                packets += self.packets(message)
+            except Exception as error:
+                on_fault(error)
+        return tuple(packets)
 
     def messages(self, outgoing: Outgoing) -> list[Any]:
         """The same, as pymavlink has them before they are bytes."""

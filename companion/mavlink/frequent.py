@@ -3,50 +3,66 @@
 The packets' layout is pymavlink's own; only its message objects are left out, which take most of the time.
 """
 
-import math
 from collections.abc import Callable
 from operator import attrgetter, itemgetter
 from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
+from companion.mavlink.bounds import (
+    ANGULAR_VELOCITY_RAD_S,
+    POSITION_M,
+    SPECIFIC_FORCE_M_S2,
+    TIME_US,
+    VELOCITY_M_S,
+    is_rotation,
+    within,
+)
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Refused, Sample
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
 
 
-def finite(*values: float) -> bool:
-    """False when any value is NaN or infinite (either makes the sum so)."""
-    return math.isfinite(sum(values))
-
-
-def _imu(time_us: int, x: float, y: float, z: float, p: float, q: float, r: float, updated: int) -> ImuSample | None:
-    if updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED or not finite(x, y, z):
+def _imu(
+    time_us: int, x: float, y: float, z: float, p: float, q: float, r: float, updated: int
+) -> ImuSample | Refused | None:
+    if updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED:
         return None
+    if not (within(SPECIFIC_FORCE_M_S2, x, y, z) and within(ANGULAR_VELOCITY_RAD_S, p, q, r) and time_us < TIME_US):
+        text = f"specific force {x:g} {y:g} {z:g} m/s^2, rates {p:g} {q:g} {r:g} rad/s at {time_us} us"
+        return Refused("HIGHRES_IMU", text)
     return ImuSample(time_us, (x, y, z), (p, q, r))
 
 
 def _local_position(
     time_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float
-) -> LocalPosition | None:
-    return LocalPosition(time_ms * 1000, (x, y, z), (vx, vy, vz)) if finite(x, y, z, vx, vy, vz) else None
+) -> LocalPosition | Refused:
+    if not (within(POSITION_M, x, y, z) and within(VELOCITY_M_S, vx, vy, vz)):
+        return Refused("LOCAL_POSITION_NED", _motion_text(x, y, z, vx, vy, vz))
+    return LocalPosition(time_ms * 1000, (x, y, z), (vx, vy, vz))
 
 
-def _attitude(time_ms: int, w: float, x: float, y: float, z: float, p: float, q: float, r: float) -> Attitude | None:
-    if not finite(w, x, y, z):
-        return None
-    return Attitude(time_ms * 1000, (w, x, y, z), (p, q, r) if finite(p, q, r) else None)
+def _attitude(time_ms: int, w: float, x: float, y: float, z: float, p: float, q: float, r: float) -> Attitude | Refused:
+    if not (is_rotation(w, x, y, z) and within(ANGULAR_VELOCITY_RAD_S, p, q, r)):
+        text = f"quaternion {w:g} {x:g} {y:g} {z:g}, rates {p:g} {q:g} {r:g} rad/s"
+        return Refused("ATTITUDE_QUATERNION", text)
+    return Attitude(time_ms * 1000, (w, x, y, z), (p, q, r))
 
 
 def _odometry(
     time_us: int, frame: int, child: int, x: float, y: float, z: float, vx: float, vy: float, vz: float, resets: int
-) -> Odometry | None:
+) -> Odometry | Refused | None:
     # PX4 sends NED velocity under child frame LOCAL_NED; any other frame would have to be turned first.
-    in_ned = frame == dialect.MAV_FRAME_LOCAL_NED and child == dialect.MAV_FRAME_LOCAL_NED
-    if not in_ned or not finite(x, y, z, vx, vy, vz):
+    if frame != dialect.MAV_FRAME_LOCAL_NED or child != dialect.MAV_FRAME_LOCAL_NED:
         return None
+    if not (within(POSITION_M, x, y, z) and within(VELOCITY_M_S, vx, vy, vz) and time_us < TIME_US):
+        return Refused("ODOMETRY", _motion_text(x, y, z, vx, vy, vz))
     return Odometry(time_us, (x, y, z), (vx, vy, vz), resets)
+
+
+def _motion_text(x: float, y: float, z: float, vx: float, vy: float, vz: float) -> str:
+    return f"position {x:g} {y:g} {z:g} m, velocity {vx:g} {vy:g} {vz:g} m/s"
 
 
 class FrequentReader:

@@ -61,6 +61,14 @@ class MessageId(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Refused:
+    """A message of the vehicle's that was not believed: a value that is not finite, or that no vehicle can have."""
+
+    message: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Heartbeat:
     system_id: int
     component_id: int
@@ -234,4 +242,5 @@ Sample: TypeAlias = (
     | Parameter
     | EstimatorStatus
     | AutopilotVersion
+    | Refused
 )

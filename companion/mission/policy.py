@@ -53,6 +53,8 @@ class Limits(Written):
     max_step_m: Annotated[Positive, Field(ge=0.5)] = 5.0
     """From the vehicle to a setpoint. PX4 answers one that lies d ahead with MPC_XY_P * d = 0.95/s * d: 5 m are 4.75
     m/s. Recoveries ask for up to 3 m; a setpoint further off is an estimate that jumped or a mistake."""
+    max_tilt_deg: Annotated[Positive, Field(le=60.0)] = 45.0
+    """Of what a setpoint's acceleration asks for sideways: PX4's own MPC_TILTMAX_AIR."""
 
 
 class Resume(Written):

@@ -1,5 +1,6 @@
 """MAVLink bytes to samples and commands to bytes, against pymavlink's own packing and parsing."""
 
+import copy
 import math
 import struct
 
@@ -27,6 +28,7 @@ from companion.messages import (
     Parameter,
     PositionSetpoint,
     ReadParameter,
+    Refused,
     RequestMessage,
     SendCommand,
     SetArmed,
@@ -195,15 +197,61 @@ def test_only_heartbeats_are_heard_before_the_vehicle_is_known_and_only_the_vehi
     assert decoder.feed(packed(HEARTBEAT[0], 1, 190))[0][1] is None
 
 
-def test_answers_to_others_and_numberless_values_are_not_samples():
-    nan = float("nan")
+def test_answers_to_others_and_unmeasured_values_are_not_samples():
     for message in (
         mav.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190),
-        mav.MAVLink_local_position_ned_message(5000, nan, 0, 0, 0, 0, 0),
-        mav.MAVLink_highres_imu_message(1, nan, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F),
         mav.MAVLink_highres_imu_message(1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x38),
+        mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, 101, 0, 0, 0, 0, 0, 0),
+        mav.MAVLink_param_value_message(b"MPC_XY_P", math.nan, mav.MAV_PARAM_TYPE_REAL32, 1, 0),
     ):
         assert listening_decoder().feed(packed(message))[0][1] is None
+
+
+# Message, the fields that must be finite and bounded, and the largest value that PX4 can mean by them.
+MEASURED = [
+    ("HIGHRES_IMU", ("xacc", "yacc", "zacc"), 40 * 9.80665),
+    ("HIGHRES_IMU", ("xgyro", "ygyro", "zgyro"), math.radians(4000)),
+    ("LOCAL_POSITION_NED", ("x", "y", "z"), 1e6),
+    ("LOCAL_POSITION_NED", ("vx", "vy", "vz"), 100.0),
+    ("ODOMETRY", ("x", "y", "z"), 1e6),
+    ("ODOMETRY", ("vx", "vy", "vz"), 100.0),
+    ("ATTITUDE_QUATERNION", ("rollspeed", "pitchspeed", "yawspeed"), math.radians(4000)),
+    ("ATTITUDE_TARGET", ("thrust",), 1.0),
+    ("VIBRATION", ("vibration_y",), 2 * math.radians(4000)),
+    ("VIBRATION", ("vibration_z",), 2 * 40 * 9.80665),
+]
+BROKEN = (math.nan, math.inf, -math.inf, 3e38, -3e38)
+
+
+def measured(name):
+    return next(message for message, sample in CASES if message.get_type() == name)
+
+
+@pytest.mark.parametrize(("name", "fields", "most"), MEASURED)
+def test_a_value_that_no_vehicle_can_have_is_refused_and_the_greatest_it_can_have_is_not(name, fields, most):
+    for field in fields:
+        message = copy.copy(measured(name))
+        setattr(message, field, 0.99 * most)
+        assert not isinstance(listening_decoder().feed(packed(message))[0][1], Refused | None), field
+        for value in (*BROKEN, 3.0 * most):
+            setattr(message, field, value)
+            refused = listening_decoder().feed(packed(message))[0][1]
+            assert isinstance(refused, Refused) and refused.message == name, (field, value)
+
+
+@pytest.mark.parametrize("field", ["q1", "q2", "q3", "q4"])
+@pytest.mark.parametrize("value", [*BROKEN, 1e20, 2.0, 0.0])
+def test_what_is_no_rotation_is_refused(field, value):
+    message = copy.copy(measured("ATTITUDE_QUATERNION"))
+    setattr(message, field, value)
+    assert isinstance(listening_decoder().feed(packed(message))[0][1], Refused)
+
+
+def test_a_stamp_that_is_not_exact_in_double_precision_is_refused():
+    for name in ("HIGHRES_IMU", "ODOMETRY", "VIBRATION"):
+        message = copy.copy(measured(name))
+        message.time_usec = 1 << 63
+        assert isinstance(listening_decoder().feed(packed(message))[0][1], Refused), name
 
 
 def sent(outgoing):

@@ -1,10 +1,13 @@
 """A fault in the program itself: the vehicle is handed over, and heartbeats, setpoints and events go on until it is."""
 
 import itertools
+import math
 
 import pytest
+from pymavlink.dialects.v20 import development as mav
 
 from companion.detection import watch
+from companion.flight.context import Target
 from companion.flight.progress import FlyItems
 from tests.companion.fake_vehicle import LOITER, Flight, flight
 
@@ -40,6 +43,40 @@ def test_whatever_breaks_in_the_air_the_vehicle_is_handed_over(monkeypatch, plac
     assert max(b - a for a, b in itertools.pairwise(times_us)) <= 50_000, "no gap before the mode is seen to hold"
     last = f.setpoints_since(broken_at_us)[-1][1]
     assert last[7] == 84
+
+
+def broken_target(self, now_us):
+    return Target((float("nan"), 0.0, -1.5), None)
+
+
+@pytest.mark.parametrize(
+    ("place", "does"),
+    [
+        ("companion.flight.progress.FlyItems.target", broken_target),
+        ("companion.flight.limiting.bounded", breaks),
+        ("companion.core.status_text", breaks),
+        ("companion.mavlink.encode.Encoder._setpoint", breaks),
+    ],
+)
+def test_what_breaks_on_the_way_out_hands_the_vehicle_over_by_setpoints_that_are_safe_to_hold(monkeypatch, place, does):
+    f = in_mission()
+    safe = f.setpoints_since(0)[-1][1]
+    monkeypatch.setattr(place, does)
+    broken_at_us = f.now_us
+    f.companion.core.flight.tell(f.now_us, "policy", "something to tell")
+    f.run_to_end(3.0)
+
+    assert f.companion.report().outcome == "failed"
+    assert f.vehicle.mode == LOITER and f.vehicle.armed
+    for _, frame in f.setpoints_since(broken_at_us):
+        message = mav.MAVLink(None).decode(bytearray(frame))
+        assert math.isfinite(message.x) and math.isnan(message.vx) and math.isnan(message.afx)
+        assert math.dist((message.x, message.y, message.z), place_in(safe)) < 0.1, "where the last good one was"
+
+
+def place_in(frame: bytes) -> tuple[float, float, float]:
+    message = mav.MAVLink(None).decode(bytearray(frame))
+    return message.x, message.y, message.z
 
 
 def test_a_fault_on_the_ground_arms_nothing(monkeypatch):

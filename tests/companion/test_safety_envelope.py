@@ -2,13 +2,14 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.flight.context import Target
-from companion.flight.envelope import Surroundings, bounded
+from companion.flight.envelope import GRAVITY_M_S2, SetpointError, Surroundings, bounded
 from companion.flight.trajectory import LineProfile
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
@@ -63,9 +64,72 @@ def test_a_velocity_is_scaled_down_in_its_direction():
     assert reason == "velocity above 3 m/s"
 
 
-def test_on_the_way_up_from_the_ground_there_is_no_floor():
+def test_on_the_way_up_from_the_ground_the_ground_is_the_floor():
     target = asked((0.0, 0.0, 0.0))
     assert bounded(target, around((0.0, 0.0, 0.0), has_floor=False), FENCE, LIMITS) == (target, "")
+    under, reason = bounded(asked((0.0, 0.0, 50.0)), around((0.0, 0.0, 0.0), has_floor=False), FENCE, LIMITS)
+    assert place_of(under)[2] == pytest.approx(0.0) and "outside the fence" in reason
+
+
+def lean(acceleration, velocity=(0.0, 0.0, 0.0), place=(0.0, 0.0, -1.5), is_height_free=True) -> Target:
+    return replace(asked(place, velocity, acceleration), leans_only=True, is_height_free=is_height_free)
+
+
+def test_a_lean_is_bounded_by_the_tilt_and_by_gravity():
+    target, reason = bounded(lean((60.0, 80.0, 0.0)), around(), FENCE, LIMITS)
+    n, e, d = target.acceleration_ned_m_s2
+    assert math.hypot(n, e) == pytest.approx(GRAVITY_M_S2), "45 degrees"
+    assert e / n == pytest.approx(80 / 60) and d == 0.0
+    assert reason == "tilt above 45 degrees"
+    target, _ = bounded(lean((0.0, 0.0, -80.0)), around(), FENCE, LIMITS)
+    assert target.acceleration_ned_m_s2[2] >= -GRAVITY_M_S2
+
+
+def test_a_lean_stays_a_lean_wherever_the_estimate_that_is_not_flown_by_says_the_vehicle_is():
+    far = lean((2.0, 0.0, 0.0), place=(25.0, 0.0, -1.5))
+    assert bounded(far, around((-25.0, 0.0, -1.5)), FENCE, LIMITS) == (far, "")
+    held = lean((2.0, 0.0, 0.0), place=(25.0, 0.0, 3.0), is_height_free=False)
+    target, reason = bounded(held, around(), FENCE, LIMITS)
+    assert target.leans_only and target.acceleration_ned_m_s2[0] == 2.0
+    assert place_of(target)[2] == pytest.approx(-0.5) and "outside the fence" in reason, "its height is asked for"
+
+
+@pytest.mark.parametrize("is_height_free", [True, False])
+@pytest.mark.parametrize("height_m", [0.6, 1.0, 3.9])
+@pytest.mark.parametrize(("down_m_s", "down_m_s2"), [(0.0, 8.0), (2.5, 0.0), (1.0, 9.0), (-2.5, 0.0), (0.0, -9.0)])
+def test_held_for_com_of_loss_t_a_setpoint_leads_neither_below_the_floor_nor_out_of_the_top(
+    is_height_free, height_m, down_m_s, down_m_s2
+):
+    """By PX4's own loops: velocity gain MPC_Z_VEL_P_ACC = 4, height gain MPC_Z_P = 1; held for 1 s."""
+    place = (0.0, 0.0, -height_m)
+    wanted = lean((0.0, 0.0, down_m_s2), (0.0, 0.0, down_m_s), place, is_height_free)
+    target, _ = bounded(wanted, around(place), FENCE, LIMITS)
+
+    down_m, speed_m_s, step_s = -height_m, 0.0, 0.001
+    for _ in range(1000):
+        wish_m_s = target.velocity_ned_m_s[2]
+        wish_m_s += 0.0 if is_height_free else place_of(target)[2] - down_m
+        speed_m_s += step_s * (target.acceleration_ned_m_s2[2] + 4.0 * (wish_m_s - speed_m_s))
+        down_m += step_s * speed_m_s
+    assert -4.0 - 0.01 <= down_m <= -0.5 + 0.01
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_a_fault_and_nothing_else(broken):
+    good = asked((0.0, 0.0, -1.5), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for index in range(3):
+        for part in ("position_ned_m", "velocity_ned_m_s", "acceleration_ned_m_s2"):
+            values = list(getattr(good, part))
+            values[index] = broken
+            with pytest.raises(SetpointError):
+                bounded(replace(good, **{part: tuple(values)}), around(), FENCE, LIMITS)
+    with pytest.raises(SetpointError):
+        bounded(replace(good, yaw_rad=broken), around(), FENCE, LIMITS)
+
+
+def test_a_yaw_is_turned_into_one_turn():
+    target, _ = bounded(replace(asked((0.0, 0.0, -1.5)), yaw_rad=7.0), around(), FENCE, LIMITS)
+    assert target.yaw_rad == pytest.approx(7.0 - math.tau)
 
 
 @given(POINT, POINT, st.one_of(st.none(), POINT))
@@ -120,8 +184,8 @@ def test_a_hit_may_make_the_setpoint_jump():
 def test_an_estimate_that_jumps_does_not_send_the_vehicle_flying():
     f = in_mission(abort_when={"outside_fence_by_m": None}, fence={"radius_m": 30})
     f.vehicle.position[0] += 12.0
-    f.step()
-    f.run_for(0.1)
+    sent = len(f.vehicle.setpoints)
+    f.run_until(lambda: len(f.vehicle.setpoints) > sent + 1)
     last = f.vehicle.setpoints[-1][1]
     assert f.vehicle.position[0] - last.x == pytest.approx(5.0, abs=0.1), "limits.max_step_m"
 

@@ -6,7 +6,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.gate import Gate
 from companion.guard.holding import is_foreign
 from companion.guard.states import State
-from companion.messages import PositionTarget
+from companion.messages import PositionTarget, Refused
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from tests.guard.attached_air import REPEATED_EVERY_S, AttachedAir
 
@@ -134,7 +134,7 @@ def test_fields_of_another_dialect_make_no_sample_and_no_error():
     assert sample_from("HEARTBEAT", (1, 1), {"type": None, "custom_mode": None}) is None
     assert sample_from("NO_SUCH_MESSAGE", (1, 1), {}) is None
     imu = {"time_usec": 1, "xacc": None, "yacc": 0.0, "zacc": 0.0, "xgyro": 0.0, "ygyro": 0.0, "zgyro": 0.0}
-    assert sample_from("HIGHRES_IMU", (1, 1), {**imu, "fields_updated": 63}) is None
+    assert isinstance(sample_from("HIGHRES_IMU", (1, 1), {**imu, "fields_updated": 63}), Refused)
 
 
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():

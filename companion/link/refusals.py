@@ -1,0 +1,38 @@
+"""Messages of the vehicle's that were not believed: counted, and told when it lasts."""
+
+from dataclasses import dataclass, field
+
+from companion.messages import Refused
+
+# One broken packet is a matter for the count. PX4 needs as long to leave OFFBOARD by default (COM_OF_LOSS_T).
+LASTING_US = 1_000_000
+
+
+@dataclass(slots=True)
+class Run:
+    """Refusals of one message with less than LASTING_US between them."""
+
+    since_us: int
+    last_us: int
+    is_told: bool = False
+
+
+@dataclass(slots=True)
+class Refusals:
+    """How often each message was refused, and the present run of each."""
+
+    counts: dict[str, int] = field(default_factory=dict)
+    _runs: dict[str, Run] = field(default_factory=dict)
+
+    def add(self, refused: Refused, now_us: int) -> str | None:
+        """One more; what is to be told of it, once a run."""
+        name = refused.message
+        self.counts[name] = self.counts.get(name, 0) + 1
+        run = self._runs.get(name)
+        if run is None or now_us - run.last_us >= LASTING_US:
+            run = self._runs[name] = Run(now_us, now_us)
+        run.last_us = now_us
+        if run.is_told or now_us - run.since_us < LASTING_US:
+            return None
+        run.is_told = True
+        return f"{name} is not believed: {refused.reason}"

@@ -1,0 +1,136 @@
+"""Hostile but well-formed messages of the vehicle's, and what must hold of every setpoint whatever is heard."""
+
+import math
+import random
+from collections.abc import Iterable
+
+from pymavlink.dialects.v20 import development as mav
+
+from companion.mavlink.decode import CONVERTERS
+from companion.mavlink.frequent import FREQUENT
+from tests.companion.fake_vehicle import INTERVAL_US, FakeVehicle, Flight, flight
+
+HEARD = sorted({*CONVERTERS, *FREQUENT})
+# The states of a flight, and a mission that passes them all: into a wall, home and down.
+STATES = ("connect", "takeoff", "mission", "recovering", "holding", "returning", "landing")
+ITEMS = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
+    {"return": {}},
+]
+POLICY = {"then": "hold", "hold_s": 1.0}
+
+FLOATS = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e20, -1e20, 1e-45, 0.0, -0.0, 1e6, -1e6)
+MILD = (-1000.0, -100.0, -40.0, -10.0, -3.0, -1.0, -0.1, 0.1, 1.0, 3.0, 10.0, 40.0, 100.0, 1000.0)
+INTEGER_BITS = {"uint8_t": 8, "uint16_t": 16, "uint32_t": 32, "uint64_t": 64, "int8_t": 7, "int16_t": 15}
+INTEGER_BITS |= {"int32_t": 31, "int64_t": 63}
+
+
+class Attacker:
+    """Who knows the vehicle's ids and its newest messages, and sends in its name."""
+
+    def __init__(self, vehicle: FakeVehicle, seed: int) -> None:
+        self._vehicle = vehicle
+        self._random = random.Random(seed)
+        self._tx = mav.MAVLink(None, vehicle.system_id, 1)
+
+    def packet(self, message_id: int | None = None, field: str | None = None, value: object = None) -> bytes:
+        """One message, true but for some fields; which one, which field and which value by chance unless given."""
+        chosen = self._random.choice(HEARD) if message_id is None else message_id
+        message = self._true(chosen)
+        names = list(message.fieldnames)
+        fields = [field] if field else self._random.sample(names, self._random.randint(1, min(3, len(names))))
+        for name in fields:
+            self._spoil(message, name, value)
+        return bytes(message.pack(self._tx))
+
+    def _true(self, message_id: int) -> mav.MAVLink_message:
+        """As the vehicle would say it now."""
+        v, kind = self._vehicle, mav.mavlink_map[message_id]
+        values = [self._plain(kind, index) for index in range(len(kind.fieldnames))]
+        message = kind(*values)
+        now = {"time_usec": v.time_us, "time_boot_ms": v.time_us // 1000, "q1": 1.0, "fields_updated": 0x3F}
+        now |= dict(zip(("x", "y", "z", "vx", "vy", "vz"), (*v.position, *v.velocity), strict=True))
+        now |= dict(zip(("xacc", "yacc", "zacc"), v.specific_force, strict=True))
+        now |= {"frame_id": 1, "child_frame_id": 1, "autopilot": v.autopilot, "type": v.vehicle_type}
+        now |= {"custom_mode": v.mode, "base_mode": 0x9D if v.armed else 0x1D, "landed_state": v.landed, "thrust": 0.5}
+        now["system_status"] = 4 if v.armed else 3
+        for name in message.fieldnames:
+            if name in now:
+                setattr(message, name, now[name])
+        return message
+
+    @staticmethod
+    def _plain(kind: type, index: int) -> object:
+        # the lengths are in the order of the wire, the names in that of the definition
+        length = kind.array_lengths[kind.ordered_fieldnames.index(kind.fieldnames[index])]
+        if kind.fieldtypes[index] == "char":
+            return b""
+        return [0] * length if length else 0
+
+    def _spoil(self, message: mav.MAVLink_message, name: str, value: object) -> None:
+        kind = message.fieldtypes[message.fieldnames.index(name)]
+        if kind == "char":
+            return
+        now = getattr(message, name)
+        if isinstance(now, list):
+            now[self._random.randrange(len(now))] = self._value(kind, value, 0)
+        else:
+            setattr(message, name, self._value(kind, value, now))
+
+    def _value(self, kind: str, value: object, now: float) -> object:
+        if value is not None:
+            return value
+        r = self._random
+        if kind in ("float", "double"):
+            return r.choice((r.choice(FLOATS), r.choice(MILD), now + r.choice(MILD), r.uniform(-20.0, 20.0)))
+        bits = INTEGER_BITS[kind]
+        least = 0 if kind[0] == "u" else -(1 << bits)
+        most = (1 << bits) - 1
+        near = min(max(int(now) + r.choice((-1, 1)) * r.choice((1, 1000, 1_000_000, 60_000_000)), least), most)
+        return r.choice((least, most, 0, r.randint(least, most), near))
+
+
+def attacked(f: Flight, packets: Iterable[bytes]) -> None:
+    """One step of the flight with these packets before the vehicle's own."""
+    f.now_us += INTERVAL_US
+    result = f.companion.step(b"".join(packets) + f.vehicle.step(f.pending), f.now_us)
+    f.pending = b"".join(result.sent_frames)
+    f.events += result.events
+    for frame in result.sent_frames:
+        assert_inside(f, frame)
+
+
+def assert_inside(f: Flight, frame: bytes) -> None:
+    """What a setpoint asks for is finite, inside the fence, and within the limits; whatever it is not asked is NaN."""
+    message = mav.MAVLink(None).decode(bytearray(frame))
+    if message.get_type() != "SET_POSITION_TARGET_LOCAL_NED":
+        return
+    mask, told = message.type_mask, str(message)
+    asked = [
+        getattr(message, name)
+        for bit, name in enumerate(("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz"))
+        if not mask >> bit & 1
+    ]
+    assert asked and all(map(math.isfinite, asked)), told
+    assert mask & 0x400 or abs(message.yaw) <= math.pi + 1e-6, told
+    core = f.companion.core
+    fence, limits, origin = core.flight.mission.fence, core.flight.mission.limits, core.flight.origin_ned_m
+    if not mask & 0x1C0:
+        sideways = math.hypot(message.afx, message.afy)
+        assert sideways <= 9.81 * math.tan(math.radians(limits.max_tilt_deg)) * 1.001, told
+        assert abs(message.afz) <= 9.81, told
+    if not mask & 0x038:
+        assert math.hypot(message.vx, message.vy, message.vz) <= limits.max_speed_m_s * 1.001, told
+    if origin is not None and not mask & 0x003:
+        assert fence.contains((message.x - origin[0]) * 0.999, (message.y - origin[1]) * 0.999), told
+    if origin is not None and not mask & 0x004:
+        assert -fence.max_height_m - 0.01 <= message.z - origin[2] <= 0.01, told
+
+
+def flight_in(state: str) -> Flight:
+    """A flight that has just come to the state; of a mission that flies into a wall."""
+    vehicle = FakeVehicle(wall_north_m=3.0, battery_percent=80)
+    f = flight(vehicle, items=ITEMS, on_collision=POLICY)
+    f.run_to(state)
+    return f
