@@ -15,6 +15,9 @@ from rebound_cli.schema_hints import keys_allowed_at, nearest
 DocumentPath = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
+# The missions that ship have a thousand characters; PyYAML takes ten seconds for a million.
+MOST_CHARACTERS = 1_000_000
+
 # A reader repairs the first few faults and runs again; a longer list only hides them.
 _MOST_ERRORS_SHOWN = 5
 
@@ -84,6 +87,8 @@ def load_document(path: Path) -> Document:
 
 def parse_document(text: str, name: str) -> Document:
     """Read YAML text; `name` is what errors call it. Raises DocumentError."""
+    if len(text) > MOST_CHARACTERS:
+        raise DocumentError(f"{name}: longer than {MOST_CHARACTERS // 1_000_000} MB; no file that a person writes is.")
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
@@ -91,7 +96,12 @@ def parse_document(text: str, name: str) -> Document:
             raise DocumentError(f"{name}: the file is empty.")
         if not isinstance(node, yaml.MappingNode):
             raise DocumentError(f"{name}:{_line(node)}: a mapping was expected here, such as 'name: square'.")
-        lines = dict(_lines_below(node, (), name))
+        lines = {}
+        for path, line in _lines_below(node, (), name):
+            lines[path] = line
+            # Every value that is written out takes a character; only aliases of aliases make more of them.
+            if len(lines) > len(text):
+                raise DocumentError(f"{name}:{line}: aliases in aliases or in themselves; write the values out.")
         data = loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark

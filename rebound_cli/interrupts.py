@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the first hands the vehicle over in good order, the second ends the program at once."""
+"""Ctrl-C, SIGTERM and SIGHUP: the first hands the vehicle over in good order, the second ends the program at once."""
 
 import signal
 from collections.abc import Iterator
@@ -7,7 +7,11 @@ from multiprocessing import resource_tracker
 from types import FrameType, TracebackType
 from typing import Self
 
-_REASONS = {signal.SIGINT: "stopped with Ctrl-C", signal.SIGTERM: "stopped by a terminate signal"}
+_REASONS = {
+    signal.SIGINT: "stopped with Ctrl-C",
+    signal.SIGTERM: "stopped by a terminate signal",
+    signal.SIGHUP: "stopped because its terminal is gone",
+}
 
 
 class Interrupts:

@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from argparse import Namespace
+from functools import partial
 from pathlib import Path
 
 from companion.errors import ConfigurationError
@@ -22,7 +23,7 @@ def run_sim(options: Namespace) -> int:
         _check_place(options.truth)
     world = load_world(options.mission, options.set, options.airframe, options.seed)
     stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: stopped.set())
     if options.stop_with_stdin:
         threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
@@ -73,7 +74,8 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
     new_vehicle().step(MOTORS_STOPPED)
     print(f"Body of '{world.airframe.name}' for PX4. Ctrl-C stops it.", flush=True)
     port = PX4_SIMULATOR_PORT if options.port is None else options.port
-    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, lambda text: print(text, flush=True))
+    tell = partial(print, flush=True)
+    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, tell, options.host)
 
 
 def _wait_for_end_of_stdin(stopped: threading.Event) -> None:

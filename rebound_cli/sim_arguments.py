@@ -36,6 +36,12 @@ def add_sim(commands: Commands) -> None:
         "with --autopilot px4 the TCP port (4560)",
     )
     sim.add_argument(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="with --autopilot px4: where to listen for it (default 127.0.0.1: this machine alone)",
+    )
+    sim.add_argument(
         "--speed",
         type=speed,
         default=os.environ.get("PX4_SIM_SPEED_FACTOR") or "1",

@@ -59,7 +59,7 @@ def is_free(sample: LocalPosition, contact: Contact, ended_boot_us: int) -> bool
 def lean_left(fixes: Sequence[VelocityFix], boot_us: int) -> Vector3:
     """The horizontal acceleration of a vehicle that nothing pushes, of the last moments before a time; NED, m/s^2."""
     recent = [fix for fix in fixes if boot_us - LEFT_US <= fix.time_boot_us <= boot_us]
-    if len(recent) < 2:
+    if not recent or recent[0].time_boot_us == recent[-1].time_boot_us:
         return REST
     first, last = recent[0], recent[-1]
     per_s = 1e6 / (last.time_boot_us - first.time_boot_us)

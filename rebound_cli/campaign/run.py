@@ -101,7 +101,11 @@ def _outcomes(campaign: Campaign, missing: Sequence[tuple[int, Any]], workers: W
 def _client(workers: Workers) -> Client:
     if workers.scheduler is None:
         cluster = LocalCluster(
-            n_workers=workers.jobs, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+            n_workers=workers.jobs,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
         )
         return _LocalClient(cluster)
     try:

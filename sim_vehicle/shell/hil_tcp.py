@@ -28,13 +28,14 @@ def serve_px4(
     truth_path: Path | None = None,
     stop: Callable[[], bool] = lambda: False,
     tell: Callable[[str], None] = print,
+    host: str = "127.0.0.1",
 ) -> None:
     """Give one PX4 after another a new vehicle until ``stop()``; ``tell`` gets sentences for a person.
 
     ``speed``: simulated seconds a second at most, 0 for as fast as PX4 answers. The truth of each PX4's
-    vehicle is written when it goes. Raises PortInUse where ``port`` cannot be had, and NotInLockstep.
+    vehicle is written when it goes. Raises PortInUse where ``port`` cannot be had at ``host``, and NotInLockstep.
     """
-    with _listening_socket(port) as listener:
+    with _listening_socket(host, port) as listener:
         tell(f"Waiting for PX4 at TCP port {listener.getsockname()[1]}.")
         while not stop():
             link = _accept(listener)
@@ -154,12 +155,12 @@ def _now_us() -> int:
     return time.monotonic_ns() // 1000
 
 
-def _listening_socket(port: int) -> socket.socket:
+def _listening_socket(host: str, port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         # A PX4 that has just gone leaves its connection in TIME_WAIT, which must not hold up the next start.
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(("0.0.0.0", port))
+        listener.bind((host, port))
         listener.listen(1)
     except OSError as problem:
         listener.close()

@@ -19,7 +19,9 @@ class UdpPeerPort:
     def __init__(self, vehicle: SimulatedVehicle, options: LinkOptions, listen_port: int, remote: Address) -> None:
         """Raises LinkAddressError for a host that nobody knows, PortInUse where ``listen_port`` cannot be had."""
         self._remote = _resolved(remote)
-        self._socket = bound_socket(socket.SOCK_DGRAM, "0.0.0.0", listen_port)
+        # Nobody but this machine is listened to, unless another was named.
+        here = "127.0.0.1" if self._remote[0].startswith("127.") else "0.0.0.0"
+        self._socket = bound_socket(socket.SOCK_DGRAM, here, listen_port)
         self._has_peer = False
         self._link = connected(vehicle, options)
 

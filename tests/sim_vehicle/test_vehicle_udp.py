@@ -12,10 +12,13 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import PortInUse
+from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.mavlink.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import px4_ports
 from sim_vehicle.shell.realtime import Pace, serve
 from sim_vehicle.shell.truth_file import load_truth
+from sim_vehicle.shell.udp_ports import UdpPeerPort
 from sim_vehicle.vehicle import SimulatedVehicle
 
 TIMEOUT_S = 5.0
@@ -69,6 +72,17 @@ def test_it_sends_unasked_one_packet_a_datagram():
         received = messages(companion, 400)
     # 400 packets are some 1.4 s of the default streams
     assert {message.get_type() for message in received} >= {"HEARTBEAT", "HIGHRES_IMU", "LOCAL_POSITION_NED"}
+
+
+def test_only_this_machine_is_listened_to_unless_another_was_named():
+    for remote, here in (
+        (("127.0.0.1", 9), "127.0.0.1"),
+        (("localhost", 9), "127.0.0.1"),
+        (("192.0.2.1", 9), "0.0.0.0"),
+    ):
+        port = UdpPeerPort(new_vehicle(), LinkOptions(LinkKind.ONBOARD), 0, remote)
+        assert port._socket.getsockname()[0] == here
+        port.close()
 
 
 def test_the_first_sender_becomes_the_companion_for_good():

@@ -205,6 +205,13 @@ def test_a_px4_without_lockstep_ends_the_simulation_with_a_reason():
     assert isinstance(server.problem, NotInLockstep)
 
 
+def test_only_this_machine_is_listened_to(monkeypatch):
+    bound = []
+    monkeypatch.setattr(socket.socket, "bind", lambda _, address: bound.append(address))
+    serve_px4(new_vehicle, 4560, stop=lambda: True, tell=lambda _: None)
+    assert bound == [("127.0.0.1", 4560)]
+
+
 def test_a_port_that_is_taken_is_said_so():
     with socket.socket() as other:
         other.bind(("0.0.0.0", 0))

@@ -1,0 +1,19 @@
+"""Signals: the first one is a reason to hand the vehicle over, the second ends the program."""
+
+import os
+import signal
+
+import pytest
+
+from rebound_cli.interrupts import Interrupts
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_the_first_signal_is_a_reason_and_the_second_ends_the_program(number):
+    before = signal.getsignal(number)
+    with Interrupts() as interrupts:
+        os.kill(os.getpid(), number)
+        assert interrupts.reason is not None and interrupts.reason.startswith("stopped")
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), number)
+    assert signal.getsignal(number) is before
