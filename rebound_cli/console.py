@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
+from rebound_cli.background import Background, at_once
+
 if TYPE_CHECKING:
     from companion.report import Event, Status
 
@@ -20,10 +22,15 @@ _ERASE_LINE = "\r\x1b[K"
 
 
 class Console:
-    """Text for a person, on stdout or, when stdout belongs to a program, on stderr."""
+    """Text for a person, on stdout or, when stdout belongs to a program, on stderr.
 
-    def __init__(self, stream: TextIO) -> None:
+    With a `writer` nothing waits for the terminal, or for the reader of a pipe, before `close`.
+    """
+
+    def __init__(self, stream: TextIO, writer: Background | None = None) -> None:
         self._stream = stream
+        self.writer = writer
+        self._do = at_once if writer is None else writer.give
         self.is_terminal = stream.isatty()
         self._live_due_s = 0.0
         self._live_is_shown = False
@@ -38,29 +45,36 @@ class Console:
         line = live_text(status(), flight_time_s)
         if self.is_terminal:
             width = shutil.get_terminal_size().columns - 1
-            self._stream.write(_ERASE_LINE + line[:width])
-            self._stream.flush()
+            self._do(self._write, _ERASE_LINE + line[:width])
             self._live_is_shown = True
         else:
             self.print(line)
 
     def print(self, text: str = "") -> None:
-        if self._live_is_shown:
-            self._stream.write(_ERASE_LINE)
-            self._live_is_shown = False
-        self._stream.write(text + "\n")
-        self._stream.flush()
+        before = _ERASE_LINE if self._live_is_shown else ""
+        self._live_is_shown = False
+        self._do(self._write, f"{before}{text}\n")
 
     def ask(self, question: str) -> None:
         """Print a question whose answer is read elsewhere; live lines wait until it has come."""
         self.print()
-        self._stream.write(question)
-        self._stream.flush()
+        self._do(self._write, question)
         self.live_is_held = True
 
+    def close(self) -> None:
+        """Return when all is shown that could be. Raises what kept the rest from it."""
+        if self.writer is not None:
+            self.writer.close()
+            if self.writer.error is not None:
+                raise self.writer.error
 
-def console_for(json_on_stdout: bool) -> Console:
-    return Console(sys.stderr if json_on_stdout else sys.stdout)
+    def _write(self, text: str) -> None:
+        self._stream.write(text)
+        self._stream.flush()
+
+
+def console_for(json_on_stdout: bool, writer: Background | None = None) -> Console:
+    return Console(sys.stderr if json_on_stdout else sys.stdout, writer)
 
 
 def live_text(status: "Status", flight_time_s: float) -> str:

@@ -14,6 +14,7 @@ from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, UdpInConnection
 from rebound_cli import run_folder
+from rebound_cli.background import Background
 from rebound_cli.console import Console, console_for, summary_text, timeline
 from rebound_cli.documents import Override, apply_override
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
@@ -60,12 +61,13 @@ def run_fly(options: Namespace) -> int:
             remember_from(options.resume, document)
         mission = mission_from(document)
     world = world_from(document) if is_simulated else None
-    console = console_for(options.json)
+    console = console_for(options.json, Background("console"))
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
     connection = _connection_for(options)
     folder = run_folder.create_run_folder(options.out, mission.name)
     _write_inputs(folder, options.mission, mission, world)
-    recorder = FlightRecorder(folder)
+    # In lockstep the vehicle waits for the disk as for everything else.
+    recorder = FlightRecorder(folder, None if options.lockstep else Background("log"))
     with Interrupts() as interrupts:
         flight = Flight(mission, world, folder, recorder, console, interrupts)
         try:
@@ -103,10 +105,12 @@ def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirm
     companion = Companion(flight.mission)
     started_s = time.monotonic()
     try:
-        fly_realtime(companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts)
+        timing = fly_realtime(
+            companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts
+        )
     finally:
         connection.close()
-    return Flown(companion.report(), time.monotonic() - started_s, None)
+    return Flown(companion.report(), time.monotonic() - started_s, None, timing)
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:
@@ -168,12 +172,17 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
         settled_duration_s=flight.mission.companion.settled.duration_s,
     )
     summary = build_summary(flown, facts)
-    run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
-    console = flight.console
+    console, writer = flight.console, flight.recorder.writer
     console.print(timeline(flight.recorder.events, flown.report.started_at_us))
     console.print("\n" + summary_text(summary))
-    draw_flight(flight.folder, flight.mission, world.scene if world else None, flown.report, flown.truth)
-    console.print(f"\n  everything is in {flight.folder}/")
-    if json_on_stdout:
-        print(json.dumps(summary, indent=2))
+    if writer is not None and writer.loss is not None:
+        console.print(f"\n  {writer.loss} ({writer.lost} steps)")
+    try:
+        run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
+        draw_flight(flight.folder, flight.mission, world.scene if world else None, flown.report, flown.truth)
+        console.print(f"\n  everything is in {flight.folder}/")
+    finally:
+        if json_on_stdout:
+            print(json.dumps(summary, indent=2))
+    console.close()
     return 0 if summary["outcome"] == "completed" else 1

@@ -28,6 +28,8 @@ from rebound_cli.tune.arguments import add_tune
 EXIT_ERROR = 1
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
 EXIT_INTERRUPTED = 130
+# What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
+_DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
 
@@ -53,8 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return EXIT_ERROR
     except OSError as error:
-        # A file or folder that cannot be had, or a full disk; an error of any other kind is a fault of ours.
-        if error.filename is None and error.errno != errno.ENOSPC:
+        # A file or folder that cannot be had, or a disk that takes no more; any other error is a fault of ours.
+        if error.filename is None and error.errno not in _DISK_ERRORS:
             raise
         where = "" if error.filename is None else f"{error.filename}: "
         print(f"rebound: {where}{error.strerror}.", file=sys.stderr)

@@ -1,19 +1,33 @@
 """The companion or the guard on a real connection and the real clock."""
 
+import contextlib
 import os
 import select
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 from companion.companion import Companion, StepResult
+from companion.errors import ReboundError
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.timing import Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
+# A socket holds no more: Linux counts each datagram as 768 bytes or more of the 212,992 in net.core.rmem_default.
+MOST_DATAGRAMS = 300
+# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.commander).
+HANDING_OVER_US = 10_000_000
+
+
+class FlightFaultError(ReboundError):
+    """Something around the flight failed; the vehicle has been handed over, as far as it could be reached."""
 
 
 class Confirmation(Protocol):
@@ -81,22 +95,30 @@ class AskPerson:
 class Stepped(Protocol):
     """The companion or the guard: bytes and time in, frames and events out."""
 
+    @property
+    def armed(self) -> bool | None: ...
+
+    @property
+    def finished(self) -> bool: ...
+
     def next_deadline_us(self) -> int: ...
 
     def step(self, received: bytes, now_us: int) -> StepResult: ...
 
+    def stop(self, reason: str) -> None: ...
 
-def exchange(
-    stepped: Stepped, connection: Connection, clock: Clock, recorder: FlightRecorder
-) -> tuple[int, StepResult]:
-    """Wait for bytes or the next deadline, take one step, send and record; the time of the step and what came of it."""
-    received = connection.receive(min((stepped.next_deadline_us() - clock.now_us()) / 1e6, LONGEST_WAIT_S))
-    now_us = clock.now_us()
-    result = stepped.step(received, now_us)
-    for frame in result.sent_frames:
-        connection.send(frame)
-    recorder.record(now_us, result)
-    return now_us, result
+    def note(self, kind: str, text: str) -> None: ...
+
+
+def waiting(connection: Connection, timeout_s: float) -> bytes:
+    """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
+    received = connection.receive(timeout_s)
+    if not received:
+        return received
+    pieces = [received]
+    while len(pieces) < MOST_DATAGRAMS and (received := connection.receive(0.0)):
+        pieces.append(received)
+    return b"".join(pieces)
 
 
 def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -> None:
@@ -104,6 +126,99 @@ def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -
     if companion.file_awaited is not None and Path(companion.file_awaited).exists():
         companion.file_is_there()
         recorder.record_file(now_us)
+
+
+@dataclass(slots=True)
+class Loop:
+    """Exchanges with a vehicle until what is stepped has finished."""
+
+    stepped: Stepped
+    connection: Connection
+    clock: Clock
+    recorder: FlightRecorder
+    console: Console
+    interrupts: Interrupts
+    timing: Timing = field(default_factory=Timing)
+    now_us: int | None = None  # of the last step
+    is_interrupted: bool = False
+
+    def run(self, beside: Callable[[int, StepResult], None]) -> None:
+        """After the first interrupt it finishes by itself. `beside` is what happens besides with each step.
+
+        Whatever is raised in all this hands the vehicle over first, and then ends in FlightFaultError.
+        """
+        with undisturbed() as allow_collecting:
+            try:
+                while not self.stepped.finished:
+                    now_us, result = self.exchange()
+                    allow_collecting(self.stepped.armed is False)
+                    beside(now_us, result)
+                    self._look_up(now_us)
+            except Exception as error:
+                place = traceback.extract_tb(error.__traceback__)[-1]
+                reason = f"fault around the flight, please report it: {type(error).__name__} in {place.name}: {error}"
+                self._hand_over(reason)
+                text = f"{reason[:1].upper()}{reason[1:]}; the vehicle was handed over, as far as it answered."
+                raise FlightFaultError(text) from error
+
+    def exchange(self) -> tuple[int, StepResult]:
+        """Wait for bytes or the next deadline, take one step, send and record; when it was and what came of it."""
+        deadline_us = self.stepped.next_deadline_us()
+        received = waiting(self.connection, min((deadline_us - self.clock.now_us()) / 1e6, LONGEST_WAIT_S))
+        now_us = self.clock.now_us()
+        result = self._step(received, now_us)
+        late = self.timing.stepped(deadline_us, now_us, self.clock.now_us())
+        if late is not None:
+            self._note("late", late, now_us)
+        return now_us, result
+
+    def _step(self, received: bytes, now_us: int) -> StepResult:
+        result = self.stepped.step(received, now_us)
+        self.now_us = now_us
+        try:
+            for frame in result.sent_frames:
+                self.connection.send(frame)
+        finally:
+            self.recorder.record(now_us, result)
+        return result
+
+    def _look_up(self, now_us: int) -> None:
+        """Whether somebody wants an end, and whether all that was to be written was."""
+        if self.interrupts.reason is not None and not self.is_interrupted:
+            self.is_interrupted = True
+            self._stop(self.interrupts.reason)
+        if self.stepped.armed is None:
+            # Nobody has been heard yet who could be told.
+            return
+        for writer in (self.recorder.writer, self.console.writer):
+            loss = None if writer is None else writer.news()
+            if loss is not None:
+                self._note("lost", loss, now_us)
+
+    def _note(self, kind: str, text: str, now_us: int) -> None:
+        self.stepped.note(kind, text)
+        self.recorder.record_note(now_us, kind, text)
+
+    def _stop(self, reason: str) -> None:
+        self.stepped.stop(reason)
+        if self.now_us is not None:
+            self.recorder.record_person(self.now_us, False, reason)
+
+    def _hand_over(self, reason: str) -> None:
+        """With the steps and the link alone. Where these fail again the next one is tried, for as long as it takes."""
+        self._stop(reason)
+        until_us = self.clock.now_us() + HANDING_OVER_US
+        while not self.stepped.finished and self.clock.now_us() < until_us:
+            wait_s = min((self.stepped.next_deadline_us() - self.clock.now_us()) / 1e6, LONGEST_WAIT_S)
+            received = b""
+            try:
+                received = waiting(self.connection, wait_s)
+            except Exception:
+                # A link that cannot be read may still be written to.
+                self.clock.sleep(wait_s)
+            # Where a step fails again, the next one goes on by time alone.
+            with contextlib.suppress(Exception):
+                self._step(received, self.clock.now_us())
 
 
 def fly_realtime(
@@ -114,18 +229,18 @@ def fly_realtime(
     console: Console,
     confirmation: Confirmation,
     interrupts: Interrupts,
-) -> None:
-    """Run until the companion has finished; after the first interrupt it finishes by itself."""
+) -> Timing:
+    """Run until the companion has finished; after the first interrupt it finishes by itself. How steadily it went."""
     started_us = clock.now_us()
-    is_stopped = False
-    while not companion.finished:
-        now_us, result = exchange(companion, connection, clock, recorder)
+
+    def beside(now_us: int, result: StepResult) -> None:
         if result.events:
             recorder.record_obstacles(companion.obstacles())
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
-        if interrupts.reason is not None and not is_stopped:
-            is_stopped = True
-            companion.stop(interrupts.reason)
         recorder.record_person(now_us, companion.plan_is_confirmed, companion.stop_reason)
         console.live(companion.status, (now_us - started_us) / 1e6)
+
+    loop = Loop(companion, connection, clock, recorder, console, interrupts)
+    loop.run(beside)
+    return loop.timing

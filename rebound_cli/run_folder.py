@@ -15,6 +15,7 @@ from companion.errors import ReboundError
 from companion.memory.stored import file_data
 from companion.shell.tlog import TlogWriter, is_packet
 from rebound_cli import __version__
+from rebound_cli.background import Background, at_once
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -101,11 +102,13 @@ class FlightRecorder:
     """Writes packets and events as they happen and keeps the events for the timeline.
 
     What a replay needs besides is in a file of its own: the steps of which no packet tells, because nothing came
-    and nothing was sent, and what the person said.
+    and nothing was sent, and what the companion was told. With a `writer` no call waits for the disk or raises.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, writer: Background | None = None) -> None:
         self._folder = folder
+        self.writer = writer
+        self._do = at_once if writer is None else writer.give
         self._obstacles: Sequence[Patch] | None = None
         self._tlog = TlogWriter(folder / TLOG_NAME)
         # Line-buffered: events are few, and the last one before a kill is the one that matters.
@@ -116,43 +119,60 @@ class FlightRecorder:
         self.events: list[Event] = []
 
     def record(self, now_us: int, result: "StepResult") -> None:
+        if result.events:
+            self.events += result.events
+        self._do(self._write_step, now_us, result)
+
+    def _write_step(self, now_us: int, result: "StepResult") -> None:
+        # What is small first: a log that may grow no more costs no event.
+        for event in result.events:
+            self._events_file.write(event_line(event))
+        if not result.sent_frames and not any(map(is_packet, result.received_frames)):
+            self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
         if result.received_frames:
             self._tlog.write(now_us, result.received_frames)
         if result.sent_frames:
             self._tlog.write(now_us, result.sent_frames)
-        elif not any(map(is_packet, result.received_frames)):
-            self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
-        for event in result.events:
-            self.events.append(event)
-            self._events_file.write(event_line(event))
 
     def record_person(self, now_us: int, is_confirmed: bool, stop_reason: str | None) -> None:
         """What the companion has been told by now, after its step at `now_us`; only what is new is written."""
         if is_confirmed and not self._is_confirmed:
             self._is_confirmed = True
-            self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "confirm"}}\n')
+            self._record_input(now_us, "confirm")
         if stop_reason is not None and stop_reason != self._stop_reason:
             self._stop_reason = stop_reason
-            self._inputs_file.write(json.dumps({"time_us": now_us, "kind": "stop", "reason": stop_reason}) + "\n")
+            self._record_input(now_us, "stop", reason=stop_reason)
 
     def record_file(self, now_us: int) -> None:
         """The companion was told, after its step at `now_us`, that the file it waits for exists."""
-        self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "file"}}\n')
+        self._record_input(now_us, "file")
+
+    def record_note(self, now_us: int, event: str, text: str) -> None:
+        """The companion was given an event to tell, after its step at `now_us`."""
+        self._record_input(now_us, "note", event=event, text=text)
+
+    def _record_input(self, now_us: int, kind: str, **data: str) -> None:
+        self._do(self._inputs_file.write, json.dumps({"time_us": now_us, "kind": kind, **data}) + "\n")
 
     def record_obstacles(self, patches: "Sequence[Patch]") -> None:
         """The memory as it is by now. Whenever the program ends, the file is whole: the old one or the new one."""
         if patches == self._obstacles:
             return
         self._obstacles = patches
+        self._do(self._write_obstacles, patches)
+
+    def _write_obstacles(self, patches: "Sequence[Patch]") -> None:
         path = self._folder / OBSTACLES_NAME
         half_written = path.with_suffix(".part")
         write_json(half_written, file_data(patches))
         half_written.replace(path)
 
     def close(self) -> None:
-        self._tlog.close()
-        self._events_file.close()
-        self._inputs_file.close()
+        """Return when all is written that could be."""
+        for file in (self._tlog, self._events_file, self._inputs_file):
+            self._do(file.close)
+        if self.writer is not None:
+            self.writer.close()
 
 
 def event_line(event: "Event") -> str:

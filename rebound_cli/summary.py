@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from companion.memory.stored import as_data
 from companion.report import FlightReport
+from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth, match_contacts
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Flown:
     report: FlightReport
     wall_clock_s: float
     truth: FlightTruth | None
+    timing: Timing | None = None  # None in lockstep, which knows no real time
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         "duration_s": round(duration_s, _TIME_DIGITS),
         "wall_clock_s": round(flown.wall_clock_s, 3),
         "realtime_factor": round(duration_s / flown.wall_clock_s, 3) if flown.wall_clock_s > 0 else None,
+        **(flown.timing or Timing()).summary(),
         "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
         "refused_messages": dict(report.refused_messages),
         "false_detections": matches.false_detections if matches else None,

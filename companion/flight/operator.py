@@ -81,6 +81,8 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "refused": _as_it_stands,
     "crossed": _as_it_stands,
     "left_alone": _as_it_stands,
+    "lost": _as_it_stands,
+    "late": _as_it_stands,
     "fault": _fault,
     "done": _ended,
     "aborted": _ended,

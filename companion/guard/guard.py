@@ -65,6 +65,16 @@ class Guard:
         """What is remembered between steps, for whoever studies a guard; None before the first."""
         return self._core
 
+    def note(self, kind: str, text: str) -> None:
+        """An event of the program around this one, told with the next step's; nothing before the first."""
+        if self._core is not None:
+            self._core.flight.tell(self._core.now_us, kind, text)
+
+    @property
+    def armed(self) -> bool | None:
+        """As the vehicle says; None as long as it has not."""
+        return None if self._core is None else self._core.flight.vehicle.armed
+
     @property
     def finished(self) -> bool:
         return self._core is not None and self._core.machine.state is State.ENDED

@@ -19,3 +19,7 @@ class Clock:
 
     def now_us(self) -> int:
         return round_down_to_stamp_us(self._epoch_at_monotonic_zero_us + time.monotonic_ns() // 1000)
+
+    def sleep(self, duration_s: float) -> None:
+        """Let so much of it pass; no time where that is negative."""
+        time.sleep(max(duration_s, 0.0))

@@ -38,14 +38,19 @@ class TlogWriter:
             self.flush()
 
     def flush(self) -> None:
-        if self._pending:
-            self._file.write(b"".join(self._pending))
-            self._pending.clear()
+        """Write all that waits. Raises OSError, and drops what could not be written: the log goes on after a gap."""
+        left = memoryview(b"".join(self._pending))
+        self._pending.clear()
+        # A file without a buffer takes what there is room for, and says only at the next write that there is no more.
+        while left:
+            left = left[self._file.write(left) :]
 
     def close(self) -> None:
         if not self._file.closed:
-            self.flush()
-            self._file.close()
+            try:
+                self.flush()
+            finally:
+                self._file.close()
 
 
 def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:

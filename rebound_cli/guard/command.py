@@ -3,6 +3,7 @@
 from argparse import Namespace
 from dataclasses import asdict
 
+from companion.companion import StepResult
 from companion.errors import ConfigurationError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -10,10 +11,11 @@ from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli import run_folder
+from rebound_cli.background import Background
 from rebound_cli.console import Console, console_for, timeline
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import exchange
+from rebound_cli.realtime import Loop
 from rebound_cli.run_folder import FlightRecorder
 
 CONFIG_NAME = "guard.yaml"
@@ -27,7 +29,8 @@ def run_guard(options: Namespace) -> int:
     folder = run_folder.create_run_folder(options.out, "guard")
     run_folder.write_yaml(folder / CONFIG_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
-    recorder, console, guard = FlightRecorder(folder), console_for(False), Guard(config)
+    recorder = FlightRecorder(folder, Background("log"))
+    console, guard = console_for(False, Background("console")), Guard(config)
     try:
         with Interrupts() as interrupts:
             _run(guard, connection, recorder, console, interrupts)
@@ -37,6 +40,7 @@ def run_guard(options: Namespace) -> int:
         hits = [asdict(collision) for collision in guard.collisions()]
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, {"outcome": guard.outcome, "collisions": hits})
     console.print(f"{guard.outcome}; {len(hits)} hits; log in {folder}")
+    console.close()
     if interrupts.reason is None:
         raise ConfigurationError(guard.outcome[:1].upper() + guard.outcome[1:] + ".")
     return 0
@@ -59,10 +63,10 @@ def _run(
 ) -> None:
     clock = Clock()
     started_us = clock.now_us()
-    while not guard.finished:
-        now_us, result = exchange(guard, connection, clock, recorder)
+
+    def beside(now_us: int, result: StepResult) -> None:
         if result.events:
             console.print(timeline(result.events, started_us))
-        if interrupts.reason is not None:
-            guard.stop(interrupts.reason)
         console.live(guard.status, (now_us - started_us) / 1e6)
+
+    Loop(guard, connection, clock, recorder, console, interrupts).run(beside)

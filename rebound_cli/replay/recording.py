@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -28,7 +28,7 @@ from rebound_cli.run_folder import (
 
 @dataclass(slots=True)
 class Step:
-    """One call of the companion's step; the person's word came after it."""
+    """One call of the companion's step; what it was told came after it."""
 
     time_us: int
     received: Sequence[bytes] = ()
@@ -36,6 +36,7 @@ class Step:
     confirms: bool = False
     stop_reason: str | None = None
     file_appears: bool = False
+    notes: list[tuple[str, str]] = field(default_factory=list)  # kinds of events and their texts
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,8 @@ def read_recording(folder: Path) -> Recording:
         step.confirms |= record["kind"] == "confirm"
         step.file_appears |= record["kind"] == "file"
         step.stop_reason = record.get("reason", step.stop_reason)
+        if record["kind"] == "note":
+            step.notes.append((str(record.get("event")), str(record.get("text"))))
     lines = read_text(folder / EVENTS_NAME).splitlines(keepends=True)
     is_cut = not (folder / SUMMARY_NAME).exists()
     if is_cut:

@@ -48,6 +48,8 @@ def reproduce(recording: Recording) -> Reproduction:
             companion.file_is_there()
         if step.stop_reason is not None:
             companion.stop(step.stop_reason)
+        for kind, text in step.notes:
+            companion.note(kind, text)
     comparison.finish()
     return Reproduction(
         findings=notebook.close(recording.steps[-1].time_us),

@@ -1,0 +1,264 @@
+"""Disks, terminals, garbage and faults beside the control path: none of them ends a flight in the air."""
+
+import gc
+import resource
+import sys
+import threading
+
+import pytest
+
+from companion.companion import Companion, StepResult
+from companion.px4_mode import AUTO_LOITER
+from rebound_cli import run_folder
+from rebound_cli.background import MOST_WAITING, Background
+from rebound_cli.console import Console
+from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.realtime import HANDING_OVER_US, MOST_DATAGRAMS, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.timing import TOO_LATE_US, Timing, undisturbed
+from sim_vehicle.vehicle import SimulatedVehicle
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
+
+EPOCH_US = 1_600_000_000_000_000
+HEARTBEAT = 0
+HOP_SETS = [word for word in HOP if word != "--set"]
+
+
+class World:
+    """A connection to a simulated vehicle, and the clock: waiting for bytes lets virtual time pass."""
+
+    def __init__(self, scene):
+        self.vehicle = SimulatedVehicle(scene.airframe, scene.scene, scene.seed)
+        self.sent, self.custom_mode, self.is_deaf = [], None, False
+        self._pending, self._readings = b"", 0
+
+    def now_us(self):
+        # A clock that is read goes on.
+        self._readings += 1
+        return EPOCH_US + self.vehicle.time_boot_us + 4 * self._readings
+
+    def sleep(self, duration_s):
+        until_us = self.now_us() + duration_s * 1e6
+        while self.now_us() < until_us:
+            self._pass()
+
+    def receive(self, timeout_s):
+        if timeout_s > 0.0 and self.is_deaf:
+            raise OSError("the driver is gone")
+        return self._pass() if timeout_s > 0.0 else b""
+
+    def send(self, frame):
+        self.sent.append(frame)
+        self._pending += frame
+
+    def _pass(self):
+        frames = self.vehicle.step(self._pending)
+        self._pending = b""
+        for frame in frames:
+            if frame[7:10] == bytes([HEARTBEAT, 0, 0]):
+                self.custom_mode = int.from_bytes(frame[10:14], "little")
+        return b"".join(frames)
+
+
+class Gone:
+    """A terminal or pipe that nobody reads any more."""
+
+    def isatty(self):
+        return False
+
+    def write(self, text):
+        raise BrokenPipeError(32, "Broken pipe")
+
+
+class Broken(ConfirmAtOnce):
+    """Works until the vehicle is in the air."""
+
+    def poll(self, companion):
+        super().poll(companion)
+        if companion.status().state == "mission" or companion.status().state == "landing":
+            raise ValueError("nobody thought of this")
+
+
+class Deaf(ConfirmAtOnce):
+    """Takes the link away once the vehicle climbs."""
+
+    def __init__(self, world):
+        super().__init__()
+        self._world = world
+
+    def poll(self, companion):
+        super().poll(companion)
+        self._world.is_deaf |= companion.status().state == "takeoff" and companion.status().armed
+
+
+def fly(folder, stream=sys.stderr, confirm=None):
+    """A hop in virtual time through the loop of real flights."""
+    document = load_mission_document(SQUARE, HOP_SETS)
+    mission, scene = mission_from(document), world_from(document)
+    world, companion = World(scene), Companion(mission)
+    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))
+    run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
+    run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
+    recorder, console = FlightRecorder(folder, Background("log")), Console(stream, Background("console"))
+    confirmation = ConfirmAtOnce() if confirm is None else confirm(world)
+    problem = None
+    try:
+        fly_realtime(companion, world, world, recorder, console, confirmation, Interrupts())
+    except FlightFaultError as error:
+        problem = str(error)
+    recorder.close()
+    return companion, world, recorder, console, problem
+
+
+def test_a_full_disk_ends_no_flight_and_is_told(tmp_path):
+    # Given a disk on which nothing can be written any more
+    for name in (run_folder.TLOG_NAME, run_folder.EVENTS_NAME, run_folder.INPUTS_NAME):
+        (tmp_path / name).symlink_to("/dev/full")
+    # When a mission is flown
+    companion, world, recorder, _, problem = fly(tmp_path)
+    # Then it lands, and the person and the operator read what was lost
+    assert problem is None and companion.report().outcome == "completed"
+    assert [event.text for event in recorder.events if event.kind == "lost"] == [
+        "log has gaps: No space left on device"
+    ]
+    assert any(b"Log has gaps: No space left on device" in frame for frame in world.sent)
+    assert recorder.writer.lost > 1
+
+
+def test_a_reader_that_is_gone_ends_no_flight_and_is_told_and_replayed(tmp_path):
+    companion, world, _, console, problem = fly(tmp_path, stream=Gone())
+    assert problem is None and companion.report().outcome == "completed"
+    assert any(b"Console has gaps: Broken pipe" in frame for frame in world.sent)
+    # And the program says so when the vehicle is down
+    with pytest.raises(BrokenPipeError):
+        console.close()
+    # And what was told is part of what is decided again
+    assert assert_comes_again(tmp_path).events == len(events_of(tmp_path))
+    assert "lost" in [event["kind"] for event in events_of(tmp_path)]
+
+
+@pytest.mark.parametrize(("confirm", "words"), [(lambda _: Broken(), "nobody thought"), (Deaf, "driver is gone")])
+def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, confirm, words):
+    # When something beside the control path fails in the air, for good
+    companion, world, recorder, _, problem = fly(tmp_path, confirm=confirm)
+    # Then the vehicle holds by itself, in time, and one sentence says what happened
+    failed_us = next(event.time_us for event in recorder.events if event.kind == "aborted")
+    assert companion.finished and world.now_us() - failed_us < HANDING_OVER_US
+    world.sleep(1.1)
+    assert world.custom_mode == AUTO_LOITER
+    assert words in problem and "the vehicle was handed over" in problem and "\n" not in problem
+    assert words in companion.report().reason
+    assert_comes_again(tmp_path)
+
+
+def test_in_a_real_flight_neither_a_limit_of_size_nor_a_pipe_that_closes_matters(tmp_path):
+    # Given a vehicle in the air
+    folder = tmp_path / "run"
+    process = start("fly", SQUARE, "--sim", *HOP, "--out", folder)
+    wait_for_event(folder, "armed")
+    # When its log may grow no more (SIGXFSZ, EFBIG) and its reader closes the pipe (SIGPIPE, EPIPE)
+    size = (folder / "flight.tlog").stat().st_size
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (size, size))
+    process.stdout.close()
+    # Then it lands as planned; the end of the program says that something was lost
+    assert process.wait(60) == 1
+    assert "Traceback" not in process.stderr.read()
+    process.stderr.close()
+    told = {event["kind"]: event["text"] for event in events_of(folder)}
+    assert "done" in told and "lost" in told
+
+
+def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
+    # Given a disk that has stopped, and one write too many
+    done, going_on = [], threading.Event()
+    background = Background("log")
+    background.give(going_on.wait)
+    for number in range(MOST_WAITING + 50):
+        background.give(done.append, number)
+    assert background.loss == "log has gaps: writing takes too long" == background.news()
+    assert background.news() is None
+    # When it goes on, and one of the writes fails
+    dropped = background.lost
+    going_on.set()
+    background.close()
+    # Then what was kept is there in its order
+    assert dropped >= 49 and done == list(range(len(done))) and len(done) + dropped == MOST_WAITING + 50
+
+
+class Stepping:
+    """What the loop steps, for its bytes."""
+
+    armed, finished = True, False
+
+    def __init__(self, deadline_us):
+        self.received, self.deadline_us, self.notes = [], deadline_us, []
+
+    def next_deadline_us(self):
+        return self.deadline_us
+
+    def step(self, received, now_us):
+        self.received.append(received)
+        return StepResult((), (), ())
+
+    def note(self, kind, text):
+        self.notes.append((kind, text))
+
+
+class Queued:
+    """A socket in which datagrams wait; the clock stands after a stall."""
+
+    def __init__(self, datagrams, now_us):
+        self.datagrams, self._now_us = list(datagrams), now_us
+
+    def now_us(self):
+        return self._now_us
+
+    def receive(self, timeout_s):
+        return self.datagrams.pop(0) if self.datagrams else b""
+
+
+def exchanged(tmp_path, datagrams, late_us):
+    stepping, queued = Stepping(EPOCH_US), Queued(datagrams, EPOCH_US + late_us)
+    recorder = FlightRecorder(tmp_path)
+    Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
+    recorder.close()
+    return stepping, queued
+
+
+def test_after_a_stall_all_that_has_arrived_is_one_step(tmp_path):
+    stepping, _ = exchanged(tmp_path, [b"old", b"newer", b"newest"], 3_000_000)
+    assert stepping.received == [b"oldnewernewest"]
+    assert stepping.notes == [("late", "setpoints 3000 ms late, PX4 needs two a second")]
+
+
+def test_who_sends_without_end_does_not_keep_a_step_from_being_taken(tmp_path):
+    stepping, queued = exchanged(tmp_path, [b"x"] * 1000, 0)
+    assert stepping.received == [b"x" * MOST_DATAGRAMS] and len(queued.datagrams) == 1000 - MOST_DATAGRAMS
+    assert stepping.notes == []
+
+
+def test_lateness_is_measured_and_told_each_time_it_doubles():
+    timing = Timing()
+    # Given 98 steps in time to a tenth of a millisecond, one early because something arrived, and late ones
+    for _ in range(98):
+        assert timing.stepped(EPOCH_US, EPOCH_US + 100, EPOCH_US + 300) is None
+    assert timing.stepped(EPOCH_US, EPOCH_US - 900, EPOCH_US) is None
+    assert timing.stepped(EPOCH_US, EPOCH_US + TOO_LATE_US - 1, EPOCH_US + TOO_LATE_US) is None
+    said = [timing.stepped(EPOCH_US, at_us, at_us) for at_us in (EPOCH_US + n * TOO_LATE_US for n in (1, 1.9, 2, 3))]
+    assert [text is not None for text in said] == [True, False, True, False]
+    summary = timing.summary()
+    assert summary["tick_lateness_ms"] == {"p50": 0.1, "p99": 950.0, "max": 1500.0}
+    assert summary["step_ms"]["p50"] == 0.2 and summary["step_ms"]["max"] == 0.9
+
+
+def test_garbage_is_collected_while_disarmed_only():
+    switch_interval_s = sys.getswitchinterval()
+    assert gc.isenabled()
+    with undisturbed() as allow_collecting:
+        assert not gc.isenabled() and gc.get_freeze_count() > 0
+        allow_collecting(True)
+        assert gc.isenabled()
+        allow_collecting(False)
+        assert not gc.isenabled() and sys.getswitchinterval() < switch_interval_s
+    assert gc.isenabled() and gc.get_freeze_count() == 0 and sys.getswitchinterval() == switch_interval_s
