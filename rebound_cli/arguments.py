@@ -104,6 +104,12 @@ def add_connect(parser: "argparse.ArgumentParser | argparse._MutuallyExclusiveGr
     )
 
 
+def add_peer(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--peer", metavar="HOST[:PORT]", help="with udpin: hear this address alone (default: the first vehicle's)"
+    )
+
+
 def add_companion(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--companion", type=Path, metavar="FILE", help="settings from this file's companion: part, as tune writes it"

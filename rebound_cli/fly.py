@@ -88,7 +88,7 @@ def run_fly(options: Namespace) -> int:
 def _connection_for(options: Namespace) -> Connection | None:
     """To a vehicle that is not ours to start; None for one that is."""
     if options.connect is not None:
-        return open_connection(options.connect)
+        return open_connection(options.connect, options.peer)
     return UdpInConnection("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
 
 

@@ -8,6 +8,7 @@ from rebound_cli.arguments import (
     add_companion,
     add_connect,
     add_json,
+    add_peer,
     add_world_options,
     instance,
     runs,
@@ -48,5 +49,6 @@ def add_fly(commands: Commands) -> None:
         help="what is known beforehand, e.g. another run's obstacles.json",
     )
     add_json(fly, "summary")
+    add_peer(fly)
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
     fly.set_defaults(run=runs("rebound_cli.fly:run_fly"))

@@ -190,6 +190,9 @@ class Loop:
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return
+        stranger = self.connection.news()
+        if stranger is not None:
+            self._note("stranger", stranger, now_us)
         for writer in (self.recorder.writer, self.console.writer):
             loss = None if writer is None else writer.news()
             if loss is not None:

@@ -222,7 +222,7 @@ class Decoder:
         end = len(data)
         while start < end:
             length = packet_length(data, start)
-            if length == 0 or (start + length <= end and not _checksum_holds(data, start, length)):
+            if length == 0 or (start + length <= end and not checksum_holds(data, start, length)):
                 start += 1
                 continue
             if start + length > end:
@@ -268,7 +268,7 @@ class Decoder:
             return None
 
 
-def _checksum_holds(data: bytes, start: int, length: int) -> bool:
+def checksum_holds(data: bytes, start: int, length: int) -> bool:
     """Whether the packet's own checksum holds; for messages that are not in the dialect, always."""
     if data[start] == MAGIC_V2:
         message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16

@@ -1,6 +1,6 @@
 """Connection addresses, in MAVSDK's convention, turned into connections.
 
-udpin://0.0.0.0:14540            listen; answers go to the last sender
+udpin://0.0.0.0:14540            listen, and answer the vehicle that speaks there (see peer.py)
 udpout://192.168.1.20:14580      send first, to this address
 tcpout://127.0.0.1:5760          connect to a server
 tcpin://0.0.0.0:5760             wait for one client
@@ -9,6 +9,7 @@ udp://:14540                     the older form of udpin (or of udpout when a re
 """
 
 import re
+import socket
 
 from companion.errors import ConnectionSetupError
 from companion.shell.connection import (
@@ -24,11 +25,16 @@ _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
-def open_connection(url: str) -> Connection:
-    """Open the address. Raises ConnectionSetupError with one clear sentence."""
+def open_connection(url: str, peer: str | None = None) -> Connection:
+    """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin.
+
+    Raises ConnectionSetupError with one clear sentence.
+    """
     scheme, separator, rest = url.partition("://")
     if not separator:
         raise ConnectionSetupError(f"{url!r} is not a connection address: use {_FORMS}.")
+    if peer is not None and scheme not in ("udpin", "udp"):
+        raise ConnectionSetupError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
         return SerialConnection(*_device_and_baud(url, rest))
     host, port = _host_and_port(url, rest)
@@ -37,7 +43,7 @@ def open_connection(url: str) -> Connection:
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise ConnectionSetupError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme == "udpin":
-        return UdpInConnection(host, port)
+        return UdpInConnection(host, port, None if peer is None else _peer(peer))
     if scheme == "udpout":
         return UdpOutConnection(host, port)
     if scheme == "tcpout":
@@ -45,6 +51,16 @@ def open_connection(url: str) -> Connection:
     if scheme == "tcpin":
         return TcpInConnection(host, port)
     raise ConnectionSetupError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+
+
+def _peer(text: str) -> tuple[str, int | None]:
+    """The number of a host, and its port where one is given."""
+    host, _, port = text.rpartition(":") if _HOST_PORT.match(text) else (text, "", "")
+    try:
+        found = socket.getaddrinfo(host.strip("[]"), None, type=socket.SOCK_DGRAM)[0][4][0]
+    except (OSError, UnicodeError) as error:
+        raise ConnectionSetupError(f"--peer {text}: this host is unknown; give HOST or HOST:PORT.") from error
+    return str(found), int(port) if port else None
 
 
 def _device_and_baud(url: str, rest: str) -> tuple[str, int]:

@@ -8,11 +8,14 @@ import time
 from typing import Any, Protocol
 
 from companion.errors import ConnectionSetupError
+from companion.shell.peer import Peer
 
 # A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
 TCP_CONNECT_TIMEOUT_S = 5.0
 # A send that blocks longer than this would stall the setpoints, 20 to 50 a second; the packet is dropped instead.
 SEND_TIMEOUT_S = 0.02
+# Datagrams of others that are passed over before the next step is taken.
+MOST_STRANGERS = 300
 # More than the longest MAVLink packet (280 bytes) and more than one UDP datagram can hold.
 _READ_SIZE = 65_536
 
@@ -26,16 +29,19 @@ class Connection(Protocol):
     def send(self, frame: bytes) -> None:
         """Send one packet; one datagram a packet on UDP. Dropped when nobody is there to take it."""
 
+    def news(self) -> str | None:
+        """Something about the link that a person should know, once."""
+
     def close(self) -> None: ...
 
 
 class UdpInConnection:
-    """Listens on a local port and answers whoever sent last."""
+    """Listens on a local port to one peer (see `peer`) and answers it."""
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, only: tuple[str, int | None] | None = None) -> None:
         self._socket = _bound_socket(socket.SOCK_DGRAM, host, port)
         self._socket.setblocking(False)
-        self._remote: Any = None
+        self._peer = Peer(only)
 
     @property
     def local_port(self) -> int:
@@ -44,15 +50,21 @@ class UdpInConnection:
     def receive(self, timeout_s: float) -> bytes:
         if not _readable(self._socket, timeout_s):
             return b""
-        try:
-            datagram, self._remote = self._socket.recvfrom(_READ_SIZE)
-        except OSError:
-            return b""
-        return datagram
+        for _ in range(MOST_STRANGERS):
+            try:
+                datagram, sender = self._socket.recvfrom(_READ_SIZE)
+            except OSError:
+                return b""
+            if self._peer.accepts(datagram, sender[:2], time.monotonic_ns() // 1000):
+                return datagram
+        return b""
 
     def send(self, frame: bytes) -> None:
-        if self._remote is not None:
-            _send_datagram(self._socket, frame, self._remote)
+        if self._peer.answered is not None:
+            _send_datagram(self._socket, frame, self._peer.answered)
+
+    def news(self) -> str | None:
+        return self._peer.news()
 
     def close(self) -> None:
         self._socket.close()
@@ -77,6 +89,9 @@ class UdpOutConnection:
 
     def send(self, frame: bytes) -> None:
         _send_datagram(self._socket, frame, self._remote)
+
+    def news(self) -> str | None:
+        return None
 
     def close(self) -> None:
         self._socket.close()
@@ -138,6 +153,9 @@ class TcpOutConnection:
     def send(self, frame: bytes) -> None:
         self._stream.send(frame)
 
+    def news(self) -> str | None:
+        return None
+
     def close(self) -> None:
         self._socket.close()
 
@@ -179,6 +197,9 @@ class TcpInConnection:
         if self._stream is not None:
             self._stream.send(frame)
 
+    def news(self) -> str | None:
+        return None
+
     def close(self) -> None:
         if self._client is not None:
             self._client.close()
@@ -204,6 +225,9 @@ class SerialConnection:
 
     def send(self, frame: bytes) -> None:
         self._stream.send(frame)
+
+    def news(self) -> str | None:
+        return None
 
     def close(self) -> None:
         self._port.close()

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, add_connect, add_set, runs
+from rebound_cli.arguments import Commands, add_connect, add_peer, add_set, runs
 
 
 def add_guard(commands: Commands) -> None:
@@ -12,6 +12,7 @@ def add_guard(commands: Commands) -> None:
         description="Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/guard.md.",
     )
     add_connect(guard, required=True)
+    add_peer(guard)
     guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/guard.md")
     add_set(guard, "change a setting, e.g. max_hits=5")
     guard.add_argument("--modes", metavar="A,B", help="the modes that may be taken over, e.g. POSCTL,AUTO.MISSION")

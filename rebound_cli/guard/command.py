@@ -25,7 +25,7 @@ def run_guard(options: Namespace) -> int:
     """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
     config = guard_config(options)
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-    connection = open_connection(options.connect)
+    connection = open_connection(options.connect, options.peer)
     folder = run_folder.create_run_folder(options.out, "guard")
     run_folder.write_yaml(folder / CONFIG_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())

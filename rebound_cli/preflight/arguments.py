@@ -1,6 +1,6 @@
 """The arguments of `rebound preflight`."""
 
-from rebound_cli.arguments import Commands, add_companion, add_connect, add_json, runs
+from rebound_cli.arguments import Commands, add_companion, add_connect, add_json, add_peer, runs
 
 
 def add_preflight(commands: Commands) -> None:
@@ -10,6 +10,7 @@ def add_preflight(commands: Commands) -> None:
         description="Parameters, streams, time, estimate and vibration, each with its remedy; see docs/preflight.md.",
     )
     add_connect(preflight, required=True)
+    add_peer(preflight)
     add_companion(preflight)
     preflight.add_argument("--fix", action="store_true", help="offer to set the parameters that would mend it")
     preflight.add_argument("--yes", action="store_true", help="with --fix: set them without asking")

@@ -26,7 +26,7 @@ def run_preflight(options: Namespace) -> int:
     if options.yes and not options.fix:
         raise ConfigurationError("--yes answers the question of --fix: give both.")
     config = companion_settings(options.companion, (), None)
-    connection = open_connection(options.connect)
+    connection = open_connection(options.connect, options.peer)
     try:
         preflight = Preflight(config, clock.now_us())
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")

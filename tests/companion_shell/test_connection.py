@@ -6,12 +6,14 @@ import socket
 import threading
 
 import pytest
+from pymavlink.dialects.v20 import development as mav
 
 from companion.errors import ConnectionSetupError
 from companion.shell.addresses import open_connection
 from companion.shell.connection import UdpInConnection
 
 LOCAL = "127.0.0.1"
+HEARTBEAT = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(mav.MAVLink(None, 1, 1)))
 
 
 @pytest.fixture
@@ -22,24 +24,41 @@ def peer():
         yield bound
 
 
-def test_udpin_answers_the_last_sender_one_packet_a_datagram(peer):
+def test_udpin_answers_the_vehicle_one_packet_a_datagram_whoever_else_sends(peer):
     # Given a listening connection and a vehicle that sent first
     connection = UdpInConnection(LOCAL, 0)
-    peer.sendto(b"hello", (LOCAL, connection.local_port))
-    assert connection.receive(2.0) == b"hello"
+    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+    assert connection.receive(2.0) == HEARTBEAT
     # When two packets are sent
     connection.send(b"one")
     connection.send(b"two")
     # Then each arrives as a datagram of its own
     assert [peer.recv(100), peer.recv(100)] == [b"one", b"two"]
-    # And a second sender takes the first one's place
+    # And a stranger's byte, or heartbeat, diverts nothing
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.settimeout(2)
-        other.sendto(b"me too", (LOCAL, connection.local_port))
-        connection.receive(2.0)
-        connection.send(b"three")
-        assert other.recv(100) == b"three"
+        for content in (b"\0", HEARTBEAT):
+            other.sendto(content, (LOCAL, connection.local_port))
+            assert connection.receive(2.0) == b""
+            connection.send(b"three")
+            assert peer.recv(100) == b"three"
+        assert f"{LOCAL}:{other.getsockname()[1]} sends to this port, too" in connection.news()
     connection.close()
+
+
+def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
+    connection = open_connection(f"udpin://{LOCAL}:0", f"{LOCAL}:{peer.getsockname()[1]}")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+        assert connection.receive(2.0) == b""
+        peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+        assert connection.receive(2.0) == HEARTBEAT
+    connection.close()
+
+
+@pytest.mark.parametrize(("url", "named"), [("udpout://127.0.0.1:9", "127.0.0.1"), ("udpin://127.0.0.1:0", "no such")])
+def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named):
+    with pytest.raises(ConnectionSetupError, match="--peer"):
+        open_connection(url, named)
 
 
 def test_udpin_drops_what_nobody_is_there_to_take():

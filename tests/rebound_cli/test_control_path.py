@@ -48,6 +48,9 @@ class World:
             raise OSError("the driver is gone")
         return self._pass() if timeout_s > 0.0 else b""
 
+    def news(self):
+        return None
+
     def send(self, frame):
         self.sent.append(frame)
         self._pending += frame

@@ -1,0 +1,70 @@
+"""Whose datagrams are heard on a UDP port, and who is answered."""
+
+import random
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.shell.peer import RELEASED_US, Peer
+
+VEHICLE, STRANGER = ("192.168.4.1", 14580), ("10.0.0.66", 4444)
+
+
+def packed(message, component=1) -> bytes:
+    return bytes(message.pack(mav.MAVLink(None, 1, component)))
+
+
+HEARTBEAT = packed(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3))
+CAMERAS = packed(mav.MAVLink_heartbeat_message(30, 8, 0, 0, 3, 3), component=100)
+IMU = packed(mav.MAVLink_highres_imu_message(1, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F))
+
+
+def test_before_there_is_a_vehicle_the_last_sender_of_a_packet_is_answered():
+    peer = Peer()
+    assert peer.accepts(IMU, VEHICLE, 0) and peer.answered == VEHICLE
+    assert peer.accepts(b"\0", STRANGER, 1) and peer.answered == VEHICLE, "one byte is no packet"
+    assert peer.accepts(IMU[:-1] + b"\0", STRANGER, 2) and peer.answered == VEHICLE, "nor is a broken one"
+    assert peer.accepts(CAMERAS, STRANGER, 3) and peer.answered == STRANGER
+
+
+def test_the_vehicles_heartbeat_pins_its_address():
+    peer = Peer()
+    assert peer.accepts(IMU + HEARTBEAT, VEHICLE, 0)
+    for datagram in (b"\0", IMU, HEARTBEAT):
+        assert not peer.accepts(datagram, STRANGER, 1)
+    assert (peer.answered, peer.dropped) == (VEHICLE, 3)
+    assert "10.0.0.66:4444" in peer.news() and peer.news() is None, "told once"
+
+
+def test_a_camera_pins_nothing():
+    peer = Peer()
+    assert peer.accepts(CAMERAS, STRANGER, 0) and peer.accepts(HEARTBEAT, VEHICLE, 1)
+    assert peer.answered == VEHICLE
+
+
+def test_a_vehicle_that_comes_back_from_another_address_is_heard_once_the_first_is_silent():
+    peer, moved = Peer(), ("192.168.4.1", 50_001)
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    assert not peer.accepts(HEARTBEAT, moved, RELEASED_US)
+    assert peer.accepts(IMU, VEHICLE, RELEASED_US)
+    assert not peer.accepts(HEARTBEAT, moved, 2 * RELEASED_US)
+    assert peer.accepts(HEARTBEAT, moved, 2 * RELEASED_US + 1)
+    assert peer.answered == moved and not peer.accepts(HEARTBEAT, VEHICLE, 2 * RELEASED_US + 2)
+
+
+@pytest.mark.parametrize("port", [None, VEHICLE[1]])
+def test_who_was_named_is_heard_alone_before_and_after(port):
+    peer = Peer((VEHICLE[0], port))
+    assert not peer.accepts(HEARTBEAT, STRANGER, 0)
+    assert peer.accepts(HEARTBEAT, VEHICLE, 1)
+    assert not peer.accepts(HEARTBEAT, STRANGER, 10 * RELEASED_US)
+    assert peer.accepts(HEARTBEAT, (VEHICLE[0], 1), 10 * RELEASED_US) is (port is None)
+
+
+def test_a_hundred_thousand_random_datagrams_divert_nothing_and_take_no_memory():
+    peer, chance = Peer(), random.Random(1)
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    for number in range(100_000):
+        sender = (f"10.0.{chance.randrange(256)}.{chance.randrange(256)}", chance.randrange(65_536))
+        assert not peer.accepts(chance.randbytes(chance.randrange(40)), sender, number % RELEASED_US)
+    assert peer.answered == VEHICLE and peer.dropped == 100_000 and len(peer._told) <= 3
