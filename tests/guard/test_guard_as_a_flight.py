@@ -36,9 +36,11 @@ def test_a_mode_that_a_person_chose_just_before_the_vehicle_is_given_back_is_not
     air.step()
     assert air.vehicle_mode() == "OFFBOARD", "the report that shows it is yet to come"
     air.guard.stop("stopped")
+    stopped_s = air.time_s
     air.run(1.0)
     assert air.vehicle_mode() == "POSCTL"
-    assert "AUTO.LOITER" not in " ".join(air.told("mode")[-2:])
+    asked = [m for at, who, m in air.on_wire if who == "guard" and at > stopped_s and m.get_type() == "COMMAND_LONG"]
+    assert [message for message in asked if message.command == 176] == []
 
 
 @pytest.mark.parametrize(("armed", "main_mode"), [(0, 6), (0x80, 3)])
