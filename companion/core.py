@@ -14,6 +14,7 @@ from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.hearing import hear
+from companion.flight.leaving_ground import note_height, too_low
 from companion.flight.limiting import Limiter
 from companion.flight.machine import Machine
 from companion.flight.operator import status_text, values
@@ -23,7 +24,6 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import (
     CommandAck,
-    LandedState,
     LocalPosition,
     OnboardHeartbeat,
     Sample,
@@ -39,9 +39,6 @@ POLL_INTERVAL_US = 50_000
 ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
 # Off the ground, which is the detector's affair by height, a hit in the climb or the descent is a hit too.
 DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
-# A vehicle that has come down lower than this, and was not told to, drags itself along the ground: nothing of that is a
-# hit to recover from. Its feet are a tenth of a metre below it, and where it leans they are not what touches.
-SCRAPING_M = 0.1
 
 
 @dataclass(slots=True)
@@ -104,7 +101,7 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     """
     try:
         refusal = hear(core.flight, samples, now_us)
-        note_height(core)
+        note_height(core.flight)
         impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
         moved = fly(core, samples, impacts, refusal, now_us)
         follow_contact(core.flight, core.watch)
@@ -113,38 +110,24 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     return moved
 
 
-def note_height(core: Core) -> None:
-    """Whether the vehicle has left the ground behind; a hit that throws it down again does not bring that back."""
-    flight, height_m = core.flight, core.flight.height_m
-    if height_m is None or flight.vehicle.landed is LandedState.ON_GROUND:
-        flight.has_climbed = False
-    elif height_m >= flight.mission.companion.min_detection_height_m:
-        flight.has_climbed = True
-
-
 def situation(core: Core) -> Situation:
     """What the flight knows, for the detector."""
     flight = core.flight
     target = flight.target
-    height_m = flight.height_m
     return Situation(
-        off_reason=why_not_detecting(core, height_m),
+        off_reason=why_not_detecting(core),
         armed=flight.vehicle.armed,
         landed_state=flight.vehicle.landed,
-        height_m=height_m,
+        height_m=flight.height_m,
         descent_commanded=core.machine.state is State.LANDING,
         setpoint_position_ned_m=None if target is None else target.position_ned_m,
     )
 
 
-def why_not_detecting(core: Core, height_m: float | None) -> str | None:
+def why_not_detecting(core: Core) -> str | None:
     """The ground shakes a vehicle as a hit does, until it has left it and where it goes down to it."""
-    state, least_m = core.machine.state, core.flight.mission.companion.min_detection_height_m
-    if state not in DETECTING_STATES:
-        return state.value
-    if core.flight.has_climbed and state is not State.LANDING:
-        least_m = min(least_m, SCRAPING_M)
-    return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
+    state = core.machine.state
+    return too_low(core.flight, state is State.LANDING) if state in DETECTING_STATES else state.value
 
 
 def fly(
@@ -171,7 +154,7 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
     core.setpoint_due_us = due_us if not at_once and due_us > now_us else now_us + core.setpoint_interval_us
     try:
         wanted = core.machine.activity.target(now_us)
-        if wanted is None:
+        if wanted is None or not core.flight.vehicle.is_mode_known:
             return
         has_floor = core.machine.state in ON_THE_WAY
         target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)

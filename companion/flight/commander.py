@@ -14,7 +14,7 @@ from companion.messages import (
     SetMode,
     VehicleCommand,
 )
-from companion.px4_mode import mode_name
+from companion.px4_mode import AUTO_LOITER, mode_name
 
 # PX4 answers in 2 to 10 ms on UDP; a telemetry radio's round trip stays below half a second.
 ACK_TIMEOUT_US = 500_000
@@ -93,9 +93,18 @@ class Commander:
     @property
     def requested_mode(self) -> int | None:
         """The mode asked for and not yet confirmed."""
-        if self._pending is not None and isinstance(self._pending.command, SetMode):
-            return self._pending.command.custom_mode
-        return None
+        match None if self._pending is None else self._pending.command:
+            case SetMode(custom_mode):
+                return custom_mode
+            case Reposition():
+                return AUTO_LOITER
+            case _:
+                return None
+
+    @property
+    def is_unsaid(self) -> bool:
+        """Whether there is a command that has not been sent once."""
+        return self._pending is not None and self._pending.attempts == 0
 
     def begin(self, command: VehicleCommand) -> None:
         """Take up a command, dropping any other; it goes out in the next `step`."""
@@ -105,9 +114,12 @@ class Commander:
         self._pending = None
 
     def step(
-        self, acks: Sequence[CommandAck], seen: bool, now_us: int
+        self, acks: Sequence[CommandAck], seen: bool, now_us: int, may_send: bool = True
     ) -> tuple[SendCommand | None, CommandOutcome | None]:
-        """`seen`: the command's effect shows in the vehicle's own messages."""
+        """`seen`: the command's effect shows in the vehicle's own messages.
+
+        What may not be sent when its time has come is as good as lost on the way: it counts as an attempt.
+        """
         pending = self._pending
         if pending is None:
             return None, None
@@ -125,7 +137,7 @@ class Commander:
         if pending.attempts >= ATTEMPTS:
             return self._end(False, _why_given_up(pending))
         self._pending = replace(pending, attempts=pending.attempts + 1, repeat_at_us=now_us + ACK_TIMEOUT_US)
-        return SendCommand(pending.command, pending.attempts), None
+        return SendCommand(pending.command, pending.attempts) if may_send else None, None
 
     def _end(self, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
         assert self._pending is not None

@@ -13,7 +13,7 @@ from companion.flight.pressing import Pressing
 from companion.flight.states import Trigger
 from companion.link.refusals import Refusals
 from companion.link.streams import StreamMonitor
-from companion.link.vehicle import Vehicle
+from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
 from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
 from companion.mission.expectations import ExpectItem
@@ -132,6 +132,7 @@ class FlightContext:
     origin_ned_m: Vector3 | None = None
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
+    conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
     foreign_mode_since_us: int | None = None  # while landing: when the mode was first not ours
     arming_requested: bool = False
     armed_at_us: int | None = None
@@ -185,9 +186,35 @@ class FlightContext:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
 
+    @property
+    def own_modes(self) -> tuple[int | None, ...]:
+        """The modes that mean that the companion has the vehicle; none while it does not hold it."""
+        return () if self.expected_mode is None else (self.expected_mode, self.commander.requested_mode)
+
+    def may_ask(self, now_us: int) -> bool:
+        """Whether a command that moves a held vehicle may leave: not on old news, which the pilot may have made untrue.
+
+        Into a silence it is said once. A link cut in one direction delivers that, one cut in both loses it; what is
+        not repeated does not arrive after the pilot has taken over.
+        """
+        if self.expected_mode is None or self.vehicle.is_mode_known:
+            return True
+        is_silent = now_us - self.vehicle.last_heard_us >= OLD_NEWS_US
+        return is_silent and self.vehicle.doubted_mode is None and self.commander.is_unsaid
+
+    def is_time_to_give_away(self, since_us: int, now_us: int) -> bool:
+        """Whether a mode may be asked for that ends the holding: straight after a report of the mode.
+
+        A person's own request of before that report shows in it, and is not overruled. Where none comes, the wait ends.
+        """
+        silent_us = now_us - self.vehicle.last_heard_us
+        waited_s = (now_us - since_us) * 1e-6
+        is_over = silent_us >= OLD_NEWS_US or waited_s >= self.mission.companion.link.silence_s
+        return is_over or (self.vehicle.mode_heard_us == now_us and self.vehicle.is_mode_known)
+
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
         """Let the commander work on its command; failures are told."""
-        send, outcome = self.commander.step(inputs.acks, seen, now_us)
+        send, outcome = self.commander.step(inputs.acks, seen, now_us, self.may_ask(now_us))
         if send is not None:
             self.outbox.append(send)
         if outcome is not None and not outcome.succeeded:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
 from companion.link.identity import identify, is_autopilot
+from companion.link.refusals import LASTING_US
 from companion.messages import Heartbeat, Refused, Sample, TimeSyncReply, TimeSyncRequest
 from companion.px4_mode import mode_name
 
@@ -11,7 +12,9 @@ from companion.px4_mode import mode_name
 def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
     """Bring the vehicle view up to date, answer time requests; why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
-    mode, armed = vehicle.custom_mode, vehicle.armed
+    mode, armed, conflicts = vehicle.custom_mode, vehicle.armed, vehicle.conflicts
+    vehicle.note_silence(now_us)
+    own_modes = flight.own_modes
     for sample in samples:
         if isinstance(sample, Heartbeat):
             if not is_autopilot(sample):
@@ -23,6 +26,10 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
                 vehicle.identity = identity
             if sample.system_id != vehicle.identity.system_id:
                 continue
+            if identify(sample) != vehicle.identity:
+                # Another vehicle under its name: nothing that it says counts.
+                vehicle.conflicts += 1
+                continue
         elif isinstance(sample, Refused):
             text = flight.refusals.add(sample, now_us)
             if text is not None:
@@ -30,10 +37,20 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
             continue
         elif isinstance(sample, TimeSyncRequest):
             flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
-        vehicle.hear(sample, now_us)
+        vehicle.hear(sample, now_us, own_modes)
         streams.count(type(sample), now_us)
+    if vehicle.conflicts > conflicts:
+        _tell_conflict(flight, now_us)
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
         flight.tell(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.tell(now_us, "disarmed", "disarmed")
     return None
+
+
+def _tell_conflict(flight: FlightContext, now_us: int) -> None:
+    """Once a run: a sender that goes on contradicting the vehicle is no news."""
+    last_us, flight.conflict_us = flight.conflict_us, now_us
+    if last_us is None or now_us - last_us >= LASTING_US:
+        count = flight.vehicle.conflicts
+        flight.tell(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)

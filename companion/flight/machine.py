@@ -129,7 +129,7 @@ class Machine:
         expecting.close(flight, now_us)
         text = f"{flight.outcome}: {move.text}"
         flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index)
-        return HandOver(flight) if move.hand_over else LetGo()
+        return HandOver(flight, now_us) if move.hand_over else LetGo()
 
 
 def _hits(count: int) -> str:

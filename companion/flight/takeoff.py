@@ -67,6 +67,7 @@ class TakeOff:
     def _lead(self, flight: FlightContext, now_us: int) -> Move | None:
         if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
             self._step = Step.MODE
+            flight.expected_mode = flight.vehicle.custom_mode
             flight.commander.begin(SetMode(OFFBOARD))
             return self._switch(flight, Inputs(), now_us)
         return None

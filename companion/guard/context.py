@@ -44,6 +44,7 @@ class GuardContext:
     then_hold: str = ""
     program_elsewhere: bool = False  # since it was armed, some program sent setpoints on a link of its own
     hits: int = 0  # since it was armed
+    left_alone: int = 0  # hits told, and left to the program that flies
     others_setpoint_us: int | None = None  # when one was last seen on its way
     sticks: Sticks | None = None
     global_position: GlobalPosition | None = None

@@ -9,6 +9,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.hearing import hear
+from companion.flight.leaving_ground import note_height, too_low
 from companion.flight.limiting import Limiter
 from companion.flight.operator import status_text, values
 from companion.flight.outputs import Outputs, collect
@@ -93,6 +94,7 @@ def react(core: GuardCore, samples: Sequence[Sample], now_us: int) -> bool:
     try:
         refusal = hear(core.flight, samples, now_us)
         place_origin(core.flight, core.guard)
+        note_height(core.flight)
         impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
         moved = act(core, samples, impacts, refusal, now_us)
         follow_contact(core.flight, core.watch)
@@ -118,23 +120,21 @@ def situation(core: GuardCore) -> Situation:
     """What the guard knows, for the detector; of a stranger's setpoints it knows nothing."""
     flight = core.flight
     target = flight.target if core.machine.state in HOLDING else None
-    height_m = flight.height_m
     return Situation(
-        off_reason=why_not_detecting(core, height_m),
+        off_reason=why_not_detecting(core),
         armed=flight.vehicle.armed,
         landed_state=flight.vehicle.landed,
-        height_m=height_m,
+        height_m=flight.height_m,
         setpoint_position_ned_m=None if target is None else target.position_ned_m,
     )
 
 
-def why_not_detecting(core: GuardCore, height_m: float | None) -> str | None:
+def why_not_detecting(core: GuardCore) -> str | None:
     """Ground, take-off and landing shake a vehicle as a hit does."""
     state = core.machine.state
     if state is not State.WATCHING and state not in HOLDING:
         return why_not(core.guard) or state.value
-    least_m = core.guard.config.companion.min_detection_height_m
-    return f"below {least_m:g} m" if height_m is None or height_m < least_m else None
+    return too_low(core.flight, False)
 
 
 def act(
@@ -172,7 +172,7 @@ def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
     core.setpoint_due_us = now_us + round(1e6 / rate_hz)
     try:
         wanted = core.machine.activity.target(now_us)
-        if wanted is None:
+        if wanted is None or not core.flight.vehicle.is_mode_known:
             return
         # What leads the way is the place of a vehicle that others fly, wherever they fly it.
         target = core.limiter.passed(core.flight, wanted, True, moved, now_us) if is_ours else wanted

@@ -97,6 +97,15 @@ class Guard:
     def collisions(self) -> tuple[CollisionReport, ...]:
         return () if self._core is None else collisions(self._core)
 
+    def left_alone(self) -> int:
+        """Hits that were told and left to the program that flies."""
+        return 0 if self._core is None else self._core.guard.left_alone
+
+    @property
+    def stop_reason(self) -> str | None:
+        """What `stop` was last called with; None as long as nobody has."""
+        return self._stop_reason
+
 
 def status(core: GuardCore) -> Status:
     vehicle = core.flight.vehicle

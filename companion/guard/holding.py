@@ -83,6 +83,9 @@ def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
 class GiveBack:
     """Ask for one mode after the other until one is seen; setpoints go on meanwhile.
 
+    The first is asked for straight after a report of the present one: a person's own request that shows there is not
+    overruled. One that crosses ours on the link, within its delay of about 10 ms, cannot be seen by anybody.
+
     A program's own OFFBOARD needs no asking: its setpoints are let through again. Beside a program on
     another link nothing is streamed; the vehicle is asked to hold clear of what it hit. When no mode is taken the
     setpoints stop, and PX4's action for lost setpoints follows.
@@ -100,8 +103,7 @@ class GiveBack:
             self._target = None
             self._aside = StepAside(now_us)
         self._began_us = now_us
-        if self._aside is None:
-            self._ask(guard)
+        self._is_asked = False
 
     def target(self, now_us: int) -> Target | None:
         return self._target
@@ -120,8 +122,15 @@ class GiveBack:
             self._aside.step(guard, inputs, now_us)
             if not self._aside.is_over:
                 return None
+            # It asked for the first of these modes, too.
+            self._is_asked = True
             self._ask(guard)
             inputs = GuardInputs()
+        if not self._is_asked:
+            if not flight.is_time_to_give_away(self._began_us, now_us):
+                return None
+            self._is_asked = True
+            self._ask(guard)
         is_seen = flight.vehicle.custom_mode == self.wish
         outcome = flight.command_outcome(inputs.flight, is_seen, now_us)
         if is_seen:

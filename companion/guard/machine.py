@@ -56,6 +56,7 @@ class GuardMachine:
         for estimate in inputs.flight.impacts:
             trigger = self._trigger_of_hit()
             if trigger is Trigger.HIT_BESIDE_PROGRAM and self.guard.config.beside_program == "tell":
+                self.guard.left_alone += 1
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
                 self.guard.flight.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif TABLE.moves(self.state, trigger):

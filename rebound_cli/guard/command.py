@@ -18,8 +18,6 @@ from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop
 from rebound_cli.run_folder import FlightRecorder
 
-CONFIG_NAME = "guard.yaml"
-
 
 def run_guard(options: Namespace) -> int:
     """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
@@ -27,7 +25,7 @@ def run_guard(options: Namespace) -> int:
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
     connection = open_connection(options.connect, options.peer)
     folder = run_folder.create_run_folder(options.out, "guard")
-    run_folder.write_yaml(folder / CONFIG_NAME, config.model_dump(mode="json", exclude_none=True))
+    run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     recorder = FlightRecorder(folder, Background("log"))
     console, guard = console_for(False, Background("console")), Guard(config)
@@ -38,8 +36,10 @@ def run_guard(options: Namespace) -> int:
         connection.close()
         recorder.close()
         hits = [asdict(collision) for collision in guard.collisions()]
-        run_folder.write_json(folder / run_folder.SUMMARY_NAME, {"outcome": guard.outcome, "collisions": hits})
-    console.print(f"{guard.outcome}; {len(hits)} hits; log in {folder}")
+        summary = {"outcome": guard.outcome, "collisions": hits, "left_alone": guard.left_alone()}
+        run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
+    left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
+    console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
     console.close()
     if interrupts.reason is None:
         raise ConfigurationError(guard.outcome[:1].upper() + guard.outcome[1:] + ".")

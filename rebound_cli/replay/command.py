@@ -11,11 +11,11 @@ from rebound_cli.console import Console, console_for
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.telemetry import read_telemetry
-from rebound_cli.replay.recording import Recording, is_run_folder, read_recording
+from rebound_cli.replay.recording import Recording, is_run_folder, read_recording, settings_file
 from rebound_cli.replay.report import report_data, report_text
 from rebound_cli.replay.result import Replay, replay_flight, replay_log
 from rebound_cli.replay.settings import companion_settings
-from rebound_cli.run_folder import RESOLVED_NAME, RUNS_FOLDER, TLOG_NAME, versions
+from rebound_cli.run_folder import RUNS_FOLDER, TLOG_NAME, versions
 
 
 def run_replay(options: Namespace) -> int:
@@ -39,11 +39,11 @@ def _replay(options: Namespace, console: Console) -> Replay:
         recording = read_recording(folder)
         _warn_of_versions(recording, console)
         return replay_flight(read_telemetry(folder / TLOG_NAME), recording)
-    settings_file = options.companion
-    if folder is not None and settings_file is None:
+    settings = options.companion
+    if folder is not None and settings is None:
         console.print(f"with {', '.join(changed)} the flight's own decisions cannot come again and are not compared")
-        settings_file = folder / RESOLVED_NAME
-    config = companion_settings(settings_file, options.set, options.detector)
+        settings = settings_file(folder)
+    config = companion_settings(settings, options.set, options.detector)
     log = read_log(options.log if folder is None else folder / TLOG_NAME)
     return replay_log(log, config, options.rate)
 

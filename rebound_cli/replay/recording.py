@@ -7,15 +7,17 @@ from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 
+from companion.guard.config import GuardConfig
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.mission.model import Mission
 from companion.shell.tlog import read_tlog
-from rebound_cli.documents import load_document
+from rebound_cli.documents import load_document, validated
 from rebound_cli.inputs import mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.run_folder import (
     EVENTS_NAME,
+    GUARD_NAME,
     INPUTS_NAME,
     RESOLVED_NAME,
     SUMMARY_NAME,
@@ -47,7 +49,7 @@ class Recording:
     `versions` are those it was flown with.
     """
 
-    mission: Mission
+    settings: Mission | GuardConfig
     steps: Sequence[Step]
     event_lines: Sequence[str]
     is_cut: bool
@@ -66,7 +68,7 @@ def read_recording(folder: Path) -> Recording:
             f"{folder}: no {INPUTS_NAME} in it, so the flight was recorded by a version that cannot be replayed to the "
             f"bit; replay {folder / TLOG_NAME} instead."
         )
-    mission = mission_from(load_document(folder / RESOLVED_NAME))
+    settings = _settings(folder)
     steps = _steps(folder / TLOG_NAME)
     if not steps:
         raise LogError(f"{folder / TLOG_NAME}: no packet in it: nothing was ever heard in this flight.")
@@ -90,7 +92,18 @@ def read_recording(folder: Path) -> Recording:
         versions = dict(json.loads(read_text(folder / VERSIONS_NAME)))
     except (ValueError, TypeError) as error:
         raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
-    return Recording(mission, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
+    return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
+
+
+def settings_file(folder: Path) -> Path:
+    """The mission as it was flown, or the guard's settings."""
+    return folder / (GUARD_NAME if (folder / GUARD_NAME).exists() else RESOLVED_NAME)
+
+
+def _settings(folder: Path) -> Mission | GuardConfig:
+    file = settings_file(folder)
+    document = load_document(file)
+    return mission_from(document) if file.name == RESOLVED_NAME else validated(GuardConfig, document, document.data)
 
 
 def _steps(tlog: Path) -> dict[int, Step]:

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from companion.companion import Companion, StepResult
 from companion.core import situation
 from companion.detection.interface import Situation
-from companion.report import FlightReport
+from companion.guard.config import GuardConfig
+from companion.guard.core import situation as guard_situation
+from companion.guard.guard import Guard
 from rebound_cli.replay.findings import Findings, Notebook
 from rebound_cli.replay.recording import Recording, Step
 from rebound_cli.run_folder import event_line
@@ -19,7 +21,6 @@ class Reproduction:
     """What became of it; `first_difference` is None when every packet sent and every event is the same to the bit."""
 
     findings: Findings
-    report: FlightReport
     steps: int
     packets_received: int
     packets_sent: int
@@ -30,30 +31,31 @@ class Reproduction:
 
 def reproduce(recording: Recording) -> Reproduction:
     """Fly the recording to its end, whatever differs."""
-    companion = Companion(recording.mission)
+    settings = recording.settings
+    stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
     comparison = _Comparison(recording.event_lines)
     notebook = Notebook()
     for step in recording.steps:
         # What the flight knew when the packets came; they may move it on.
-        known = _BEFORE_THE_FIRST_STEP if companion.core is None else situation(companion.core)
-        result = companion.step(b"".join(step.received), step.time_us)
+        known = _known(stepped)
+        result = stepped.step(b"".join(step.received), step.time_us)
         comparison.compare(step, result)
         for event in result.events:
             notebook.tell(event.time_us, event.text)
-        assert companion.core is not None, "the first step begins it"
-        notebook.note(companion.core.watch, known, step.time_us)
-        if step.confirms:
-            companion.confirm_plan()
-        if step.file_appears:
-            companion.file_is_there()
+        assert stepped.core is not None, "the first step begins it"
+        notebook.note(stepped.core.watch, known, step.time_us)
+        if isinstance(stepped, Companion):
+            if step.confirms:
+                stepped.confirm_plan()
+            if step.file_appears:
+                stepped.file_is_there()
         if step.stop_reason is not None:
-            companion.stop(step.stop_reason)
+            stepped.stop(step.stop_reason)
         for kind, text in step.notes:
-            companion.note(kind, text)
+            stepped.note(kind, text)
     comparison.finish()
     return Reproduction(
         findings=notebook.close(recording.steps[-1].time_us),
-        report=companion.report(),
         steps=len(recording.steps),
         packets_received=sum(len(step.received) for step in recording.steps),
         packets_sent=sum(len(step.sent) for step in recording.steps),
@@ -61,6 +63,12 @@ def reproduce(recording: Recording) -> Reproduction:
         is_cut=recording.is_cut,
         first_difference=comparison.first_difference,
     )
+
+
+def _known(stepped: Companion | Guard) -> Situation:
+    if stepped.core is None:
+        return _BEFORE_THE_FIRST_STEP
+    return guard_situation(stepped.core) if isinstance(stepped, Guard) else situation(stepped.core)
 
 
 class _Comparison:

@@ -57,7 +57,7 @@ def replay_log(log: Log, config: CompanionConfig, rate_hz: float | None) -> Repl
 
 def replay_flight(log: Log, recording: Recording) -> Replay:
     """Our own flight decided again, from the first byte to the last."""
-    config = recording.mission.companion
+    config = recording.settings.companion
     reproduction = reproduce(recording)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)

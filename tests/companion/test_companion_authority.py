@@ -60,7 +60,8 @@ def test_a_failsafe_is_called_a_failsafe_and_not_fought(state, seen_in):
     f.vehicle.no_current_mode = seen_in == "heartbeat"
 
     f.vehicle.failsafe_takes(LOITER)
-    f.run_to("aborted", 3.0 if state == "landing" else 1.1)
+    # HEARTBEAT alone tells it once a second, and tells it twice before it counts
+    f.run_to("aborted", 3.7 if state == "landing" else 2.1)
 
     report = f.companion.report()
     assert report.outcome == "aborted"
@@ -73,7 +74,7 @@ def test_a_failsafe_is_called_a_failsafe_and_not_fought(state, seen_in):
 def test_a_disarmed_vehicle_ends_the_flight(state):
     f = flying_in(state)
     f.vehicle.armed = False
-    f.run_to("aborted", 1.1)
+    f.run_to("aborted", 2.1)
     assert "disarmed" in f.companion.report().reason
     assert_silent_from_now(f)
 
@@ -88,7 +89,10 @@ def test_the_pilot_choosing_land_is_still_the_pilot():
 def test_without_current_mode_the_heartbeat_tells_the_pilot():
     f = flying_in("mission", FakeVehicle(no_current_mode=True))
     f.vehicle.pilot_takes(POSCTL)
+    f.run_for(1.1)
+    since = f.now_us
     f.run_to("aborted", 1.1)
+    assert f.setpoints_since(since) == [], "none from the first report on"
     assert "pilot" in f.companion.report().reason
 
 

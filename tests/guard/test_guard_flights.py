@@ -251,6 +251,7 @@ def test_beside_a_program_on_another_link_the_guard_tells_of_a_hit_and_sends_not
     assert air.state is State.WATCHING
     kinds = {m.get_type() for at, who, m in air.on_wire if who == "guard" and at >= hit_s}
     assert kinds <= {"HEARTBEAT", "STATUSTEXT", "TIMESYNC", "NAMED_VALUE_FLOAT"}
+    assert air.guard.left_alone() == len(air.told("left_alone"))
 
 
 def test_beside_a_program_on_another_link_the_vehicle_is_led_clear_by_a_command_where_that_is_wanted():

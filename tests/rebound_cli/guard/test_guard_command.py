@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from companion.guard.config import GuardConfig
-from tests.rebound_cli.command import ROOT, events_of, run, start, wait_for_event
+from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
 QUICK = ("--set", "companion.streams.window_s=0.5", "--set", "companion.link.heartbeat_wait_s=30")
 
@@ -51,6 +51,7 @@ def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
     assert done.returncode == 1
     assert "No HEARTBEAT from an autopilot within 0.3 s" in done.stderr
     assert json.loads((tmp_path / "summary.json").read_text())["collisions"] == []
+    assert json.loads((tmp_path / "summary.json").read_text())["left_alone"] == 0
 
 
 def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path):
@@ -72,6 +73,10 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path):
     assert "stopped by a terminate signal; 0 hits" in stdout
     assert [event["kind"] for event in events_of(tmp_path)][-1] == "stopped"
     assert (tmp_path / "flight.tlog").stat().st_size > 10_000
+    assert_comes_again(tmp_path)
+    replayed = run("replay", tmp_path, "--json")
+    assert replayed.returncode == 0, replayed.stderr
+    assert json.loads(replayed.stdout)["reproduction"]["identical"]
     written = GuardConfig.model_validate(yaml.safe_load((tmp_path / "guard.yaml").read_text()))
     assert written.then == "previous"
     assert written.companion.streams.window_s == 0.5
