@@ -57,7 +57,7 @@ MOTORS_S, MOTORS_RAD_S2, YAW_SHARE = 0.025, 100.0, 0.3
 
 def _compiled(function: Kernel) -> Kernel:
     """To machine code, kept for the next start. No fast-math: the same inputs have to give the same bits."""
-    return cast(Kernel, numba.njit(cache=True, fastmath=False)(function))
+    return cast(Kernel, numba.njit(cache=True, fastmath=False, nogil=True)(function))
 
 
 def _inlined(function: Kernel) -> Kernel:

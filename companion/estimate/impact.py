@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
@@ -83,6 +84,7 @@ class ImpactEstimator:
     estimate: ImpactEstimate | None = None
     push: Push | None = None
     search: Search | None = None
+    seek: Callable[[Search], Search] = further  # what takes the search on with each message
     is_over: bool = False
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
@@ -133,7 +135,7 @@ class ImpactEstimator:
                 velocity, averaging_s = estimate.velocity_ned_m_s, config.imu_averaging_interval_s
                 self.search = begin(push.touch, velocity, config.guards, averaging_s)
         elif not search.is_over:
-            self.search = further(search)
+            self.search = self.seek(search)
             if self.search.is_over:
                 self.estimate = replace(estimate, normal_ned=self._normal(push, estimate.velocity_ned_m_s))
 

@@ -1,9 +1,10 @@
 """The guard on a program's own connection: messages as names and fields in and out, and a gate for what passes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from companion.estimate.normal import Search, further
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore, advance, next_deadline_us, start
 from companion.guard.gate import SETPOINTS, Gate
@@ -26,11 +27,15 @@ class AttachedStep:
 class AttachedGuard:
     """Joins fields with the pure core; holds no clock and no thread. Times are microseconds, any epoch.
 
-    The program's own heartbeats and its answers to time requests are already there; none are added.
+    The program's own heartbeats and its answers to time requests are already there; none are added. `seek` takes the
+    search for a hit's normal on, with each message.
     """
 
-    def __init__(self, config: GuardConfig, system_id: int, now_us: int) -> None:
+    def __init__(
+        self, config: GuardConfig, system_id: int, now_us: int, seek: Callable[[Search], Search] = further
+    ) -> None:
         self.core: GuardCore = start(config, True, now_us)
+        self.core.watch.estimator.seek = seek
         self._source = (system_id, AUTOPILOT_COMPONENT_ID)
         self._encoder = Encoder()
         self._encoder.speak_to(*self._source)
