@@ -44,7 +44,7 @@ types: $(READY)
 	$(BIN)/mypy
 
 results: $(READY)
-	$(BIN)/rebound results
+	$(BIN)/python -m bench paper results
 
 # Every version is pinned in requirements.txt, so that a fresh machine gets what was tested.
 $(READY): pyproject.toml requirements.txt
@@ -54,13 +54,13 @@ $(READY): pyproject.toml requirements.txt
 	touch $(READY)
 
 paper: $(READY)
-	$(BIN)/rebound paper --seeds 50
+	$(BIN)/python -m bench paper --seeds 50
 
 schema: $(READY)
 	$(BIN)/rebound check --schema > missions/schema.json
 
 diagrams: $(READY)
-	$(BIN)/python -m rebound_cli.diagrams docs/architecture.md
+	$(BIN)/python -m bench.diagrams docs/architecture.md
 
 clean:
 	rm -rf $(VENV) $(CLIENTS) .pytest_cache .mypy_cache .ruff_cache runs

@@ -10,18 +10,13 @@ from companion.errors import ReboundError
 from rebound_cli import __version__
 from rebound_cli.airframe_arguments import add_airframe
 from rebound_cli.arguments import SIMULATED_AUTOPILOTS
-from rebound_cli.campaign_report.arguments import add_campaign
 from rebound_cli.check.arguments import add_check
-from rebound_cli.detectors_report.arguments import add_detectors
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
-from rebound_cli.paper.arguments import add_paper
 from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
-from rebound_cli.recoveries.arguments import add_recoveries
 from rebound_cli.replay.arguments import add_replay
-from rebound_cli.results_arguments import add_results
 from rebound_cli.sim_arguments import add_sim
 from rebound_cli.tune.arguments import add_tune
 
@@ -34,21 +29,40 @@ _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 COMMANDING = ("fly", "guard")
 
 
+# Studies that were commands of the drone's program once, and what they are in the laboratory.
+MOVED = {
+    "paper": "paper",
+    "results": "paper results",
+    "detectors": "detectors",
+    "campaign": "campaign",
+    "recoveries": "campaign recoveries",
+}
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    options = build_parser().parse_args(_with_plain_sim(sys.argv[1:] if arguments is None else arguments))
+    words = _with_plain_sim(sys.argv[1:] if arguments is None else arguments)
+    if words and words[0] in MOVED:
+        text = f"'rebound {words[0]}' is now 'python -m bench {MOVED[words[0]]}', run in a checkout of Rebound"
+        print(f"rebound: {text}.", file=sys.stderr)
+        return EXIT_ERROR
+    return run(build_parser().parse_args(words), "rebound")
+
+
+def run(options: argparse.Namespace, program: str) -> int:
+    """What was asked for; an expected error is one sentence on stderr."""
     from sim_vehicle.errors import SimulationError
 
     try:
         return int(options.run(options))
     except (ReboundError, SimulationError) as error:
-        print(f"rebound: {error}", file=sys.stderr)
+        print(f"{program}: {error}", file=sys.stderr)
         return EXIT_ERROR
     except KeyboardInterrupt:
         text = "ended at once"
         if options.command in COMMANDING:
             text += "; a vehicle in the air does what its autopilot does when setpoints stop"
-        print(f"rebound: {text}.", file=sys.stderr)
+        print(f"{program}: {text}.", file=sys.stderr)
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone (`rebound ... | head`): nobody is left to tell.
@@ -59,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if error.filename is None and error.errno not in _DISK_ERRORS:
             raise
         where = "" if error.filename is None else f"{error.filename}: "
-        print(f"rebound: {where}{error.strerror}.", file=sys.stderr)
+        print(f"{program}: {where}{error.strerror}.", file=sys.stderr)
         return EXIT_ERROR
 
 
@@ -75,11 +89,6 @@ def build_parser() -> argparse.ArgumentParser:
     add_check(commands)
     add_plan(commands)
     add_sim(commands)
-    add_results(commands)
-    add_recoveries(commands)
-    add_campaign(commands)
-    add_paper(commands)
-    add_detectors(commands)
     add_preflight(commands)
     add_replay(commands)
     add_tune(commands)

@@ -5,13 +5,13 @@ import math
 
 import pytest
 
+from bench.random_missions.campaign import MissionCase, work_out_mission
 from companion.flight.leaning import HELD_M_S2, Leaning, lean_of
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.random_missions.campaign import MissionCase, work_out_mission
 from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene

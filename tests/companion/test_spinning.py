@@ -5,9 +5,9 @@ import math
 
 import pytest
 
+from bench.random_missions.campaign import MissionCase, work_out_mission
 from companion.flight.spinning import MOST_M_S2, Steering, coming_to_rest, spin_rad_s
 from companion.messages import Attitude, LocalPosition
-from rebound_cli.random_missions.campaign import MissionCase, work_out_mission
 
 EVERY_S, G_M_S2 = 0.02, 9.80665
 # An attitude loop of 12 rad/s, critically damped: k (z_d - z) = z'' + 2 sqrt(k) z' - 2 i r z', z the lean in the world

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from bench.random_missions.campaign import MissionCase, work_out_mission
+from bench.random_missions.crashes import tilts_deg
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.random_missions.campaign import MissionCase, work_out_mission
-from rebound_cli.random_missions.crashes import tilts_deg
 from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene

@@ -7,6 +7,7 @@ import threading
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
+from rebound_cli.main import main
 from tests.rebound_cli.command import SQUARE, WALL, assert_one_clear_sentence, processes_naming, run
 
 MULTICOPTER, PLANE = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_TYPE_FIXED_WING
@@ -141,3 +142,10 @@ def test_a_vehicle_that_is_no_px4_multicopter(tmp_path, autopilot, vehicle_type,
     finally:
         is_over.set()
         announcer.join()
+
+
+@pytest.mark.parametrize("command", ["paper", "results", "detectors", "campaign", "recoveries"])
+def test_a_study_that_moved_names_its_new_place(command, capsys):
+    assert main([command, "--out", "docs"]) == 1
+    complaint = capsys.readouterr().err
+    assert "is now 'python -m bench " in complaint and complaint.count("\n") == 1

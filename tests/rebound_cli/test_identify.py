@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.head_on import head_on
 from rebound_cli.documents import load_document, validated
-from rebound_cli.head_on import head_on
 from rebound_cli.identification.fit import fit_friction, fit_restitution, fit_restitution_with_loss, fit_spring
 from rebound_cli.identification.hit import IdentificationError
 from rebound_cli.identification.motion import find_hit

@@ -1,0 +1,1 @@
+"""`bench campaign`: random missions, and hits with both laws, judged by what must be shown; docs/campaign.md."""

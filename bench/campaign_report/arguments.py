@@ -1,0 +1,37 @@
+"""The arguments of `bench campaign`."""
+
+from pathlib import Path
+
+from bench.recoveries.arguments import add_recoveries
+from rebound_cli.arguments import Commands, add_workers, count, runs
+
+
+def add_campaign(commands: Commands) -> None:
+    campaign = commands.add_parser(
+        "campaign",
+        help="fly random missions in random rooms and write what became of them",
+        description="Random missions with both airframes, and hits with both recovery laws; see docs/campaign.md.",
+    )
+    campaign.add_argument("--missions", type=count, default=1000, metavar="N", help="random missions (default 1000)")
+    campaign.add_argument(
+        "--first-seed", type=count, default=1, metavar="SEED", help="of the first; the others follow (default 1)"
+    )
+    campaign.add_argument(
+        "--hits", type=count, default=5, metavar="SEEDS", help="of each hit with each recovery law (default 5)"
+    )
+    add_workers(campaign)
+    campaign.add_argument(
+        "--only", type=count, metavar="SEED", help="fly this one mission again and keep its whole run folder"
+    )
+    campaign.add_argument(
+        "--airframe", choices=("foldable", "rigid"), help="with --only, which of its two flights (default foldable)"
+    )
+    campaign.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder of campaign.md and images (default: docs); with --only the run folder "
+        "(default: runs/<time>-random-SEED)",
+    )
+    campaign.set_defaults(run=runs("bench.campaign_report.command:run_campaign_command"))
+    add_recoveries(campaign.add_subparsers(metavar="PART", dest="part"))

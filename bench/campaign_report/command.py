@@ -1,0 +1,99 @@
+"""`bench campaign`: flies everything that must be shown and writes docs/campaign.md, and docs/recovery.md's table."""
+
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from bench.campaign.plan import Campaign
+from bench.campaign.run import Results, Workers, failures_text, run_campaign
+from bench.campaign_report import tables
+from bench.campaign_report.flown import Missions
+from bench.campaign_report.law_bars import law_bars
+from bench.campaign_report.mission_bars import mission_bars
+from bench.campaign_report.only import run_only
+from bench.campaign_report.picture import missions_figure
+from bench.campaign_report.reading import HOW_TO_READ
+from bench.detectors_report.bars import Bar, bars_text, summary_text
+from bench.marked import checked_text, write_part
+from bench.random_missions.campaign import missions_campaign
+from bench.recoveries.command import PART as RECOVERY_PART
+from bench.recoveries.command import write_table
+from bench.recoveries.hits import recoveries_campaign
+from companion.errors import ConfigurationError
+from rebound_cli import __version__
+from rebound_cli.run_folder import make_folder
+
+DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
+PART, TITLE = "campaign", "Campaign"
+
+
+def run_campaign_command(options: Namespace) -> int:
+    """0 when everything is written, whatever it says; 1 when a case failed to be flown."""
+    if options.only is not None:
+        return run_only(options.only, options.airframe or "foldable", options.out)
+    if options.airframe is not None:
+        raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
+    started_s = time.monotonic()
+    workers, out = Workers(options.jobs, options.scheduler), options.out or Path("docs")
+    _check(out)
+    flown = missions_campaign(options.missions, options.first_seed)
+    missions_results = run_campaign(flown, workers)
+    hits = recoveries_campaign(options.hits)
+    hits_results = run_campaign(hits, workers)
+    worked_out = [(flown, missions_results), (hits, hits_results)]
+    failed = [text for campaign, results in worked_out if (text := failures_text(campaign, results))]
+    missions = Missions(flown.cases, missions_results.results)
+    bars = mission_bars(missions) + law_bars(hits.cases, hits_results.results)
+    _write(out, missions, _text(options, missions, bars, worked_out))
+    if (out / RECOVERY_NAME).exists():
+        write_table(out / RECOVERY_NAME, hits, hits_results, options.hits)
+    print(summary_text(bars))
+    for text in failed:
+        print(text)
+    print(f"Written to {out / DOCUMENT_NAME} in {time.monotonic() - started_s:.0f} s.")
+    return 1 if failed else 0
+
+
+def _check(folder: Path) -> None:
+    """Whether there will be a place for it all, before hours are flown. Raises ReboundError."""
+    make_folder(folder)
+    checked_text(folder / DOCUMENT_NAME, PART, TITLE)
+    if (folder / RECOVERY_NAME).exists():
+        checked_text(folder / RECOVERY_NAME, RECOVERY_PART)
+
+
+def _text(options: Namespace, missions: Missions, bars: list[Bar], worked_out: list[tuple[Campaign, Results]]) -> str:
+    return "\n".join(
+        [
+            _lead(options, worked_out),
+            f"### What must be shown\n\n{bars_text(bars)}",
+            HOW_TO_READ,
+            f"### Missions that did not end as they say\n\n{tables.causes_text(missions)}",
+            tables.failures_text(missions),
+            f"### By room, stream and wind\n\nMissions that ended as they say.\n\n{tables.kinds_text(missions)}",
+            f"### Recoveries by speed\n\n{tables.speeds_text(missions)}",
+            f"![the first missions from above]({PICTURE.as_posix()})\n",
+        ]
+    )
+
+
+def _lead(options: Namespace, worked_out: list[tuple[Campaign, Results]]) -> str:
+    """What was run and how to run it again."""
+    missions, hits = (results for _, results in worked_out)
+    first = "" if options.first_seed == 1 else f" --first-seed {options.first_seed}"
+    command = f"python -m bench campaign --missions {options.missions}{first} --hits {options.hits}"
+    last_seed = options.first_seed + options.missions - 1
+    seconds = sum(result["seconds"] for result in missions.results.values())
+    failed = len(missions.failures) + len(hits.failures)
+    return (
+        f"\nWritten by `{command}` (version {__version__}): {len(missions.results)} flights of seeds "
+        f"{options.first_seed} to {last_seed}, {seconds / 3600:.1f} h in the vehicle's time, and {len(hits.results)} "
+        f"hits with a recovery law each.{f' {failed} cases failed.' if failed else ''}\n"
+    )
+
+
+def _write(folder: Path, missions: Missions, text: str) -> None:
+    """The picture beside the document; what stands between its marks made anew, the rest left as it is."""
+    (folder / PICTURE.parent).mkdir(parents=True, exist_ok=True)
+    missions_figure(missions).savefig(folder / PICTURE)
+    write_part(folder / DOCUMENT_NAME, PART, text, TITLE)

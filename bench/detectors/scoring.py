@@ -1,0 +1,165 @@
+"""A hit's truth beside what each detector reported of it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bench.detectors.links import LINKS, over_link
+from bench.detectors.recording import Recording
+from bench.detectors.watching import (
+    ASKED_HZ,
+    SWEPT_FACTORS,
+    Found,
+    configuration,
+    streams_asked_hz,
+    watch_all,
+)
+from bench.detectors.wire import Heard, Wire
+from companion.estimate.impact import ImpactEstimate
+from companion.messages import ImuSample
+from sim_vehicle.airframe import Airframe
+from sim_vehicle.truth import Hit
+
+Vector3 = tuple[float, float, float]
+
+# A force counts as above the noise floor from this many standard deviations of an IMU sample on: of ten hours at
+# 250 Hz on three axes, 2.7e7 numbers, noise alone takes one above six with a probability of 0.05.
+NOISE_FLOOR_SIGMAS = 6.0
+# A hit that is reported no later than this after its first touch has been found.
+FOUND_WITHIN_US = 400_000
+SWEPT_RATES = (50, 246)
+
+
+@dataclass(frozen=True, slots=True)
+class Possible:
+    """The first sample that shows the contact, or None where the contact fell between the samples."""
+
+    time_boot_us: int | None
+    imu_times_boot_us: Sequence[int]
+
+    def samples_late(self, found_boot_us: int) -> int | None:
+        """How many IMU samples the report came after the first possible one; 0: with it."""
+        first = self.time_boot_us
+        if first is None:
+            return None
+        if found_boot_us <= first:
+            return 0
+        return sum(first < time_us <= found_boot_us for time_us in self.imu_times_boot_us)
+
+
+def first_possible(recording: Recording, arrived: Sequence[Heard], touch_boot_us: float, floor_m_s2: float) -> Possible:
+    """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
+    # A sample's own interval: over a bad link it may arrive in a later one.
+    stamps = (sample.time_boot_us for sample in recording.samples)
+    contact_m_s2 = dict(zip(stamps, recording.contact_m_s2, strict=True))
+    times, first = [], None
+    for step in arrived:
+        stamps_heard = [sample.time_boot_us for sample in step.samples if isinstance(sample, ImuSample)]
+        if not stamps_heard:
+            continue
+        times.append(step.time_boot_us)
+        shows = any(stamp >= touch_boot_us and contact_m_s2[stamp] > floor_m_s2 for stamp in stamps_heard)
+        if shows and first is None:
+            first = step.time_boot_us
+    return Possible(first, times)
+
+
+def score_hit(
+    recording: Recording,
+    hit: Hit,
+    airframe: Airframe,
+    seed: int,
+    detectors: Sequence[str],
+    sweeps: bool,
+    link: str | None = None,
+) -> dict[str, Any]:
+    """What the tables need of one hit, for every rate and detector."""
+    touch_us = hit.contact_at_boot_us
+    floor_m_s2 = NOISE_FLOOR_SIGMAS * airframe.imu.accelerometer_noise_m_s2
+    result: dict[str, Any] = {
+        "speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
+        "off_head_on_deg": _angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
+        "clipped": _clipped(recording, hit),
+        "contact_s": hit.contact_duration_s,
+        "rates": {},
+    }
+    wire = Wire(recording)
+    for rate in ASKED_HZ:
+        arrived = wire.heard(streams_asked_hz(rate), seed + rate)
+        if link is not None:
+            arrived = over_link(arrived, recording, LINKS[link], seed + rate)
+        possible = first_possible(recording, arrived, touch_us, floor_m_s2)
+        entries, swept = {}, {}
+        for name in detectors:
+            found, touches, blind = watch_all(configuration(name), arrived, recording.situations)
+            told_us = [touch.impact.sample_time_boot_us for touch in touches]
+            entries[name] = _entry(found, hit, possible, blind) | {"touches": sum(t >= touch_us for t in told_us)}
+            if sweeps and rate in SWEPT_RATES:
+                swept[name] = [_is_found(name, factor, arrived, recording, touch_us) for factor in SWEPT_FACTORS]
+        possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
+        result["rates"][str(rate)] = {"possible_ms": possible_ms, "detectors": entries, "swept": swept}
+    return result
+
+
+def _is_found(name: str, factor: float, arrived: Sequence[Heard], recording: Recording, touch_us: float) -> bool:
+    found, _, _ = watch_all(configuration(name, factor), arrived, recording.situations)
+    return _first_of(found, touch_us) is not None
+
+
+def _first_of(found: Sequence[Found], touch_us: float) -> Found | None:
+    return next((f for f in found if touch_us <= f.time_boot_us <= touch_us + FOUND_WITHIN_US), None)
+
+
+def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> dict[str, Any]:
+    """One detector's report on one hit."""
+    touch_us = hit.contact_at_boot_us
+    entry: dict[str, Any] = {"false": sum(f.time_boot_us < touch_us for f in found), "blind": blind}
+    first = _first_of(found, touch_us)
+    if first is None:
+        return entry
+    velocity, true_velocity = first.final.velocity_ned_m_s, hit.impact_velocity_ned_m_s
+    return entry | {
+        "latency_ms": 1e-3 * (first.time_boot_us - touch_us),
+        "samples_late": possible.samples_late(first.time_boot_us),
+        "evidence": first.first.impact.evidence.value,
+        "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
+        "velocity_error_m_s": math.dist(velocity, true_velocity),
+        "normal_error_deg": _angle_deg(first.final.normal_ned, hit.normal_ned),
+        "first_normal_error_deg": _angle_deg(first.first.normal_ned, hit.normal_ned),
+        "time_error_ms": 1e-3 * (first.final.time_boot_us - touch_us),
+        "kind": first.final.kind.value,
+        "confidence": first.final.confidence,
+        "bound": first.final.is_lower_bound,
+        "impulse": _ratio(first.final, hit),
+    }
+
+
+def _ratio(estimate: ImpactEstimate, hit: Hit) -> float:
+    """Impulse per unit mass over the true change of velocity that the obstacle made."""
+    change = math.dist(hit.rebound_velocity_ned_m_s, hit.impact_velocity_ned_m_s)
+    return estimate.impulse_m_s / change if change > 0.0 else 0.0
+
+
+def _clipped(recording: Recording, hit: Hit) -> bool:
+    """Whether the accelerometer reached its range during the contact."""
+    before = after = recording.samples[0].clipping_counts
+    for sample in recording.samples:
+        if sample.time_boot_us <= hit.contact_at_boot_us:
+            before = sample.clipping_counts
+        after = sample.clipping_counts
+        if sample.time_boot_us > hit.ended_at_boot_us:
+            break
+    return before != after
+
+
+def _minus(vector: Vector3) -> Vector3:
+    return -vector[0], -vector[1], -vector[2]
+
+
+def _angle_deg(one: Vector3, other: Vector3) -> float:
+    lengths = math.hypot(*one) * math.hypot(*other)
+    if lengths == 0.0:
+        return 180.0
+    cosine = sum(a * b for a, b in zip(one, other, strict=True)) / lengths
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))

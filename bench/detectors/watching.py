@@ -1,0 +1,107 @@
+"""Detectors by name let loose on what was heard."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from bench.detectors.wire import BUILDERS, Heard
+from companion.detection.interface import Situation
+from companion.detection.registry import DETECTORS
+from companion.detection.watch import advance, start_watch
+from companion.estimate.impact import ImpactEstimate
+from companion.link.streams import wanted_streams
+from companion.messages import MessageId
+from companion.mission.config import CompanionConfig
+
+# HIGHRES_IMU asked for, and what a client of PX4 receives of it.
+ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
+
+# What a detector's sensitivity hangs on is taken times these.
+SWEPT_FACTORS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)
+# Its settings; of detectors that are not here it is the first of their settings.
+SWEPT_FIELDS = {
+    "hybrid": ("threshold_m_s2", "torque_threshold_rad_s2"),
+    "lateral": ("threshold_m_s2", "noise_factor"),
+    "fused": (
+        "side_threshold_m_s2",
+        "vertical_threshold_m_s2",
+        "noise_factor",
+        "velocity_step_m_s",
+        "velocity_step_turned_m_s",
+        "rate_step_rad_s",
+        "jolt_rad_s",
+        "jolt_rad_s2",
+        "kick_rad_s",
+        "kick_rad_s2",
+        "spin_rad_s",
+        "spin_rad_s2",
+    ),
+}
+
+
+@dataclass(slots=True)
+class Found:
+    """A reported collision: when its sample was heard, its estimate then, and the final one if there was one."""
+
+    time_boot_us: int
+    first: ImpactEstimate
+    final: ImpactEstimate
+
+
+def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
+    """Default settings but for the detector's name, and its thresholds times `factor`."""
+    if factor == 1.0:
+        return CompanionConfig(detector=detector)
+    config = alarms_only(detector)
+    own = getattr(config, detector)
+    changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
+    settings = type(own).model_validate({**own.model_dump(), **changes})
+    return config.model_copy(update={detector: settings})
+
+
+def alarms_only(detector: str) -> CompanionConfig:
+    """Default settings where nobody asks which way a collision pushed: some detectors report thousands."""
+    config = CompanionConfig(detector=detector)
+    return config.model_copy(update={"estimate": config.estimate.model_copy(update={"fits_normal": False})})
+
+
+def swept_fields(detector: str) -> tuple[str, ...]:
+    """Names of the settings that are swept together."""
+    fields: dict[str, object] = type(getattr(CompanionConfig(), detector)).model_fields
+    return SWEPT_FIELDS.get(detector, (next(iter(fields)),))
+
+
+def detector_names() -> tuple[str, ...]:
+    return tuple(DETECTORS)
+
+
+def streams_asked_hz(rate: int) -> dict[MessageId, float]:
+    """What is asked of the vehicle for all detectors together, HIGHRES_IMU at the rate."""
+    config = CompanionConfig().streams
+    asked = {stream.message_id: stream.asked_hz for stream in wanted_streams(config, tuple(MessageId))}
+    wanted = {message: hz for message, hz in asked.items() if message in BUILDERS}
+    return {**wanted, MessageId.HIGHRES_IMU: ASKED_HZ[rate]}
+
+
+def watch_all(
+    config: CompanionConfig, heard: Sequence[Heard], situations: Sequence[Situation]
+) -> tuple[list[Found], list[ImpactEstimate], int]:
+    """Collisions reported, touches that were reported as none, and how often the detector said it was blind."""
+    watch = start_watch(config, heard[0].time_boot_us)
+    found: list[Found] = []
+    touches: list[ImpactEstimate] = []
+    blind = 0
+    for step in heard:
+        seen = advance(watch, step.samples, situations[step.index], step.time_boot_us)
+        for estimate in seen.impacts:
+            if estimate.impact.is_collision:
+                found.append(Found(step.time_boot_us, estimate, estimate))
+            else:
+                touches.append(estimate)
+        for final in seen.finished:
+            for entry in found:
+                if entry.first.impact is final.impact:
+                    entry.final = final
+        blind += sum("blind" in notice.text for notice in seen.notices)
+    if found and watch.estimate is not None and watch.estimate.impact is found[-1].first.impact:
+        found[-1].final = watch.estimate
+    return found, touches, blind

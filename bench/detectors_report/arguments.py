@@ -1,0 +1,28 @@
+"""The arguments of `bench detectors`."""
+
+import os
+from pathlib import Path
+
+from rebound_cli.arguments import Commands, add_documents_folder, add_workers, count, hours, runs
+
+
+def add_detectors(commands: Commands) -> None:
+    detectors = commands.add_parser(
+        "detectors",
+        help="try every collision detector on hits and healthy flights",
+        description="Simulated and recorded hits and flights through every detector; see docs/detection.md.",
+    )
+    detectors.add_argument("--hits", type=count, default=400, metavar="N", help="simulated hits (default 400)")
+    detectors.add_argument(
+        "--hours", type=hours, default=0.5, metavar="H", help="hours of simulated healthy flight (default 0.5)"
+    )
+    detectors.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        default=os.environ.get("REBOUND_DATA") or None,
+        help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
+    )
+    add_workers(detectors)
+    add_documents_folder(detectors, "detection.md and images/detection")
+    detectors.set_defaults(run=runs("bench.detectors_report.command:run_detectors"))

@@ -1,0 +1,26 @@
+"""The command `python -m bench`: the paper's studies, every detector on its bench, random missions by the thousand."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from bench.campaign_report.arguments import add_campaign
+from bench.detectors_report.arguments import add_detectors
+from bench.paper.arguments import add_paper
+from rebound_cli.main import run
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one study and return its exit code."""
+    return run(build_parser().parse_args(sys.argv[1:] if arguments is None else arguments), "bench")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m bench", description="Studies of Rebound and their tables; needs a checkout and its environment."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
+    add_paper(commands)
+    add_detectors(commands)
+    add_campaign(commands)
+    return parser

@@ -1,0 +1,52 @@
+"""The campaign of random missions: each flown by both airframes."""
+
+import numpy as np
+
+from bench.campaign.plan import Campaign, Json
+from bench.random_missions.contacts import contacts_of
+from bench.random_missions.flight import JudgedFlight, fly
+from bench.random_missions.generator import AIRFRAMES, MissionCase, random_mission
+from bench.random_missions.judge import failures
+from bench.random_missions.recovered import recoveries
+
+# The paths of the first missions are kept for the picture, a point a quarter of a second.
+PICTURED = 6
+_EVERY_S = 0.25
+# The first hit of every fifth mission shows what the feed-forward of the height is worth.
+COMPARED_EVERY = 5
+
+
+def missions_campaign(missions: int, first_seed: int = 1) -> Campaign:
+    """Seeds from the first on, each with every airframe; then some again without the feed-forward of the height."""
+    seeds = range(first_seed, first_seed + missions)
+    cases = [MissionCase(seed, name) for seed in seeds for name in AIRFRAMES]
+    cases += [MissionCase(seed, name, False) for seed in seeds if seed % COMPARED_EVERY == 0 for name in AIRFRAMES]
+    parameters = {"missions": missions, "first_seed": first_seed}
+    return Campaign("missions", parameters, cases, work_out_mission)
+
+
+def work_out_mission(case: MissionCase) -> Json:
+    """What became of it."""
+    drawn = random_mission(case)
+    flight = fly(case, drawn)
+    contacts = contacts_of(flight)
+    found: Json = {
+        "room": drawn.room,
+        "stream_hz": drawn.stream_hz,
+        "wind_m_s": drawn.wind_m_s,
+        "extras": list(drawn.extras),
+        "items": [next(iter(item)) for item in drawn.data["items"]],
+        "outcome": flight.report.outcome,
+        "seconds": round(1e-6 * (flight.report.ended_at_us - flight.report.started_at_us), 3),
+        "failures": [[failure.cause, failure.details] for failure in failures(flight)],
+        "detours": sum(event.kind == "detour" for event in flight.events),
+        "unreachable": sum(event.kind == "unreachable" for event in flight.events),
+        "hits": recoveries(flight, contacts),
+    }
+    return found | ({"path_ned_m": _path(flight)} if case.seed <= PICTURED else {})
+
+
+def _path(flight: JudgedFlight) -> list[list[float]]:
+    series = flight.truth.series
+    step = max(1, round(_EVERY_S / (1e-6 * float(np.diff(series["time_boot_us"][:2])[0]))))
+    return [[round(float(x), 3) for x in place] for place in series["position_ned_m"][::step]]

@@ -1,0 +1,55 @@
+"""One random mission flown in lockstep, and what is known of the flight afterwards."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bench.random_missions.generator import MissionCase, RandomMission, airframe_named
+from companion.mission.model import Mission
+from companion.report import Event, FlightReport
+from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import fly_mission_lockstep
+from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.truth_match import FlightTruth, Vector3
+from sim_vehicle.scene import Scene
+from sim_vehicle.world import Obstacle
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """What a judge may look at: the mission, what the companion told, what really happened."""
+
+    mission: Mission
+    report: FlightReport
+    events: Sequence[Event]
+    truth: FlightTruth
+    start_ned_m: Vector3 = (0.0, 0.0, 0.0)
+    standing_m: float = 0.08
+    """Height of the centre when the vehicle stands on the ground."""
+    arm_m: float = 0.0
+    """From the centre to a motor's axis, about which a guard goes round with `guard_m`."""
+    guard_m: float = 0.0
+    obstacles: Mapping[str, Obstacle] = field(default_factory=dict)
+    """By name."""
+
+    def boot_us(self, event: Event) -> float:
+        return event.time_us - self.truth.epoch_at_boot_us
+
+
+def fly(case: MissionCase, drawn: RandomMission) -> JudgedFlight:
+    """From take-off to the end, through the whole wire; nothing is kept but what is returned."""
+    mission, scene = Mission.model_validate(drawn.data), Scene.model_validate(drawn.data["sim"])
+    airframe = airframe_named(case.airframe)
+    with tempfile.TemporaryDirectory() as name:
+        recorder = FlightRecorder(Path(name))
+        try:
+            flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+        finally:
+            recorder.close()
+    assert flown.truth is not None, "a lockstep flight has its truth"
+    frame = airframe.geometry
+    parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m
+    start, obstacles = scene.start.position_ned_m, {obstacle.name: obstacle for _, obstacle in scene.obstacles()}
+    return JudgedFlight(mission, flown.report, tuple(recorder.events), flown.truth, start, *parts, obstacles)

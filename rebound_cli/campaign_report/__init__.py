@@ -1,1 +1,0 @@
-"""`rebound campaign`: random missions, and hits with both laws, judged by what must be shown; docs/campaign.md."""

@@ -1,0 +1,309 @@
+"""The judge on flights made up by hand: each cause of a failure is found, and a good flight has none."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.random_missions.contacts import Role, contacts_of
+from bench.random_missions.judge import failures
+from bench.random_missions.obedience import disobediences
+from bench.random_missions.recovered import recoveries
+from sim_vehicle.world import Wall
+from tests.bench.random_missions.made_up import (
+    DONE_S,
+    collision,
+    event,
+    events_with_hit,
+    flight,
+    hit,
+    path,
+    plain_path,
+)
+
+# At the wall at 10 s, back half a metre, down there.
+BOUNCED = path(
+    (0, 0, 0, 0),
+    (5, 0, 0, 0),
+    (8, 0, 0, 2),
+    (10, 2, 0, 2),
+    (11, 1.5, 0, 2),
+    (13, 1.5, 0, 2),
+    (16.5, 1.5, 0, 0),
+    (17, 1.5, 0, 0),
+)
+LANDS_THERE = [event(12.0, "landing"), event(DONE_S, "done")]
+LANDS_LATER = [event(13.6, "landing"), event(DONE_S, "done")]
+LAND, DETOUR = {"then": "land"}, {"then": "detour"}
+
+
+def causes(judged):
+    return [failure.cause for failure in failures(judged)]
+
+
+def bounced(*after, policy=LAND, **settings):
+    """Hit the wall, seen, recovered; then `after`, which is right for `land` by default."""
+    settings = {"hits": [hit()], "collisions": [collision()], "series": BOUNCED, **settings}
+    return flight(events_with_hit(*(after or LANDS_THERE)), on_collision=policy, **settings)
+
+
+def test_a_flight_as_its_mission_says_has_no_failure():
+    assert failures(flight()) == []
+    assert failures(bounced()) == []
+
+
+def test_a_vehicle_that_leans_by_more_than_a_right_angle_has_tumbled():
+    series = plain_path()
+    half = math.radians(100.0) / 2
+    series["attitude_wxyz"][500] = [math.cos(half), math.sin(half), 0.0, 0.0]
+    assert causes(flight(series=series)) == ["tumbled"]
+
+
+def test_reaching_the_ground_fast_is_a_fall_though_it_was_told_to_land():
+    fast = path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (12, 4, 0, 2), (13, 4, 0, 0), (17, 4, 0, 0))
+    assert causes(flight(series=fast)) == ["fell"]
+    slow = path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (12, 4, 0, 2), (14, 4, 0, 0), (17, 4, 0, 0))
+    assert causes(flight(series=slow)) == []
+
+
+def test_the_ground_touched_while_an_item_is_flown_is_a_crash():
+    dips = path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 0), (12, 4, 0, 2), (15.5, 4, 0, 0), (17, 4, 0, 0))
+    assert causes(flight(series=dips)) == ["touched the ground"]
+
+
+def test_a_guard_of_a_leaning_vehicle_touches_the_ground_before_its_feet():
+    dips = path(
+        (0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 0.1), (12, 4, 0, 2), (15.5, 4, 0, 0), (17, 4, 0, 0)
+    )
+    assert causes(flight(series=dips)) == []
+    at_the_lowest = int(np.argmin(np.abs(dips["time_boot_us"] - 10e6)))
+    half = math.radians(75.0) / 2
+    dips["attitude_wxyz"][at_the_lowest] = [math.cos(half), math.sin(half), 0.0, 0.0]
+    assert causes(flight(series=dips)) == ["touched the ground"]
+    # Who answers that has answered a hit
+    assert "answered a hit that was none" not in causes(flight(series=dips, collisions=[collision()]))
+
+
+def test_a_metre_and_more_outside_the_fence_is_a_failure():
+    assert causes(flight(fence={"radius_m": 4.0})) == []
+    flies_past = path(
+        (0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 5.2, 0, 2), (12, 4, 0, 2), (15.5, 4, 0, 0), (17, 4, 0, 0)
+    )
+    assert causes(flight(series=flies_past, fence={"radius_m": 4.0})) == ["left the fence"]
+
+
+def test_a_hit_that_nobody_noticed_is_a_failure_unless_it_was_a_slow_touch():
+    assert causes(flight(hits=[hit(speed_m_s=0.6)])) == ["hit not noticed"]
+    assert causes(flight(hits=[hit(speed_m_s=0.4)])) == []
+
+
+def test_a_recovery_from_nothing_is_a_failure():
+    judged = bounced(hits=())
+    assert causes(judged) == ["answered a hit that was none"]
+
+
+def test_a_contact_that_fell_between_the_samples_explains_a_detection_shortly_after_it():
+    assert causes(bounced(collisions=[collision(at_s=10.12)])) == []
+    assert causes(bounced(collisions=[collision(at_s=10.3)])) == ["hit not noticed", "answered a hit that was none"]
+
+
+@pytest.mark.parametrize(
+    ("policy", "after"),
+    [
+        ({"then": "land"}, LANDS_THERE),
+        ({"then": "hold", "hold_s": 1}, [event(12, "hold"), event(13, "item", step=2), event(13, "landing")]),
+        ({"then": "continue"}, [event(12, "item", step=2), event(12, "landing")]),
+        ({"then": "land", "max_hits": 1, "after_max_hits": "land"}, LANDS_THERE),
+    ],
+)
+def test_what_the_policy_says_is_no_failure(policy, after):
+    assert causes(bounced(*after, event(DONE_S, "done"), policy=policy)) == []
+
+
+@pytest.mark.parametrize(
+    ("policy", "after"),
+    [
+        ({"then": "land"}, [event(12, "item", step=2), event(12, "landing")]),
+        ({"then": "hold", "hold_s": 1}, [event(12, "item", step=2), event(12, "landing")]),
+        ({"then": "continue"}, LANDS_THERE),
+        ({"then": "retry"}, [event(12, "item", step=2), event(12, "landing")]),
+        ({"then": "return"}, LANDS_THERE),
+        ({"then": "land", "max_hits": 1, "after_max_hits": "return"}, LANDS_THERE),
+    ],
+)
+def test_anything_else_after_the_recovery_is_a_failure(policy, after):
+    assert "not as the mission says" in causes(bounced(*after, event(DONE_S, "done"), policy=policy))
+
+
+@pytest.mark.parametrize("policy", [DETOUR, {"then": "land", "max_hits": 1, "after_max_hits": "return"}])
+def test_after_a_hit_on_the_way_down_there_is_nothing_but_the_landing(policy):
+    begun = [event(5, "armed"), event(8, "item", step=1), event(8.5, "item", step=2), event(9, "landing")]
+    hit_there = [event(10.004, "detection"), event(12, "recovered")]
+    settings = {"on_collision": policy, "hits": [hit()], "collisions": [collision()], "series": BOUNCED}
+    done = event(DONE_S, "done")
+    assert disobediences(flight([*begun, *hit_there, event(12, "landing"), done], **settings)) == []
+    assert disobediences(flight([*begun, *hit_there, event(12, "return"), event(13, "landing"), done], **settings))
+
+
+def test_an_item_left_out_is_a_failure():
+    left_out = [event(5, "armed"), event(8, "item", step=2), event(8, "landing"), event(DONE_S, "done")]
+    assert "not as the mission says" in causes(flight(left_out))
+
+
+def test_an_abort_is_a_failure_unless_the_policy_asked_for_it():
+    aborts = [event(12, "aborted")]
+    asked = {"then": "hold", "max_hits": 1, "after_max_hits": "abort"}
+    assert causes(bounced(*aborts, policy=asked, outcome="aborted")) == []
+    assert causes(bounced(*aborts, outcome="aborted", reason="not arrived")) == ["not as the mission says"]
+
+
+def test_a_goal_that_was_called_reached_and_was_not_is_a_failure():
+    short = path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (12, 3.2, 0, 2), (15.5, 3.2, 0, 0), (17, 3.2, 0, 0))
+    assert causes(flight(series=short)) == ["not where the mission says"]
+
+
+def test_a_vehicle_that_drifts_while_it_holds_is_a_failure():
+    hold = [event(12, "hold"), event(14, "item", step=2), event(14, "landing"), event(DONE_S, "done")]
+    policy = {"then": "hold", "hold_s": 2}
+    assert causes(bounced(*hold, policy=policy, series=_held_at(1.5))) == []
+    assert causes(bounced(*hold, policy=policy, series=_held_at(0.8))) == ["not where the mission says"]
+
+
+def _held_at(north_m):
+    """At 1.5 m when the hold begins, there when it ends."""
+    up = ((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 2, 0, 2), (12, 1.5, 0, 2))
+    return path(*up, (14, north_m, 0, 2), (16.5, north_m, 0, 0), (17, north_m, 0, 0))
+
+
+def test_a_vehicle_that_lands_elsewhere_is_a_failure():
+    blown = path((0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (12, 4, 0, 2), (15.5, 4, 1.5, 0), (17, 4, 1.5, 0))
+    assert causes(flight(series=blown)) == ["not where the mission says"]
+
+
+def test_home_is_where_it_started():
+    items = [{"takeoff": {"height_m": 2}}, {"go_to": {"position_ned_m": [4, 0, -2]}}, {"return": {}}]
+    home = [event(5, "armed"), event(8, "item", step=1), event(10, "item", step=2), event(10, "return")]
+    home += [event(14, "landing"), event(DONE_S, "done")]
+    there = path(
+        (0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 4, 0, 2), (14, 0.3, 0, 2), (16.9, 0.3, 0, 0), (17, 0.3, 0, 0)
+    )
+    beside = path(
+        (0, 0, 0, 0), (5, 0, 0, 0), (8, 0, 0, 2), (10, 4, 0, 2), (14, 1.3, 0, 2), (16.9, 1.3, 0, 0), (17, 1.3, 0, 0)
+    )
+    assert causes(flight(home, there, items=items)) == []
+    assert causes(flight(home, beside, items=items)) == ["not where the mission says"]
+
+
+def test_the_same_place_hit_twice_is_a_failure_unless_it_was_tried_again_on_purpose():
+    touched = (2.2, 0.1, -2.0)
+    twice = [replace(hit(), contact_point_ned_m=touched), replace(hit(at_s=12.6), contact_point_ned_m=touched)]
+    seen = [collision(), collision(at_s=12.604)]
+    again = [event(12, "item", step=2), event(12.61, "detection"), event(13.6, "recovered"), *LANDS_LATER]
+    items = [{"takeoff": {"height_m": 2}}, *[{"go_to": {"position_ned_m": [4, 0, -2]}}] * 2, {"land": {}}]
+    policy = {"then": "continue", "max_hits": 2}
+    judged = bounced(*again, policy=policy, items=items, hits=twice, collisions=seen)
+    assert causes(judged) == ["flew into a known surface"]
+    # half a metre beside is not known
+    beside = [twice[0], replace(twice[1], contact_point_ned_m=(2.2, 0.6, -2.0))]
+    assert causes(bounced(*again, policy=policy, items=items, hits=beside, collisions=seen)) == []
+    # nor is a place that a vehicle that has lost its position takes for another
+    drifted = [twice[0], replace(twice[1], frame_offset_ned_m=(0.0, 0.6, 0.0))]
+    assert causes(bounced(*again, policy=policy, items=items, hits=drifted, collisions=seen)) == []
+    retried = [event(12, "item", step=1), *again[1:]]
+    retry = {"then": "retry", "max_hits": 2}
+    assert causes(bounced(*retried, policy=retry, hits=twice, collisions=seen)) == []
+
+
+def test_a_goal_called_out_of_reach_is_one_behind_something():
+    told = [event(12, "item", step=1), event(12, "unreachable", item="2", then="land"), *LANDS_THERE]
+    judged = bounced(*told, policy=DETOUR)
+    assert causes(judged) == []
+    # with the wall 2 m beside the straight way, which is the line east = 0
+    beside = Wall("wall", (2.2, 2.0, -2.0), (0.0, -1.0, 0.0), 10.0, 10.0, 0.1)
+    assert causes(replace(judged, obstacles={"wall": beside})) == ["gave up a goal in the open"]
+
+
+def test_what_follows_a_goal_out_of_reach_is_what_the_mission_says():
+    told = [event(12, "item", step=1), event(12, "unreachable", item="2", then="return"), *LANDS_THERE]
+    assert causes(bounced(*told, policy=DETOUR)) == ["not as the mission says"]
+
+
+def test_contacts_in_a_recovery_are_the_same_surface_again_or_another():
+    again, other = hit(at_s=10.5), hit(at_s=11.0, obstacle="pole", normal=(1.0, 0.0, 0.0))
+    landing = hit(at_s=15.0, obstacle="step", normal=(0.0, 0.0, -1.0))
+    judged = bounced(hits=[hit(), again, other, landing])
+    assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.NEXT, Role.LANDING]
+    (figures,) = recoveries(judged, contacts_of(judged))
+    assert (figures["again"], figures["others"]) == (1, 1)
+
+
+def test_a_bounce_before_anybody_told_of_the_hit_belongs_to_it():
+    judged = flight(hits=[hit(speed_m_s=0.6), hit(at_s=10.1, speed_m_s=0.6), hit(at_s=10.6, speed_m_s=0.6)])
+    assert [contact.role for contact in contacts_of(judged)] == [Role.HIT, Role.AGAIN, Role.HIT]
+
+
+def test_a_guard_that_swings_in_while_the_vehicle_leaves_is_counted_apart_and_ends_no_recovery():
+    # Given a vehicle that rebounds and runs past its setpoint, whose other guard brushes the wall on the way
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (10.5, 1.3, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(series))
+    assert (figures["again"], figures["returned"]) == (1, 0)
+    assert figures["past_m"] == pytest.approx(0.2, abs=0.02)
+    assert figures["clear_m"] == pytest.approx(0.46, abs=0.01), "from where that guard touched"
+    # and one whose centre comes back for it
+    back = path((0, 0, 0, 0), (10, 2, 0, 2), (10.2, 1.9, 0, 2), (10.3, 1.96, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(back, at_s=10.3))
+    assert (figures["again"], figures["returned"]) == (1, 1)
+
+
+@pytest.mark.parametrize(("at_s", "returned"), [(10.08, 0), (10.2, 1)])
+def test_what_slides_on_to_its_next_guard_has_come_back_only_where_it_could_have_been_turned(at_s, returned):
+    inwards = path((0, 0, 0, 0), (10, 1.8, 0, 2), (at_s, 1.96, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    (figures,) = recoveries(*_touched_again(inwards, at_s))
+    assert (figures["again"], figures["returned"]) == (1, returned)
+
+
+def _touched_again(series, at_s=10.08):
+    judged = bounced(series=series, hits=[hit(), hit(at_s=at_s, place=(1.96, 0.0, -2.08))])
+    return judged, contacts_of(judged)
+
+
+def test_a_recovery_goes_to_the_setpoint_that_was_told_last():
+    # Given a contact that went on from one wall of a corner to the other, of which the companion told twice
+    told = [collision(setpoint=(1.8, 0.0, -2.08), settled_s=None), collision(at_s=10.02)]
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    judged = flight(events_with_hit(*LANDS_THERE), series, [hit()], told)
+    (figures,) = recoveries(judged, contacts_of(judged))
+    assert figures["past_m"] == pytest.approx(0.0, abs=0.01), "0.3 m past the one that was given up"
+    assert figures["settled_s"] == pytest.approx(1.02)
+    assert figures["latency_ms"] == pytest.approx(4.0)
+
+
+def test_past_is_beyond_the_setpoint_as_seen_from_the_contact():
+    # Given a vehicle that slid past an edge and came to rest behind it, 0.1 m beyond its setpoint
+    told = [collision(setpoint=(3.0, 0.0, -2.08))]
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 3.1, 0, 2), (17, 3.1, 0, 2))
+    judged = flight(events_with_hit(*LANDS_THERE), series, [hit()], told)
+    (figures,) = recoveries(judged, contacts_of(judged))
+    assert figures["past_m"] == pytest.approx(0.1, abs=0.01)
+
+
+def test_clear_is_the_nearest_of_the_last_half_second():
+    # Given a vehicle that settles 0.5 m off the wall and then drifts back to 0.2 m
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (11, 1.5, 0, 2), (11.2, 1.8, 0, 2), (17, 1.8, 0, 2))
+    (figures,) = recoveries(bounced(series=series), contacts_of(bounced(series=series)))
+    assert figures["clear_m"] == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_recovery_is_measured_by_truth():
+    # Given a vehicle that, in truth, ran 0.2 m past its setpoint and sank by 0.1 m on the way
+    series = path((0, 0, 0, 0), (10, 2, 0, 2), (10.5, 1.3, 0, 1.9), (11, 1.5, 0, 2), (17, 1.5, 0, 2))
+    judged = bounced(series=series)
+    (figures,) = recoveries(judged, contacts_of(judged))
+    assert figures["past_m"] == pytest.approx(0.2, abs=0.02)
+    assert figures["lost_m"] == pytest.approx(0.1, abs=0.01)
+    assert figures["clear_m"] == pytest.approx(0.5, abs=0.01)
+    assert figures["settled_s"] == pytest.approx(1.004)
+    assert figures["latency_ms"] == pytest.approx(4.0)
+    assert figures["closing_m_s"] == pytest.approx(2.0)
+    assert np.isclose(figures["risen_m"], 0.0)

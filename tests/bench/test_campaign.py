@@ -1,0 +1,151 @@
+"""The campaign engine: who computes, in what order and how often it was broken off changes nothing."""
+
+import json
+import random
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from bench.campaign import run as running
+from bench.campaign.plan import Campaign, work_out
+from bench.campaign.record import Record, RecordError
+from bench.campaign.run import CampaignError, Workers, failures_text, run_campaign
+from tests.rebound_cli.command import ROOT
+
+SCRIPT = """\
+import sys
+from pathlib import Path
+from tests.bench.test_campaign import campaign, table
+from distributed import LocalCluster
+from bench.campaign.run import Workers, run_campaign
+if __name__ == "__main__":
+    who, folder = sys.argv[1], Path(sys.argv[2])
+    if who == "scheduler":
+        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=':0') as cluster:
+            print(table(run_campaign(campaign(), Workers(scheduler=cluster.scheduler_address), folder)))
+    else:
+        print(table(run_campaign(campaign(), Workers(int(who)), folder)))
+"""
+
+
+@dataclass(frozen=True)
+class Throw:
+    """A case that knows its seed; the unlucky ones fail."""
+
+    seed: int
+    fails: bool = False
+
+
+def throw(case):
+    if case.fails:
+        raise ValueError(f"nothing falls upwards, seed {case.seed}")
+    return {"height_m": random.Random(case.seed).random(), "seed": case.seed}
+
+
+def campaign(cases=30, **parameters):
+    throws = [Throw(1000 + number, fails=number in (4, 17)) for number in range(cases)]
+    return Campaign("throws", {"cases": cases, **parameters}, throws, throw)
+
+
+def table(results):
+    return json.dumps([results.results, results.failures])
+
+
+@pytest.fixture
+def in_process(monkeypatch):
+    """Everything in this process, tasks one after the other: what is tested here is not Dask's."""
+
+    def outcomes(campaign, missing, workers):
+        for numbered in missing:
+            yield from work_out(campaign.work_out, [numbered])
+
+    monkeypatch.setattr(running, "_outcomes", outcomes)
+
+
+def test_one_two_or_a_schedulers_workers_give_the_same_bytes(tmp_path):
+    # Given the same campaign in folders of its own
+    texts = []
+    for who in ("1", "2", "scheduler"):
+        # When one process works it out, or two, or the workers of a scheduler that was there before
+        command = [sys.executable, "-c", SCRIPT, who, str(tmp_path / who)]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True, timeout=300)
+        texts.append(done.stdout)
+    # Then the results are the same to the byte, with the failures among them
+    assert texts[0] == texts[1] == texts[2]
+    results, failures = json.loads(texts[0])
+    assert len(results) == 28 and set(failures) == {"4", "17"}
+
+
+def test_a_failing_case_is_listed_with_its_seed_and_cause_and_stops_nothing(tmp_path, in_process):
+    results = run_campaign(campaign(), Workers(), tmp_path)
+    assert set(results.failures) == {4, 17} and set(results.results) == set(range(30)) - {4, 17}
+    text = failures_text(campaign(), results)
+    assert "case 4 failed: ValueError: nothing falls upwards" in text and "seed=1004" in text
+
+
+@pytest.mark.parametrize("torn", ["", '{"case":9,"resu'])
+def test_a_broken_off_campaign_goes_on_and_ends_as_an_unbroken_one(tmp_path, monkeypatch, in_process, torn):
+    # Given a run that ends after ten cases, perhaps in the middle of a line
+    whole = table(run_campaign(campaign(), Workers(), tmp_path / "whole"))
+    (path,) = (tmp_path / "whole").iterdir()
+    (tmp_path / "broken").mkdir()
+    begun = "".join(path.read_text().splitlines(keepends=True)[:11]) + torn
+    (tmp_path / "broken" / path.name).write_text(begun)
+    # When the same campaign is run again
+    again = []
+
+    def outcomes(campaign, missing, workers):
+        again.extend(number for number, _ in missing)
+        yield from work_out(campaign.work_out, missing)
+
+    monkeypatch.setattr(running, "_outcomes", outcomes)
+    resumed = table(run_campaign(campaign(), Workers(), tmp_path / "broken"))
+    # Then only what was missing or had failed is worked out, and the results are the same
+    assert again == [4, *range(10, 30)]
+    assert resumed == whole
+
+
+def test_other_parameters_are_another_campaign(tmp_path):
+    assert campaign(30).key == campaign(30).key
+    assert len({campaign(30).key, campaign(31).key, campaign(30, hits=5).key}) == 3
+
+
+def test_another_version_of_the_code_is_another_campaign(monkeypatch):
+    before = campaign().key
+    monkeypatch.setattr("bench.campaign.plan.code_version", lambda name: "changed")
+    assert campaign().key != before
+
+
+@pytest.mark.parametrize("line", [b"nonsense", b"\xff", b"3", b'{"result":1}', b'{"case":[]}'])
+def test_a_damaged_record_is_refused_with_the_line(tmp_path, line):
+    record = Record(campaign(), tmp_path)
+    record.close()
+    with record.path.open("ab") as file:
+        file.write(line + b"\n")
+    with pytest.raises(RecordError, match=r"is damaged in line 2; move it away\.$"):
+        Record(campaign(), tmp_path)
+
+
+def test_a_file_of_another_campaign_is_refused(tmp_path):
+    wanted = campaign()
+    path = tmp_path / f"throws-{wanted.key}.jsonl"
+    path.write_text('{"campaign":"walks"}\n')
+    with pytest.raises(RecordError, match="another campaign"):
+        Record(wanted, tmp_path)
+
+
+def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(running, "CONNECT_TIMEOUT_S", 0.5)
+    with pytest.raises(CampaignError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
+        run_campaign(campaign(), Workers(scheduler="tcp://127.0.0.1:9"), tmp_path)
+
+
+def test_the_record_grows_one_line_a_case(tmp_path, in_process):
+    run_campaign(campaign(), Workers(), tmp_path)
+    (path,) = Path(tmp_path).iterdir()
+    head, *lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert head["parameters"] == {"cases": 30}
+    assert [line["case"] for line in lines] == list(range(30))

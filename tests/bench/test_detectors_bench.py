@@ -1,0 +1,109 @@
+"""The detectors' bench: its short cut past the bytes, its truth, its verdicts."""
+
+import pytest
+
+from bench.detectors.hits import airframe_of, draw_case, fly_hit
+from bench.detectors.recording import Recording
+from bench.detectors.scoring import first_possible
+from bench.detectors.watching import ASKED_HZ, streams_asked_hz
+from bench.detectors.wire import BUILDERS, Wire
+from companion.detection.interface import Situation
+from companion.mavlink.decode import Decoder
+from companion.messages import ExtendedState, MessageId
+from sim_vehicle.physics.plant import Plant
+from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
+
+# --- the short cut --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rate", ASKED_HZ)
+def test_the_samples_without_bytes_are_those_of_the_whole_wire(rate, monkeypatch):
+    # Given a vehicle that takes off, whose link was asked for the bench's rates before anything else
+    recording, seed = Recording(), 11 + rate
+    step = Plant.step
+
+    def recorded_step(plant, setpoint, armed):
+        output = step(plant, setpoint, armed)
+        recording.add(plant, output, Situation(), 1.0)
+        return output
+
+    monkeypatch.setattr(Plant, "step", recorded_step)
+    client = Client(seed)
+    asked_hz = streams_asked_hz(rate)
+    for message, hz in asked_hz.items():
+        client.command(SET_INTERVAL, message, 1e6 / hz)
+    client.run(0.2)
+    client.command(TAKEOFF)
+    client.command(ARM_DISARM, 1)
+    client.run(6.0)
+    assert client.position()[2] < -1.5
+    # When its packets are decoded as the companion does it
+    decoder = Decoder()
+    decoder.listen_to(1, 1)
+    kinds = {type(BUILDERS[message](recording)(1)) for message in asked_hz}
+    decoded = [sample for raw in client.sent for _, sample in decoder.feed(raw) if type(sample) in kinds]
+    # Then they are, bit by bit and in this order, what the bench makes of the recording
+    made = [sample for step in Wire(recording).heard(asked_hz, seed) for sample in step.samples]
+    assert len(made) > 6 * rate and kinds == {type(sample) for sample in made}
+    assert without_landed_state(decoded) == without_landed_state(made)
+
+
+def without_landed_state(samples):
+    """The bench's flights know their own landed state; here it is only when it comes that counts."""
+    return [ExtendedState if isinstance(sample, ExtendedState) else sample for sample in samples]
+
+
+# --- hits -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_hit_is_drawn_from_its_seed_alone():
+    assert draw_case("plain", 7) == draw_case("plain", 7)
+    drawn = [draw_case("plain", seed) for seed in range(40)]
+    assert {case.airframe for case in drawn} == {"foldable", "rigid"}
+    first, again = (fly_hit(drawn[0], airframe_of(drawn[0])) for _ in range(2))
+    assert first[0].samples == again[0].samples and first[1] == again[1]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_hit_is_the_one_that_was_asked_for(seed):
+    # Given any approach
+    case = draw_case("plain", seed)
+    airframe = airframe_of(case)
+    # When it is flown
+    recording, hit = fly_hit(case, airframe)
+    # Then the vehicle touches at the speed asked for, moving towards the obstacle
+    speed_m_s = sum(v * v for v in hit.impact_velocity_ned_m_s) ** 0.5
+    assert speed_m_s == pytest.approx(case.speed_m_s, rel=0.1, abs=0.1)
+    # And the recorded contact force adds up to the hit's impulse, and there is none before it
+    before = [
+        force
+        for sample, force in zip(recording.samples, recording.contact_m_s2, strict=True)
+        if sample.time_boot_us < hit.contact_at_boot_us
+    ]
+    assert before and not any(before)
+    total_m_s = sum(recording.contact_m_s2) * 1e-6 * airframe.imu.integration_interval_us
+    assert total_m_s >= 0.95 * sum(j * j for j in hit.impulse_ned_n_s) ** 0.5 / airframe.mass_kg
+
+
+def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
+    # Given a hit, heard at every rate
+    case = draw_case("plain", 0)
+    recording, hit = fly_hit(case, airframe_of(case))
+    first_us = {}
+    for rate in ASKED_HZ:
+        arrived = Wire(recording).heard(streams_asked_hz(rate), case.seed)
+        possible = first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1.5)
+        first_us[rate] = possible.time_boot_us
+        # Then the report that came with it was not late, and one with the next sample was late by one
+        after = next(time for time in possible.imu_times_boot_us if time > possible.time_boot_us)
+        assert possible.samples_late(possible.time_boot_us) == 0 and possible.samples_late(after) == 1
+        assert possible.time_boot_us > hit.contact_at_boot_us
+    # And slower streams show it later or at the same time, up to an interval of the stream
+    assert first_us[246] - hit.contact_at_boot_us <= 8_000
+    assert first_us[50] - hit.contact_at_boot_us <= 24_000
+    # And where no force reaches the floor, the hit fell between the samples
+    assert first_possible(recording, arrived, hit.contact_at_boot_us, floor_m_s2=1e6).time_boot_us is None
+
+
+def test_all_streams_of_the_companion_have_a_builder():
+    assert {MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_TARGET} <= set(BUILDERS)

@@ -1,0 +1,154 @@
+"""The bench's hits over a bad link, struck hovers and hands: what is flown, what arrives, and the verdicts."""
+
+import dataclasses
+import math
+
+import pytest
+
+from bench.detectors.campaigns import HANDS_AT_MOST, SIDE_HITS_AT_MOST, hands_campaign, hits_campaign
+from bench.detectors.hands import draw_hand, hover_in_hand, work_out_hand
+from bench.detectors.hits import airframe_of, built_in, draw_case, fly_hit, work_out_hit
+from bench.detectors.links import JITTERY, LINKS, over_link
+from bench.detectors.scoring import first_possible
+from bench.detectors.watching import streams_asked_hz
+from bench.detectors.wire import Wire
+from bench.detectors_report.bars import MET, MISSED
+from bench.detectors_report.families import families_text, family_bars, hand_bars, hands_text
+from bench.detectors_report.numbers import Hits
+from companion.messages import ImuSample
+
+# --- a bad link -------------------------------------------------------------------------------------------------------
+
+
+def sent_and_arrived(fault, seed=4):
+    case = draw_case("link", 0)
+    recording, hit = fly_hit(case, airframe_of(case))
+    sent = Wire(recording).heard(streams_asked_hz(246), seed)
+    return recording, hit, sent, over_link(sent, recording, fault, seed)
+
+
+def imu_stamps(heard):
+    return [s.time_boot_us for step in heard for s in step.samples if isinstance(s, ImuSample)]
+
+
+def test_a_bad_link_delays_loses_and_reorders_and_adds_nothing():
+    # Given what a vehicle sent, over a link with jitter, loss and packets that are overtaken
+    recording, _, sent, arrived = sent_and_arrived(LINKS[JITTERY])
+    before, after = imu_stamps(sent), imu_stamps(arrived)
+    # Then about one in a hundred is missing, what comes is what was sent, some of it after its followers
+    assert 0.0 < 1.0 - len(after) / len(before) < 0.04
+    assert set(after) < set(before) and len(set(after)) == len(after)
+    assert after != sorted(after)
+    # And nothing comes before it was sent, or later than jitter and overtaking can make it
+    late_us = [step.time_boot_us - s.time_boot_us for step in arrived for s in step.samples if isinstance(s, ImuSample)]
+    assert min(late_us) >= 0 and 8_000 < max(late_us) <= 31_000
+    # And each arrival is in the interval whose situation the companion knows by then
+    assert all(recording.samples[step.index].time_boot_us <= step.time_boot_us for step in arrived)
+    # And the same seed loses the same
+    assert sent_and_arrived(LINKS[JITTERY])[3] == arrived
+
+
+def test_a_link_that_only_delays_shows_the_hit_by_so_much_later():
+    # Given a link on which everything takes 50 ms
+    fault = LINKS[JITTERY].model_copy(update={"jitter_s": 0.0, "loss": 0.0, "reorder": 0.0, "delay_s": 0.05})
+    recording, hit, sent, arrived = sent_and_arrived(fault)
+    touch_us = hit.contact_at_boot_us
+    # Then the first sample that shows the hit is the same one, heard 50 ms later, to the millisecond
+    direct = first_possible(recording, sent, touch_us, 1.5).time_boot_us
+    delayed = first_possible(recording, arrived, touch_us, 1.5).time_boot_us
+    assert 50_000 <= delayed - direct <= 51_000
+
+
+# --- struck in hover --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
+    # Given an obstacle of any kind that comes at a hovering vehicle
+    case = draw_case("struck", seed, is_struck=True)
+    _, hit = fly_hit(case, airframe_of(case))
+    # Then it is the obstacle that moves, at the speed asked for, and it meets the vehicle head-on or at a slant
+    assert 0.5 <= case.speed_m_s <= 3.0
+    assert math.hypot(*hit.impact_velocity_ned_m_s) < 0.15
+    assert math.hypot(*hit.surface_velocity_ned_m_s) == pytest.approx(case.speed_m_s, rel=0.01)
+    assert sum(v * n for v, n in zip(hit.surface_velocity_ned_m_s, hit.normal_ned, strict=True)) > 0.0
+
+
+# --- hands ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_a_hand_holds_or_pushes_a_hovering_vehicle(seed):
+    # Given a hand that holds (first) or pushes (second)
+    case = draw_hand(seed, ())
+    recording, began_us = hover_in_hand(case, built_in(case.airframe))
+    samples = recording.samples
+    moved_m = [math.dist(s.position_ned_m, (0.0, 0.0, -30.0)) for s in samples if s.time_boot_us < began_us]
+    # Then it hovered until then, and nothing of it is an obstacle
+    assert samples[-1].time_boot_us > began_us + 0.8e6 and max(moved_m) < 0.3
+    assert not any(recording.contact_m_s2)
+    # And the push is felt sideways
+    felt = max(math.hypot(*s.specific_force_frd_m_s2[:2]) for s in samples if s.time_boot_us > began_us)
+    assert felt > 1.5 if case.grip == "pushed" else felt < 8.0
+
+
+# --- numbers and verdicts ---------------------------------------------------------------------------------------------
+
+
+def test_every_bench_has_some_of_each_and_a_large_one_not_too_many():
+    for hits, side, hands in ((4, 2, 4), (10_000, SIDE_HITS_AT_MOST, HANDS_AT_MOST)):
+        families = [case.family for case in hits_campaign(hits).cases]
+        assert families.count("link") == families.count("struck") == side
+        assert len(hands_campaign(hits).cases) == hands
+
+
+def made_up(**changes):
+    """A hit over a bad link and a struck hover for each airframe, all found; `changes` in every one."""
+    cases = [draw_case("link", seed, ("fused",), link=JITTERY) for seed in (0, 1)]
+    cases += [draw_case("struck", seed, ("fused",), is_struck=True) for seed in (0, 1)]
+    cases = [dataclasses.replace(case, speed_m_s=1.0) for case in cases]
+    entry = {"false": 0, "blind": 0, "latency_ms": 2.0, "kind": "wall", "touches": 0, **changes}
+    entry = {key: value for key, value in entry.items() if value is not None}
+    rate = {"possible_ms": 2.0, "detectors": {"fused": entry}}
+    return Hits(cases, {n: {"rates": {"50": rate, "100": rate, "246": rate}} for n in range(4)})
+
+
+def test_a_hit_missed_over_a_bad_link_or_in_hover_misses_the_bar():
+    assert {bar.verdict for bar in family_bars(made_up())} == {MET} and len(family_bars(made_up())) == 12
+    assert {bar.verdict for bar in family_bars(made_up(latency_ms=None))} == {MISSED}
+    assert "| struck in hover | fused | rigid | 246 | 1 | 100.00 | 2.0 / 2.0 | 0 | 0 | 0 | wall 1 |" in families_text(
+        made_up()
+    )
+
+
+def test_one_hand_taken_for_a_collision_misses_the_bar():
+    cases = [draw_hand(seed, ("fused",)) for seed in range(4)]
+
+    def results(collisions):
+        held = {"collisions": collisions, "told_after_ms": 40.0}
+        return {n: {"rates": {str(hz): {"detectors": {"fused": held}} for hz in (50, 100, 246)}} for n in range(4)}
+
+    assert {bar.verdict for bar in hand_bars(cases, results([]))} == {MET}
+    assert {bar.verdict for bar in hand_bars(cases, results(["wall"]))} == {MISSED}
+    assert "| held | fused | 246 | 2 | 0 | 2 | 40.0 |  |" in hands_text(cases, results([]))
+
+
+def test_the_default_detector_finds_them_and_lets_hands_be():
+    # Given a hit over a bad link, an obstacle that comes, and a hand
+    for settings in ({"link": JITTERY}, {"is_struck": True}):
+        scored = work_out_hit(draw_case("any", 1, ("fused",), **settings))
+        # Then the hits are found at every rate, with no alarm before, and the hand is no collision
+        for at_rate in scored["rates"].values():
+            assert "latency_ms" in at_rate["detectors"]["fused"] and at_rate["detectors"]["fused"]["false"] == 0
+    for at_rate in work_out_hand(draw_hand(6, ("fused",)))["rates"].values():
+        entry = at_rate["detectors"]["fused"]
+        assert entry["collisions"] == [] and entry["told_after_ms"] is not None
+
+
+def test_the_echo_of_a_stiff_hit_does_not_turn_the_obstacle_round():
+    # Given a rigid frame's head-on hit of 2.7 m/s that fell between the samples of 50 Hz but for a faint echo
+    scored = work_out_hit(draw_case("plain", 11, ("fused",)))
+    fused = scored["rates"]["50"]["detectors"]["fused"]
+    # Then it is found, and the normal is that of something in the vehicle's way, whatever the echo would explain
+    assert fused["evidence"] == "force" and scored["off_head_on_deg"] < 5.0
+    assert fused["normal_error_deg"] < 20.0
