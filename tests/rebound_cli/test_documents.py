@@ -196,3 +196,21 @@ def test_a_wire_fault_on_a_message_that_there_is_not_is_found_before_the_flight(
     fault = "  faults:\n    - {kind: wire, at_s: 1, loss: 1.0, messages: [ATTITUDE, ATITUDE]}\n"
     text = complaint(world_from, parse_document(MISSION + fault, "demo.yaml"))
     assert text == "demo.yaml:12: no MAVLink message is called 'ATITUDE'."
+
+
+def test_thousands_of_faults_are_told_after_the_schema_was_looked_at_once(monkeypatch):
+    # Given a mission with the same mistake on every line
+    asked = []
+
+    class Counted(Mission):
+        @classmethod
+        def model_json_schema(cls, *arguments, **options):
+            asked.append(cls)
+            return super().model_json_schema(*arguments, **options)
+
+    lines = "".join(f"  - wait: {{mistake{n}: 1}}\n" for n in range(200))
+    found = parse_document(f"name: demo\nitems:\n{lines}", "demo.yaml")
+    # When it is checked, then the answer is short, and did not take a schema a fault
+    text = complaint(validated, Counted, found, found.data)
+    assert len(text.splitlines()) == 6 and "more" in text
+    assert len(asked) == 1
