@@ -162,8 +162,6 @@ def _fly_lockstep(flight: Flight) -> Flown:
 
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
-    from rebound_cli.figure.flight import draw_flight
-
     world = flight.world
     facts = FlightFacts(
         mission=flight.mission.name,
@@ -179,7 +177,11 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
         console.print(f"\n  {writer.loss} ({writer.lost} steps)")
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
-        draw_flight(flight.folder, flight.mission, world.scene if world else None, flown.report, flown.truth)
+        if world is not None:
+            # A drone draws nothing: `rebound replay` does, wherever the folder is taken.
+            from rebound_cli.figure.flight import draw_flight
+
+            draw_flight(flight.folder, flight.mission, world.scene, flown.report, flown.truth)
         console.print(f"\n  everything is in {flight.folder}/")
     finally:
         if json_on_stdout:

@@ -29,6 +29,17 @@ _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 COMMANDING = ("fly", "guard")
 
 
+# What a drone does without, and the extra that brings it.
+EXTRAS = {
+    "numba": "sim",
+    "pygeomag": "sim",
+    "ambiance": "sim",
+    "matplotlib": "sim",
+    "pyulog": "logs",
+    "mavsdk": "mavsdk",
+    "distributed": "bench",
+}
+
 # Studies that were commands of the drone's program once, and what they are in the laboratory.
 MOVED = {
     "paper": "paper",
@@ -57,6 +68,12 @@ def run(options: argparse.Namespace, program: str) -> int:
         return int(options.run(options))
     except (ReboundError, SimulationError) as error:
         print(f"{program}: {error}", file=sys.stderr)
+        return EXIT_ERROR
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get((error.name or "").partition(".")[0])
+        if extra is None:
+            raise
+        print(f"{program}: this needs {error.name}: pip install 'px4-rebound[{extra}]'.", file=sys.stderr)
         return EXIT_ERROR
     except KeyboardInterrupt:
         text = "ended at once"

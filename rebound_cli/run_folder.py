@@ -4,6 +4,7 @@ import json
 import os
 import platform
 import re
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -214,5 +215,6 @@ def versions() -> dict[str, str]:
     """What a replay needs to match: the program, Python, the machine and the packages."""
     found = {"px4-rebound": __version__, "python": platform.python_version(), "machine": platform.platform()}
     for package in _VERSIONED_PACKAGES:
-        found[package] = metadata.version(package)
+        with suppress(metadata.PackageNotFoundError):
+            found[package] = metadata.version(package)
     return found

@@ -144,6 +144,9 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
     if not watch.losses_told and watch.state.phase is Phase.ARMED and now_us - watch.started_us >= HEARD_US:
         watch.losses_told = True
+        if watch.config.estimate.fits_normal and not watch.estimator.fits_normal:
+            text = "an obstacle's normal comes from its push alone: install px4-rebound[fit]"
+            notices.append(Notice("loss", text, {}))
         for message, loss in watch.detector.losses.items():
             if message not in watch.heard:
                 notices.append(Notice("loss", f"no {message.name}: {loss}", {}))

@@ -20,9 +20,16 @@ import math
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+try:
+    import numba
+except ImportError:
+    # The extra [fit] is not installed: a drone does without the fit.
+    numba = None
+
+IS_COMPILED = numba is not None
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -57,11 +64,13 @@ MOTORS_S, MOTORS_RAD_S2, YAW_SHARE = 0.025, 100.0, 0.3
 
 def _compiled(function: Kernel) -> Kernel:
     """To machine code, kept for the next start. No fast-math: the same inputs have to give the same bits."""
-    return cast(Kernel, numba.njit(cache=True, fastmath=False, nogil=True)(function))
+    return function if numba is None else cast(Kernel, numba.njit(cache=True, fastmath=False, nogil=True)(function))
 
 
 def _inlined(function: Kernel) -> Kernel:
     """The same, put into whatever calls it."""
+    if numba is None:
+        return function
     return cast(Kernel, numba.njit(cache=True, fastmath=False, forceinline=True)(function))
 
 

@@ -12,7 +12,7 @@ from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
 from companion.estimate.collision import STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
 from companion.estimate.facing import normal_by, whole_normal
 from companion.estimate.history import MotionHistory
-from companion.estimate.normal import Search, begin, further
+from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
 from companion.estimate.push import Push, unit
 from companion.estimate.rotation import body_to_ned, turned
 from companion.estimate.strapdown import Strapdown
@@ -90,6 +90,11 @@ class ImpactEstimator:
     contact_ended_boot_us: int | None = None
     clipping_counts: tuple[int, int, int] | None = None
 
+    @property
+    def fits_normal(self) -> bool:
+        """Whether a touch is fitted for its normal: where it is wanted, and the extra [fit] is installed."""
+        return self.config.fits_normal and IS_AVAILABLE
+
     def hear(self, sample: Sample) -> None:
         """Take one sample of any kind."""
         if isinstance(sample, ImuSample):
@@ -128,7 +133,7 @@ class ImpactEstimator:
     def _seek(self, push: Push) -> None:
         """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
         estimate, search, config = self.estimate, self.search, self.config
-        if estimate is None or not config.fits_normal:
+        if estimate is None or not self.fits_normal:
             return
         if search is None:
             if push.is_heard or self.is_over:
@@ -142,7 +147,7 @@ class ImpactEstimator:
     @property
     def _seeks(self) -> bool:
         """Whether the normal is still to come."""
-        is_wanted = self.push is not None and self.config.fits_normal
+        is_wanted = self.push is not None and self.fits_normal
         return is_wanted and (self.search is None or not self.search.is_over)
 
     def _clipped(self, sample: Vibration) -> None:

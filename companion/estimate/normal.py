@@ -27,6 +27,8 @@ from companion.estimate.suppositions import Floats, Known, Touch, Trials, known_
 from companion.messages import Attitude, ImuSample, Vector3
 from companion.mission.config import GuardsConfig
 
+# Without machine code the search would take seconds.
+IS_AVAILABLE = g.IS_COMPILED
 # Suppositions that are followed in one piece of work: two milliseconds here. Nine messages are then enough, and the
 # normal is there before the recovery asks for it (flight.recovering), also where two hundred come in a second.
 FOLLOWED = 400
@@ -93,6 +95,8 @@ def normal_of(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, ave
 @lru_cache(maxsize=1)
 def prepare() -> None:
     """Compile, or load what the last start compiled: seconds that a flight does not have."""
+    if not IS_AVAILABLE:
+        return
     samples = [ImuSample(4_000 * number, (-float(number), 0.0, -10.0), (0.0, 0.0, 0.0)) for number in range(2)]
     touch = Touch((0.0, 0.0, -10.0), samples, [Attitude(0, (1.0, 0.0, 0.0, 0.0))])
     normal_of(touch, (1.0, 0.0, 0.0), GuardsConfig(), 0.004)

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from pygeomag import GeoMag
 
 from sim_vehicle.hil.messages import Air, Place
 from sim_vehicle.world import Vector3
@@ -41,6 +40,9 @@ def place_at(position_ned_m: Vector3, home: Place = HOME) -> Place:
 
 def magnetic_field_ned_gauss(home: Place = HOME, year: float = FIELD_YEAR) -> Vector3:
     """The World Magnetic Model's field, the same all over a scene."""
+    # Here, as below: only a vehicle that is simulated needs it.
+    from pygeomag import GeoMag
+
     field = GeoMag(coefficients_file=_FIELD_MODEL).calculate(
         glat=home.latitude_deg, glon=home.longitude_deg, alt=home.altitude_m / 1000, time=year
     )

@@ -79,7 +79,7 @@ class Broken(ConfirmAtOnce):
 
     def poll(self, companion):
         super().poll(companion)
-        if companion.status().state == "mission" or companion.status().state == "landing":
+        if companion.status().state == "takeoff" and companion.status().armed:
             raise ValueError("nobody thought of this")
 
 

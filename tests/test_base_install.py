@@ -1,0 +1,54 @@
+"""What a drone installs is enough for what a drone does: tried in a process that has no more."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+# Everything that only an extra brings; filterpy's own matplotlib is there, and must not be imported either.
+LEFT_OUT = ("numba", "matplotlib", "distributed", "dask", "mavsdk", "pyulog", "pygeomag", "ambiance", "pytest")
+WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"
+QUICK = "'--set', 'companion.link.heartbeat_wait_s=0.2'"
+
+
+def alone(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", WITHOUT + code], cwd=ROOT, capture_output=True, text=True, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("'guard', '--connect', 'udpin://127.0.0.1:0', '--out', folder, " + QUICK, "No HEARTBEAT"),
+        ("'fly', 'missions/square.yaml', '--connect', 'udpin://127.0.0.1:0', '--out', folder, " + QUICK, "HEARTBEAT"),
+        ("'fly', 'missions/square.yaml', '--lockstep', '--out', folder", "pip install 'px4-rebound[sim]'"),
+        ("'sim'", "pip install 'px4-rebound[sim]'"),
+        ("'replay', 'some.ulg'", "pip install 'px4-rebound[logs]'"),
+    ],
+)
+def test_each_command_works_or_names_the_extra_that_it_needs(tmp_path, command, words):
+    code = f"from rebound_cli.main import main\nfolder = {str(tmp_path / 'run')!r}\nsys.exit(main([{command}]))"
+    done = alone(code, tmp_path)
+    assert done.returncode == 1 and "Traceback" not in done.stderr, done.stderr
+    assert words in done.stderr + done.stdout
+
+
+def test_a_mission_is_flown_and_a_wall_recovered_from(tmp_path):
+    code = """
+from tests.companion.fake_vehicle import FakeVehicle, flight
+f = flight(FakeVehicle(wall_north_m=3.0), items=[
+    {"takeoff": {"height_m": 1.5}}, {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}}, {"land": {}}])
+f.run_to("holding")
+f.run_to_end()
+assert len(f.companion.report().collisions) == 1 and f.companion.report().outcome == "completed"
+assert any("px4-rebound[fit]" in text for text in f.texts())
+"""
+    done = alone(code, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_help_imports_nothing_that_is_slow():
+    code = "import sys\nfrom rebound_cli.main import build_parser\nbuild_parser()\nprint(*sys.modules)"
+    imported = alone(code, ROOT).stdout.split()
+    assert not {"numpy", "scipy", "pydantic", "pymavlink", "shapely", "sim_vehicle", "yaml"} & set(imported)
