@@ -166,4 +166,5 @@ class Companion:
             obstacles=all_known(flight),
             unreachable=tuple(flight.unreachable),
             refused_messages=dict(flight.refusals.counts),
+            unconfirmed=flight.unconfirmed,
         )

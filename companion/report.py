@@ -82,7 +82,8 @@ class FlightReport:
     `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission coordinates.
     `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits, in mission
     coordinates. `unreachable` are the labels of items, or "home", to which that left no way. `refused_messages` counts
-    the vehicle's messages that were not believed, by name.
+    the vehicle's messages that were not believed, by name. `unconfirmed` counts the hits that were none: one sample
+    showed them, and nothing else.
     """
 
     outcome: Outcome
@@ -98,3 +99,4 @@ class FlightReport:
     obstacles: tuple[Patch, ...] = ()
     unreachable: tuple[str, ...] = ()
     refused_messages: Mapping[str, int] = field(default_factory=dict)
+    unconfirmed: int = 0

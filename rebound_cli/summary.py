@@ -66,6 +66,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         **(flown.timing or Timing()).summary(),
         "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
         "refused_messages": dict(report.refused_messages),
+        "unconfirmed": report.unconfirmed,
         "false_detections": matches.false_detections if matches else None,
         "missed_contacts": matches.missed_contacts if matches else None,
         "recontacts": matches.recontacts if matches else None,

@@ -47,7 +47,7 @@ class ImpactEstimate:
     obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
     IMU sample. `is_lower_bound`: the sensor clipped, or part of the contact was not seen, and both may be larger.
     `may_be_clipped`: the sensor's range may not have been enough, and then the vehicle's own estimate lacks what it did
-    not show. `is_final`: the contact is over.
+    not show. `is_final`: the contact is over. `earlier` is the IMU sample before the first one that shows it.
     """
 
     impact: Impact
@@ -64,6 +64,7 @@ class ImpactEstimate:
     kind: ImpactKind
     confidence: float
     is_final: bool
+    earlier: ImuSample | None = None
 
 
 @dataclass(slots=True)
@@ -197,6 +198,7 @@ class ImpactEstimator:
             kind=impact.kind,
             confidence=impact.confidence,
             is_final=False,
+            earlier=self.earlier_imu,
         )
         return estimate
 

@@ -1,6 +1,6 @@
 """The mission's policy for hits: decided at each hit, acted on when the vehicle has settled."""
 
-from companion.flight.context import AfterRecovery, FlightContext, Move
+from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Move, Target
 from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.policy import OnCollision
@@ -71,3 +71,39 @@ def afterwards(flight: FlightContext) -> Move:
     """What was decided, as a move."""
     after = flight.after_recovery
     return Move(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)
+
+
+# What goes on after a hit that was none.
+_GOES_ON = {
+    State.TAKEOFF: Trigger.RECOVERED_TO_CONTINUE,
+    State.MISSION: Trigger.RECOVERED_TO_RETRY,
+    State.HOLDING: Trigger.RECOVERED_TO_HOLD,
+    State.RETURNING: Trigger.RECOVERED_TO_RETURN,
+    State.LANDING: Trigger.RECOVERED_TO_LAND,
+}
+
+
+def note_before(flight: FlightContext, state: State) -> None:
+    """What the hit that is about to be recorded changes. Within a recovery the one that began it counts."""
+    tally = flight.tally
+    if state is State.RECOVERING:
+        flight.before_hit = None
+    else:
+        flight.before_hit = BeforeHit(state, flight.step_index, tally.hits, tally.pace_factor, flight.after_recovery)
+
+
+def take_back(flight: FlightContext, now_us: int) -> Move | None:
+    """The newest hit was none: it is forgotten, and what it interrupted goes on from here. None within a recovery that
+    another hit began."""
+    before, latest = flight.before_hit, flight.vehicle.history.latest()
+    if before is None or latest is None:
+        return None
+    flight.collisions.pop()
+    flight.unconfirmed += 1
+    text = "not a hit: one sample showed a push, and nothing else did; going on"
+    flight.tell(now_us, "unconfirmed", text, count=flight.unconfirmed)
+    flight.tally.hits, flight.tally.pace_factor = before.step_hits, before.pace_factor
+    flight.step_index = max(before.step_index, 1) if before.state is State.TAKEOFF else before.step_index
+    flight.after_recovery = before.after_recovery
+    flight.target = Target(latest.position_ned_m, flight.yaw_rad)
+    return Move(_GOES_ON[before.state])

@@ -8,6 +8,7 @@ from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
+from companion.flight.confirming import DECIDED_US, Claim, contradicts
 from companion.messages import Attitude, LocalPosition, Vector3
 from companion.recovery.climb import Climb
 from companion.recovery.direction import away_from
@@ -51,6 +52,7 @@ class CollisionRecord:
     is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
+    claim: Claim | None = None  # of the first sample, until something else shows the hit, too
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
@@ -59,6 +61,8 @@ class CollisionRecord:
 
     def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
         """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
+        if self.claim is not None:
+            self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
@@ -73,6 +77,8 @@ class CollisionRecord:
     ) -> None:
         """While the contact lasts: its largest force and its end; the normal as it is known by now."""
         self.fixes = fixes
+        if self.claim is not None and (self._is_seen_again(state, self.claim) or self.claim.is_turned):
+            self.claim = None
         if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
             return
         if estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
@@ -84,6 +90,18 @@ class CollisionRecord:
         self.impulse_m_s = estimate.impulse_m_s
         self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
         self.is_clipped = estimate.is_lower_bound
+
+    def _is_seen_again(self, state: DetectorState, claim: Claim) -> bool:
+        """Another sample of the contact's force has come."""
+        return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > claim.time_boot_us
+
+    def is_contradicted(self, now_boot_us: int) -> bool:
+        """Whether, once that is decided, nothing but its first sample shows this hit."""
+        if self.claim is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
+            return False
+        found = contradicts(self.fixes, self.claim)
+        self.claim = None
+        return found
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""

@@ -10,7 +10,7 @@ from companion.flight.commander import Commander, CommandOutcome
 from companion.flight.course import Pace
 from companion.flight.leaning import Leaning
 from companion.flight.pressing import Pressing
-from companion.flight.states import Trigger
+from companion.flight.states import State, Trigger
 from companion.link.refusals import Refusals
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
@@ -97,6 +97,17 @@ class AfterRecovery:
     text: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class BeforeHit:
+    """What a hit changes, as it was: taken up again where the hit turns out to be none."""
+
+    state: State
+    step_index: int
+    step_hits: int
+    pace_factor: float
+    after_recovery: AfterRecovery
+
+
 @dataclass(slots=True)
 class Expectation:
     """An assertion of the mission's: pending until `met` is known."""
@@ -148,6 +159,8 @@ class FlightContext:
     file_is_there: bool = False
     expectations: list[Expectation] = field(default_factory=list)
     collisions: list[CollisionRecord] = field(default_factory=list)
+    before_hit: BeforeHit | None = None
+    unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it

@@ -4,7 +4,7 @@ import traceback
 from dataclasses import dataclass
 
 from companion.flight import expecting
-from companion.flight.after_hit import decide, lands_anyway
+from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
 from companion.flight.guards import ON_THE_GROUND, guard
@@ -42,6 +42,7 @@ class Machine:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.activity, FlyItems):
                     self.activity.interrupt(now_us)
+                note_before(self.flight, self.state)
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)
                 self._take(Move(Trigger.COLLISION), now_us)

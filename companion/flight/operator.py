@@ -75,6 +75,7 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "envelope": _as_it_stands,
     "link": _as_it_stands,
     "implausible": _as_it_stands,
+    "unconfirmed": _as_it_stands,
     "take_over": _as_it_stands,
     "given_back": _as_it_stands,
     "let_go": _as_it_stands,

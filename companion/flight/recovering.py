@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
-from companion.flight.after_hit import afterwards
+from companion.flight.after_hit import afterwards, take_back
 from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, overtaken
 from companion.flight.collision import CollisionRecord
+from companion.flight.confirming import Claim, claim_of
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
 from companion.flight.pinned import Hanging, has_room_below, let_go
@@ -91,6 +93,10 @@ class Recover:
         record = self._record
         self._hang(flight, now_us)
         for sample in inputs.positions:
+            if record.is_contradicted(sample.time_boot_us):
+                move = take_back(flight, now_us)
+                if move is not None:
+                    return move
             if not self._believes(flight, sample):
                 continue
             record.follow_recovery(sample)
@@ -247,9 +253,19 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         inherits_doubt=doubted is not None,
         climb=climb,
         is_behind=behind is not None,
+        claim=_claim(flight, estimate),
     )
     flight.collisions.append(record)
     tell_detection(flight, record, now_us)
+
+
+def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | None:
+    """What the first sample says alone; None where that is not known, or the vehicle recovers from another hit."""
+    attitude = flight.vehicle.attitude
+    if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
+        return None
+    force_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
+    return claim_of(estimate, force_ned, flight.mission.companion.estimate.imu_averaging_interval_s)
 
 
 def _doubted(flight: FlightContext) -> CollisionRecord | None:

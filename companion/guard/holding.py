@@ -44,7 +44,7 @@ class TakeOver:
             text = "OFFBOARD already, the program's setpoints kept out" if outcome is None else "OFFBOARD confirmed"
             flight.tell(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return Move(Trigger.CONFIRMED)
-        self.recover.step(flight, inputs.flight, now_us)
+        recovered(guard, self.recover, inputs.flight, now_us)
         if outcome is not None:
             return Move(Trigger.NOT_CONFIRMED, outcome.text)
         if took_ms > guard.config.confirm_within_s * 1e3:
@@ -69,7 +69,15 @@ class Recovering:
         if self._foreign >= CROSSED_TIMES:
             guard.program_elsewhere = True
             return Move(Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own")
-        return Move(Trigger.SETTLED) if self._recover.step(guard.flight, inputs.flight, now_us) is not None else None
+        return Move(Trigger.SETTLED) if recovered(guard, self._recover, inputs.flight, now_us) else None
+
+
+def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int) -> bool:
+    """One step of the recovery; whether it is over, be it that the hit was none, which then does not count."""
+    before = guard.flight.unconfirmed
+    is_over = recover.step(guard.flight, inputs, now_us) is not None
+    guard.hits -= guard.flight.unconfirmed - before
+    return is_over
 
 
 def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:

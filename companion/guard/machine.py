@@ -5,8 +5,10 @@ import traceback
 from dataclasses import dataclass
 
 from companion.estimate.rotation import yaw_rad
+from companion.flight.after_hit import note_before
 from companion.flight.authority import Holder, who_decided
 from companion.flight.recovering import Recover, record_collision
+from companion.flight.states import State as FlightState
 from companion.guard.context import Activity, GuardContext, GuardInputs, Move
 from companion.guard.holding import GiveBack, Recovering, TakeOver
 from companion.guard.override import has_moved
@@ -61,6 +63,8 @@ class GuardMachine:
                 self.guard.flight.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif TABLE.moves(self.state, trigger):
                 self._remember_hit(now_us)
+                is_first = self.state is State.WATCHING
+                note_before(self.guard.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.guard.flight, estimate, now_us)
                 self._take(Move(trigger), now_us)
         move = self.activity.step(self.guard, inputs, now_us)

@@ -29,6 +29,9 @@ def _imu(
 ) -> ImuSample | Refused | None:
     if updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED:
         return None
+    if x == y == z == 0.0:
+        # Not even in free fall: every accelerometer has noise. A sensor that is off reads so.
+        return Refused("HIGHRES_IMU", "the accelerometer reads zero on all axes")
     if not (within(SPECIFIC_FORCE_M_S2, x, y, z) and within(ANGULAR_VELOCITY_RAD_S, p, q, r) and time_us < TIME_US):
         text = f"specific force {x:g} {y:g} {z:g} m/s^2, rates {p:g} {q:g} {r:g} rad/s at {time_us} us"
         return Refused("HIGHRES_IMU", text)

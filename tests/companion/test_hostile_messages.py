@@ -66,6 +66,19 @@ def test_gyroscopes_that_are_never_a_number_are_no_hits_but_told_and_end_the_mis
     assert "blind" in f.companion.report().reason
 
 
+def test_an_accelerometer_that_reads_zero_for_a_second_is_no_hit():
+    f = flight_in("mission")
+    f.vehicle.no_imu = True
+    for _ in range(300):
+        zero = mav.MAVLink_highres_imu_message(f.vehicle.time_us, *[0.0] * 13, 0x3F)
+        attacked(f, [bytes(zero.pack(mav.MAVLink(None, 1, 1)))])
+    f.vehicle.no_imu = False
+    for _ in range(250):
+        attacked(f, [])
+    assert f.state == "mission" and f.companion.report().collisions == ()
+    assert "the accelerometer reads zero on all axes" in f.event("implausible").text
+
+
 @pytest.mark.parametrize(
     ("message_id", "field", "value"),
     [

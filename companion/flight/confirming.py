@@ -1,0 +1,81 @@
+"""Was it a hit? One sample is answered at once; it counts as a hit when something else shows it, too.
+
+One row is an accelerometer's sample. A second one is another sample of the contact's force; or rates of turn that no
+motor makes so fast; or the vehicle's own velocity, which a true push of the length of that sample's mean must have
+changed. A broken or forged packet does none of this: rates and velocity go on as all other samples say.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.detection.interface import Evidence
+from companion.estimate.approach import VelocityFix
+from companion.estimate.guards import MOTORS_RAD_S2
+from companion.estimate.impact import ImpactEstimate
+from companion.messages import ImuSample, Vector3
+
+# All but the longest contacts are over (0.12 s at 1 m/s), and the vehicle's estimate is 20 to 40 ms late. A setpoint
+# that leans by 17 degrees for so long moves a vehicle by 3 cm.
+DECIDED_US = 150_000
+LATE_US = 40_000
+# What the velocity was is taken from as long before; the estimate's own slow errors are the smaller the shorter it is.
+BEFORE_US = DECIDED_US
+# Three standard deviations: what the velocity cannot tell from its own noise does not speak against a hit.
+SURE = 3.0
+
+
+@dataclass(slots=True)
+class Claim:
+    """What one sample says alone: a contact's force per unit mass, local NED, as a mean over a window."""
+
+    time_boot_us: int
+    earlier: ImuSample  # the one before
+    force_ned_m_s2: Vector3
+    averaging_s: float
+    later_boot_us: int | None = None  # of the one after, once it has come
+    is_turned: bool = False  # by it, as no motor turns
+
+    def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
+        """With the newest IMU sample: the first one after the claim's shows how the vehicle turns now."""
+        if self.later_boot_us is None and time_boot_us > self.time_boot_us:
+            self.later_boot_us = time_boot_us
+            elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)
+            turned = math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s)
+            self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
+
+
+def claim_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Claim | None:
+    """None where more than one sample or message has spoken already."""
+    impact = estimate.impact
+    if impact.evidence is not Evidence.FORCE or estimate.is_final or estimate.earlier is None:
+        return None
+    return Claim(impact.sample_time_boot_us, estimate.earlier, force_ned_m_s2, averaging_s)
+
+
+def contradicts(fixes: Sequence[VelocityFix], claim: Claim) -> bool:
+    """Whether the velocities after the sample show that the push it claims has not been.
+
+    `fixes` hold each velocity beside the accelerometer's sum (trapezoids). Without the claimed sample's own share in
+    the sum, the velocity of a vehicle that was pushed is ahead of it, by the whole impulse; of one that was not, it is
+    where it was.
+    """
+    hit_us, later_us = claim.time_boot_us, claim.later_boot_us
+    before = [fix for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
+    after = [fix for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
+    size_m_s2 = math.hypot(*claim.force_ned_m_s2)
+    if len(before) < 2 or len(after) < 2 or later_us is None or size_m_s2 == 0.0:
+        return False
+    away = tuple(part / size_m_s2 for part in claim.force_ned_m_s2)
+    was, came = [_ahead(fix, away) for fix in before], [_ahead(fix, away) for fix in after]
+    mean_was, mean_came = sum(was) / len(was), sum(came) / len(came)
+    noise = math.sqrt(sum((value - mean_was) ** 2 for value in was) / (len(was) - 1))
+    spread = noise * math.sqrt(1.0 / len(was) + 1.0 / len(came))
+    in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - claim.earlier.time_boot_us)
+    pushed_m_s, least_m_s = mean_came - mean_was + in_sum_m_s, 0.5 * size_m_s2 * claim.averaging_s
+    return pushed_m_s < least_m_s and least_m_s > SURE * spread
+
+
+def _ahead(fix: VelocityFix, away: Sequence[float]) -> float:
+    """The velocity less the accelerometer's sum, along a direction."""
+    return sum(a * (v - s) for a, v, s in zip(away, fix.velocity_ned_m_s, fix.sum_ned_m_s, strict=True))

@@ -1,0 +1,124 @@
+"""One packet alone is answered at once and counts for nothing: a second row confirms a hit within 150 ms."""
+
+import math
+from dataclasses import dataclass, field
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.companion import Companion
+from companion.report import Event
+from rebound_cli.documents import apply_overrides, parse_document
+from rebound_cli.inputs import mission_from, world_from
+from sim_vehicle.vehicle import SimulatedVehicle
+
+EPOCH_US = 1_600_000_000_000_000
+MISSION = """\
+name: forged
+items:
+  - takeoff: {height_m: 1.5}
+  - go_to: {position_ned_m: [6, 0, -1.5], speed_m_s: 2.0}
+  - return: {}
+on_collision: {then: continue, max_hits: 2}
+sim: {walls: []}
+"""
+
+
+@dataclass
+class Air:
+    """Companion and simulated vehicle in lockstep, and somebody who sends in the vehicle's name."""
+
+    sets: tuple[str, ...] = ()
+    events: list[Event] = field(default_factory=list)
+    pending: bytes = b""
+    setpoints: list = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        document = parse_document(MISSION, "forged.yaml")
+        apply_overrides(document, self.sets)
+        world = world_from(document)
+        self.companion = Companion(mission_from(document))
+        self.companion.confirm_plan()
+        self.vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
+
+    @property
+    def state(self) -> str:
+        return self.companion.status().state
+
+    def step(self, forged: bytes = b"") -> None:
+        heard = b"".join(self.vehicle.step(self.pending))
+        result = self.companion.step(forged + heard, EPOCH_US + self.vehicle.time_boot_us)
+        self.pending = b"".join(result.sent_frames)
+        self.events += result.events
+        for frame in result.sent_frames:
+            message = mav.MAVLink(None).decode(bytearray(frame))
+            if message.get_type() == "SET_POSITION_TARGET_LOCAL_NED":
+                self.setpoints.append(message)
+
+    def run_until(self, condition, limit_s=60.0) -> None:
+        for _ in range(round(limit_s * 250)):
+            if condition():
+                return
+            self.step()
+        raise AssertionError([event.text for event in self.events])
+
+    def imu(self, force_m_s2: float) -> bytes:
+        """Between two of its own samples: a push against the way."""
+        message = mav.MAVLink_highres_imu_message(
+            self.vehicle.time_boot_us + 2000, force_m_s2, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F
+        )
+        return bytes(message.pack(mav.MAVLink(None, 1, 1)))
+
+
+def cruising(*sets: str) -> Air:
+    air = Air(sets)
+    air.run_until(lambda: air.state == "mission" and (air.companion.status().position_ned_m or (0,))[0] > 2.5)
+    return air
+
+
+@pytest.mark.parametrize("force_m_s2", [-100.0, -40.0, 40.0])
+def test_one_forged_packet_costs_a_twitch(force_m_s2):
+    air = cruising()
+    before = len(air.setpoints)
+    air.step(air.imu(force_m_s2))
+    # The companion acts on it at once
+    assert air.state == "recovering"
+    began_us, here = air.vehicle.time_boot_us, air.companion.status().position_ned_m
+    air.run_until(lambda: air.state != "recovering", 1.0)
+    # And within a quarter of a second the mission goes on
+    assert air.state == "mission" and air.vehicle.time_boot_us - began_us <= 250_000
+    assert [event.kind for event in air.events].count("unconfirmed") == 1
+    for message in air.setpoints[before:]:
+        if not message.type_mask & 0x003:
+            assert math.dist((message.x, message.y, message.z), here) <= 5.0
+        if not message.type_mask & 0x1C0:
+            assert math.hypot(message.afx, message.afy) <= 9.81
+    air.run_until(lambda: air.companion.finished)
+    report = air.companion.report()
+    assert (report.outcome, report.collisions, report.unconfirmed, report.obstacles) == ("completed", (), 1, ())
+
+
+def test_the_hits_allowed_are_not_used_up_by_hits_that_were_none():
+    air = cruising()
+    for _ in range(3):
+        air.step(air.imu(-40.0))
+        air.run_until(lambda: air.state == "mission")
+        for _ in range(150):  # what the velocity was is taken from half a second
+            air.step()
+    air.run_until(lambda: air.companion.finished)
+    assert air.companion.report().unconfirmed == 3
+    assert air.companion.report().outcome == "completed" and "policy" not in [event.kind for event in air.events]
+
+
+@pytest.mark.parametrize("airframe", ["foldable", "rigid"])
+@pytest.mark.parametrize("hz", [250, 50])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_hit_on_a_wall_is_always_confirmed(airframe, hz, seed):
+    """By the velocity, where one sample alone shows the contact."""
+    wall = "sim.walls=[{point_ned_m: [4, 0, 0], normal_ned: [-1, 0, 0]}]"
+    rate = f"companion.streams.highres_imu_hz={hz}"
+    air = Air((wall, rate, f"sim.airframe={airframe}", f"sim.seed={seed}"))
+    air.run_until(lambda: air.state == "recovering")
+    for _ in range(250):
+        air.step()
+    assert air.companion.report().unconfirmed == 0 and len(air.companion.report().collisions) >= 1
