@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 .PHONY: fly test clients check lint types results paper schema diagrams clean
 
 fly: $(READY)
-	$(BIN)/rebound fly missions/wall.yaml --sim
+	$(BIN)/rebound fly missions/wall.yaml
 
 test: $(READY)
 	$(BIN)/python -m pytest
@@ -47,7 +47,7 @@ results: $(READY)
 	$(BIN)/python -m bench paper results
 
 # Every version is pinned in requirements.txt, so that a fresh machine gets what was tested.
-$(READY): pyproject.toml requirements.txt
+$(READY): pyproject.toml setup.py requirements.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .

@@ -1,7 +1,9 @@
 """What the commands' arguments have in common: kinds of values, and options that several commands have."""
 
 import argparse
+import contextlib
 import importlib
+import importlib.resources
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +24,16 @@ def count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a count: give a whole number from 1 on")
     return int(text)
+
+
+def mission_file(text: str) -> Path:
+    """The file itself, or a mission of that name that ships with the program."""
+    path = Path(text)
+    if not path.exists() and path.name == text and not path.suffix:
+        with contextlib.suppress(ModuleNotFoundError):
+            shipped = Path(str(importlib.resources.files("rebound_missions"))) / f"{text}.yaml"
+            return shipped if shipped.exists() else path
+    return path
 
 
 def host_and_port(text: str) -> tuple[str, int]:

@@ -11,21 +11,25 @@ from rebound_cli.arguments import (
     add_peer,
     add_world_options,
     instance,
+    mission_file,
     runs,
 )
 
 
 def add_fly(commands: Commands) -> None:
     fly = commands.add_parser("fly", help="fly a mission", description="Fly a mission from take-off to landing.")
-    fly.add_argument("mission", type=Path, metavar="MISSION", help="mission file, such as missions/wall.yaml")
-    how = fly.add_mutually_exclusive_group(required=True)
+    fly.add_argument(
+        "mission", type=mission_file, metavar="MISSION", help="mission file, or the name of one that ships: wall"
+    )
+    how = fly.add_mutually_exclusive_group()
     how.add_argument(
         "--sim",
         nargs="?",
         const="builtin",
+        default="builtin",
         choices=SIMULATED_AUTOPILOTS,
         metavar="px4",
-        help="start the simulated vehicle and fly it in real time over UDP; "
+        help="start the simulated vehicle and fly it in real time over UDP, as without any of these; "
         "px4: with your PX4 as its autopilot, see docs/px4.md",
     )
     how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")

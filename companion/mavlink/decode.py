@@ -195,6 +195,10 @@ LONE_GUARD_CONVERTERS: dict[int, Callable[[Any], Sample | None]] = {
 }
 
 
+# Packets with other ids have a checksum that cannot be checked.
+KNOWN_IDS = frozenset(dialect.mavlink_map)
+
+
 class Decoder:
     """A byte stream in any chunks, with any damage, to packets; never raises on what it is fed.
 

@@ -32,7 +32,9 @@ def open_connection(url: str, peer: str | None = None) -> Connection:
     """
     scheme, separator, rest = url.partition("://")
     if not separator:
-        raise ConnectionSetupError(f"{url!r} is not a connection address: use {_FORMS}.")
+        meant = _meant(url)
+        hint = f"use {_FORMS}." if meant is None else f"did you mean {meant}?"
+        raise ConnectionSetupError(f"{url!r} is not a connection address: {hint}")
     if peer is not None and scheme not in ("udpin", "udp"):
         raise ConnectionSetupError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
@@ -51,6 +53,21 @@ def open_connection(url: str, peer: str | None = None) -> Connection:
     if scheme == "tcpin":
         return TcpInConnection(host, port)
     raise ConnectionSetupError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+
+
+def _meant(text: str) -> str | None:
+    """What other programs' habits stand for: pymavlink's `udp:HOST:PORT`, a device, a host and port, a port alone."""
+    scheme, _, rest = text.partition(":")
+    if text.startswith("/dev/"):
+        # PX4's TELEM2 for a companion, SER_TEL2_BAUD.
+        device, _, baud = text.replace(",", ":").partition(":")
+        return f"serial://{device}:{baud or 921600}"
+    known = {"udp": "udpin", "udpin": "udpin", "udpout": "udpout", "tcp": "tcpout", "tcpin": "tcpin"}.get(scheme)
+    if known is not None and _HOST_PORT.match(rest):
+        return f"{known}://{rest}"
+    if text.isdecimal():
+        return f"udpin://0.0.0.0:{text}"
+    return f"udpout://{text}" if _HOST_PORT.match(text) and scheme else None
 
 
 def _peer(text: str) -> tuple[str, int | None]:

@@ -1,8 +1,9 @@
 """Who may speak on a UDP port that anybody can send to: the vehicle's address, pinned by its heartbeat.
 
-    open    packets from anybody; answers go to whoever sent the last whole packet
-    pinned  a heartbeat of an autopilot has come: its address alone is heard and answered
-    open    again, when the pinned address has been silent for RELEASED_US: a router was restarted, an address changed
+    open      packets from anybody; answers go to whoever sent the last whole packet
+    pinned    a heartbeat of an autopilot has come: its address alone is heard and answered
+    released  the pinned address has sent no packet for RELEASED_US, as when a router was restarted: a heartbeat of the
+              same system and component pins its new address, and nobody else is heard
 
 An address can be forged where the network lets it be; what keeps such packets out is MAVLink's signing.
 """
@@ -11,7 +12,7 @@ from collections.abc import Iterator
 from typing import TypeAlias
 
 from companion.link.identity import AUTOPILOT_COMPONENT_ID
-from companion.mavlink.decode import checksum_holds
+from companion.mavlink.decode import KNOWN_IDS, checksum_holds
 from companion.mavlink.packet import message_id_of, packet_length, source_of
 
 Address: TypeAlias = tuple[str, int]
@@ -30,6 +31,7 @@ class Peer:
     def __init__(self, only: tuple[str, int | None] | None = None) -> None:
         self._only = only
         self._pinned: Address | None = None
+        self._vehicle: tuple[int, int] | None = None  # system and component
         self._last_us = 0
         self._told: set[Address] = set()
         self._news: str | None = None
@@ -38,17 +40,10 @@ class Peer:
 
     def accepts(self, datagram: bytes, sender: Address, now_us: int) -> bool:
         """Whether the datagram is to be heard."""
-        if not self._may_speak(sender, now_us):
+        if not self._is_heard(datagram, sender, now_us):
             self.dropped += 1
             self._note(sender)
             return False
-        if sender == self._pinned:
-            self._last_us = now_us
-            return True
-        for packet in _packets(datagram):
-            self.answered = sender
-            if message_id_of(packet) == HEARTBEAT and source_of(packet)[1] == AUTOPILOT_COMPONENT_ID:
-                self._pinned, self._last_us = sender, now_us
         return True
 
     def news(self) -> str | None:
@@ -56,11 +51,23 @@ class Peer:
         news, self._news = self._news, None
         return news
 
-    def _may_speak(self, sender: Address, now_us: int) -> bool:
+    def _is_heard(self, datagram: bytes, sender: Address, now_us: int) -> bool:
         if self._only is not None and (sender[0] != self._only[0] or self._only[1] not in (None, sender[1])):
             return False
-        is_released = self._pinned is None or now_us - self._last_us > RELEASED_US
-        return is_released or sender == self._pinned
+        if sender == self._pinned:
+            if any(True for _ in _packets(datagram)):
+                self._last_us = now_us
+            return True
+        if self._vehicle is not None and now_us - self._last_us <= RELEASED_US:
+            return False
+        for packet in _packets(datagram):
+            source = source_of(packet)
+            if self._vehicle is None:
+                self.answered = sender
+            is_autopilot = source[1] == AUTOPILOT_COMPONENT_ID
+            if message_id_of(packet) == HEARTBEAT and is_autopilot and self._vehicle in (None, source):
+                self._vehicle, self._pinned, self._last_us, self.answered = source, sender, now_us, sender
+        return self._vehicle is None or sender == self._pinned
 
     def _note(self, sender: Address) -> None:
         # An attacker has sixty thousand ports; the first few tell all there is to tell.
@@ -76,5 +83,8 @@ def _packets(datagram: bytes) -> Iterator[bytes]:
         length = packet_length(datagram, start)
         if length == 0 or start + length > len(datagram) or not checksum_holds(datagram, start, length):
             return
-        yield datagram[start : start + length]
+        packet = datagram[start : start + length]
+        if message_id_of(packet) not in KNOWN_IDS:
+            return
+        yield packet
         start += length

@@ -61,6 +61,24 @@ def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named):
         open_connection(url, named)
 
 
+@pytest.mark.parametrize(
+    ("habit", "meant"),
+    [
+        ("/dev/ttyUSB0", "serial:///dev/ttyUSB0:921600"),
+        ("/dev/ttyACM0,57600", "serial:///dev/ttyACM0:57600"),
+        ("udp:127.0.0.1:14550", "udpin://127.0.0.1:14550"),
+        ("udpout:10.0.0.2:14580", "udpout://10.0.0.2:14580"),
+        ("tcp:127.0.0.1:5760", "tcpout://127.0.0.1:5760"),
+        ("192.168.1.20:14580", "udpout://192.168.1.20:14580"),
+        ("14540", "udpin://0.0.0.0:14540"),
+    ],
+)
+def test_other_programs_habits_are_answered_with_what_was_meant(habit, meant):
+    with pytest.raises(ConnectionSetupError) as refused:
+        open_connection(habit)
+    assert str(refused.value).endswith(f"did you mean {meant}?")
+
+
 def test_udpin_drops_what_nobody_is_there_to_take():
     connection = UdpInConnection(LOCAL, 0)
     connection.send(b"nobody")

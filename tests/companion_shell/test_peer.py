@@ -52,6 +52,28 @@ def test_a_vehicle_that_comes_back_from_another_address_is_heard_once_the_first_
     assert peer.answered == moved and not peer.accepts(HEARTBEAT, VEHICLE, 2 * RELEASED_US + 2)
 
 
+def test_a_silent_vehicles_place_is_taken_by_nobody_else():
+    peer, other = Peer(), bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(mav.MAVLink(None, 77, 1)))
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    for datagram in (CAMERAS, IMU, other, b"\0"):
+        assert not peer.accepts(datagram, STRANGER, 2 * RELEASED_US)
+    assert peer.answered == VEHICLE and peer.accepts(HEARTBEAT, VEHICLE, 2 * RELEASED_US + 1)
+
+
+def test_noise_from_the_vehicles_address_does_not_keep_it_pinned():
+    peer, moved = Peer(), ("192.168.4.1", 50_001)
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    peer.accepts(b"\0" * 20, VEHICLE, RELEASED_US)
+    assert peer.accepts(HEARTBEAT, moved, RELEASED_US + 1)
+
+
+def test_a_packet_whose_checksum_cannot_be_checked_diverts_no_answer():
+    peer = Peer()
+    peer.accepts(IMU, VEHICLE, 0)
+    peer.accepts(bytes([0xFD, 0, 0, 0, 0, 1, 1, 0xFF, 0xFF, 0xFF, 0, 0]), STRANGER, 1)
+    assert peer.answered == VEHICLE
+
+
 @pytest.mark.parametrize("port", [None, VEHICLE[1]])
 def test_who_was_named_is_heard_alone_before_and_after(port):
     peer = Peer((VEHICLE[0], port))

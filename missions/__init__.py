@@ -1,0 +1,1 @@
+"""The missions that ship: `rebound fly wall` finds them by name."""
