@@ -143,10 +143,12 @@ def _fly_beside_px4(flight: Flight, connection: Connection, instance: int) -> Fl
 
 def _with_truth(flight: Flight, flown: Flown) -> Flown:
     """The flight beside what the simulated vehicle's process wrote; without it if PX4 never flew."""
-    from sim_vehicle.shell.truth_file import load_faults, load_truth
+    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
 
     path = flight.folder / run_folder.TRUTH_NAME
-    return replace(flown, truth=FlightTruth(*load_truth(path), load_faults(path))) if path.exists() else flown
+    if not path.exists():
+        return flown
+    return replace(flown, truth=FlightTruth(*load_truth(path), load_faults(path), load_stalls(path)))
 
 
 def _fly_lockstep(flight: Flight) -> Flown:

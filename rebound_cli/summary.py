@@ -105,8 +105,8 @@ def _collision(report: FlightReport, number: int) -> dict[str, Any]:
 
 def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", truth: FlightTruth) -> Mapping[str, Any]:
     collision = report.collisions[number]
-    contact_at_us = truth.epoch_at_boot_us + hit.contact_at_boot_us
-    end_boot_us = _recovery_end_us(report, number, facts) - truth.epoch_at_boot_us
+    contact_at_us = truth.at_us(hit.contact_at_boot_us)
+    end_boot_us = hit.contact_at_boot_us + _recovery_end_us(report, number, facts) - contact_at_us
     overshoot_m, height_lost_m = truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, end_boot_us)
     return {
         "contact_at_s": _seconds(contact_at_us - report.started_at_us),

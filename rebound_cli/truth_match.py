@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,18 +16,29 @@ if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulato
 # 50 Hz stream are 20 ms apart.
 LATE_SAMPLE_US = 20_000
 
+Time = TypeVar("Time", float, npt.NDArray[np.float64])
 Series = dict[str, npt.NDArray[np.float64]]
 Vector3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class FlightTruth:
-    """What the simulator knows of a flight. `epoch_at_boot_us` is when the vehicle's boot clock read 0."""
+    """What the simulator knows of a flight. `epoch_at_boot_us` is when the vehicle's boot clock read 0, by its end.
+
+    `stalls` are boot times at which the simulator stood still, and for how long: before one of them, boot time 0 was
+    by so much earlier.
+    """
 
     hits: "Sequence[Hit]"
     series: Series
     epoch_at_boot_us: float
     faults: "Sequence[FaultSpan]" = ()
+    stalls: Sequence[tuple[int, int]] = ()
+
+    def at_us(self, boot_us: Time) -> Time:
+        """The companion's clock at a time, or at times, of the vehicle's."""
+        earlier = sum(late_us * (boot_us < at_us) for at_us, late_us in self.stalls)
+        return boot_us + self.epoch_at_boot_us - earlier
 
     def past_setpoint_and_below(self, hit: "Hit", setpoint_ned_m: Vector3, until_boot_us: float) -> tuple[float, float]:
         """Furthest distance past the setpoint along the wall's normal and greatest loss of height, in metres.

@@ -68,7 +68,7 @@ def first_hit(mission: Mission, report: FlightReport, truth: FlightTruth | None)
         contact = match_contacts(report.collisions, truth.hits, settled_duration_s).hit_of_collision[0]
         if contact is not None:
             normal, obstacle = np.array(contact.normal_ned), contact.obstacle
-            contact_s = (truth.epoch_at_boot_us + contact.contact_at_boot_us - report.started_at_us) / 1e6
+            contact_s = (truth.at_us(contact.contact_at_boot_us) - report.started_at_us) / 1e6
             touch_m = float((np.array(contact.contact_position_ned_m) - origin) @ -normal)
             if contact.contact_point_ned_m is not None:
                 surface_m = float((np.array(contact.contact_point_ned_m) - origin) @ -normal)
@@ -105,7 +105,7 @@ def draw_position(axis: Any, hit: HitShown, log: FlightLog, report: FlightReport
 
 def draw_velocity(axis: Any, hit: HitShown, log: FlightLog, report: FlightReport, truth: FlightTruth | None) -> None:
     if truth is not None:
-        true_s = seconds_since_start(truth.series["time_boot_us"] + truth.epoch_at_boot_us, report)
+        true_s = seconds_since_start(truth.at_us(truth.series["time_boot_us"]), report)
         axis.plot(true_s, hit.along(truth.series["velocity_ned_m_s"]), label="simulator's truth", **TRUE)
     measured_s = seconds_since_start(log.position_at_us, report)
     axis.plot(measured_s, hit.along(log.velocity_ned_m_s), label="measured", **MEASURED)
@@ -140,7 +140,7 @@ def draw_specific_force(
 
 
 def draw_fold(axis: Any, hit: HitShown, report: FlightReport, truth: FlightTruth) -> None:
-    seconds = seconds_since_start(truth.series["time_boot_us"] + truth.epoch_at_boot_us, report)
+    seconds = seconds_since_start(truth.at_us(truth.series["time_boot_us"]), report)
     near = np.abs(seconds - hit.detected_s) <= _ZOOM_S
     fold_mm = 1e3 * truth.series["arm_fold_m"]
     # PX4's motor order of the quad-x frame.

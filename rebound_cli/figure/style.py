@@ -44,7 +44,7 @@ def mark_faults(axes: Sequence[Any], report: FlightReport, truth: FlightTruth | 
         left, right = axis.get_xlim()
         for fault in truth.faults:
             began_s, ended_s = (
-                right if at_us is None else (truth.epoch_at_boot_us + at_us - report.started_at_us) / 1e6
+                right if at_us is None else (truth.at_us(at_us) - report.started_at_us) / 1e6
                 for at_us in (fault.began_at_boot_us, fault.ended_at_boot_us)
             )
             axis.axvspan(began_s, max(ended_s, began_s + 0.02), color=_FAULT, alpha=0.12)

@@ -52,7 +52,7 @@ def serve(
         for port in ports:
             port.close()
         if truth_path is not None:
-            save_truth(truth_path, vehicle.truth, pace.epoch_at_boot_us())
+            save_truth(truth_path, vehicle.truth, pace.epoch_at_boot_us(), pace.stalls)
 
 
 class Pace:
@@ -68,13 +68,25 @@ class Pace:
         self._monotonic_ns = monotonic_ns
         self._sleep_s = sleep_s
         self._time_boot_us = time_boot_us
+        self.stalls: list[tuple[int, int]] = []
+        """Boot times at which the vehicle's clock stood while the machine's went on, and for how long, microseconds."""
+        self._boot_ns: int | None = None
         self.restart(speed)
 
     def restart(self, speed: float) -> None:
         """Go on from here at a speed, after another one or a pause."""
         self.speed = speed
         self._ns_per_us = 1000 / speed if speed > 0 else 0.0
-        self._boot_ns = self._monotonic_ns() - round(self._ns_per_us * self._time_boot_us)
+        self._begin(self._monotonic_ns() - round(self._ns_per_us * self._time_boot_us))
+
+    def _begin(self, boot_ns: int) -> None:
+        """When the vehicle's clock would have read 0, from now on."""
+        if self._boot_ns is not None:
+            at_us, late_us = self._time_boot_us, (boot_ns - self._boot_ns) // 1000
+            if self.stalls and self.stalls[-1][0] == at_us:
+                late_us += self.stalls.pop()[1]
+            self.stalls.append((at_us, late_us))
+        self._boot_ns = boot_ns
 
     def wait_until(self, time_boot_us: int) -> None:
         """Return when the vehicle's clock may show that; at once when it is late."""
@@ -82,14 +94,16 @@ class Pace:
         if self._ns_per_us == 0.0:
             return
         now_ns = self._monotonic_ns()
+        assert self._boot_ns is not None, "restart begins it"
         due_ns = self._boot_ns + round(self._ns_per_us * time_boot_us)
         if due_ns > now_ns:
             self._sleep_s(1e-9 * (due_ns - now_ns))
         elif now_ns - due_ns > MOST_CAUGHT_UP_NS:
-            self._boot_ns += now_ns - due_ns
+            self._begin(self._boot_ns + now_ns - due_ns)
 
     def epoch_at_boot_us(self) -> int:
         """Wall clock at the vehicle's boot time 0, as its clock stands now."""
         if self._ns_per_us != 1000.0:
             return time.time_ns() // 1000 - self._time_boot_us
+        assert self._boot_ns is not None, "restart begins it"
         return (time.time_ns() - self._monotonic_ns() + self._boot_ns) // 1000

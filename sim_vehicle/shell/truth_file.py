@@ -1,6 +1,7 @@
 """Truth in a file, so that a simulation in a process of its own can hand it over after a flight."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,14 +11,21 @@ import numpy.typing as npt
 
 from sim_vehicle.truth import FaultSpan, Hit, TruthRecorder
 
+# What else is in the file.
+_NO_SERIES = ("hits", "faults", "epoch_at_boot_us", "stalls")
+
 Floats = npt.NDArray[np.float64]
 
 
-def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int) -> None:
-    """Write hits and path as `.npz`; ``epoch_at_boot_us`` is the wall clock at the vehicle's boot time 0."""
+def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int, stalls: Sequence[tuple[int, int]] = ()) -> None:
+    """Write hits and path as `.npz`; ``epoch_at_boot_us`` is the wall clock at the vehicle's boot time 0, by its end.
+
+    ``stalls``: boot times at which its clock stood, and for how long.
+    """
     hits = json.dumps([asdict(hit) for hit in truth.hits])
     faults = json.dumps([asdict(fault) for fault in truth.faults])
     arrays: dict[str, Any] = {**truth.series(), "hits": hits, "faults": faults, "epoch_at_boot_us": epoch_at_boot_us}
+    arrays["stalls"] = np.array(stalls, dtype=np.int64).reshape(-1, 2)
     # Given a path, numpy would put its own ending on it.
     with path.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -26,7 +34,7 @@ def save_truth(path: Path, truth: TruthRecorder, epoch_at_boot_us: int) -> None:
 def load_truth(path: Path) -> tuple[list[Hit], dict[str, Floats], int]:
     """Hits, path and the wall clock (microseconds) at the vehicle's boot time 0."""
     with np.load(path) as stored:
-        series = {name: stored[name] for name in stored.files if name not in ("hits", "faults", "epoch_at_boot_us")}
+        series = {name: stored[name] for name in stored.files if name not in _NO_SERIES}
         hits = [Hit(**_as_tuples(fields)) for fields in json.loads(str(stored["hits"]))]
         return hits, series, int(stored["epoch_at_boot_us"])
 
@@ -35,6 +43,12 @@ def load_faults(path: Path) -> list[FaultSpan]:
     """The faults that acted, in the order in which they began."""
     with np.load(path) as stored:
         return [FaultSpan(**fields) for fields in json.loads(str(stored["faults"]))] if "faults" in stored else []
+
+
+def load_stalls(path: Path) -> list[tuple[int, int]]:
+    """Boot times at which the vehicle's clock stood, and for how long."""
+    with np.load(path) as stored:
+        return [(int(at), int(late)) for at, late in stored["stalls"]] if "stalls" in stored else []
 
 
 def _as_tuples(fields: dict[str, Any]) -> dict[str, Any]:

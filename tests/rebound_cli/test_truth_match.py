@@ -127,6 +127,16 @@ def test_the_summary_measures_overshoot_and_height_away_from_the_wall():
     assert (summary["duration_s"], summary["realtime_factor"]) == (25.0, 50.0)
 
 
+def test_a_simulator_that_stalls_after_a_hit_moves_nothing_of_before():
+    # Given a simulator that stood still for half a second, 0.4 s after the contact
+    path = path_of([(9.9, 3.7, -1.6), (10.0, 3.8, -1.5), (11.0, 3.0, -1.47), (12.0, 2.76, -1.5)])
+    truth = FlightTruth([hit(10_000)], path, EPOCH_US + 500_000, stalls=[(10_400_000, 500_000)])
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then the latency is what it was
+    assert summary["collisions"][0]["truth"]["detection_latency_ms"] == pytest.approx(4.5)
+    assert summary["collisions"][0]["truth"]["contact_at_s"] == pytest.approx(9.0)
+
+
 def test_a_setpoint_lies_in_the_frame_that_the_vehicle_believed_in_at_the_contact():
     # Given the same path, of a vehicle that believed itself 0.3 m further north than it was when it touched
     path = path_of([(10.0, 3.8, -1.5), (11.0, 3.0, -1.5), (12.0, 2.46, -1.5)])

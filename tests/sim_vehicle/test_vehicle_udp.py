@@ -140,6 +140,8 @@ def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_m
         if boot_us == 100_000:
             machine.now_ns += hangs_ms * 1_000_000
     assert boot_us == 2_000_000 - 1000 * lost_ms
+    # And that the clock stood then is known, for whoever puts truth and telemetry beside each other
+    assert pace.stalls == ([(104_000, 1000 * lost_ms)] if lost_ms else [])
 
 
 def test_an_interval_is_never_flown_before_it_has_passed():
