@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: fly test clients check lint types results paper schema diagrams clean
+.PHONY: fly test clients check lint types results paper schema diagrams wheel clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml
@@ -53,6 +53,19 @@ $(READY): pyproject.toml setup.py requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $(READY)
 
+# What somebody gets who has no checkout: the wheel in an environment of its own, and a mission that ships, from an
+# empty folder.
+WHEEL := $(abspath .venv-wheel)
+
+wheel: $(READY)
+	rm -rf build $(WHEEL)
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w $(WHEEL)/dist .
+	$(PYTHON) -m venv $(WHEEL)/venv
+	$(WHEEL)/venv/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.txt \
+		"$$(ls $(WHEEL)/dist/*.whl)[sim]"
+	mkdir $(WHEEL)/empty
+	cd $(WHEEL)/empty && $(WHEEL)/venv/bin/rebound fly wall --lockstep
+
 paper: $(READY)
 	$(BIN)/python -m bench paper --seeds 50
 
@@ -63,5 +76,5 @@ diagrams: $(READY)
 	$(BIN)/python -m bench.diagrams docs/architecture.md
 
 clean:
-	rm -rf $(VENV) $(CLIENTS) .pytest_cache .mypy_cache .ruff_cache runs
+	rm -rf $(VENV) $(CLIENTS) $(WHEEL) build .pytest_cache .mypy_cache .ruff_cache runs
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -67,7 +67,9 @@ def _meant(text: str) -> str | None:
         return f"{known}://{rest}"
     if text.isdecimal():
         return f"udpin://0.0.0.0:{text}"
-    return f"udpout://{text}" if _HOST_PORT.match(text) and scheme else None
+    if not _HOST_PORT.match(text):
+        return None
+    return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
 def _peer(text: str) -> tuple[str, int | None]:
