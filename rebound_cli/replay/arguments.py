@@ -23,10 +23,27 @@ def add_replay(commands: Commands) -> None:
         "--expect", type=_expected, metavar="none|N", help="exit 1 unless there are exactly so many collisions"
     )
     replay.add_argument(
+        "--least-watched",
+        type=_share,
+        default=0.5,
+        metavar="SHARE",
+        help="with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)",
+    )
+    replay.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of the pictures (default: runs/replay-<name of the log>)"
     )
     add_json(replay, "findings")
     replay.set_defaults(run=runs("rebound_cli.replay.command:run_replay"))
+
+
+def _share(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a share: give a number from 0 to 1")
+    return value
 
 
 def _expected(text: str) -> int:

@@ -27,7 +27,7 @@ def run_replay(options: Namespace) -> int:
         print(json.dumps(report_data(replay, pictures), indent=2))
     else:
         console.print(report_text(replay, pictures).rstrip())
-    return _exit_code(replay, options.expect, console)
+    return _exit_code(replay, options.expect, options.least_watched, console)
 
 
 def _replay(options: Namespace, console: Console) -> Replay:
@@ -83,11 +83,16 @@ def _draw(replay: Replay, folder: Path) -> Sequence[str]:
     return [str(path) for path in paths]
 
 
-def _exit_code(replay: Replay, expected: int | None, console: Console) -> int:
+def _exit_code(replay: Replay, expected: int | None, least_watched: float, console: Console) -> int:
     found = len(replay.findings.collisions)
     is_other = replay.reproduction is not None and replay.reproduction.first_difference is not None
     if expected is not None and found != expected:
         console.print(f"expected {expected or 'no'} collisions, found {found}")
+        return 1
+    share = replay.findings.watched_share
+    if expected == 0 and (share is None or share < least_watched):
+        seen = "nothing" if share is None else f"{100.0 * share:.0f} %"
+        console.print(f"expected no collisions, and {seen} of the flight was watched: that shows none")
         return 1
     return 1 if is_other else 0
 

@@ -55,6 +55,13 @@ class Findings:
     blind: list[Span] = field(default_factory=list)
     off: list[Span] = field(default_factory=list)
     happenings: list[Happening] = field(default_factory=list)
+    flown_us: int = 0  # armed and in the air
+    watched_us: int = 0  # of that, with a detector that was on and saw
+
+    @property
+    def watched_share(self) -> float | None:
+        """How much of the flight a hit would have been seen in; None where nothing was flown."""
+        return self.watched_us / self.flown_us if self.flown_us else None
 
     @property
     def collisions(self) -> list[Finding]:
@@ -76,6 +83,7 @@ class Notebook:
         self._landed = LandedState.UNDEFINED
         self._armed: bool | None = None
         self._mode: int | None = None
+        self._noted_us: int | None = None
 
     def note(self, watch: Watch, situation: Situation, at_us: int) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
@@ -89,6 +97,16 @@ class Notebook:
             self._note_span("off", None, self.findings.off, at_us)
             self._off_reason = situation.off_reason
         self._note_span("off", situation.off_reason, self.findings.off, at_us)
+        self._note_share(watch, situation, at_us)
+
+    def _note_share(self, watch: Watch, situation: Situation, at_us: int) -> None:
+        elapsed_us = 0 if self._noted_us is None else at_us - self._noted_us
+        self._noted_us = at_us
+        if not situation.armed or situation.landed_state is LandedState.ON_GROUND:
+            return
+        self.findings.flown_us += elapsed_us
+        if situation.off_reason is None and watch.blind_reason is None:
+            self.findings.watched_us += elapsed_us
 
     def tell(self, at_us: int, text: str) -> None:
         self.findings.happenings.append(Happening(at_us, text))

@@ -54,10 +54,12 @@ def _wrapped(text: str, lead: str, hanging: str) -> str:
 
 
 def verdict_text(replay: Replay) -> str:
-    """One line: how many collisions, how many touches that are none."""
+    """One line: how many collisions, how many touches that are none, and in how much of the flight one would show."""
     collisions, contacts = len(replay.findings.collisions), len(replay.findings.contacts)
     text = f"{collisions or 'no'} collision{'' if collisions == 1 else 's'}"
-    return text + (f", {contacts} contact{'' if contacts == 1 else 's'} that {_are(contacts)} none" if contacts else "")
+    text += f", {contacts} contact{'' if contacts == 1 else 's'} that {_are(contacts)} none" if contacts else ""
+    share = replay.findings.watched_share
+    return text + ("; no flight was heard" if share is None else f"; {100.0 * share:.0f} % of the flight was watched")
 
 
 def _are(count: int) -> str:
@@ -176,6 +178,7 @@ def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
             for finding, name in zip(findings.impacts, names, strict=True)
         ],
         "happenings": [{"at_s": _seconds(replay, h.at_us), "text": h.text} for h in findings.happenings],
+        "watched_share": findings.watched_share,
         "blind": [_span_data(replay, span) for span in findings.blind],
         "off": [_span_data(replay, span) for span in findings.off],
         "noise_rms_frd_m_s2": {

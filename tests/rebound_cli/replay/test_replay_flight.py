@@ -136,3 +136,13 @@ def test_arguments_that_make_no_sense_are_refused(wall_flight, tmp_path, capsys)
     for arguments in (("--rate", "0"), ("--rate", "fast"), ("--expect", "some")):
         with pytest.raises(SystemExit):
             main(["replay", str(wall_flight), *arguments])
+
+
+def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(wall_flight, tmp_path, capsys):
+    # Given an IMU stream too slow to see a hit by
+    arguments = (wall_flight / "flight.tlog", "--rate", "10", "--expect", "none", "--out", tmp_path)
+    assert main(["replay", *map(str, arguments)]) == 1
+    said = capsys.readouterr().out
+    assert "0 % of the flight was watched" in said and "that shows none" in said
+    # Unless the person asks for no more
+    assert main(["replay", *map(str, arguments), "--least-watched", "0"]) == 0
