@@ -173,7 +173,9 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     )
     summary = build_summary(flown, facts)
     console, writer = flight.console, flight.recorder.writer
-    console.print(timeline(flight.recorder.events, flown.report.started_at_us))
+    if flown.timing is None:
+        # In real time each was printed as it happened.
+        console.print(timeline(flight.recorder.events, flown.report.started_at_us))
     console.print("\n" + summary_text(summary))
     if writer is not None and writer.loss is not None:
         console.print(f"\n  {writer.loss} ({writer.lost} steps)")

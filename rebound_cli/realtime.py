@@ -13,7 +13,7 @@ from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
-from rebound_cli.console import Console
+from rebound_cli.console import Console, timeline
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.timing import Timing, undisturbed
@@ -239,6 +239,8 @@ def fly_realtime(
     def beside(now_us: int, result: StepResult) -> None:
         if result.events:
             recorder.record_obstacles(companion.obstacles())
+            began_us = started_us if companion.core is None else companion.core.started_at_us
+            console.print(timeline(result.events, began_us))
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
         recorder.record_person(now_us, companion.plan_is_confirmed, companion.stop_reason)
