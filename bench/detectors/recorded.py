@@ -232,7 +232,8 @@ def _moments(path: Path) -> list[int]:
     log, known = _read(path), Circumstances()
     free: list[tuple[int, bool]] = []
     for item in log.heard:
-        if known.hear(item.sample):
+        known.wait(item.at_us)
+        if known.hear(item):
             now = known.situation
             flies = now.landed_state is not LandedState.ON_GROUND and now.armed is not False
             free.append((item.at_us, flies and not now.descent_commanded))

@@ -12,6 +12,7 @@ _MODES = {
     5: _AUTO << 16 | 5 << 24,  # RTL
     10: 5 << 16,  # ACRO
     12: AUTO_LAND,  # DESCEND shows as LAND
+    13: 1 << 16,  # TERMINATION shows as MANUAL
     14: OFFBOARD,
     15: 7 << 16,  # STABILIZED
     17: _AUTO << 16 | 2 << 24,  # TAKEOFF
@@ -20,6 +21,15 @@ _MODES = {
     20: _AUTO << 16 | 9 << 24,  # PRECLAND
     21: 3 << 16 | 1 << 24,  # ORBIT shows under POSCTL
 }
+
+# MANUAL, ACRO, STABILIZED, RATTITUDE: the sticks ask for an attitude or for rates, and position control is off
+# (commander/ModeUtil/control_mode.cpp).
+_BY_STICKS_ALONE = (1, 5, 7, 8)
+
+
+def flies_setpoints(custom_mode: int) -> bool:
+    """Whether PX4's position control acts in this mode; it is taken to where the mode is unknown."""
+    return custom_mode >> 16 & 0xFF not in _BY_STICKS_ALONE
 
 
 def custom_mode(nav_state: int) -> int:

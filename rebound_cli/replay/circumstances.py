@@ -1,15 +1,18 @@
 """What a flight would have known at each moment of a foreign log: armed, landed, height, on the way down."""
 
 from companion.detection.interface import Situation
+from companion.link.vehicle import OLD_NEWS_US
 from companion.messages import CurrentMode, ExtendedState, Heartbeat, LandedState, LocalPosition
 from companion.px4_mode import AUTO_LAND
-from rebound_cli.logs.log import Demand, Told
+from rebound_cli.logs.log import Demand, Heard
+from rebound_cli.logs.modes import flies_setpoints
 
 # AUTO.PRECLAND
 _AUTO_PRECLAND = 4 << 16 | 9 << 24
 # From this downward speed asked for PX4's land detector takes a descent to be meant: 1.1 x LNDMC_Z_VEL_MAX, 0.25 m/s
 # (land_detector/MulticopterLandDetector.cpp).
 DESCENT_M_S = 0.275
+_NO_DEMAND = Demand(0, None, None, None)
 
 
 class Circumstances:
@@ -22,10 +25,12 @@ class Circumstances:
         self._mode = 0
         self._down_m: float | None = None
         self._ground_down_m: float | None = None
-        self._demand = Demand(0, None, None, None)
+        self._demand = _NO_DEMAND
+        self._demand_old_us = 0  # from then on it is no longer flown, unless it is renewed
 
-    def hear(self, sample: Told) -> bool:
+    def hear(self, heard: Heard) -> bool:
         """Whether the sample changed the situation."""
+        sample = heard.sample
         match sample:
             case LocalPosition():
                 self._down_m = sample.position_ned_m[2]
@@ -39,11 +44,18 @@ class Circumstances:
             case ExtendedState():
                 self._landed = sample.landed_state
             case Demand():
-                self._demand = sample
+                # PX4 keeps OFFBOARD for so long without a setpoint (COM_OF_LOSS_T); logs hold five in a second.
+                self._demand, self._demand_old_us = sample, heard.at_us + OLD_NEWS_US
             case _:
                 return False
         self.situation = self._now()
         return True
+
+    def wait(self, now_us: int) -> None:
+        """Time has passed: a setpoint that nobody renewed is no longer flown."""
+        if self._demand is not _NO_DEMAND and now_us >= self._demand_old_us:
+            self._demand = _NO_DEMAND
+            self.situation = self._now()
 
     def _arm(self, armed: bool) -> None:
         """Heights count from the place of arming, which is where the vehicle stands when it is armed."""
@@ -64,11 +76,15 @@ class Circumstances:
             landed_state=self._landed,
             height_m=height_m,
             descent_commanded=self._is_told_to_descend(),
-            setpoint_position_ned_m=self._demand.position_ned_m,
+            setpoint_position_ned_m=self._flown().position_ned_m,
         )
+
+    def _flown(self) -> Demand:
+        """The setpoint, in a mode that flies it."""
+        return self._demand if flies_setpoints(self._mode) else _NO_DEMAND
 
     def _is_told_to_descend(self) -> bool:
         if self._mode in (AUTO_LAND, _AUTO_PRECLAND) or self._landed is LandedState.LANDING:
             return True
-        down_m_s = self._demand.velocity_down_m_s
+        down_m_s = self._flown().velocity_down_m_s
         return down_m_s is not None and down_m_s >= DESCENT_M_S

@@ -25,12 +25,15 @@ def watch_log(log: Log, config: CompanionConfig, rate_hz: float | None = None) -
     watch = start_watch(config, start_us)
     for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
         for poll_us in _polls(last_us, at_us):
+            circumstances.wait(poll_us)
             for notice in advance(watch, (), circumstances.situation, poll_us).notices:
                 notebook.tell(poll_us, notice.text)
             notebook.note(watch, circumstances.situation, poll_us)
-        told = [item.sample for item in group]
-        for sample in told:
-            circumstances.hear(sample)
+        items = list(group)
+        for item in items:
+            circumstances.hear(item)
+        circumstances.wait(at_us)
+        told = [item.sample for item in items]
         notebook.note_samples(told, at_us)
         # One by one: two impacts of one instant would otherwise be one.
         samples: list[Sample] = [sample for sample in told if not isinstance(sample, Demand)]

@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 
 from companion.detection.interface import Situation
-from companion.messages import ExtendedState, LandedState
+from companion.messages import ExtendedState, LandedState, LocalPosition
+from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND
-from rebound_cli.logs.log import Demand
+from rebound_cli.logs.log import Demand, Heard
 from rebound_cli.logs.shaking import Stage, shaking
 from rebound_cli.replay.circumstances import DESCENT_M_S, Circumstances
 from rebound_cli.replay.watching import thinned, watch_log
@@ -64,7 +65,7 @@ def test_a_hit_between_the_samples_of_a_slow_stream_is_not_seen_by_its_force():
 def situation_after(*samples):
     circumstances = Circumstances()
     for sample in samples:
-        circumstances.hear(sample)
+        circumstances.hear(Heard(0, sample))
     return circumstances.situation
 
 
@@ -90,6 +91,53 @@ def test_height_counts_from_the_place_of_arming():
 )
 def test_a_descent_is_commanded_by_mode_by_landing_or_by_its_speed(samples, expected):
     assert situation_after(*samples).descent_commanded is expected
+
+
+STABILIZED, MANUAL, ACRO = 7 << 16, 1 << 16, 5 << 16
+DOWN = Demand(0, (0.0, 0.0, 0.0), None, 2.0)
+
+
+@pytest.mark.parametrize("mode", [STABILIZED, MANUAL, ACRO])
+def test_a_setpoint_counts_in_a_mode_that_flies_it(mode):
+    # Given a pilot who takes the sticks of a vehicle that was told to descend
+    situation = situation_after(beat(True), DOWN, beat(True, mode))
+    assert not situation.descent_commanded and situation.setpoint_position_ned_m is None
+    # and gives it back
+    assert situation_after(beat(True, mode), DOWN, beat(True)).descent_commanded
+
+
+def test_a_setpoint_that_nobody_renews_is_not_flown_for_longer_than_px4_would():
+    circumstances = Circumstances()
+    circumstances.hear(Heard(0, beat(True)))
+    circumstances.hear(Heard(5 * SECOND, DOWN))
+    circumstances.wait(6 * SECOND - 1)
+    assert circumstances.situation.descent_commanded
+    # COM_OF_LOSS_T is 1 s
+    circumstances.wait(6 * SECOND)
+    assert not circumstances.situation.descent_commanded
+    # A stream of them goes on counting, though each is old in its turn
+    circumstances.hear(Heard(7 * SECOND, DOWN))
+    circumstances.wait(7 * SECOND + SECOND // 2)
+    assert circumstances.situation.descent_commanded
+
+
+def test_one_old_setpoint_does_not_make_a_crash_a_landing():
+    # Given a log that begins with the setpoint of a flight 44 s before, and a vehicle that strikes something 0.5 m up
+    log = flight(push_m_s2=60.0)
+    low = [
+        replace(item, sample=replace(item.sample, position_ned_m=(0.0, 0.0, -0.5)))
+        if isinstance(item.sample, LocalPosition) and item.at_us > 2 * SECOND
+        else item
+        for item in log.heard
+    ]
+    log = replace(log, heard=(Heard(-44 * SECOND, DOWN), *low))
+    findings = watch_log(log, CompanionConfig(detector="fused"))
+    assert [finding.is_collision for finding in findings.impacts] == [True]
+    # The same with a setpoint that is renewed is one that was asked for
+    told = [Heard(time_us, DOWN) for time_us in range(2 * SECOND, 10 * SECOND, SECOND // 5)]
+    log = replace(log, heard=tuple(sorted([*log.heard, *told], key=lambda item: item.at_us)))
+    findings = watch_log(log, CompanionConfig(detector="fused"))
+    assert [finding.is_collision for finding in findings.impacts] == [False]
 
 
 def test_noise_is_told_for_each_stage_of_a_flight():
