@@ -152,9 +152,11 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
         return
     due_us = core.setpoint_due_us + core.setpoint_interval_us
     core.setpoint_due_us = due_us if not at_once and due_us > now_us else now_us + core.setpoint_interval_us
+    if not core.flight.vehicle.is_mode_known:
+        return
     try:
         wanted = core.machine.activity.target(now_us)
-        if wanted is None or not core.flight.vehicle.is_mode_known:
+        if wanted is None:
             return
         has_floor = core.machine.state in ON_THE_WAY
         target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)

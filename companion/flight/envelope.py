@@ -9,12 +9,12 @@ velocity beside a height ends, by PX4's height loop, at v / MPC_Z_P from it.
 import math
 from dataclasses import dataclass, replace
 
+from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
 from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
 
-GRAVITY_M_S2 = 9.80665
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
 # PX4's defaults: COM_OF_LOSS_T, MPC_Z_VEL_P_ACC and MPC_Z_P.

@@ -170,15 +170,17 @@ def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
     config, is_ours = core.guard.config, core.machine.holds
     rate_hz = config.companion.flight.setpoint_hz if is_ours else config.lead_hz
     core.setpoint_due_us = now_us + round(1e6 / rate_hz)
+    if not core.flight.vehicle.is_mode_known:
+        return
     try:
         wanted = core.machine.activity.target(now_us)
-        if wanted is None or not core.flight.vehicle.is_mode_known:
+        if wanted is None:
             return
         # What leads the way is the place of a vehicle that others fly, wherever they fly it.
         target = core.limiter.passed(core.flight, wanted, True, moved, now_us) if is_ours else wanted
     except Exception as error:
         fault(core, error, now_us)
-        if core.limiter.last is None:
+        if not is_ours or core.limiter.last is None:
             return
         target = core.limiter.last.at_rest()
     if is_ours:

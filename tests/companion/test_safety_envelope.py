@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
-from companion.flight.envelope import GRAVITY_M_S2, SetpointError, Surroundings, bounded
+from companion.flight.envelope import SetpointError, Surroundings, bounded
 from companion.flight.trajectory import LineProfile
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
