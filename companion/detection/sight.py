@@ -1,7 +1,9 @@
 """Can the detector see? A blind detector is a state that is told, never silence."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
+from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.written import Positive, Written
 
 # The received rate is judged over this: 20 samples at the least rate, and no longer than a link's brief gap.
@@ -37,6 +39,32 @@ class Sight(NamedTuple):
     blind_reason: str | None = None
 
 
+@dataclass(slots=True)
+class Sameness:
+    """Whether the IMU measures. All six axes twice the same to the last bit, while the vehicle turned between, are no
+    two measurements: noise alone changes the last bits of each. At rest a sensor without noise may repeat itself."""
+
+    values: tuple[Vector3, Vector3] | None = None
+    attitude_wxyz: Quaternion | None = None
+    """At the first of the samples that are the same."""
+    has_turned: bool = False
+
+    def imu(self, sample: ImuSample) -> bool:
+        """Take one sample; whether it repeats the one before of a vehicle that has turned since."""
+        values = (sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
+        if values == self.values:
+            return self.has_turned
+        self.values, self.attitude_wxyz, self.has_turned = values, None, False
+        return False
+
+    def attitude(self, sample: Attitude) -> None:
+        """Take one attitude: another than the first since the values are the same."""
+        if self.attitude_wxyz is None:
+            self.attitude_wxyz = sample.attitude_wxyz
+        elif sample.attitude_wxyz != self.attitude_wxyz:
+            self.has_turned = True
+
+
 def heard(sight: Sight, imu_samples: int, config: SightConfig, now_us: int) -> Sight:
     """With the IMU samples that arrived by ``now_us`` (companion's clock)."""
     last_us, started_us, count, rate_hz, reason = sight
@@ -56,10 +84,12 @@ def heard(sight: Sight, imu_samples: int, config: SightConfig, now_us: int) -> S
     return Sight(last_us, started_us, count, rate_hz, reason)
 
 
-def why_blind(sight: Sight, threshold_m_s2: float, config: SightConfig, now_us: int) -> str | None:
-    """One phrase, or None for a detector that sees."""
+def why_blind(
+    sight: Sight, threshold_m_s2: float, config: SightConfig, now_us: int, useless: str | None = None
+) -> str | None:
+    """One phrase, or None for a detector that sees. `useless`: what was wrong with the newest IMU message."""
     if now_us - sight.last_heard_us > config.silence_s * 1e6:
-        return f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
+        return useless or f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
     if sight.rate_hz is not None and sight.rate_hz < config.min_rate_hz:
         return f"HIGHRES_IMU at {sight.rate_hz:.0f} Hz, below {config.min_rate_hz:g}"
     if threshold_m_s2 > config.max_threshold_m_s2:

@@ -9,11 +9,11 @@ from typing import Any
 
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
 from companion.detection.registry import DETECTORS
-from companion.detection.sight import Sight, heard, why_blind
+from companion.detection.sight import Sameness, Sight, heard, why_blind
 from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.estimate.normal import prepare
-from companion.messages import AttitudeTarget, ImuSample, MessageId, Odometry, Sample, Vibration
+from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
 from companion.mission.config import CompanionConfig
 
 # What a detector may make use of besides HIGHRES_IMU; the slowest is PX4's VIBRATION, every two seconds by default.
@@ -44,7 +44,9 @@ class Watch:
     estimator: ImpactEstimator
     sight: Sight
     started_us: int
+    sameness: Sameness = field(default_factory=Sameness)
     last_imu_boot_us: int = 0
+    useless: str | None = None  # what was wrong with the newest IMU message
     threshold_told: bool = False
     losses_told: bool = False
     doubt_told: bool = False
@@ -100,10 +102,20 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
     imu_samples = 0
     for sample in samples:
         if type(sample) is ImuSample:
+            if watch.sameness.imu(sample):
+                watch.useless = "IMU stuck at one value"
+                continue
+            watch.useless = None
             imu_samples += 1
             if 0 <= watch.last_imu_boot_us - sample.time_boot_us < REBOOT_US:
                 continue
             watch.last_imu_boot_us = sample.time_boot_us
+        elif type(sample) is Attitude:
+            watch.sameness.attitude(sample)
+        elif type(sample) is Refused:
+            if sample.message == MessageId.HIGHRES_IMU.name:
+                watch.useless = f"HIGHRES_IMU not believed: {sample.reason}"
+            continue
         elif not watch.losses_told and type(sample) in WISHED:
             watch.heard.add(WISHED[type(sample)])
         watch.estimator.hear(sample)
@@ -116,7 +128,7 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
             cut_short = watch.estimator.close()
             if cut_short is not None:
                 finished.append(cut_short)
-            impacts.append(watch.estimator.begin(impact, situation))
+            impacts.append(watch.estimator.begin(impact, situation, type(sample) is not ImuSample))
         elif type(sample) is ImuSample:
             final = watch.estimator.follow(watch.state)
             if final is not None:
@@ -132,14 +144,14 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
     notices: list[Notice] = []
     sight = heard(watch.sight, imu_samples, watch.config.sight, now_us)
     on = situation.off_reason is None
-    reason = why_blind(sight, watch.state.threshold_m_s2, watch.config.sight, now_us) if on else None
+    threshold_m_s2 = watch.state.threshold_m_s2
+    reason = why_blind(sight, threshold_m_s2, watch.config.sight, now_us, watch.useless) if on else None
     if (reason is None) != (sight.blind_reason is None) and on:
         text = "the detector sees again" if reason is None else f"detector blind: {reason}"
         notices.append(Notice("link", text, {}))
     watch.sight = sight if reason == sight.blind_reason else sight._replace(blind_reason=reason)
     if not watch.threshold_told and watch.state.phase is Phase.ARMED:
         watch.threshold_told = True
-        threshold_m_s2 = watch.state.threshold_m_s2
         text = f"detector '{watch.detector.name}' on the watch: a hit is {threshold_m_s2:.1f} m/s^2 or more"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
     if not watch.losses_told and watch.state.phase is Phase.ARMED and now_us - watch.started_us >= HEARD_US:

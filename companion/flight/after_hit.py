@@ -100,7 +100,7 @@ def take_back(flight: FlightContext, now_us: int) -> Move | None:
         return None
     flight.collisions.pop()
     flight.unconfirmed += 1
-    text = "not a hit: one sample showed a push, and nothing else did; going on"
+    text = "not a hit: one message showed it, and nothing else did; going on"
     flight.tell(now_us, "unconfirmed", text, count=flight.unconfirmed)
     flight.tally.hits, flight.tally.pace_factor = before.step_hits, before.pace_factor
     flight.step_index = max(before.step_index, 1) if before.state is State.TAKEOFF else before.step_index

@@ -8,7 +8,7 @@ from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
-from companion.flight.confirming import DECIDED_US, Claim, contradicts
+from companion.flight.confirming import DECIDED_US, Claim, Leap
 from companion.messages import Attitude, LocalPosition, Vector3
 from companion.recovery.climb import Climb
 from companion.recovery.direction import away_from
@@ -52,7 +52,7 @@ class CollisionRecord:
     is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
-    claim: Claim | None = None  # of the first sample, until something else shows the hit, too
+    claim: Claim | Leap | None = None  # of the first sample or velocity, until something else shows the hit, too
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
@@ -61,7 +61,7 @@ class CollisionRecord:
 
     def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
         """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
-        if self.claim is not None:
+        if isinstance(self.claim, Claim):
             self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         if self.fixes:
             fix = self.fixes[-1]
@@ -77,7 +77,9 @@ class CollisionRecord:
     ) -> None:
         """While the contact lasts: its largest force and its end; the normal as it is known by now."""
         self.fixes = fixes
-        if self.claim is not None and (self._is_seen_again(state, self.claim) or self.claim.is_turned):
+        claim = self.claim
+        is_turned = isinstance(claim, Claim) and claim.is_turned
+        if claim is not None and (is_turned or self._is_seen_again(state, claim)):
             self.claim = None
         if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
             return
@@ -91,7 +93,7 @@ class CollisionRecord:
         self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
         self.is_clipped = estimate.is_lower_bound
 
-    def _is_seen_again(self, state: DetectorState, claim: Claim) -> bool:
+    def _is_seen_again(self, state: DetectorState, claim: Claim | Leap) -> bool:
         """Another sample of the contact's force has come."""
         return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > claim.time_boot_us
 
@@ -99,7 +101,7 @@ class CollisionRecord:
         """Whether, once that is decided, nothing but its first sample shows this hit."""
         if self.claim is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
-        found = contradicts(self.fixes, self.claim)
+        found = self.claim.is_contradicted(self.fixes)
         self.claim = None
         return found
 

@@ -2,7 +2,9 @@
 
 One row is an accelerometer's sample. A second one is another sample of the contact's force; or rates of turn that no
 motor makes so fast; or the vehicle's own velocity, which a true push of the length of that sample's mean must have
-changed. A broken or forged packet does none of this: rates and velocity go on as all other samples say.
+changed. A broken or forged packet does none of this: rates and velocity go on as all other samples say. Nor do the
+velocities after a forged one stay where it was, and rates that come and go within one sample take two pushes, both off
+the obstacle, of which a velocity tells.
 """
 
 import math
@@ -14,6 +16,7 @@ from companion.estimate.approach import VelocityFix
 from companion.estimate.guards import MOTORS_RAD_S2
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, Vector3
+from companion.mission.config import GuardsConfig
 
 # All but the longest contacts are over (0.12 s at 1 m/s), and the vehicle's estimate is 20 to 40 ms late. A setpoint
 # that leans by 17 degrees for so long moves a vehicle by 3 cm.
@@ -44,38 +47,80 @@ class Claim:
             turned = math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s)
             self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
 
+    def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
+        """Whether the velocities after the sample show that the push it claims has not been.
 
-def claim_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Claim | None:
+        `fixes` hold each velocity beside the accelerometer's sum (trapezoids). Without the claimed sample's own share
+        in the sum, the velocity of a vehicle that was pushed is ahead of it, by the whole impulse; of one that was not,
+        it is where it was.
+        """
+        hit_us, later_us = self.time_boot_us, self.later_boot_us
+        before = [fix for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
+        after = [fix for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
+        size_m_s2 = math.hypot(*self.force_ned_m_s2)
+        if len(before) < 2 or len(after) < 2 or later_us is None or size_m_s2 == 0.0:
+            return False
+        away = tuple(part / size_m_s2 for part in self.force_ned_m_s2)
+        was, came = [_ahead(fix, away) for fix in before], [_ahead(fix, away) for fix in after]
+        mean_was, mean_came = sum(was) / len(was), sum(came) / len(came)
+        noise = math.sqrt(sum((value - mean_was) ** 2 for value in was) / (len(was) - 1))
+        spread = noise * math.sqrt(1.0 / len(was) + 1.0 / len(came))
+        in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - self.earlier.time_boot_us)
+        pushed_m_s, least_m_s = mean_came - mean_was + in_sum_m_s, 0.5 * size_m_s2 * self.averaging_s
+        return pushed_m_s < least_m_s and least_m_s > SURE * spread
+
+
+@dataclass(frozen=True, slots=True)
+class Leap:
+    """What one velocity says alone, or one sample's rates that were gone in the next: the velocity has changed."""
+
+    time_boot_us: int
+    free_until_boot_us: int
+    change_m_s: float
+    away: Vector3 | None  # its direction, local NED; None where that is not known
+
+    def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
+        """Whether no velocity since shows so much as half of the change."""
+        free_us, hit_us = self.free_until_boot_us, self.time_boot_us
+        before = [_less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
+        after = [_less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
+        if len(before) < 2 or len(after) < 2:
+            return False
+        was = tuple(sum(axis) / len(before) for axis in zip(*before, strict=True))
+        return all(self._departs_m_s(came, was) < 0.5 * self.change_m_s for came in after)
+
+    def _departs_m_s(self, came: Sequence[float], was: Sequence[float]) -> float:
+        if self.away is None:
+            return math.dist(came, was)
+        return sum(a * (c - w) for a, c, w in zip(self.away, came, was, strict=True))
+
+
+def claim_of(
+    estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float, guards: GuardsConfig
+) -> Claim | Leap | None:
     """None where more than one sample or message has spoken already."""
     impact = estimate.impact
-    if impact.evidence is not Evidence.FORCE or estimate.is_final or estimate.earlier is None:
+    hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
+    if impact.evidence is Evidence.AFTERMATH:
+        size_m_s2 = math.hypot(*force_ned_m_s2)
+        if estimate.by_velocity and size_m_s2 > 0.0:
+            n, e, d = force_ned_m_s2
+            away = (n / size_m_s2, e / size_m_s2, d / size_m_s2)
+            return Leap(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
+        if not estimate.by_velocity and estimate.spike_rad_s is not None:
+            # A push that turns by so much has the longest lever at a guard's rim; there and back take two of them.
+            per_rad_m = min(guards.gyration_frd_m) ** 2 / (guards.centre_m + guards.radius_m)
+            return Leap(hit_us, free_us, 2.0 * per_rad_m * estimate.spike_rad_s, None)
         return None
-    return Claim(impact.sample_time_boot_us, estimate.earlier, force_ned_m_s2, averaging_s)
-
-
-def contradicts(fixes: Sequence[VelocityFix], claim: Claim) -> bool:
-    """Whether the velocities after the sample show that the push it claims has not been.
-
-    `fixes` hold each velocity beside the accelerometer's sum (trapezoids). Without the claimed sample's own share in
-    the sum, the velocity of a vehicle that was pushed is ahead of it, by the whole impulse; of one that was not, it is
-    where it was.
-    """
-    hit_us, later_us = claim.time_boot_us, claim.later_boot_us
-    before = [fix for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
-    after = [fix for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
-    size_m_s2 = math.hypot(*claim.force_ned_m_s2)
-    if len(before) < 2 or len(after) < 2 or later_us is None or size_m_s2 == 0.0:
-        return False
-    away = tuple(part / size_m_s2 for part in claim.force_ned_m_s2)
-    was, came = [_ahead(fix, away) for fix in before], [_ahead(fix, away) for fix in after]
-    mean_was, mean_came = sum(was) / len(was), sum(came) / len(came)
-    noise = math.sqrt(sum((value - mean_was) ** 2 for value in was) / (len(was) - 1))
-    spread = noise * math.sqrt(1.0 / len(was) + 1.0 / len(came))
-    in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - claim.earlier.time_boot_us)
-    pushed_m_s, least_m_s = mean_came - mean_was + in_sum_m_s, 0.5 * size_m_s2 * claim.averaging_s
-    return pushed_m_s < least_m_s and least_m_s > SURE * spread
+    if estimate.is_final or estimate.earlier is None:
+        return None
+    return Claim(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)
 
 
 def _ahead(fix: VelocityFix, away: Sequence[float]) -> float:
     """The velocity less the accelerometer's sum, along a direction."""
-    return sum(a * (v - s) for a, v, s in zip(away, fix.velocity_ned_m_s, fix.sum_ned_m_s, strict=True))
+    return sum(a * less for a, less in zip(away, _less_sum(fix), strict=True))
+
+
+def _less_sum(fix: VelocityFix) -> tuple[float, ...]:
+    return tuple(v - s for v, s in zip(fix.velocity_ned_m_s, fix.sum_ned_m_s, strict=True))

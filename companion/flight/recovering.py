@@ -10,7 +10,7 @@ from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, overtaken
 from companion.flight.collision import CollisionRecord
-from companion.flight.confirming import Claim, claim_of
+from companion.flight.confirming import Claim, Leap, claim_of
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
 from companion.flight.pinned import Hanging, has_room_below, let_go
@@ -259,13 +259,14 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     tell_detection(flight, record, now_us)
 
 
-def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | None:
+def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | Leap | None:
     """What the first sample says alone; None where that is not known, or the vehicle recovers from another hit."""
     attitude = flight.vehicle.attitude
     if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
         return None
     force_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
-    return claim_of(estimate, force_ned, flight.mission.companion.estimate.imu_averaging_interval_s)
+    config = flight.mission.companion.estimate
+    return claim_of(estimate, force_ned, config.imu_averaging_interval_s, config.guards)
 
 
 def _doubted(flight: FlightContext) -> CollisionRecord | None:

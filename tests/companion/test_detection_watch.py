@@ -174,3 +174,16 @@ def test_what_is_lost_without_a_message_is_said_once():
     _, _, notices = fly(watch, 8_000_000)
     losses = [notice.text for notice in notices if notice.text.startswith("no ")]
     assert [text.split(":")[0] for text in losses] == ["no ATTITUDE_TARGET", "no VIBRATION", "no ODOMETRY"]
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_samples_that_are_the_same_to_the_last_bit_are_none_only_of_a_vehicle_that_turned_between(turns):
+    """At rest a sensor without noise repeats itself; nothing that turns does."""
+    watch = start_watch(lateral(), 0)
+    fly(watch, 1_000_000)
+    notices = []
+    for t in range(1_000_000, 2_000_000, INTERVAL_US):
+        roll = 1e-4 * (t % 3) if turns else 0.0
+        samples = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, roll, 0.0, 0.0))]
+        notices += advance(watch, samples, WANTED, t).notices
+    assert [notice.text for notice in notices] == (["detector blind: IMU stuck at one value"] if turns else [])

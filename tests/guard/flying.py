@@ -94,6 +94,13 @@ class Air:
         self._guards_bytes = b"" if self.keep_guard_silent else b"".join(result.sent_frames)
         self.events += result.events
 
+    def guard_hears(self, forged: bytes) -> list[Event]:
+        """Somebody sends this in the vehicle's name."""
+        result = self.guard.step(forged, EPOCH_US + self.vehicle.time_boot_us)
+        self._guards_bytes += b"".join(result.sent_frames)
+        self.events += result.events
+        return list(result.events)
+
     def _note(self, sender: str, sent: bytes) -> None:
         for message in self._parser.parse_buffer(bytearray(sent)) or [] if sent else []:
             self.on_wire.append((self.time_s, sender, message))

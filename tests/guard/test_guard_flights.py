@@ -289,3 +289,22 @@ def test_a_second_stream_that_appears_while_the_guard_holds_is_noticed_and_not_f
     air.until(lambda: air.told("crossed") != [], 1.0)
     assert air.time_s - began_s < 0.8
     air.until(lambda: air.vehicle_mode() == "AUTO.LOITER", 1.0)
+
+
+def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
+    air = Air(GuardConfig(then="previous"))
+    stick = pilot(air)
+    air.take_off()
+    air.mode(MANUAL_POSITION)
+    air.until(lambda: air.vehicle_mode() == "POSCTL", 2.0)
+    stick[0] = 0.1
+    air.run(1.0)
+    stick[0] = 0.0
+    values = (-40.0, 0.0, -9.8, *[0.0] * 10)
+    forged = dialect.MAVLink_highres_imu_message(air.vehicle.time_boot_us + 2_000, *values, 0x3F)
+    heard = air.guard_hears(bytes(forged.pack(dialect.MAVLink(None, 1, 1))))
+    assert air.state is State.TAKING_OVER and [event.kind for event in heard].count("detection") == 1
+    assert air.until(lambda: air.state is State.WATCHING, 3.0) < 1.0
+    air.until(lambda: air.vehicle_mode() == "POSCTL", 1.0)
+    assert [event.kind for event in air.events].count("unconfirmed") == 1
+    assert air.guard.core.machine.guard.hits == 0

@@ -1,6 +1,7 @@
 """One packet alone is answered at once and counts for nothing: a second row confirms a hit within 150 ms."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import pytest
@@ -13,6 +14,7 @@ from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.vehicle import SimulatedVehicle
 
 EPOCH_US = 1_600_000_000_000_000
+AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
 MISSION = """\
 name: forged
 items:
@@ -62,12 +64,46 @@ class Air:
             self.step()
         raise AssertionError([event.text for event in self.events])
 
-    def imu(self, force_m_s2: float) -> bytes:
-        """Between two of its own samples: a push against the way."""
-        message = mav.MAVLink_highres_imu_message(
-            self.vehicle.time_boot_us + 2000, force_m_s2, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F
-        )
-        return bytes(message.pack(mav.MAVLink(None, 1, 1)))
+    def imu(self, force_m_s2: float, rate_rad_s: float = 0.0) -> bytes:
+        """Between two of its own samples: a push against the way, or a turn about the nose."""
+        values = (force_m_s2, 0, -9.8, rate_rad_s, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+        return packed(mav.MAVLink_highres_imu_message(self.vehicle.time_boot_us + 2000, *values, 0x3F))
+
+    def motion(self) -> tuple[float, ...]:
+        """Place and velocity as the vehicle last told them."""
+        latest = self.companion.core.flight.vehicle.history.latest()
+        return (*latest.position_ned_m, *latest.velocity_ned_m_s)
+
+    def local_position(self, *jump: float) -> bytes:
+        moved = [was + by for was, by in zip(self.motion(), jump, strict=True)]
+        return packed(mav.MAVLink_local_position_ned_message((self.vehicle.time_boot_us + 2000) // 1000, *moved))
+
+    def odometry(self, *jump: float) -> bytes:
+        """With the reset counter of a vehicle that has never reset its estimate."""
+        x, y, z, *velocity = (was + by for was, by in zip(self.motion(), jump, strict=True))
+        unknown = [math.nan] * 21
+        values = (1, 1, x, y, z, [1, 0, 0, 0], *velocity, 0, 0, 0, unknown, unknown, 0)
+        return packed(mav.MAVLink_odometry_message(self.vehicle.time_boot_us + 2000, *values))
+
+    def spoil_imu(self, spoilt: Callable[[tuple[float, ...]], tuple[float, ...]], seconds: float) -> None:
+        """Let the vehicle's IMU read otherwise for a while: its three forces and three rates."""
+        fly, until_us = self.vehicle.step, self.vehicle.time_boot_us + round(seconds * 1e6)
+
+        def step(received: bytes) -> list[bytes]:
+            heard = []
+            for frame in fly(received):
+                message = mav.MAVLink(None).decode(bytearray(frame))
+                if message.get_type() == "HIGHRES_IMU" and self.vehicle.time_boot_us < until_us:
+                    values = spoilt(tuple(getattr(message, axis) for axis in AXES))
+                    frame = packed(mav.MAVLink_highres_imu_message(message.time_usec, *values, *[0] * 7, 0x3F))
+                heard.append(frame)
+            return heard
+
+        self.vehicle.step = step
+
+
+def packed(message: mav.MAVLink_message) -> bytes:
+    return bytes(message.pack(mav.MAVLink(None, 1, 1)))
 
 
 def cruising(*sets: str) -> Air:
@@ -96,6 +132,74 @@ def test_one_forged_packet_costs_a_twitch(force_m_s2):
     air.run_until(lambda: air.companion.finished)
     report = air.companion.report()
     assert (report.outcome, report.collisions, report.unconfirmed, report.obstacles) == ("completed", (), 1, ())
+
+
+@pytest.mark.parametrize("hz", [250, 50])
+@pytest.mark.parametrize(
+    "forged",
+    [
+        lambda air: air.odometry(0, 0, 0, -2, 0, 0),
+        lambda air: air.odometry(0, 0, 0, 0, 2, 0),
+        lambda air: air.imu(0.0, rate_rad_s=10.0),
+        lambda air: air.imu(0.0, rate_rad_s=30.0),
+    ],
+    ids=["brakes", "slides", "turns", "spins"],
+)
+def test_one_forged_velocity_or_rate_is_contradicted_by_the_velocities_after_it(forged, hz):
+    air = cruising(f"companion.streams.highres_imu_hz={hz}")
+    began_us = air.vehicle.time_boot_us
+    air.step(forged(air))
+    air.run_until(lambda: air.state == "recovering", 0.1)
+    air.run_until(lambda: air.state == "mission", 1.0)
+    assert air.vehicle.time_boot_us - began_us <= 250_000
+    air.run_until(lambda: air.companion.finished)
+    report = air.companion.report()
+    assert (report.outcome, report.collisions, report.unconfirmed, report.obstacles) == ("completed", (), 1, ())
+
+
+@pytest.mark.parametrize(
+    "jump",
+    [(5, 0, 0, 0, 0, 0), (0, -5, 0, 0, 0, 0), (0, 0, 5, 0, 0, 0), (0, 0, 0, -2, 0, 0), (0, 0, 0, 0, 2, 0)],
+)
+def test_one_forged_position_or_velocity_of_local_position_is_no_hit(jump):
+    air = cruising()
+    air.step(air.local_position(*jump))
+    air.run_until(lambda: air.companion.finished)
+    report = air.companion.report()
+    assert (report.outcome, report.collisions, report.unconfirmed) == ("completed", (), 0)
+
+
+def stuck() -> Callable[[tuple[float, ...]], tuple[float, ...]]:
+    """All six at the values they first show."""
+    first: list[tuple[float, ...]] = []
+
+    def spoilt(values: tuple[float, ...]) -> tuple[float, ...]:
+        first.append(values)
+        return first[0]
+
+    return spoilt
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "reason"),
+    [
+        (stuck, "detector blind: IMU stuck at one value"),
+        (lambda: lambda _: (0.0,) * 6, "detector blind: HIGHRES_IMU not believed: the accelerometer reads zero"),
+    ],
+    ids=["stuck", "zero"],
+)
+@pytest.mark.parametrize("north_m", [2.5, 5.2])
+def test_an_imu_that_measures_nothing_for_a_second_makes_the_detector_blind_and_is_no_hit(spoilt, reason, north_m):
+    """In cruise, and where the vehicle brakes for its goal, which such a sensor does not show."""
+    air = Air()
+    air.run_until(lambda: air.state == "mission" and air.motion()[0] > north_m)
+    air.spoil_imu(spoilt(), seconds=1.0)
+    for _ in range(500):
+        air.step()
+    links = [event.text for event in air.events if event.kind == "link"]
+    assert len(links) == 2 and links[0].startswith(reason) and links[1] == "the detector sees again"
+    report = air.companion.report()
+    assert (report.collisions, report.unconfirmed) == ((), 0)
 
 
 def test_the_hits_allowed_are_not_used_up_by_hits_that_were_none():
