@@ -58,6 +58,7 @@ STANDS_M_S2 = 1.0
 def findings(survey: Survey) -> list[Finding]:
     """All items, in the order in which they would be mended."""
     return [
+        *_frame(survey),
         *_streams(survey),
         *_integration(survey),
         *_offboard_loss(survey),
@@ -70,6 +71,16 @@ def findings(survey: Survey) -> list[Finding]:
         *_battery(survey),
         *_sight(survey),
     ]
+
+
+def _frame(survey: Survey) -> Iterator[Finding]:
+    """HEARTBEAT tells how many arms there are, not where: a quadrotor is taken for an X."""
+    kind = "" if survey.identity is None else survey.identity.vehicle_type
+    if kind != "quadrotor" and survey.config.estimate.fits_normal:
+        remedy = "companion.estimate.fits_normal: false in the mission: the normal is the push's direction then"
+        yield Finding("frame", Verdict.DOUBTFUL, f"{kind}: a hit's normal is fitted for a quad-x", remedy)
+    else:
+        yield Finding("frame", Verdict.GOOD, kind)
 
 
 def _streams(survey: Survey) -> Iterator[Finding]:

@@ -9,6 +9,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
+from rebound_cli.logs.kind import other_arms
 from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
 
 Packets = list[tuple[int, bytes]]
@@ -41,7 +42,8 @@ def read_telemetry(path: Path) -> Log:
             continue
         heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
     kinds = {message_id_of(packet) for _, packet in packets if source_of(packet) == source}
-    losses = [f"{MessageId(number).name} is not in it" for number in _WANTED if number not in kinds]
+    losses = [*other_arms(vehicle.vehicle_type)]
+    losses += [f"{MessageId(number).name} is not in it" for number in _WANTED if number not in kinds]
     if others:
         losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
     if MessageId.HIGHRES_IMU not in kinds:

@@ -13,6 +13,7 @@ import numpy as np
 from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
 from companion.messages import Attitude, AttitudeTarget, Heartbeat, LocalPosition, Odometry, Vector3, Vibration
 from rebound_cli.logs.inertial import averaging_us, clipped_at_us, imu_samples, inertial_topic
+from rebound_cli.logs.kind import QUADROTOR, other_arms, rotors, vehicle_type
 from rebound_cli.logs.landed import landed_states
 from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
 from rebound_cli.logs.modes import custom_mode
@@ -27,8 +28,6 @@ _NAMES = (
 
 # MAV_STATE, as PX4 fills HEARTBEAT.system_status.
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5
-# MAV_TYPE_QUADROTOR, where a log does not name the type.
-_QUADROTOR = 2
 
 # What a missing topic costs, in the words of docs/replay.md.
 _COSTS = {
@@ -55,6 +54,7 @@ def read_ulog(path: Path) -> Log:
         raise LogError(
             f"{path}: neither sensor_combined nor vehicle_imu in it; PX4 logs them by default (SDLOG_PROFILE)."
         )
+    kind = vehicle_type(path, topics)
     heard: list[Heard] = list(imu_samples(topics, imu))
     for names, convert in _CONVERSIONS.items():
         topic = topics.first(*names)
@@ -71,7 +71,7 @@ def read_ulog(path: Path) -> Log:
             vehicle=f"PX4{version}{hardware}",
             started_at_us=topics.started_us,
             heard=tuple(heard),
-            losses=tuple(_losses(topics, imu)),
+            losses=(*other_arms(MULTICOPTERS[kind], rotors(topics)), *_losses(topics, imu)),
             hover_thrust_fraction=_hover_thrust(topics),
             clipped_at_us=clipped_at_us(imu),
             averaging_us=averaging_us(imu),
@@ -171,7 +171,7 @@ def _heartbeat(topic: Topic) -> Iterable[Heard]:
     for index, time_us in enumerate(topic.time_us.tolist()):
         armed = arming[index] == ARMED
         acting = failsafe is not None and bool(failsafe[index])
-        kind = int(kinds[index]) if kinds is not None and int(kinds[index]) in MULTICOPTERS else _QUADROTOR
+        kind = int(kinds[index]) if kinds is not None and int(kinds[index]) in MULTICOPTERS else QUADROTOR
         status = _CRITICAL if acting else _ACTIVE if armed else _STANDBY
         beat = Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(armed), modes[index], status)
         yield Heard(time_us, beat)

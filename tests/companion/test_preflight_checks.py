@@ -111,6 +111,17 @@ def test_what_is_measured_is_judged(wrong, item, verdict):
     assert verdicts(surveyed(**wrong))[item] is verdict
 
 
+def test_arms_that_are_no_quad_x_are_worth_a_look_where_the_normal_is_fitted_to_them():
+    def frame(kind, **estimate):
+        survey = start_survey(CompanionConfig(estimate=estimate), 0)
+        advance(survey, [Heartbeat(1, 1, kind, 12, False, 0, 3)], 0)
+        return verdicts(survey)["frame"]
+
+    assert frame(2) is Verdict.GOOD
+    assert frame(13) is Verdict.DOUBTFUL
+    assert frame(13, fits_normal=False) is Verdict.GOOD
+
+
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
     known = {name: value for name, value in HEALTHY.items() if name != "COM_OF_LOSS_T"}
     survey = surveyed(known)

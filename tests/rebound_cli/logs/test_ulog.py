@@ -135,6 +135,40 @@ def test_mode_arming_and_failsafe_become_heartbeats(tmp_path):
     assert seen == [(OFFBOARD, False, 3), (OFFBOARD, True, 4), (AUTO_LAND, True, 5)]
 
 
+@pytest.mark.parametrize(
+    ("status", "parameters", "words"),
+    [
+        ({"system_type": 1}, (), "fixed-wing aircraft"),
+        ({"system_type": 22}, (), "VTOL aircraft"),
+        ({"vehicle_type": 2}, (), "fixed-wing aircraft"),
+        ({"vehicle_type": 3}, (), "ground rover"),
+        ({"system_type": 2, "vehicle_type": 1, "is_vtol": 1}, (), "VTOL aircraft"),
+        ({"arming_state": 2}, [("MAV_TYPE", 1.0)], "fixed-wing aircraft"),
+    ],
+)
+def test_a_log_of_no_multicopter_is_refused_by_name(tmp_path, status, parameters, words):
+    # vehicle_status.vehicle_type: 1 rotary wing, 2 fixed wing, 3 rover
+    topic = ([("uint8_t", name) for name in status], [(START, *status.values())])
+    with pytest.raises(LogError, match=f"is not a multicopter but: {words}"):
+        read(tmp_path, {**IMU, "vehicle_status": topic}, parameters=parameters)
+
+
+def test_arms_that_are_no_x_are_said(tmp_path):
+    def said(kind, *rotors):
+        places = [(f"CA_ROTOR{n}_P{'XY'[axis]}", place[axis]) for n, place in enumerate(rotors) for axis in (0, 1)]
+        topic = ([("uint8_t", "system_type")], [(START, kind)])
+        parameters = [("CA_ROTOR_COUNT", float(len(rotors))), *places]
+        losses = read(tmp_path, {**IMU, "vehicle_status": topic}, parameters=parameters).losses
+        return [loss for loss in losses if "quad-x" in loss]
+
+    # A square X, and PX4's own long-armed iris
+    assert said(2, (0.2, 0.2), (-0.2, -0.2), (0.2, -0.2), (-0.2, 0.2)) == []
+    assert said(2, (0.15, 0.245), (-0.15, -0.19), (0.15, -0.245), (-0.15, 0.19)) == []
+    # A plus, and six arms
+    assert said(2, (0.2, 0.0), (0.0, -0.2), (-0.2, 0.0), (0.0, 0.2))[0].startswith("a quadrotor whose arms are no X")
+    assert said(13)[0].startswith("a hexarotor")
+
+
 def test_landed_state_is_what_px4_would_send(tmp_path):
     topics = {
         **IMU,
