@@ -18,6 +18,7 @@ from rebound_cli.replay.recording import is_run_folder
 from rebound_cli.replay.settings import companion_settings
 from rebound_cli.replay.watching import watch_log
 from rebound_cli.run_folder import TLOG_NAME
+from rebound_cli.tune.crash import crash, told_hits
 from rebound_cli.tune.hits import Sight, hit_moments, sight
 from rebound_cli.tune.margins import margins
 from rebound_cli.tune.report import Healthy, Tuning, tuning_data, tuning_text
@@ -62,6 +63,10 @@ def _airframes(options: Namespace) -> Sequence[str]:
 
 def _log(path: Path) -> Log:
     log = read_log(path / TLOG_NAME if is_run_folder(path) else path)
+    hits = told_hits(path)
+    wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else crash(log)
+    if wrong is not None:
+        raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
     if not any(stage in (Stage.HOVER, Stage.UNDER_WAY) for stage in shaking(log).stages):
         raise LogError(f"{path}: no flight in it, only the ground, a take-off and a landing.")
     if not list(hit_moments(log)):

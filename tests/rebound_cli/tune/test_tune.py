@@ -1,16 +1,20 @@
 """`rebound tune`: margins by running the detector, hits of the arm model in a vehicle's own noise, settings to use."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import yaml
 
+from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
 from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.logs.log import Heard
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
+from rebound_cli.tune.crash import crash
 from rebound_cli.tune.hits import SPEEDS_M_S, STEP_S, Sight, hit_moments, impulse_since_touch, sight, with_hits
 from rebound_cli.tune.margins import margins
 from rebound_cli.tune.settings import RESERVE, advise, settings_text
@@ -95,12 +99,13 @@ def test_a_contact_shorter_than_the_streams_interval_is_missed_now_and_then():
     assert folding[1].seen[4] == folding[1].hits
 
 
-def healthy_log(path, duration_s):
-    """A PX4 log of a flight at 200 Hz: armed, up after a second, shaking with 0.3 m/s^2."""
+def healthy_log(path, duration_s, falls=False):
+    """A PX4 log of a flight at 200 Hz: armed, up after a second, shaking with 0.3 m/s^2. `falls`: at 5 s, for 0.5 s."""
     random = np.random.default_rng(3)
     times = every(5000, 0, round(duration_s * 1e6))
     noise = dict(zip(times, random.normal(0.0, 0.3, (len(times), 3)).tolist(), strict=True))
-    force = lambda t: (noise[t][0], noise[t][1], -9.8 + noise[t][2])  # noqa: E731
+    weight = lambda t: 0.0 if falls and 5_000_000 <= t < 5_500_000 else -9.8  # noqa: E731
+    force = lambda t: (noise[t][0], noise[t][1], weight(t) + noise[t][2])  # noqa: E731
     topics = {
         "sensor_combined": sensor_combined(times, force),
         "vehicle_land_detected": ([("bool", "landed")], [(0, True), (1_000_000, False)]),
@@ -161,6 +166,50 @@ def test_logs_that_teach_nothing_are_refused(tmp_path, capsys):
         assert code == 1 and text == "" and words in error, error
     code, _, error = tune(capsys, healthy_log(tmp_path / "long.ulg", 10.0), "--detector", "magic")
     assert code == 1 and "there is no detector 'magic'" in error
+
+
+def fallen(log):
+    """From 5 s on it shows no force for half a second."""
+    heard = [
+        replace(item, sample=replace(item.sample, specific_force_frd_m_s2=(0.3, 0.2, -1.0)))
+        if isinstance(item.sample, ImuSample) and 5_000_000 <= item.at_us < 5_500_000
+        else item
+        for item in log.heard
+    ]
+    return replace(log, heard=tuple(heard))
+
+
+def leaning(log, degrees):
+    """From 5 s on it leans so far to the right."""
+    half_rad = math.radians(degrees) / 2
+    attitude = Attitude(5_000_000, (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0))
+    heard = sorted([*log.heard, Heard(5_000_000, attitude)], key=lambda item: item.at_us)
+    return replace(log, heard=tuple(heard))
+
+
+def test_a_flight_that_tipped_over_or_fell_is_no_healthy_one():
+    healthy = flight(hit_us=None)
+    assert crash(healthy) is None
+    assert crash(leaning(healthy, 50.0)) is None
+    assert crash(leaning(healthy, 111.0)) == "it tipped to 111 degrees at 5.0 s"
+    assert crash(fallen(healthy)) == "it fell at 5.0 s"
+    # Carried by hand or taken apart on the bench, it may lie on its back
+    beats = [
+        replace(h, sample=replace(h.sample, armed=False)) for h in healthy.heard if isinstance(h.sample, Heartbeat)
+    ]
+    disarmed = (*beats, *(item for item in healthy.heard if not isinstance(item.sample, Heartbeat)))
+    assert crash(leaning(replace(healthy, heard=disarmed), 111.0)) is None
+
+
+def test_a_crash_and_our_own_flight_with_a_hit_are_refused(tmp_path, capsys):
+    log = healthy_log(tmp_path / "healthy.ulg", 12.0, falls=True)
+    code, text, error = tune(capsys, log)
+    assert code == 1 and text == "" and "not a healthy flight, it fell at 5.0 s" in error
+    run = tmp_path / "run"
+    assert main(["fly", "wall", "--lockstep", "--out", str(run)]) == 0
+    capsys.readouterr()
+    code, text, error = tune(capsys, run)
+    assert code == 1 and text == "" and "its summary tells 1 collision;" in error
 
 
 def test_every_detectors_settings_can_be_written():
