@@ -21,6 +21,9 @@ from companion.recovery.direction import plus, split
 from companion.recovery.interface import Contact, Moving, RecoveryConfig
 from companion.recovery.way import REST, SHORTEST_S, STEP, Way, glide, most_of
 
+# Of the limit. However long a way is, taking back a lean asks for 0.36 of it: from 2.8 on none keeps to the limit, and
+# the length that was looked for had no end.
+MOST_LEANT = 2.0
 # Of 10 degrees: as well as the normal is known after most hits (docs/detection.md).
 NORMAL_SINE = 0.17
 
@@ -48,7 +51,7 @@ class AdaptiveLaw:
         harder_m, along_m_s = config.clearance_s * abs(into_m_s), math.hypot(*tangential)
         if normal[2] == 0.0:
             tangential = (tangential[0], tangential[1], 0.0)
-        leant = motion.acceleration_ned_m_s2
+        leant = self._leant(motion)
         leant_m_s2, leant_along = split(leant, normal)
         duration_s, way = SHORTEST_S, REST
         while True:
@@ -65,8 +68,14 @@ class AdaptiveLaw:
         return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])
 
     def way(self, motion: Moving, goal_ned_m: Vector3) -> Way:
-        leant, most_m_s2 = motion.acceleration_ned_m_s2, self._config.acceleration_m_s2
-        return glide(motion.position_ned_m, motion.velocity_ned_m_s, leant, goal_ned_m, most_m_s2)
+        most_m_s2 = self._config.acceleration_m_s2
+        return glide(motion.position_ned_m, motion.velocity_ned_m_s, self._leant(motion), goal_ned_m, most_m_s2)
+
+    def _leant(self, motion: Moving) -> Vector3:
+        """The acceleration that the way begins with, as far as a way can take it back."""
+        leant, most_m_s2 = motion.acceleration_ned_m_s2, MOST_LEANT * self._config.acceleration_m_s2
+        size = math.hypot(*leant)
+        return leant if size <= most_m_s2 else plus(REST, most_m_s2 / size, leant)
 
 
 def _difference(a: Vector3, b: Vector3) -> Vector3:

@@ -244,6 +244,15 @@ def test_where_a_leant_vehicle_comes_to_rest_is_asked_for():
     assert off_m(hit(1.0), goal) == pytest.approx(6.0 * way.duration_s**2 / 12.0, rel=1e-6)
 
 
+@pytest.mark.parametrize("leant_m_s2", [9.0, 40.0, 1e3])
+@pytest.mark.parametrize("most_m_s2", [0.5, 3.0])
+def test_what_shows_more_lean_than_a_way_can_take_back_still_ends_near_by(leant_m_s2, most_m_s2):
+    # Given a push that goes on, taken for a lean
+    goal, way = adaptive(hit(1.0), Moving(AT, (-1.0, 0.3, 0.0), (-leant_m_s2, 0.0, 0.0)), acceleration_m_s2=most_m_s2)
+    assert off_m(hit(1.0), goal) < 8.0 / most_m_s2
+    assert max(math.dist(way.at(time_s).position_ned_m, AT) for time_s in times_of(way)) < 8.0 / most_m_s2
+
+
 def flown_past_m(duration_s, start_m_s, goal_m, answer=damped):
     """How far a vehicle with PX4's default gains runs past the goal of a glide, m; its thrust turns by a critically
     damped 12 rad/s, its estimate and link are 35 ms late, and drag is what it is not trimmed for."""
