@@ -149,6 +149,10 @@ class Control(_Part):
     velocity_p_per_s: Positive
     velocity_i_per_s2: NotNegative
     velocity_d: NotNegative
+    climb_p_per_s: Positive | None = None
+    """Of the velocity along z; None: as sideways. A vehicle that leans slowly climbs as fast as any."""
+    climb_i_per_s2: NotNegative | None = None
+    """The same of the integral."""
     attitude_frequency_rad_s: Positive
     attitude_damping: Positive
     yaw_frequency_rad_s: Positive

@@ -17,6 +17,13 @@ def add_campaign(commands: Commands) -> None:
         "--first-seed", type=count, default=1, metavar="SEED", help="of the first; the others follow (default 1)"
     )
     campaign.add_argument(
+        "--vehicles",
+        choices=("named", "drawn"),
+        default="named",
+        help="drawn: every mission has a vehicle of its own, drawn from its seed, of both airframes' kinds "
+        "(default named: the two airframes)",
+    )
+    campaign.add_argument(
         "--hits", type=count, default=5, metavar="SEEDS", help="of each hit with each recovery law (default 5)"
     )
     add_workers(campaign)
@@ -30,7 +37,7 @@ def add_campaign(commands: Commands) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="folder of campaign.md and images (default: docs); with --only the run folder "
+        help="folder of campaign.md, or of drawn.md, and images (default: docs); with --only the run folder "
         "(default: runs/<time>-random-SEED)",
     )
     campaign.set_defaults(run=runs("bench.campaign_report.command:run_campaign_command"))

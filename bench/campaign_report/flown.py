@@ -36,7 +36,7 @@ class Missions:
         return [
             Flown(self.cases[number], result)
             for number, result in sorted(self.results.items())
-            if self.cases[number] == MissionCase(self.cases[number].seed, airframe) and which(result)
+            if self.cases[number].airframe == airframe and self.cases[number].feed_forward and which(result)
         ]
 
     def first_hits_compared(self, airframe: str) -> list[tuple[Json, Json]]:
@@ -45,7 +45,8 @@ class Missions:
         pairs = [
             (result["hits"][0], with_it[self.cases[number].seed][0])
             for number, result in sorted(self.results.items())
-            if self.cases[number] == MissionCase(self.cases[number].seed, airframe, False)
+            if self.cases[number].airframe == airframe
+            and not self.cases[number].feed_forward
             and result["hits"]
             and with_it.get(self.cases[number].seed)
         ]

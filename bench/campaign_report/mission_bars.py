@@ -1,7 +1,7 @@
 """What the random missions must show."""
 
 import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from bench.campaign.plan import Json
 from bench.campaign_report.flown import HIT_SPEEDS_M_S, Missions, answered, level, square
@@ -19,12 +19,13 @@ LOSING_M, LEFT_MOST = 0.05, 0.5
 CLEAR_LEAST_M = 0.3
 
 
-def mission_bars(missions: Missions) -> list[Bar]:
-    return [*_endings(missions), *_hits(missions)]
+def mission_bars(missions: Missions, wanted: Mapping[str, float] = MISSIONS_WANTED) -> list[Bar]:
+    """`wanted`: the share of missions that must end as they say, by airframe."""
+    return [*_endings(missions, wanted), *_hits(missions)]
 
 
-def _endings(missions: Missions) -> Iterator[Bar]:
-    for airframe, wanted in MISSIONS_WANTED.items():
+def _endings(missions: Missions, shares: Mapping[str, float]) -> Iterator[Bar]:
+    for airframe, wanted in shares.items():
         flown = missions.of(airframe)
         good = share(one.is_good for one in flown)
         failed = sum(not one.is_good for one in flown)

@@ -11,15 +11,14 @@ from rebound_cli import run_folder
 AIRFRAME_AS_GIVEN = "airframe-as-given.yaml"
 
 
-def run_only(seed: int, airframe: str, out: Path | None) -> int:
+def run_only(case: MissionCase, out: Path | None) -> int:
     """Fly it as `rebound fly --lockstep` does and say what the campaign makes of it; 0 where it ended as it says."""
     from rebound_cli.main import build_parser
 
-    case = MissionCase(seed, airframe)
     drawn = random_mission(case)
     folder = run_folder.create_run_folder(out, drawn.data["name"])
     mission = folder / run_folder.MISSION_NAME
-    run_folder.write_yaml(folder / AIRFRAME_AS_GIVEN, airframe_data(airframe))
+    run_folder.write_yaml(folder / AIRFRAME_AS_GIVEN, airframe_data(case))
     sim = drawn.data["sim"] | {"airframe": str(folder / AIRFRAME_AS_GIVEN)}
     run_folder.write_yaml(mission, drawn.data | {"sim": sim})
     options: Namespace = build_parser().parse_args(["fly", str(mission), "--lockstep", "--out", str(folder)])

@@ -116,4 +116,5 @@ def failures_text(missions: Missions) -> str:
 
 def command_again(flown: Flown) -> str:
     airframe = "" if flown.case.airframe == AIRFRAMES[0] else f" --airframe {flown.case.airframe}"
-    return f"python -m bench campaign --only {flown.case.seed}{airframe}"
+    drawn = " --vehicles drawn" if flown.case.is_drawn else ""
+    return f"python -m bench campaign --only {flown.case.seed}{airframe}{drawn}"

@@ -16,12 +16,16 @@ _EVERY_S = 0.25
 COMPARED_EVERY = 5
 
 
-def missions_campaign(missions: int, first_seed: int = 1) -> Campaign:
-    """Seeds from the first on, each with every airframe; then some again without the feed-forward of the height."""
+def missions_campaign(missions: int, first_seed: int = 1, is_drawn: bool = False) -> Campaign:
+    """Seeds from the first on, each with every airframe; then some again without the feed-forward of the height.
+
+    `is_drawn`: with a vehicle drawn from each seed, of the two airframes' kinds.
+    """
     seeds = range(first_seed, first_seed + missions)
-    cases = [MissionCase(seed, name) for seed in seeds for name in AIRFRAMES]
-    cases += [MissionCase(seed, name, False) for seed in seeds if seed % COMPARED_EVERY == 0 for name in AIRFRAMES]
-    parameters = {"missions": missions, "first_seed": first_seed}
+    cases = [MissionCase(seed, name, is_drawn=is_drawn) for seed in seeds for name in AIRFRAMES]
+    some = [seed for seed in seeds if seed % COMPARED_EVERY == 0]
+    cases += [MissionCase(seed, name, False, is_drawn) for seed in some for name in AIRFRAMES]
+    parameters = {"missions": missions, "first_seed": first_seed, "is_drawn": is_drawn}
     return Campaign("missions", parameters, cases, work_out_mission)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench.random_missions.generator import MissionCase, RandomMission, airframe_named
+from bench.random_missions.generator import MissionCase, RandomMission, airframe_of
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
 from rebound_cli.inputs import SimulatedWorld
@@ -41,7 +41,7 @@ class JudgedFlight:
 def fly(case: MissionCase, drawn: RandomMission) -> JudgedFlight:
     """From take-off to the end, through the whole wire; nothing is kept but what is returned."""
     mission, scene = Mission.model_validate(drawn.data), Scene.model_validate(drawn.data["sim"])
-    airframe = airframe_named(case.airframe)
+    airframe = airframe_of(case)
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:

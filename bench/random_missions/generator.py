@@ -8,6 +8,7 @@ from typing import Any
 from bench.random_missions.draw import DIGITS, Draw, towards
 from bench.random_missions.items import LOWEST_M, Route, motion_item, policy, quiet_item
 from bench.random_missions.rooms import MAX_HEIGHT_M, Room, draw_room
+from bench.random_missions.vehicle import companion_settings, drawn_vehicle
 from companion.errors import ReboundError
 from companion.mission.model import Mission
 from sim_vehicle.airframe import Airframe, with_base
@@ -43,6 +44,8 @@ class MissionCase:
     airframe: str
     feed_forward: bool = True
     """Whether a climb or a fall after a hit is braked by an acceleration of its own."""
+    is_drawn: bool = False
+    """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +59,11 @@ class RandomMission:
     extras: tuple[str, ...]
 
 
-def airframe_data(name: str) -> Part:
-    """The airframe file: a built-in one with the integration interval of PX4 on a flight controller."""
-    return {"based_on": name, "imu": {"integration_interval_us": INTEGRATION_INTERVAL_US}}
+def airframe_data(case: MissionCase) -> Part:
+    """The airframe file: a drawn one, or a built-in one with the integration interval of PX4 on a flight controller."""
+    if case.is_drawn:
+        return drawn_vehicle(case.seed, case.airframe)
+    return {"based_on": case.airframe, "imu": {"integration_interval_us": INTEGRATION_INTERVAL_US}}
 
 
 def random_mission(case: MissionCase) -> RandomMission:
@@ -67,7 +72,7 @@ def random_mission(case: MissionCase) -> RandomMission:
         drawn = _draw(case, Draw(case.seed, attempt))
         try:
             Mission.model_validate(drawn.data)
-            check_start_is_free(Scene.model_validate(drawn.data["sim"]), airframe_named(case.airframe))
+            check_start_is_free(Scene.model_validate(drawn.data["sim"]), airframe_of(case))
         except (ValueError, SceneError):
             continue
         return drawn
@@ -75,8 +80,8 @@ def random_mission(case: MissionCase) -> RandomMission:
 
 
 @lru_cache
-def airframe_named(name: str) -> Airframe:
-    return Airframe.model_validate(with_base(airframe_data(name)))
+def airframe_of(case: MissionCase) -> Airframe:
+    return Airframe.model_validate(with_base(airframe_data(case)))
 
 
 def _draw(case: MissionCase, draw: Draw) -> RandomMission:
@@ -112,7 +117,10 @@ def _draw(case: MissionCase, draw: Draw) -> RandomMission:
         "obstacles": {"on_unreachable": out_of_reach},
         "on_interrupt": interrupted,
         "fence": room.fence,
-        "companion": {"streams": {"highres_imu_hz": STREAMS_HZ[stream_hz]}},
+        "companion": {
+            "streams": {"highres_imu_hz": STREAMS_HZ[stream_hz]},
+            **(companion_settings(airframe_data(case)) if case.is_drawn else {}),
+        },
         "sim": {
             "airframe": case.airframe,
             "seed": case.seed,

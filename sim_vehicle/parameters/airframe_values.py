@@ -25,10 +25,10 @@ def defaults_from(airframe: Airframe) -> dict[str, float]:
         "MPC_XY_VEL_P_ACC": control.velocity_p_per_s,
         "MPC_Z_P": control.position_p_per_s,
         "MPC_Z_VEL_D_ACC": control.velocity_d,
-        "MPC_Z_VEL_I_ACC": control.velocity_i_per_s2,
+        "MPC_Z_VEL_I_ACC": control.velocity_i_per_s2 if control.climb_i_per_s2 is None else control.climb_i_per_s2,
         "MPC_Z_VEL_MAX_DN": control.descent_max_m_s,
         "MPC_Z_VEL_MAX_UP": control.climb_max_m_s,
-        "MPC_Z_VEL_P_ACC": control.velocity_p_per_s,
+        "MPC_Z_VEL_P_ACC": control.climb_p_per_s or control.velocity_p_per_s,
     }
 
 

@@ -9,7 +9,7 @@ from bench.random_missions.generator import (
     AIRFRAMES,
     WIND_MAX_M_S,
     MissionCase,
-    airframe_named,
+    airframe_of,
     random_mission,
 )
 from companion.mission.model import Mission
@@ -70,4 +70,4 @@ def test_wind_and_gust_together_stay_within_five_metres_a_second(drawn):
 
 def test_nothing_stands_in_the_start(drawn):
     for mission in drawn.values():
-        check_start_is_free(Scene.model_validate(mission.data["sim"]), airframe_named("foldable"))
+        check_start_is_free(Scene.model_validate(mission.data["sim"]), airframe_of(MissionCase(1, "foldable")))
