@@ -4,13 +4,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: fly test clients check lint types results paper schema diagrams wheel clean
+.PHONY: fly test rest clients check lint types results paper schema diagrams wheel clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml
 
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not slow and not realtime"
+
+# What takes long, or runs by the clock.
+rest: $(READY)
+	$(BIN)/python -m pytest -m "slow or realtime"
 
 # Other people's clients on the simulated vehicle, each in an environment of its own: MAVSDK 3 and 4 cannot share one.
 # In real time: some minutes.
@@ -34,7 +38,7 @@ $(CLIENTS)/mavproxy/.ready:
 	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check MAVProxy==1.8.75 pytest==9.2.0
 	touch $@
 
-check: lint types test
+check: lint types test rest
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -1,6 +1,7 @@
 """What a vehicle is: masses, lengths, springs, motors, sensors and gains, read from a YAML file."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -209,6 +210,7 @@ def built_in_airframes() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in BUILT_IN_FOLDER.glob("*.yaml")))
 
 
+@lru_cache
 def load_built_in(name: str) -> Airframe:
     """The airframe of that name; raises AirframeError where there is none."""
     if name not in built_in_airframes():

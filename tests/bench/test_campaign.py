@@ -15,6 +15,8 @@ from bench.campaign.record import Record, RecordError
 from bench.campaign.run import CampaignError, Workers, failures_text, run_campaign
 from tests.rebound_cli.command import ROOT
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = """\
 import sys
 from pathlib import Path

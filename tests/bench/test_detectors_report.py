@@ -2,6 +2,8 @@
 
 import dataclasses
 
+import pytest
+
 from bench.campaign import run as running
 from bench.campaign.plan import work_out
 from bench.detectors import campaigns, pilot
@@ -14,6 +16,8 @@ from bench.detectors_report.flights import flight_bars
 from bench.detectors_report.hit_bars import hit_bars
 from bench.detectors_report.numbers import Hits, per_cent
 from bench.main import main
+
+pytestmark = pytest.mark.slow
 
 ENTRY = {
     "false": 0,

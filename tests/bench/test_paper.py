@@ -27,6 +27,8 @@ from companion.mission.model import Mission
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
 
+pytestmark = pytest.mark.slow
+
 DOCUMENT = (ROOT / "docs" / "paper.md").read_text()
 
 

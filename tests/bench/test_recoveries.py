@@ -6,6 +6,8 @@ from bench.random_missions.campaign import MissionCase, work_out_mission
 from bench.recoveries.command import _lines
 from bench.recoveries.hits import Case, cases, work_out
 
+pytestmark = pytest.mark.slow
+
 
 def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
     """This cell; docs/campaign.md has the median of all."""

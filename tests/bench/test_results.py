@@ -6,6 +6,8 @@ from bench.main import main
 from bench.paper import results
 from bench.paper.results import Case, CaseFigures, HitFigures, case_document, fly_case, results_text
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_papers_detector_law_and_gain_are_stated_in_every_flight():
     data = case_document(Case("rigid", 2.5, 7)).data

@@ -33,7 +33,7 @@ def gains(name: str, scene: str) -> list[float]:
             )
             fallen_j = airframe.mass_kg * 9.81 * (end_m - start_m)
             found.append((hit.energy_after_j - hit.energy_before_j - fallen_j) / hit.energy_before_j)
-    return found
+    return [float(gain) for gain in found]
 
 
 def main() -> None:

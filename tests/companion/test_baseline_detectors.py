@@ -8,8 +8,9 @@ from companion.detection.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
 from companion.detection.registry import DETECTORS
 from companion.detection.watch import advance, start_watch
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition
+from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
+from companion.recovery.direction import plus
 
 TICK_US = 4_000
 HIT_US = 4_000_000
@@ -20,17 +21,17 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
     """North at 2 m/s behind a setpoint that goes on; pushed by `push(t)`, m/s^2."""
     watch = start_watch(CompanionConfig(detector=detector), 0)
-    velocity, position, impacts = [2.0, 0.0, 0.0], [0.0, 0.0, -3.0], []
+    velocity, position, impacts = (2.0, 0.0, 0.0), (0.0, 0.0, -3.0), []
     for t in range(TICK_US, until_us, TICK_US):
         p, thrust = push(t), lift(t)
         force = (p[0], p[1], p[2] - thrust)
         acceleration = (force[0], force[1], force[2] + 9.81)
-        velocity = [v + a * TICK_US * 1e-6 for v, a in zip(velocity, acceleration, strict=True)]
-        position = [x + v * TICK_US * 1e-6 for x, v in zip(position, velocity, strict=True)]
+        velocity = plus(velocity, TICK_US * 1e-6, acceleration)
+        position = plus(position, TICK_US * 1e-6, velocity)
         wobble = 0.1 * math.sin(t)
-        samples = [ImuSample(t, (force[0] + wobble, force[1], force[2]), (0.0, 0.0, 0.0))]
+        samples: list[Sample] = [ImuSample(t, (force[0] + wobble, force[1], force[2]), (0.0, 0.0, 0.0))]
         if t % 20_000 == 0:
-            samples.append(LocalPosition(t, tuple(position), tuple(velocity)))
+            samples.append(LocalPosition(t, position, velocity))
             samples.append(Attitude(t, LEVEL))
             samples.append(AttitudeTarget(t, HOVER * thrust / 9.81))
         situation = Situation(

@@ -4,9 +4,7 @@ import math
 
 import pytest
 
-from companion.detection.interface import Evidence, Impact, ImpactKind, Situation
 from companion.estimate.approach import VelocityFix
-from companion.estimate.impact import ImpactEstimator
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
@@ -14,7 +12,7 @@ from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
-from companion.mission.config import EstimateConfig, GuardsConfig
+from companion.mission.config import GuardsConfig
 from companion.mission.model import Mission
 from companion.recovery.climb import Climb
 from companion.recovery.interface import Contact
@@ -48,12 +46,6 @@ def test_an_estimate_that_missed_the_hit_is_not_believed_for_want_of_an_approach
     # nor has a vehicle that hovered come near
     assert not is_believed(said(-0.3), ZERO, [SOUTH], (), 60_000)
     assert is_believed(said(-1.8), ZERO, [SOUTH], (), 60_000)
-
-
-def test_a_hit_whose_push_was_not_seen_may_have_been_clipped():
-    estimator = ImpactEstimator(EstimateConfig())
-    impact = Impact(1_000_000, 980_000, (-5.0, 0.0, 0.0), ImpactKind.UNKNOWN, 1.0, Evidence.AFTERMATH)
-    assert estimator.begin(impact, Situation()).may_be_clipped
 
 
 def test_the_glide_begins_anew_when_a_slow_contact_is_over():

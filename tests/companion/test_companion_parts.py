@@ -63,7 +63,11 @@ def test_a_line_of_no_length_is_over_at_once():
 def positions(offset_m, speed_m_s, seconds, noise_m_s=0.0, start_us=0, seed=3):
     rng = random.Random(seed)
     for t_us in range(start_us, start_us + round(seconds * 1e6), 20_000):
-        velocity = tuple(v + rng.gauss(0.0, noise_m_s) for v in (speed_m_s, 0.0, 0.0))
+        velocity = (
+            speed_m_s + rng.gauss(0.0, noise_m_s),
+            rng.gauss(0.0, noise_m_s),
+            rng.gauss(0.0, noise_m_s),
+        )
         yield LocalPosition(t_us, (offset_m, 0.0, -1.5), velocity)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from companion.detection.interface import Phase, Situation
 from companion.detection.watch import advance, start_watch
-from companion.messages import Attitude, ImuSample, LocalPosition
+from companion.messages import Attitude, ImuSample, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
 
 INTERVAL_US = 4_000
@@ -23,7 +23,7 @@ def fly(watch, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WAN
     impacts, finished, notices = [], [], []
     for t in range(start_us, until_us, every_us):
         north_m = 2.0 * t * 1e-6
-        samples = [ImuSample(t, (push(t), 0.0, -9.81), (0.0, 0.0, 0.0))]
+        samples: list[Sample] = [ImuSample(t, (push(t), 0.0, -9.81), (0.0, 0.0, 0.0))]
         samples.append(LocalPosition(t, (north_m, 0.0, -1.5), (2.0, 0.0, 0.0)))
         samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
         seen = advance(watch, samples, situation, t)
@@ -184,6 +184,6 @@ def test_samples_that_are_the_same_to_the_last_bit_are_none_only_of_a_vehicle_th
     notices = []
     for t in range(1_000_000, 2_000_000, INTERVAL_US):
         roll = 1e-4 * (t % 3) if turns else 0.0
-        samples = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, roll, 0.0, 0.0))]
+        samples: list[Sample] = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, roll, 0.0, 0.0))]
         notices += advance(watch, samples, WANTED, t).notices
     assert [notice.text for notice in notices] == (["detector blind: IMU stuck at one value"] if turns else [])

@@ -6,7 +6,7 @@ import pytest
 
 from companion.detection.interface import Situation
 from companion.detection.watch import advance, start_watch
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 
 STILL = (0.0, 0.0, 0.0)
@@ -21,7 +21,7 @@ def test_a_clipped_push_along_the_obstacle_is_none_of_its_normal(push_m_s2, norm
     impacts = []
     for t_us in range(4_000, 2_100_000, 4_000):
         push = push_m_s2 if t_us == 2_000_000 else 0.0
-        samples = [ImuSample(t_us, (0.0, push, -9.81), STILL)]
+        samples: list[Sample] = [ImuSample(t_us, (0.0, push, -9.81), STILL)]
         if t_us % 32_000 == 0:
             samples.append(Odometry(t_us, STILL, (2.0, 0.0, 0.0), 0))
             samples.append(LocalPosition(t_us, STILL, (2.0, 0.0, 0.0)))
@@ -51,7 +51,7 @@ def after_a_hit(
         push -= again_m_s2 if 2_120_000 <= t_us < 2_160_000 else 0.0
         push -= other_guard_m_s2 if t_us == 2_040_000 else 0.0
         speed += 0.004 * push
-        samples = [ImuSample(t_us, (push, 0.0, -9.80665), STILL)]
+        samples: list[Sample] = [ImuSample(t_us, (push, 0.0, -9.80665), STILL)]
         if t_us % 32_000 == 0:
             error = error_m_s(t_us * 1e-6 - 2.0) if t_us > 2_000_000 else 0.0
             # A hair's breadth of noise: velocities that stand still to the last digit are no estimate.

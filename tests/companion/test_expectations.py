@@ -1,6 +1,7 @@
 """Assertions in a mission: met or not, the flight goes on; one not met makes it a failed one."""
 
 from types import SimpleNamespace
+from typing import Any
 
 from companion.flight.context import Expectation
 from companion.flight.expecting import review
@@ -87,5 +88,6 @@ def test_a_hit_that_is_heard_of_late_came_late():
         wish.met = None
         hit = SimpleNamespace(impact_speed_m_s=2.0, detected_at_us=hit_at_us)
         record = SimpleNamespace(report=lambda hit=hit: hit)
-        review(SimpleNamespace(expectations=[wish], collisions=[record], tell=lambda *a, **b: None), 5_050_000)
+        flight: Any = SimpleNamespace(expectations=[wish], collisions=[record], tell=lambda *a, **b: None)
+        review(flight, 5_050_000)
         assert wish.met is met

@@ -74,7 +74,7 @@ class Flight:
         detector = FusedDetector(FusedConfig(**config), WINDOW_US)
         self.state, impacts = detector.initial(), []
         for t, sample in self.samples(until_us):
-            if not isinstance(sample, (ImuSample, *self.heard)):
+            if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
                 continue
             self.state, impact = detector.step(self.state, sample, self.situation(t))
             if impact is not None:

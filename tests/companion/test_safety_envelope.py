@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -122,8 +123,9 @@ def test_what_is_not_finite_is_a_fault_and_nothing_else(broken):
         for part in ("position_ned_m", "velocity_ned_m_s", "acceleration_ned_m_s2"):
             values = list(getattr(good, part))
             values[index] = broken
+            spoilt: dict[str, Any] = {part: tuple(values)}
             with pytest.raises(SetpointError):
-                bounded(replace(good, **{part: tuple(values)}), around(), FENCE, LIMITS)
+                bounded(replace(good, **spoilt), around(), FENCE, LIMITS)
     with pytest.raises(SetpointError):
         bounded(replace(good, yaw_rad=broken), around(), FENCE, LIMITS)
 

@@ -13,6 +13,8 @@ from rebound_cli.documents import apply_overrides, parse_document
 from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.vehicle import SimulatedVehicle
 
+pytestmark = pytest.mark.flight
+
 EPOCH_US = 1_600_000_000_000_000
 AXES = ("xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro")
 MISSION = """\

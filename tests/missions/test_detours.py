@@ -5,6 +5,8 @@ import pytest
 from companion.memory.surroundings import LEAST_FREE_M
 from tests.missions.detours import Wall, fly_detour
 
+pytestmark = pytest.mark.flight
+
 REACH_M = 0.2
 
 

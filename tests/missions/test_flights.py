@@ -11,6 +11,8 @@ from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.truth_match import match_contacts
 from tests.missions.test_missions import CONTACT_REACH_M, NAMES, WITHOUT_OBSTACLES, load
 
+pytestmark = pytest.mark.flight
+
 
 @pytest.fixture(scope="module")
 def fly(tmp_path_factory):

@@ -11,6 +11,8 @@ from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 
+pytestmark = pytest.mark.flight
+
 
 def flown(folder, obstacles, **more):
     mission = Mission.model_validate(

@@ -8,6 +8,8 @@ from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.missions.test_missions import FOLDER, load_document
 
+pytestmark = pytest.mark.flight
+
 EPOCH_US = 1_600_000_000_000_000
 INTERVALS_A_SECOND = 250
 

@@ -1,6 +1,7 @@
 """A vehicle that leans into its way tips over where it hits: how it speeds up, and how fast it takes off."""
 
 import numpy as np
+import pytest
 
 from bench.random_missions.campaign import MissionCase, work_out_mission
 from bench.random_missions.crashes import tilts_deg
@@ -11,6 +12,8 @@ from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
+
+pytestmark = pytest.mark.flight
 
 WALL = {"walls": [{"name": "wall", "point_ned_m": [1.18, 0, -2], "normal_ned": [-1, 0, 0], "height_m": 8}]}
 FAST = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 4.0, "acceleration_m_s2": 3.0, "yaw_deg": 0}}

@@ -4,6 +4,7 @@ import gc
 import resource
 import sys
 import threading
+from typing import Any
 
 import pytest
 
@@ -99,7 +100,8 @@ def fly(folder, stream=sys.stderr, confirm=None):
     """A hop in virtual time through the loop of real flights."""
     document = load_mission_document(SQUARE, HOP_SETS)
     mission, scene = mission_from(document), world_from(document)
-    world, companion = World(scene), Companion(mission)
+    companion = Companion(mission)
+    world: Any = World(scene)
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, {})
     run_folder.write_json(folder / run_folder.SUMMARY_NAME, {})
@@ -222,7 +224,8 @@ class Queued:
 
 
 def exchanged(tmp_path, datagrams, late_us):
-    stepping, queued = Stepping(EPOCH_US), Queued(datagrams, EPOCH_US + late_us)
+    stepping: Any = Stepping(EPOCH_US)
+    queued: Any = Queued(datagrams, EPOCH_US + late_us)
     recorder = FlightRecorder(tmp_path)
     Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
     recorder.close()
@@ -248,7 +251,9 @@ def test_lateness_is_measured_and_told_each_time_it_doubles():
         assert timing.stepped(EPOCH_US, EPOCH_US + 100, EPOCH_US + 300) is None
     assert timing.stepped(EPOCH_US, EPOCH_US - 900, EPOCH_US) is None
     assert timing.stepped(EPOCH_US, EPOCH_US + TOO_LATE_US - 1, EPOCH_US + TOO_LATE_US) is None
-    said = [timing.stepped(EPOCH_US, at_us, at_us) for at_us in (EPOCH_US + n * TOO_LATE_US for n in (1, 1.9, 2, 3))]
+    said = [
+        timing.stepped(EPOCH_US, at_us, at_us) for at_us in (EPOCH_US + round(n * TOO_LATE_US) for n in (1, 1.9, 2, 3))
+    ]
     assert [text is not None for text in said] == [True, False, True, False]
     summary = timing.summary()
     assert summary["tick_lateness_ms"] == {"p50": 0.1, "p99": 950.0, "max": 1500.0}

@@ -12,6 +12,8 @@ import pytest
 from companion.shell.tlog import read_tlog
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event
 
+pytestmark = pytest.mark.realtime
+
 COMPANION = 191
 HEARTBEAT, SET_POSITION_TARGET, COMMAND_LONG = 0, 84, 76
 

@@ -16,6 +16,8 @@ from rebound_cli.run_folder import FlightRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import SQUARE, WALL, events_of, run
 
+pytestmark = pytest.mark.flight
+
 FILES = {
     "airframe.yaml",
     "events.jsonl",

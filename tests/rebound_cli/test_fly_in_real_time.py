@@ -6,6 +6,8 @@ import signal
 import time
 import tomllib
 
+import pytest
+
 from companion.shell.tlog import read_tlog
 from tests.rebound_cli.command import (
     HOP,
@@ -21,6 +23,8 @@ from tests.rebound_cli.command import (
     wait_for_event,
     wait_until_gone,
 )
+
+pytestmark = pytest.mark.realtime
 
 # A hit within three seconds of take-off.
 NEAR_WALL = (

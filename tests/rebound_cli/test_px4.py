@@ -17,6 +17,8 @@ from tests.rebound_cli.command import (
 )
 from tests.sim_vehicle.hil.px4_client import Px4Client
 
+pytestmark = pytest.mark.realtime
+
 # Far from the ports of a PX4 that may be running on this machine.
 INSTANCE = 9
 SIMULATOR_PORT = 4560 + INSTANCE

@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 import yaml
 
 from rebound_cli.inputs import load_mission_document, mission_from
@@ -9,6 +10,8 @@ from rebound_cli.main import main
 from rebound_cli.resume import resume_of
 from rebound_cli.run_folder import EVENTS_NAME
 from tests.rebound_cli.command import QUICK, SQUARE, assert_comes_again, events_of
+
+pytestmark = pytest.mark.flight
 
 
 def fly(*arguments):

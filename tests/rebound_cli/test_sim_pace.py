@@ -12,6 +12,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from tests.rebound_cli.command import start
 
+pytestmark = pytest.mark.realtime
+
 TIMEOUT_S = 20.0
 
 

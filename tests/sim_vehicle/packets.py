@@ -1,6 +1,7 @@
 """Random packets: of every kind that there is, with senseless content, damaged, or no packets at all."""
 
 import random
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -9,7 +10,7 @@ KINDS = tuple(dialect.mavlink_map.values())
 OBEYED = frozenset({11, 20, 21, 23, 39, 43, 44, 45, 47, 51, 69, 70, 73, 75, 76, 82, 84, 86, 144, 256})
 
 
-def packet(kind: type, payload: bytes, link: dialect.MAVLink, v1: bool = False) -> bytes:
+def packet(kind: Any, payload: bytes, link: dialect.MAVLink, v1: bool = False) -> bytes:
     """A packet of ``kind`` whose checksum is right, whatever its payload."""
     message = kind.__new__(kind)
     dialect.MAVLink_message.__init__(message, kind.id, kind.msgname)

@@ -127,5 +127,5 @@ def flight(
     events = tuple(plain_events() if events is None else events)
     wall = Wall("wall", (2.2, 0.0, -2.0), (-1.0, 0.0, 0.0), 10.0, 10.0, 0.1)
     told = mission(**mission_changes)
-    parts = {"standing_m": STANDING_M, "arm_m": ARM_M, "guard_m": GUARD_M}
-    return JudgedFlight(told, report, events, truth, **parts, obstacles={"wall": wall})
+    start = (0.0, 0.0, 0.0)
+    return JudgedFlight(told, report, events, truth, start, STANDING_M, ARM_M, GUARD_M, {"wall": wall})

@@ -13,9 +13,11 @@ from bench.campaign_report.mission_bars import mission_bars
 from bench.campaign_report.tables import causes_text, failures_text
 from bench.detectors_report.bars import MET, MISSED, REPORTED
 from bench.main import main
-from bench.random_missions.campaign import missions_campaign
+from bench.random_missions.campaign import missions_campaign, work_out_mission
 from bench.random_missions.generator import MissionCase
 from bench.recoveries.hits import cases as recovery_cases
+
+pytestmark = pytest.mark.slow
 
 # A short mission in which a pole is hit.
 SEED = "4"
@@ -168,7 +170,7 @@ def written(tmp_path_factory):
 
 
 def _no_hits(seeds):
-    return Campaign("recoveries", {"seeds": seeds}, [], work_out)
+    return Campaign("recoveries", {"seeds": seeds}, [], work_out_mission)
 
 
 def test_the_command_writes_document_picture_and_a_record_to_go_on_from(written):

@@ -10,7 +10,7 @@ from bench.random_missions.vehicle import companion_settings, drawn_vehicle
 from companion.mission.config import CompanionConfig
 from sim_vehicle.airframe import Airframe, with_base
 
-SEEDS = range(1, 201)
+SEEDS = range(1, 61)
 
 
 @pytest.fixture(scope="module")

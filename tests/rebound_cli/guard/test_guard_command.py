@@ -12,6 +12,8 @@ import yaml
 from companion.guard.config import GuardConfig
 from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
+pytestmark = pytest.mark.realtime
+
 QUICK = ("--set", "companion.streams.window_s=0.5", "--set", "companion.link.heartbeat_wait_s=30")
 
 

@@ -54,8 +54,8 @@ def item(
 
 def action(command: int, *params: float) -> MissionItem:
     """An item without a place."""
-    padded = (*params, *[0.0] * (7 - len(params)))
-    return MissionItem(kinds.FRAME_MISSION, command, 1, padded)
+    a, b, c, d, e, f, g = (*params, *[0.0] * (7 - len(params)))
+    return MissionItem(kinds.FRAME_MISSION, command, 1, (a, b, c, d, e, f, g))
 
 
 def upload(flight: Flight, *items: MissionItem, kind: MissionType = MissionType.MISSION) -> None:

@@ -118,8 +118,8 @@ class Flight:
     def ask(self, command: int, *params: float) -> Result | None:
         """Send a command, parameters that are not given as NaN; its answer, or None."""
         self.acks.clear()
-        padded = (*params, *[math.nan] * (7 - len(params)))
-        self.autopilot.command(Command(255, 190, 1, 1, command, *padded))
+        a, b, c, d, e, f, g = (*params, *[math.nan] * (7 - len(params)))
+        self.autopilot.command(Command(255, 190, 1, 1, command, a, b, c, d, e, f, g))
         self.step()
         return self.acks[0].result if self.acks else None
 

@@ -38,8 +38,8 @@ class StreamsThatKnow105:
 
 
 def command(number: int, *params: float, target: tuple[int, int] = (1, 1)) -> Command:
-    p = [*params, *[0.0] * (7 - len(params))]
-    return Command(255, 190, *target, number, *p[:7])
+    a, b, c, d, e, f, g = (*params, *[0.0] * (7 - len(params)))
+    return Command(255, 190, *target, number, a, b, c, d, e, f, g)
 
 
 @pytest.mark.parametrize(

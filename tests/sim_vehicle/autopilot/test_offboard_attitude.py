@@ -1,6 +1,7 @@
 """Offboard by attitude, by rates and by geographic places."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -39,7 +40,7 @@ def global_target(frame: int, north: float, east: float, altitude_m: float, **ot
     return GlobalTarget(**{**fields, **others})  # type: ignore[arg-type]
 
 
-def stream(flight: Flight, message: object, seconds: float) -> None:
+def stream(flight: Flight, message: Any, seconds: float) -> None:
     for number in range(round(seconds * 250)):
         if number % 12 == 0:
             flight.autopilot.receive(message)

@@ -57,17 +57,17 @@ def landed_at(flight: Flight, where: tuple[float, float]) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("rtl_type", "start", "where"),
+    ("rtl_type", "north_m", "east_m", "where"),
     [
         # 1: the landing, however near home is; 3: what is nearest; 0: never the landing
-        (1, (2.0, 2.0), LANDING),
-        (3, (20.0, 40.0), LANDING),
-        (3, (2.0, 2.0), HOME),
-        (0, (20.0, 40.0), HOME),
+        (1, 2.0, 2.0, LANDING),
+        (3, 20.0, 40.0, LANDING),
+        (3, 2.0, 2.0, HOME),
+        (0, 20.0, 40.0, HOME),
     ],
 )
-def test_which_place_it_returns_to(rtl_type, start, where):
-    flight = at(*start, WITH_LANDING, RTL_TYPE=rtl_type)
+def test_which_place_it_returns_to(rtl_type, north_m, east_m, where):
+    flight = at(north_m, east_m, WITH_LANDING, RTL_TYPE=rtl_type)
     passed(flight)
     assert landed_at(flight, where)
 

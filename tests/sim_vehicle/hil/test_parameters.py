@@ -6,14 +6,14 @@ import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.hil.messages import HilState
-from sim_vehicle.hil.parameters import as_airframe_file, as_environment, as_params_file, px4_parameters
+from sim_vehicle.hil.parameters import Position, as_airframe_file, as_environment, as_params_file, px4_parameters
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 
 FOLDABLE = load_built_in("foldable")
 
 
-def values(airframe: Airframe = FOLDABLE, position: str = "mocap") -> dict[str, float]:
+def values(airframe: Airframe = FOLDABLE, position: Position = "mocap") -> dict[str, float]:
     return {parameter.name: parameter.value for parameter in px4_parameters(airframe, position)}
 
 

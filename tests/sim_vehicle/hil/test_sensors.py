@@ -173,8 +173,8 @@ def test_more_thrust_than_weight_climbs_in_every_sensor():
 def test_motors_are_in_px4s_quad_x_order(slower, axis, sign):
     vehicle = new_vehicle()
     flown(vehicle, 0.5, 0.9)
-    fractions = tuple(0.85 if motor in slower else 0.9 for motor in range(4))
-    states = of_kind([message for _ in range(10) for message in vehicle.step(fractions)], HilState)
+    first, second, third, fourth = (0.85 if motor in slower else 0.9 for motor in range(4))
+    states = of_kind([message for _ in range(10) for message in vehicle.step((first, second, third, fourth))], HilState)
     rates = states[-1].angular_velocity_frd_rad_s
     assert sign * rates[axis] > 0.02
     assert all(abs(rates[other]) < 0.1 * abs(rates[axis]) for other in range(3) if other != axis)
