@@ -2,9 +2,9 @@
 
 import math
 
-from sim_vehicle.autopilot.commander import Commander
+from sim_vehicle.autopilot.commander.commander import Commander
 from sim_vehicle.autopilot.messages import Result
-from sim_vehicle.autopilot.navigator import Navigator
+from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters

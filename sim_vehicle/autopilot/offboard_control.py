@@ -2,8 +2,8 @@
 
 from sim_vehicle.autopilot import offboard
 from sim_vehicle.autopilot.flight_messages import AttitudeTarget, GlobalTarget
+from sim_vehicle.autopilot.flight_tasks.target import Vector3
 from sim_vehicle.autopilot.messages import PositionTarget, StatusText
-from sim_vehicle.autopilot.target import Vector3
 from sim_vehicle.geography import Origin
 from sim_vehicle.setpoint import FREE, Quaternion, Setpoint
 

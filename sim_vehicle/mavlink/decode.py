@@ -19,7 +19,7 @@ from sim_vehicle.autopilot.messages import (
     SigningSetup,
     TimeSyncRequest,
 )
-from sim_vehicle.mavlink import file_service, flight_reader, mission_reader, parameter_reader
+from sim_vehicle.mavlink.services import file_service, flight_reader, mission_reader, parameter_reader
 from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
 from sim_vehicle.setpoint import Axis3
 

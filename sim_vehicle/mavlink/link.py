@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 
 from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, PeerHeartbeat, PingRequest, SigningSetup, StatusText
 from sim_vehicle.mavlink import encode
-from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
 from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line
 from sim_vehicle.mavlink.outbox import Outbox
-from sim_vehicle.mavlink.service import BusyService, Handler
-from sim_vehicle.mavlink.services import SERVICES
+from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.services.service import BusyService, Handler
+from sim_vehicle.mavlink.services.services import SERVICES
 from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
-from sim_vehicle.mavlink.stream_rates import LinkKind
-from sim_vehicle.mavlink.streams import HEARTBEAT_ID, Streams
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
 from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
 from sim_vehicle.parameters.store import Parameters
 
