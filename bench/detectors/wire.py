@@ -24,8 +24,7 @@ from companion.messages import (
     Vibration,
 )
 from sim_vehicle.mavlink.streams import vibration
-from sim_vehicle.mavlink.streams.late_loops import LateLoops
-from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
+from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
 from sim_vehicle.mavlink.streams.telemetry import quaternion_from_matrix
 from sim_vehicle.mavlink.streams.topics import Topic
 from sim_vehicle.physics.plant import PlantOutput

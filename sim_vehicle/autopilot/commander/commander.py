@@ -5,9 +5,7 @@ Source: PX4's commander/Commander.cpp.
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot.commander import preflight
-from sim_vehicle.autopilot.commander.arming import Arming, Reason
-from sim_vehicle.autopilot.commander.available import available, cannot_run
+from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_problems
 from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
@@ -15,7 +13,18 @@ from sim_vehicle.autopilot.commander.failsafe_table import Action, Situation
 from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
 from sim_vehicle.autopilot.commander.ground_station import GroundStation
 from sim_vehicle.autopilot.commander.manual_control import Gesture, ManualInput
-from sim_vehicle.autopilot.commander.modes import NEEDS, NOT_ARMABLE, Conditions, Event, Mode, ModeState, Need, missing
+from sim_vehicle.autopilot.commander.modes import (
+    NEEDS,
+    NOT_ARMABLE,
+    Conditions,
+    Event,
+    Mode,
+    ModeState,
+    Need,
+    available,
+    cannot_run,
+    missing,
+)
 from sim_vehicle.autopilot.commander.positioning import Positioning
 from sim_vehicle.autopilot.estimate import Quaternion
 from sim_vehicle.autopilot.land_detector import LandDetector
@@ -282,7 +291,7 @@ class Commander:
 
     @property
     def _problems(self) -> list[StatusText]:
-        return preflight.problems(
+        return preflight_problems(
             self._parameters, self.ground_station, self.battery, self._navigator, self.positioning
         )
 

@@ -6,7 +6,7 @@ Source: PX4's manual_control (ManualControlSelector.cpp, ManualControl.cpp, Movi
 from dataclasses import dataclass
 from enum import Enum, IntEnum, auto
 
-from sim_vehicle.autopilot.flight_messages import RadioChannels, StickInput
+from sim_vehicle.autopilot.messages import RadioChannels, StickInput
 from sim_vehicle.parameters.store import Parameters
 
 RADIO_SOURCE, FIRST_LINK_SOURCE = 1, 2

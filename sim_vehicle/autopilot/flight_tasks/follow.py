@@ -6,9 +6,9 @@ flown when it turns; the place to be moves at most at FLW_TGT_MAX_VEL instead.
 
 import math
 
-from sim_vehicle.autopilot.flight_messages import FollowTarget
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, turned_towards
 from sim_vehicle.autopilot.flight_tasks.target import View
+from sim_vehicle.autopilot.messages import FollowTarget
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters

@@ -7,6 +7,9 @@ be global; one without must be in MAV_FRAME_MISSION. What PX4 does not keep come
 import math
 
 from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem, MissionResult, MissionType, WireItem
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
+from sim_vehicle.setpoint import Vector3
 
 FRAME_GLOBAL, FRAME_MISSION, FRAME_GLOBAL_RELATIVE = 0, 2, 3
 FRAME_GLOBAL_INT, FRAME_GLOBAL_RELATIVE_INT = 5, 6
@@ -142,3 +145,9 @@ def fits(item: MissionItem, kind: int) -> bool:
         return item.command not in NOT_IN_A_MISSION
     has_too_few_corners = item.command in FENCE_POLYGONS and item.params[0] < 3
     return kind != MissionType.FENCE or not has_too_few_corners
+
+
+def place_of(item: MissionItem, origin: Origin, home_ned_m: Vector3) -> Vector3:
+    """Where an item with a place lies."""
+    north, east, down = origin.position_of(Place(item.latitude_deg, item.longitude_deg, item.altitude_m))
+    return north, east, home_ned_m[2] - item.altitude_m if item.is_relative else down

@@ -4,7 +4,6 @@ Source: PX4's navigator (navigator_main.cpp, loiter.cpp, takeoff.cpp, land.cpp) 
 """
 
 from sim_vehicle.autopilot.commander.modes import Mode
-from sim_vehicle.autopilot.flight_messages import FollowTarget
 from sim_vehicle.autopilot.flight_tasks.auto_flight import AutoFlight
 from sim_vehicle.autopilot.flight_tasks.follow import Follow
 from sim_vehicle.autopilot.flight_tasks.orbit import Orbit, OrbitStatus
@@ -18,7 +17,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     climbs_to,
     takeoff_acceptance,
 )
-from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.messages import FollowTarget, Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import Mission

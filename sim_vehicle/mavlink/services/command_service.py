@@ -1,22 +1,18 @@
 """COMMAND_LONG and COMMAND_INT: the receiver's answers come at once, the commander's in the next interval."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from sim_vehicle.autopilot import commands
 from sim_vehicle.autopilot.messages import Command, SetMode
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Handler
-
-if TYPE_CHECKING:
-    from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.services.service import Channel, Handler
 
 
 class CommandService:
     """Takes what is meant for this vehicle."""
 
-    def __init__(self, link: "Link", board: Board) -> None:
+    def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         self._board = board
 

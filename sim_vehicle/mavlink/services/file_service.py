@@ -7,15 +7,11 @@ there; this vehicle has none of either.
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Handler
-
-if TYPE_CHECKING:
-    from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.services.service import Channel, Handler
 
 _HEADER = struct.Struct("<HBBBBBBI")
 PAYLOAD_BYTES = 251
@@ -51,7 +47,7 @@ READERS = {110: read}
 class FileService:
     """Says that there is nothing."""
 
-    def __init__(self, link: "Link", board: Board) -> None:
+    def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
 
     @property

@@ -3,7 +3,26 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol, TypeAlias, runtime_checkable
 
+from sim_vehicle.autopilot.commands import StreamControl
+from sim_vehicle.mavlink.encode import Message
+
 Handler: TypeAlias = Callable[[Any], None]
+
+
+class Channel(Protocol):
+    """What a protocol may do with the link that it is spoken on."""
+
+    now_us: int
+
+    @property
+    def streams(self) -> StreamControl:
+        """The streams, for who sets their rates."""
+
+    def send(self, message: Message) -> None:
+        """Send something that is no stream."""
+
+    def burst(self, fast: int, serial: int, size: int) -> int:
+        """How many packets of ``size`` bytes may be sent now: at most ``serial`` on a serial line, else ``fast``."""
 
 
 class Service(Protocol):

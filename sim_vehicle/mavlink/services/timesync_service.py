@@ -1,21 +1,17 @@
 """TIMESYNC requests answered with the vehicle's clock."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from sim_vehicle.autopilot.messages import TimeSyncRequest
 from sim_vehicle.mavlink import encode
 from sim_vehicle.mavlink.services.board import Board
-from sim_vehicle.mavlink.services.service import Handler
-
-if TYPE_CHECKING:
-    from sim_vehicle.mavlink.link import Link
+from sim_vehicle.mavlink.services.service import Channel, Handler
 
 
 class TimeSyncService:
     """Answers at once."""
 
-    def __init__(self, link: "Link", board: Board) -> None:
+    def __init__(self, link: Channel, board: Board) -> None:
         self._link = link
         # Bytes arrive anywhere in the interval since the last sample: on average in its middle.
         self._half_interval_us = board.interval_us // 2

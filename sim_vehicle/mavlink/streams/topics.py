@@ -3,7 +3,7 @@
 from enum import IntEnum
 
 from sim_vehicle.autopilot.commander.modes import Mode
-from sim_vehicle.autopilot.flight_messages import RadioChannels, StickInput
+from sim_vehicle.autopilot.messages import RadioChannels, StickInput
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Air, HilGps
 from sim_vehicle.mavlink.streams.telemetry import Telemetry

@@ -11,9 +11,8 @@ from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.encode import Encoder
-from sim_vehicle.mavlink.line import Buffer, Line
-from sim_vehicle.mavlink.outbox import Outbox
-from sim_vehicle.mavlink.streams import late_loops as module
+from sim_vehicle.mavlink.line import Buffer, Line, Outbox
+from sim_vehicle.mavlink.streams import streams as module
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import Streams, interval_from_request
 from sim_vehicle.mavlink.streams.telemetry import Telemetry
