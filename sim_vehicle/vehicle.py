@@ -5,15 +5,15 @@ from collections.abc import Mapping
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
 from sim_vehicle.autopilot.messages import Identity, StatusText
-from sim_vehicle.autopilot.mission_store import MissionStore
-from sim_vehicle.mavlink.board import Board
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
 from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.signing import Signing
-from sim_vehicle.mavlink.stream_rates import LinkKind
-from sim_vehicle.mavlink.telemetry import Telemetry
-from sim_vehicle.mavlink.topics import Topics
-from sim_vehicle.mavlink.vibration import Vibration
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.streams.topics import Topics
+from sim_vehicle.mavlink.streams.vibration import Vibration
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.plant import Plant, PlantOutput

@@ -1,16 +1,16 @@
 """The rooms' rules: who may import whom, and where the world outside may be touched."""
 
 import ast
+import graphlib
 import importlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from bench.diagrams import with_diagrams
+from bench.import_graph import PACKAGES, imported_names, module_imports
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("companion", "sim_vehicle", "rebound_cli", "bench")
 
 # Modules through which code touches the world outside: sockets, ports, clocks, processes, the environment, files.
 OUTSIDE = {
@@ -29,16 +29,6 @@ def sources(package: str) -> list[Path]:
     return sorted((ROOT / package).rglob("*.py"))
 
 
-def imported(path: Path) -> Iterator[str]:
-    """Full names of all that a file imports, wherever in the file."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path} imports relatively"
-            yield node.module or ""
-
-
 def name(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
@@ -48,7 +38,7 @@ def breaches(packages: tuple[str, ...], forbidden: set[str]) -> list[str]:
         f"{name(path)} imports {module}"
         for package in packages
         for path in sources(package)
-        for module in imported(path)
+        for module in imported_names(path)
         if module.split(".")[0] in forbidden
     ]
 
@@ -83,6 +73,14 @@ def test_only_the_shell_touches_the_world_outside(package: str) -> None:
         if not breach.startswith(f"{package}/shell/") and breach.split(" ")[0] not in MAY_READ_FILES
     ]
     assert found == []
+
+
+def test_no_module_needs_itself_by_way_of_others() -> None:
+    # Not even late or for its types alone: two files that need each other are one concept, or hide a third.
+    try:
+        graphlib.TopologicalSorter(module_imports(ROOT)).prepare()
+    except graphlib.CycleError as cycle:
+        pytest.fail(" is imported by ".join(cycle.args[1]))
 
 
 def test_the_documented_diagrams_are_those_of_the_tables() -> None:

@@ -61,7 +61,7 @@ def _noticing(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[Fai
 
 def _places(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[str]:
     """Goals, holds, home and landings, where the vehicle really was."""
-    steps = program(flight.mission)
+    steps = program(flight.mission.items)
     goes_home = False
     told = [event for event in flight.events if event.kind in _TELLING or event.data.get("left_out")]
     for event, following in pairwise(told):

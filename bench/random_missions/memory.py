@@ -47,7 +47,7 @@ def _keeps_off(flight: JudgedFlight, contact: Contact) -> bool:
     index = next((int(str(event.data["step"])) for event in reversed(before) if event.kind == "item"), None)
     if contact.phase is not Phase.ITEM or index is None:
         return False
-    item = program(flight.mission)[index].item
+    item = program(flight.mission.items)[index].item
     policy = item.on_collision or flight.mission.on_collision
     return item.name in ("go_to", "path", "orbit") and policy.then != "retry"
 
@@ -67,7 +67,7 @@ def _believed(hit: Hit) -> Floats:
 
 def given_up(flight: JudgedFlight) -> Iterator[str]:
     """Places called out of reach to which the straight way was wide open."""
-    steps, index = program(flight.mission), 0
+    steps, index = program(flight.mission.items), 0
     for event in flight.events:
         if event.kind == "item":
             index = int(str(event.data["step"]))

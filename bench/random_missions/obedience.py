@@ -89,7 +89,7 @@ class _Course:
 
 def disobediences(flight: JudgedFlight) -> list[str]:
     """In words; empty where everything followed from the mission."""
-    course = _Course(flight.mission, program(flight.mission))
+    course = _Course(flight.mission, program(flight.mission.items))
     for event in flight.events:
         course.take(event)
     return [*course.complaints, *_ending(course, flight.report)]

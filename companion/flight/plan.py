@@ -20,8 +20,9 @@ from companion.mission.items import (
     VelocityItem,
     WaitForItem,
 )
-from companion.mission.model import Mission, MissionItem
+from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision
+from companion.mission.program import MissionItem
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05

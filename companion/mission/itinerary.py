@@ -3,13 +3,16 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from companion.flight.around import Planned, home_around, way_around
 from companion.flight.course import Pace, climb
 from companion.flight.trajectory import Chain, LineProfile, Trajectory
 from companion.memory.patch import Patch
+from companion.memory.stored import ObstaclesConfig
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
+from companion.mission.config import CompanionConfig
 from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
 from companion.mission.items import (
@@ -22,8 +25,8 @@ from companion.mission.items import (
     TakeoffItem,
     WaitForItem,
 )
-from companion.mission.model import Mission, MissionItem
-from companion.mission.program import Step, program
+from companion.mission.policy import Resume
+from companion.mission.program import MissionItem, Step, program
 
 # Setpoints this far apart in time are looked at for the fence: 4 cm at 2 m/s, as they are sent.
 _LOOK_EVERY_S = 0.02
@@ -33,6 +36,21 @@ _ROUNDING_M = 1e-6
 # PX4's MPC_LAND_SPEED, and the second and two it takes to be sure and to disarm.
 LANDING_SPEED_M_S = 0.7
 LANDING_EXTRA_S = 3.0
+
+
+class Flyable(Protocol):
+    """What ways are worked out from: a mission, which has them checked while it is read."""
+
+    @property
+    def items(self) -> tuple[MissionItem, ...]: ...
+    @property
+    def fence(self) -> Fence: ...
+    @property
+    def obstacles(self) -> ObstaclesConfig: ...
+    @property
+    def companion(self) -> CompanionConfig: ...
+    @property
+    def resume(self) -> Resume | None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +72,17 @@ class Leg:
         return self.start_ned_m if self.way is None else self.way.target_m
 
 
-def itinerary(mission: Mission) -> tuple[Leg, ...]:
+def itinerary(mission: Flyable) -> tuple[Leg, ...]:
     """The mission when nothing is hit, round what is known beforehand."""
     return tuple(_legs(mission, mission.obstacles.patches()))
 
 
-def steps_to_fly(mission: Mission) -> tuple[Step, ...]:
+def steps_to_fly(mission: Flyable) -> tuple[Step, ...]:
     """The program, or what of it an interrupted flight has left: up, to where its step begins, and on from there.
 
     Raises ValueError for a step that there is not.
     """
-    steps = program(mission)
+    steps = program(mission.items)
     if mission.resume is None:
         return steps
     at = mission.resume.at_step
@@ -77,12 +95,12 @@ def steps_to_fly(mission: Mission) -> tuple[Step, ...]:
     return (steps[0], *paces[-1:], back, *steps[at:])
 
 
-def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
+def _legs(mission: Flyable, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
     known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
     pace = Pace.of(flight)
-    for step in program(mission):
+    for step in program(mission.items):
         action = step.action
         way: Trajectory | None = None
         lasts_s: float | None = 0.0
@@ -121,7 +139,7 @@ def _landing_s(place: Vector3) -> float:
     return -place[2] / LANDING_SPEED_M_S + LANDING_EXTRA_S
 
 
-def first_complaint(mission: Mission) -> str | None:
+def first_complaint(mission: Flyable) -> str | None:
     """What is wrong with the first way that leaves the fence, or None. Raises ValueError, too."""
     steps_to_fly(mission)
     seen: set[tuple[int, Vector3]] = set()
@@ -159,6 +177,6 @@ def _way_complaint(fence: Fence, way: Trajectory) -> str | None:
     return None
 
 
-def longest_s(mission: Mission, wait_s: float) -> float:
+def longest_s(mission: Flyable, wait_s: float) -> float:
     """Time of all steps, `wait_s` for each wait without a known end."""
     return sum(wait_s if leg.lasts_s is None else leg.lasts_s for leg in itinerary(mission))

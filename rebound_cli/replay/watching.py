@@ -10,7 +10,7 @@ from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import Demand, Heard, Log
 from rebound_cli.replay.circumstances import Circumstances
 from rebound_cli.replay.findings import Findings, Notebook
-from sim_vehicle.mavlink.streams import KINDS, Stream, interval_from_request
+from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
 _MOST_POLLS = 20

@@ -3,25 +3,30 @@
 from enum import IntEnum
 
 from sim_vehicle.autopilot import commands, flight_commands
-from sim_vehicle.autopilot.commander import Commander, SystemStatus
+from sim_vehicle.autopilot.commander.commander import Commander, SystemStatus
+from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.estimate import Estimate, Vector3, yaw_of
-from sim_vehicle.autopilot.flight_messages import (
+from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
+from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, wants_takeoff
+from sim_vehicle.autopilot.flight_tasks.target import Kind, View
+from sim_vehicle.autopilot.ground_commands import Ground
+from sim_vehicle.autopilot.land_detector import LandDetector
+from sim_vehicle.autopilot.messages import (
     AttitudeTarget,
+    Command,
+    CommandAck,
     FlightInput,
     GlobalTarget,
+    PositionTarget,
     RadioChannels,
+    Result,
+    Severity,
+    StatusText,
     StickInput,
 )
-from sim_vehicle.autopilot.ground import Ground
-from sim_vehicle.autopilot.land_detector import LandDetector
-from sim_vehicle.autopilot.manual import BY_STICKS, ManualFlight
-from sim_vehicle.autopilot.messages import Command, CommandAck, PositionTarget, Result, Severity, StatusText
-from sim_vehicle.autopilot.mission_store import MissionStore
-from sim_vehicle.autopilot.modes import Mode
-from sim_vehicle.autopilot.navigator import Navigator
-from sim_vehicle.autopilot.offboard_control import OffboardControl
-from sim_vehicle.autopilot.takeoff import Takeoff, wants_takeoff
-from sim_vehicle.autopilot.target import Kind, View
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.navigator.navigator import Navigator
+from sim_vehicle.autopilot.offboard import OffboardControl
 from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint

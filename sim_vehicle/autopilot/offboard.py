@@ -7,12 +7,20 @@ commander's offboardCheck.cpp and PositionControl::_inputValid; the delays are m
 import math
 
 from sim_vehicle.autopilot.estimate import yaw_of
-from sim_vehicle.autopilot.flight_messages import AttitudeTarget, GlobalTarget
-from sim_vehicle.autopilot.messages import PositionTarget, Severity, StatusText
+from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, PositionTarget, Severity, StatusText
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.setpoint import FREE, AttitudeSetpoint, Axis3, Quaternion, RatesSetpoint, TrajectorySetpoint, Vector3
+from sim_vehicle.setpoint import (
+    FREE,
+    AttitudeSetpoint,
+    Axis3,
+    Quaternion,
+    RatesSetpoint,
+    Setpoint,
+    TrajectorySetpoint,
+    Vector3,
+)
 
 FRAME_LOCAL_NED = 1
 FRAME_BODY_NED = 8
@@ -186,3 +194,45 @@ def _turned(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:
         2 * (qx * qy + qw * qz) * x + (1 - 2 * (qx * qx + qz * qz)) * y + 2 * (qy * qz - qw * qx) * z,
         2 * (qx * qz - qw * qy) * x + 2 * (qy * qz + qw * qx) * y + (1 - 2 * (qx * qx + qy * qy)) * z,
     )
+
+
+class OffboardControl:
+    """The last valid setpoint that came in OFFBOARD."""
+
+    def __init__(self, signal: OffboardSignal, origin: Origin) -> None:
+        self.demand: Setpoint = STOP
+        self._signal = signal
+        self._origin = origin
+
+    def begin(self, last_demand: Setpoint | None) -> None:
+        """The mode was entered: until a setpoint arrives the last demand goes on, or the vehicle stops."""
+        self.demand = last_demand or STOP
+
+    def take_position(
+        self,
+        target: PositionTarget | GlobalTarget,
+        now_us: int,
+        is_flown: bool,
+        attitude_wxyz: Quaternion,
+        home_ned_m: Vector3,
+    ) -> StatusText | None:
+        """Take a setpoint, valid or not, whatever the mode; why it was refused, where PX4 says so."""
+        if isinstance(target, GlobalTarget):
+            local = local_target(target, self._origin, home_ned_m)
+        else:
+            local = refusal(target) or target
+        if not isinstance(local, PositionTarget):
+            return local
+        self._signal.heard(now_us, needs_place=(local.position_m, local.velocity_m_s) != (FREE, FREE))
+        if is_flown:
+            self.demand = trajectory_setpoint(local, attitude_wxyz)
+        return None
+
+    def take_attitude(self, target: AttitudeTarget, now_us: int, is_flown: bool) -> None:
+        """SET_ATTITUDE_TARGET; one without attitude and rates is none at all."""
+        demand = attitude_setpoint(target)
+        if demand is None:
+            return
+        self._signal.heard(now_us, needs_place=False)
+        if is_flown:
+            self.demand = demand

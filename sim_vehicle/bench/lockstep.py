@@ -8,7 +8,7 @@ from sim_vehicle.bench.timeline import Event
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import link_kind
+from sim_vehicle.mavlink.streams.stream_rates import link_kind
 from sim_vehicle.truth import TruthRecorder
 
 

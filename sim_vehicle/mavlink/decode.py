@@ -19,7 +19,7 @@ from sim_vehicle.autopilot.messages import (
     SigningSetup,
     TimeSyncRequest,
 )
-from sim_vehicle.mavlink import file_service, flight_reader, mission_reader, parameter_reader
+from sim_vehicle.mavlink.services import file_service, mission_service, parameter_service, setpoint_service
 from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
 from sim_vehicle.setpoint import Axis3
 
@@ -240,10 +240,10 @@ READERS: dict[int, Reader] = {
     76: _command_long,
     84: _position_target,
     111: _timesync,
-    **parameter_reader.READERS,
+    **parameter_service.READERS,
     **file_service.READERS,
-    **flight_reader.READERS,
-    **mission_reader.READERS,
+    **setpoint_service.READERS,
+    **mission_service.READERS,
 }
 
 # Commands may go to other components and still be answered, and who is pinged is the one thing that a PING says.

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from sim_vehicle.faults.spec import ClockJump, Fault, ImuDropout, WireFault
 from sim_vehicle.faults.wire import Wire, split
-from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.decode import ForeignPacket
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.restamp import Restamper, message_number
+from sim_vehicle.mavlink.services.board import Board
 
 # HIGHRES_IMU, SCALED_IMU, RAW_IMU and the second and third sensor's SCALED_IMU2 and 3.
 _INERTIAL = (105, 26, 27, 116, 129)

@@ -10,8 +10,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
-from sim_vehicle.mavlink import aiding
 from sim_vehicle.mavlink.encode import diagonal_covariance
+from sim_vehicle.mavlink.streams import aiding
 
 Message: TypeAlias = Any
 

@@ -1,20 +1,24 @@
 """One MAVLink connection: packets, streams, texts, services. The links of a vehicle know nothing of each other."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from sim_vehicle.autopilot.messages import EVERY_ID, CommandAck, PeerHeartbeat, PingRequest, SigningSetup, StatusText
 from sim_vehicle.mavlink import encode
-from sim_vehicle.mavlink.board import Board
 from sim_vehicle.mavlink.decode import Decoder, ForeignPacket
 from sim_vehicle.mavlink.encode import Encoder, Message
-from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line
-from sim_vehicle.mavlink.outbox import Outbox
-from sim_vehicle.mavlink.service import BusyService, Handler
-from sim_vehicle.mavlink.services import SERVICES
+from sim_vehicle.mavlink.line import FAST_LINE, Buffer, Line, Outbox
+from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.services.command_service import CommandService
+from sim_vehicle.mavlink.services.file_service import FileService
+from sim_vehicle.mavlink.services.mission_service import MissionService
+from sim_vehicle.mavlink.services.parameter_service import ParameterService
+from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
+from sim_vehicle.mavlink.services.setpoint_service import SetpointService
+from sim_vehicle.mavlink.services.timesync_service import TimeSyncService
 from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
-from sim_vehicle.mavlink.stream_rates import LinkKind
-from sim_vehicle.mavlink.streams import HEARTBEAT_ID, Streams
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
 from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
 from sim_vehicle.parameters.store import Parameters
 
@@ -22,6 +26,17 @@ from sim_vehicle.parameters.store import Parameters
 _RESERVED_BYTES = 1_000
 # MAV_PROTO_VER: MAVLink 1 until somebody speaks MAVLink 2.
 _BEGINS_WITH_MAVLINK_1 = 1
+
+
+# What every link offers, a line a protocol, in the order in which they are brought up to date in an interval.
+SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
+    CommandService,
+    TimeSyncService,
+    SetpointService,
+    ParameterService,
+    MissionService,
+    FileService,
+)
 
 
 @dataclass(frozen=True, slots=True)

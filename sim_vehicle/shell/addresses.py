@@ -13,7 +13,7 @@ import re
 from sim_vehicle.errors import LinkAddressError
 from sim_vehicle.mavlink.line import Line
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind, link_kind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind, link_kind
 from sim_vehicle.shell.port import Address, Port
 from sim_vehicle.shell.serial_port import SerialPort
 from sim_vehicle.shell.tcp_port import TcpServerPort

@@ -14,7 +14,7 @@ from sim_vehicle.bench.timeline import Event
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet, SimulationError, VehicleEnded
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import link_kind
+from sim_vehicle.mavlink.streams.stream_rates import link_kind
 from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import open_port
 from sim_vehicle.shell.control import Control

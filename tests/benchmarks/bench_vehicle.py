@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 

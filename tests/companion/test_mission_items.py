@@ -99,7 +99,7 @@ def test_repeats_may_stand_in_repeats_and_too_many_steps_are_refused():
     mission = Mission.model_validate(
         {"name": "t", "items": [TAKEOFF, {"repeat": {"times": 2, "items": [inner]}}, LAND]}
     )
-    steps = program(mission)
+    steps = program(mission.items)
     assert len(steps) == 8 and steps[4].label == "2.1.1 (2 of 2) (1 of 3)"
     with pytest.raises(ValidationError, match="more than 10000 steps"):
         items = [inner | {"repeat": inner["repeat"] | {"times": 1000}}]

@@ -12,7 +12,7 @@ from companion.guard.states import State
 from companion.report import Event
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import PortInUse
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import px4_ports
 from sim_vehicle.shell.realtime import Pace, serve

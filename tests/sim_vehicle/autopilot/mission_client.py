@@ -3,11 +3,11 @@
 import random
 from dataclasses import dataclass, field
 
-from sim_vehicle.autopilot import mission_items as commands
-from sim_vehicle.autopilot import mission_messages as wire
-from sim_vehicle.autopilot.mission_messages import MissionResult, MissionType, Peer, WireItem
-from sim_vehicle.autopilot.mission_store import MissionStore
-from sim_vehicle.autopilot.mission_transfer import MissionTransfer
+from sim_vehicle.autopilot.mission_protocol import mission_items as commands
+from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, Peer, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.mission_protocol.mission_transfer import MissionTransfer
 
 CLIENT = Peer(245, 190)
 STEP_US = 4_000

@@ -1,6 +1,6 @@
 """Arming, disarming, and doing so by itself."""
 
-from sim_vehicle.autopilot.arming import Arming, Reason
+from sim_vehicle.autopilot.commander.arming import Arming, Reason
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.parameters.store import Parameters
 

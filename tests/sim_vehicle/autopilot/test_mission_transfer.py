@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_vehicle.autopilot import mission_items as commands
-from sim_vehicle.autopilot import mission_messages as wire
-from sim_vehicle.autopilot.mission_messages import MissionResult, MissionType, Peer, WireItem
-from sim_vehicle.autopilot.mission_store import MOST_ITEMS, MissionStore
-from sim_vehicle.autopilot.mission_transfer import RETRY_US, TIMEOUT_US, State
+from sim_vehicle.autopilot.mission_protocol import mission_items as commands
+from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, Peer, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
+from sim_vehicle.autopilot.mission_protocol.mission_transfer import RETRY_US, TIMEOUT_US, State
 from tests.sim_vehicle.autopilot.mission_client import CLIENT, STEP_US, Exchange, wire_item
 
 STRANGER = Peer(246, 190)

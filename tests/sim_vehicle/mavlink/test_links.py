@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.line import Line
 from sim_vehicle.mavlink.link import Link, LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 

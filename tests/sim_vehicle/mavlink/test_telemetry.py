@@ -13,7 +13,7 @@ from sim_vehicle.geography import Origin
 from sim_vehicle.hil.earth import StandardAir
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.mavlink.link import LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.slow_sensors import air_at
 from sim_vehicle.vehicle import SimulatedVehicle

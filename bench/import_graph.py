@@ -1,0 +1,30 @@
+"""Which of the project's modules imports which, wherever in its file: for the rule that none needs itself."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+PACKAGES = ("companion", "sim_vehicle", "rebound_cli", "bench")
+
+
+def imported_names(path: Path) -> Iterator[str]:
+    """Full names of all that a file imports; of `from a import b` both `a` and `a.b`, which may be a module."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            if node.level:
+                raise ValueError(f"{path} imports relatively")
+            package = node.module or ""
+            yield package
+            yield from (f"{package}.{alias.name}" for alias in node.names)
+
+
+def module_imports(root: Path) -> dict[str, set[str]]:
+    """Every module of the project below ``root``, and those of them that it imports."""
+    paths = {_module(path.relative_to(root)): path for name in PACKAGES for path in (root / name).rglob("*.py")}
+    return {module: {name for name in imported_names(path) if name in paths} for module, path in paths.items()}
+
+
+def _module(path: Path) -> str:
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")

@@ -1,0 +1,116 @@
+"""Arming and disarming, by command and by itself, and what forbids arming beside what the mode needs.
+
+Sources: PX4's Commander::arm, Commander::disarm, Commander::handleAutoDisarm and commander/HealthAndArmingChecks
+(rcAndDataLinkCheck, batteryCheck, estimatorCheck, geofenceCheck, modeCheck).
+"""
+
+from enum import StrEnum
+
+from sim_vehicle.autopilot.commander.battery import Battery
+from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
+from sim_vehicle.autopilot.commander.ground_station import GroundStation
+from sim_vehicle.autopilot.commander.positioning import Positioning
+from sim_vehicle.autopilot.messages import Result, Severity, StatusText
+from sim_vehicle.autopilot.navigator.navigator import Navigator
+from sim_vehicle.parameters.store import Parameters
+
+
+class Reason(StrEnum):
+    """Who armed or disarmed, in PX4's words."""
+
+    COMMAND = "external command"
+    GESTURE = "stick gesture"
+    MISSION = "mission start"
+    FAILSAFE = "failsafe"
+    LANDING = "landing"
+    INACTION = "auto preflight disarming"
+
+
+class Arming:
+    """Whether the motors may turn, since when, and what has happened since."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self.armed = False
+        self.armed_at_us = 0
+        self.taken_off = False
+        self.taken_off_at_us = 0
+        self._landed_since_us: int | None = None
+
+    def arm(self, now_us: int, checks_pass: bool) -> Result:
+        """ARM by command: refused while checks fail; arming twice is accepted."""
+        if self.armed:
+            return Result.ACCEPTED
+        if not checks_pass:
+            return Result.TEMPORARILY_REJECTED
+        self.armed = True
+        self.armed_at_us = now_us
+        self.taken_off = False
+        self._landed_since_us = None
+        return Result.ACCEPTED
+
+    def disarm(self, landed: bool, forced: bool) -> Result:
+        """DISARM by command: refused in the air unless forced; disarming twice is accepted."""
+        if self.armed and not landed and not forced:
+            return Result.TEMPORARILY_REJECTED
+        self.armed = False
+        return Result.ACCEPTED
+
+    def disarm_by_itself(self, now_us: int, landed: bool) -> Reason | None:
+        """Disarm after landing or after standing armed for too long; call at every step while armed."""
+        if not landed:
+            if not self.taken_off:
+                self.taken_off, self.taken_off_at_us = True, now_us
+            self._landed_since_us = None
+            return None
+        if not self.taken_off:
+            # PX4 counts both for an armed vehicle on which nobody acts; a time of 0 or less switches it off.
+            allowed_s = self._parameters["COM_DISARM_PRFLT"]
+            waited_s = (now_us - self.armed_at_us) / 1e6
+            if allowed_s <= 0 or waited_s < allowed_s + self._parameters["COM_SPOOLUP_TIME"]:
+                return None
+            self.armed = False
+            return Reason.INACTION
+        if self._landed_since_us is None:
+            self._landed_since_us = now_us
+        wait_s = self._parameters["COM_DISARM_LAND"]
+        if wait_s <= 0 or (now_us - self._landed_since_us) / 1e6 < wait_s:
+            return None
+        self.armed = False
+        return Reason.LANDING
+
+
+_BATTERY_TEXTS = {
+    BatteryWarning.LOW: "Low battery",
+    BatteryWarning.CRITICAL: "Critical battery",
+    BatteryWarning.EMERGENCY: "Emergency battery level",
+}
+
+
+# COM_ARM_WO_GPS: 0 refuses, 1 warns, 2 does not care.
+_NOT_WITHOUT_GPS = 0
+
+
+def preflight_problems(
+    parameters: Parameters,
+    ground_station: GroundStation,
+    battery: Battery,
+    navigator: Navigator,
+    positioning: Positioning,
+) -> list[StatusText]:
+    """What forbids arming, and what PX4 says about it when somebody tries; empty where nothing does."""
+    found = []
+    if ground_station.lost and parameters["NAV_DLL_ACT"] > 0:
+        found.append(StatusText(Severity.WARNING, "Preflight Fail: No connection to the GCS"))
+    least = parameters["COM_ARM_BAT_MIN"]
+    is_too_low = battery.remaining < least if least >= 0.0 else battery.warning >= BatteryWarning.CRITICAL
+    if is_too_low:
+        found.append(StatusText(Severity.CRITICAL, _BATTERY_TEXTS.get(battery.warning, "Low battery")))
+    if positioning.is_without_gps and parameters["COM_ARM_WO_GPS"] == _NOT_WITHOUT_GPS:
+        found.append(StatusText(Severity.CRITICAL, "Preflight Fail: GPS fix too low"))
+    if navigator.fence.breached:
+        found.append(StatusText(Severity.CRITICAL, navigator.fence.breach_text))
+    if parameters["COM_ARM_MIS_REQ"] and not navigator.progress.valid:
+        # An event without a text in PX4 too.
+        found.append(StatusText(Severity.INFO, ""))
+    return found

@@ -1,0 +1,313 @@
+"""Who is in command: the mode that is meant and the one that flies, arming, and what the failsafes make of it.
+
+Source: PX4's commander/Commander.cpp.
+"""
+
+from enum import IntEnum
+
+from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_problems
+from sim_vehicle.autopilot.commander.battery import Battery
+from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
+from sim_vehicle.autopilot.commander.failsafe import Failsafe
+from sim_vehicle.autopilot.commander.failsafe_table import Action, Situation
+from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
+from sim_vehicle.autopilot.commander.ground_station import GroundStation
+from sim_vehicle.autopilot.commander.manual_control import Gesture, ManualInput
+from sim_vehicle.autopilot.commander.modes import (
+    NEEDS,
+    NOT_ARMABLE,
+    Conditions,
+    Event,
+    Mode,
+    ModeState,
+    Need,
+    available,
+    cannot_run,
+    missing,
+)
+from sim_vehicle.autopilot.commander.positioning import Positioning
+from sim_vehicle.autopilot.estimate import Quaternion
+from sim_vehicle.autopilot.land_detector import LandDetector
+from sim_vehicle.autopilot.messages import Result, Severity, StatusText
+from sim_vehicle.autopilot.navigator.navigator import Navigator
+from sim_vehicle.autopilot.offboard import OffboardSignal
+from sim_vehicle.parameters.store import Parameters
+
+# How often the failsafes look when nothing calls for it: PX4's commander runs every 10 ms, its checks every 100.
+PERIOD_US = 20_000
+# COM_RC_OVERRIDE: in which modes moved sticks take over.
+_OVERRIDES_AUTO, _OVERRIDES_OFFBOARD = 1, 2
+# Commander::arm: sticks above these refuse a stick mode, with climb control and without.
+_CENTRE_THROTTLE, _LOW_THROTTLE = 0.2, -0.8
+
+
+class SystemStatus(IntEnum):
+    """MAV_STATE as PX4 uses it."""
+
+    NOT_READY = 0
+    STANDBY = 3
+    ACTIVE = 4
+    FAILSAFE = 5
+    TERMINATED = 8
+
+
+class Commander:
+    """Requests and the time in; the mode to fly, texts out."""
+
+    def __init__(self, parameters: Parameters, navigator: Navigator, detector: LandDetector) -> None:
+        self.modes = ModeState()
+        self.arming = Arming(parameters)
+        self.failsafe = Failsafe()
+        self.signal = OffboardSignal(parameters)
+        self.sticks = ManualInput(parameters)
+        self.ground_station = GroundStation(parameters)
+        self.battery = Battery(parameters)
+        self.positioning = Positioning(parameters)
+        self.texts: list[StatusText] = []
+        self._parameters = parameters
+        self._navigator = navigator
+        self._detector = detector
+        self._now_us = 0
+        self._judged_us = -PERIOD_US
+        self._battery_at_arming = BatteryWarning.NONE
+        self._sticks_lost_at_arming = True
+        self._ever_requested = False
+        self._tipping = TippingDetector(parameters)
+        self._taken_off_us: int | None = None
+
+    # --- requests --------------------------------------------------------------------------------------------
+
+    def request_mode(self, mode: Mode) -> Result:
+        """Change the mode as a command asks."""
+        self._ever_requested = True
+        if not self.modes.apply(Event.REQUEST, self._conditions, mode):
+            return Result.TEMPORARILY_REJECTED
+        self._judge()
+        return Result.ACCEPTED
+
+    def arm(self, reason: Reason = Reason.COMMAND) -> Result:
+        """Arm as a command or a gesture asks."""
+        was_armed = self.arming.armed
+        refusal = None if was_armed else self._stick_refusal(reason)
+        if refusal is not None:
+            self._say(Severity.CRITICAL, f"Arming denied: {refusal}")
+            return Result.TEMPORARILY_REJECTED
+        result = self.arming.arm(self._now_us, self.checks_pass)
+        if result is not Result.ACCEPTED:
+            self.texts += [problem for problem in self._problems if problem.text]
+            self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+        elif not was_armed:
+            self._say(Severity.INFO, f"Armed by {reason}")
+            self._battery_at_arming = self.battery.warning
+            self._sticks_lost_at_arming = self.sticks.sticks is None
+            self._taken_off_us = None
+            self._navigator.view.armed = True
+            self._navigator.set_home_here()
+            self._navigator.enter(self.modes.flown)
+            self._judge()
+        return result
+
+    def _stick_refusal(self, reason: Reason) -> str | None:
+        """What is wrong with the throttle in a mode that sticks fly, or with the mode for a gesture."""
+        sticks, mode = self.sticks.sticks, self.modes.flown
+        if Need.STICKS not in NEEDS[mode]:
+            return "switch to manual mode first" if reason is Reason.GESTURE else None
+        if sticks is None:
+            return None
+        if mode in _CLIMB_CONTROLLED:
+            return "throttle above center" if sticks.throttle > _CENTRE_THROTTLE else None
+        return "high throttle" if sticks.throttle > _LOW_THROTTLE else None
+
+    def disarm(self, forced: bool, reason: Reason = Reason.COMMAND) -> Result:
+        """Disarm as a command, a gesture or a failsafe asks."""
+        was_armed = self.arming.armed
+        by_gesture = reason is Reason.GESTURE
+        may_fall = by_gesture and self.modes.flown in _BY_THRUST and bool(self._parameters["COM_DISARM_MAN"])
+        result = self.arming.disarm(self._detector.landed or self._detector.maybe_landed, forced or may_fall)
+        if result is not Result.ACCEPTED:
+            if not by_gesture:
+                self._say(Severity.CRITICAL, "Disarming denied: not landed")
+        elif was_armed:
+            self._disarmed(reason)
+        return result
+
+    def _disarmed(self, reason: Reason) -> None:
+        self._say(Severity.INFO, f"Disarmed by {reason}")
+        self._navigator.view.armed = False
+        self._navigator.disarmed()
+        self.modes.apply(Event.DISARMED, self._conditions)
+        self._judge()
+
+    # --- the cycle -------------------------------------------------------------------------------------------
+
+    def run(self, now_us: int, attitude_wxyz: Quaternion) -> None:
+        """Everything that changes mode or arming by itself; call it at every step."""
+        self._now_us = now_us
+        heard = (self.signal.arrives, self.signal.is_back)
+        self.signal.update(now_us)
+        if self.sticks.sticks is not None:
+            self.sticks.update(now_us)
+            self._obey_sticks()
+        over = None if self._detector.landed else self._what_is_over()
+        if over is not None and self.modes.apply(over, self._conditions):
+            self._judge()
+        self._disarm_by_itself()
+        if now_us - self._judged_us >= PERIOD_US or heard != (self.signal.arrives, self.signal.is_back):
+            self._watch(attitude_wxyz)
+            self._judge()
+
+    def _what_is_over(self) -> Event | None:
+        """Commander::checkForMissionUpdate."""
+        progress = self._navigator.progress
+        if self.modes.flown is Mode.MISSION:
+            return Event.MISSION_FINISHED if progress.finished else None
+        if self.modes.flown is not Mode.TAKEOFF or not self._navigator.takeoff_is_over:
+            return None
+        goes_on = self._parameters["COM_TAKEOFF_ACT"] == 1 and progress.valid
+        return Event.MISSION_AFTER_TAKEOFF if goes_on else Event.TAKEOFF_REACHED
+
+    def _obey_sticks(self) -> None:
+        if self.sticks.gesture is Gesture.ARM:
+            self.arm(Reason.GESTURE)
+        elif self.sticks.gesture is Gesture.DISARM:
+            self.disarm(False, Reason.GESTURE)
+        if self.sticks.sticks is None:
+            return
+        if not self.arming.armed:
+            if not self._ever_requested:
+                # As long as nobody has chosen a mode, sticks that arrive choose theirs.
+                self._ever_requested = True
+                self.modes.mean(Mode.POSCTL)
+            return
+        if not self.sticks.moving or self.failsafe.acts or not self._sticks_override:
+            return
+        if self.modes.apply(Event.STICKS, self._conditions):
+            self._say(Severity.INFO, "Pilot took over using sticks")
+            self._judge()
+
+    @property
+    def _sticks_override(self) -> bool:
+        mode, mask = self.modes.flown, int(self._parameters["COM_RC_OVERRIDE"])
+        if mode is Mode.OFFBOARD:
+            return bool(mask & _OVERRIDES_OFFBOARD)
+        return Need.STICKS not in NEEDS[mode] and bool(mask & _OVERRIDES_AUTO)
+
+    def _disarm_by_itself(self) -> None:
+        if not self.arming.armed:
+            return
+        landed = self._detector.landed
+        if not landed and self._taken_off_us is None:
+            self._taken_off_us = self._now_us
+        if landed and self.arming.taken_off and self._navigator.mission_is_in_progress:
+            return
+        reason = self.arming.disarm_by_itself(self._now_us, landed)
+        if reason is not None:
+            self._disarmed(reason)
+
+    def _watch(self, attitude_wxyz: Quaternion) -> None:
+        """The ground station, where the vehicle is, and whether it lies on its side."""
+        self.texts += self.ground_station.update(self._now_us)
+        self.positioning.update(self._now_us)
+        self._tipping.update(self._now_us, attitude_wxyz)
+
+    def _judge(self) -> None:
+        """Let the failsafes say what flies."""
+        self._judged_us = self._now_us
+        decision = self.failsafe.update(self._now_us, self._situation(), self._parameters)
+        self.modes.requested = False
+        for text in decision.says:
+            self._say(Severity.CRITICAL, text)
+        if decision.intended is not self.modes.intended:
+            self.modes.mean(decision.intended)
+        if decision.action is Action.DISARM and self.arming.armed:
+            self.disarm(True, Reason.FAILSAFE)
+            return
+        if decision.flown is not self.modes.flown:
+            self.modes.flown = decision.flown
+            self._navigator.enter(decision.flown)
+
+    def _situation(self) -> Situation:
+        armed, progress = self.arming.armed, self._navigator.progress
+        back = self._flies_setpoints and (self.signal.is_back or not self.failsafe.acts)
+        return Situation(
+            armed=armed,
+            intended=self.modes.intended,
+            armed_for_us=self._now_us - self.arming.armed_at_us if armed else 0,
+            mode_requested=self.modes.requested,
+            sticks_moved=self.failsafe.acts and self.sticks.moving and self._sticks_override,
+            sticks_lost=self.sticks.sticks is None,
+            sticks_lost_at_arming=self._were_sticks_lost_at_arming(),
+            ground_station_lost=self.ground_station.lost,
+            offboard_lost=not back,
+            fence_breached=self._navigator.fence.breached,
+            battery=self.battery.warning,
+            battery_at_arming=self._battery_at_arming,
+            mission_finished=progress.finished,
+            flight_time_over=self._flight_time_is_over,
+            tipped_over=self._tipping.tipped_over,
+            cannot_run=cannot_run(self._available, back),
+        )
+
+    def _were_sticks_lost_at_arming(self) -> bool:
+        """Whoever arms without sticks is not told that they are lost, until they have come once."""
+        if self.sticks.sticks is not None:
+            self._sticks_lost_at_arming = False
+        elif not self.arming.armed:
+            self._sticks_lost_at_arming = True
+        return self._sticks_lost_at_arming
+
+    @property
+    def _flight_time_is_over(self) -> bool:
+        most_s = self._parameters["COM_FLT_TIME_MAX"]
+        if most_s <= 0 or self._taken_off_us is None or not self.arming.armed:
+            return False
+        return self._now_us - self._taken_off_us > 1e6 * most_s
+
+    # --- what there is ---------------------------------------------------------------------------------------
+
+    @property
+    def _conditions(self) -> Conditions:
+        return Conditions(self.arming.armed, self._available)
+
+    @property
+    def _flies_setpoints(self) -> bool:
+        return self.signal.arrives and (self.positioning.has_local or not self.signal.needs_place)
+
+    @property
+    def _available(self) -> frozenset[Need]:
+        return available(
+            self.positioning.has_local,
+            self.positioning.has_global,
+            self.sticks.sticks is not None,
+            self._flies_setpoints,
+            self._navigator.progress.valid,
+        )
+
+    @property
+    def checks_pass(self) -> bool:
+        """Whether the vehicle could be armed in its present mode."""
+        mode = self.modes.intended
+        return mode not in NOT_ARMABLE and not missing(mode, self._available) and not self._problems
+
+    @property
+    def _problems(self) -> list[StatusText]:
+        return preflight_problems(
+            self._parameters, self.ground_station, self.battery, self._navigator, self.positioning
+        )
+
+    @property
+    def system_status(self) -> SystemStatus:
+        """HEARTBEAT.system_status."""
+        if self.modes.flown is Mode.TERMINATION:
+            return SystemStatus.TERMINATED
+        if self.arming.armed:
+            return SystemStatus.FAILSAFE if self.failsafe.acts else SystemStatus.ACTIVE
+        return SystemStatus.STANDBY if self.checks_pass else SystemStatus.NOT_READY
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self.texts.append(StatusText(severity, text))
+
+
+_CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL, Mode.POSITION_SLOW)
+# Modes in which the pilot's throttle is the thrust: there COM_DISARM_MAN lets him disarm in the air.
+_BY_THRUST = (Mode.MANUAL, Mode.STABILIZED, Mode.ACRO)

@@ -1,0 +1,286 @@
+"""What each failsafe does: one row a trigger, with the parameter that decides and what its values mean.
+
+Source: PX4's commander/failsafe/failsafe.cpp (August 2025, between v1.16 and v1.17) and commander_params.yaml.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+from typing import NamedTuple
+
+from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
+from sim_vehicle.autopilot.commander.modes import Mode
+from sim_vehicle.parameters.store import Parameters
+
+
+class Action(IntEnum):
+    """What a failsafe may do. The order is the precedence: of several the greatest is taken."""
+
+    NONE = 0
+    WARN = 1
+    FALL_BACK_TO_POSITION = 2
+    FALL_BACK_TO_ALTITUDE = 3
+    FALL_BACK_TO_STABILIZED = 4
+    HOLD = 5
+    RETURN = 6
+    LAND = 7
+    DESCEND = 8
+    DISARM = 9
+    TERMINATE = 10
+
+
+class Clears(StrEnum):
+    """When an action ends after its trigger is gone."""
+
+    AT_ONCE = "with the trigger"
+    MODE_CHANGE_OR_DISARM = "then mode change or disarm"
+    NEVER = "never"
+
+
+class Takeover(IntEnum):
+    """Whether the pilot may end the action; of several the greatest, the strictest, counts."""
+
+    ALWAYS = 0
+    BY_MODE_SWITCH = 1
+    AFTER_DELAY = 2
+    """Hold for COM_FAIL_ACT_T first, in which a mode switch takes over; then the action."""
+    NEVER = 3
+
+
+class Trigger(StrEnum):
+    """What sets a failsafe off."""
+
+    STICKS_LOST = "manual control lost"
+    GROUND_STATION_LOST = "ground station lost"
+    MISSION_OUT_OF_REACH = "mission finished, no link left"
+    FLIGHT_TIME = "flight time over"
+    FENCE = "geofence breached"
+    BATTERY_LOW = "battery low"
+    BATTERY_CRITICAL = "battery critical"
+    BATTERY_EMERGENCY = "battery emergency"
+    ATTITUDE_AT_TAKEOFF = "tipped over at takeoff"
+    ATTITUDE = "tipped over"
+    MODE_CANNOT_RUN = "mode cannot run"
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """One way to react."""
+
+    action: Action
+    clears: Clears = Clears.AT_ONCE
+    takeover: Takeover = Takeover.AFTER_DELAY
+
+
+class Situation(NamedTuple):
+    """What the failsafes judge, as the commander has it in this cycle. A tuple: one is made fifty times a second."""
+
+    armed: bool
+    intended: Mode
+    armed_for_us: int = 0
+    mode_requested: bool = False
+    """A mode was accepted since the last cycle, be it the same."""
+    sticks_moved: bool = False
+    """The pilot moves his sticks while a failsafe flies."""
+    sticks_lost: bool = True
+    sticks_lost_at_arming: bool = True
+    ground_station_lost: bool = True
+    offboard_lost: bool = True
+    fence_breached: bool = False
+    battery: BatteryWarning = BatteryWarning.NONE
+    battery_at_arming: BatteryWarning = BatteryWarning.NONE
+    mission_finished: bool = False
+    flight_time_over: bool = False
+    tipped_over: bool = False
+    cannot_run: frozenset[Mode] = frozenset()
+    """Modes whose needs are not met, sticks left aside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A trigger, when it counts, and what follows."""
+
+    trigger: Trigger
+    counts: Callable[[Situation, Parameters], bool]
+    parameter: str | None
+    """Its value chooses the response; without one the only response is that of 0."""
+    responses: Mapping[int, Response]
+    otherwise: Response = Response(Action.NONE)
+    """For values that PX4 does not know."""
+
+    def response(self, parameters: Parameters) -> Response:
+        """What these parameters want."""
+        value = 0 if self.parameter is None else int(parameters[self.parameter])
+        return self.responses.get(value, self.otherwise)
+
+
+def _kept(action: Action, takeover: Takeover = Takeover.AFTER_DELAY) -> Response:
+    return Response(action, Clears.MODE_CHANGE_OR_DISARM, takeover)
+
+
+_NOTHING, _WARNING = Response(Action.NONE), Response(Action.WARN)
+_TERMINATION = Response(Action.TERMINATE, Clears.NEVER, Takeover.NEVER)
+
+_LINK_LOSS: dict[int, Response] = {
+    0: _NOTHING,
+    1: _kept(Action.HOLD),
+    2: _kept(Action.RETURN),
+    3: _kept(Action.LAND),
+    5: _TERMINATION,
+    6: Response(Action.DISARM, takeover=Takeover.NEVER),
+}
+_FENCE: dict[int, Response] = {
+    0: _NOTHING,
+    1: _WARNING,
+    2: _kept(Action.HOLD, Takeover.BY_MODE_SWITCH),
+    3: _kept(Action.RETURN),
+    4: _TERMINATION,
+    5: _kept(Action.LAND),
+}
+_CRITICAL = {
+    0: _WARNING,
+    1: Response(Action.RETURN),
+    2: Response(Action.LAND),
+    3: Response(Action.RETURN),
+}
+_EMERGENCY = {**_CRITICAL, 3: Response(Action.LAND)}
+
+# COM_RCL_EXCEPT and COM_DLL_EXCEPT: in which modes a lost link is no matter.
+_EXCEPT_MISSION, _EXCEPT_HOLD, _EXCEPT_OFFBOARD = 1, 2, 4
+_EXCEPTION_OF = {
+    Mode.MISSION: _EXCEPT_MISSION,
+    Mode.LOITER: _EXCEPT_HOLD,
+    Mode.TAKEOFF: _EXCEPT_HOLD,
+    Mode.OFFBOARD: _EXCEPT_OFFBOARD,
+}
+_NO_STICKS = 4
+"""COM_RC_IN_MODE: no manual control at all."""
+_TERMINATION_BREAKER = 121212
+"""CBRK_FLIGHTTERM: with this value tipping over is only a warning."""
+
+
+def _excepted(mode: Mode, mask: float) -> bool:
+    return bool(_EXCEPTION_OF.get(mode, 0) & int(mask))
+
+
+def _sticks_lost(now: Situation, parameters: Parameters) -> bool:
+    wanted = parameters["COM_RC_IN_MODE"] != _NO_STICKS and not now.sticks_lost_at_arming
+    return now.sticks_lost and wanted and not _excepted(now.intended, parameters["COM_RCL_EXCEPT"])
+
+
+def _ground_station_lost(now: Situation, parameters: Parameters) -> bool:
+    if parameters["NAV_DLL_ACT"] == 0 or now.intended is Mode.LAND or not now.armed:
+        return False
+    return now.ground_station_lost and not _excepted(now.intended, parameters["COM_DLL_EXCEPT"])
+
+
+def _out_of_reach(now: Situation, parameters: Parameters) -> bool:
+    """Nobody could call the vehicle back, and it has nothing left to do."""
+    no_sticks = parameters["COM_RC_IN_MODE"] == _NO_STICKS or _excepted(now.intended, parameters["COM_RCL_EXCEPT"])
+    alone = no_sticks and parameters["NAV_DLL_ACT"] == 0 and now.ground_station_lost
+    return now.intended is Mode.MISSION and now.mission_finished and alone
+
+
+def _battery(level: BatteryWarning) -> Callable[[Situation, Parameters], bool]:
+    return lambda now, parameters: now.battery is level
+
+
+def _worse_than_at_arming(now: Situation) -> bool:
+    return now.battery > now.battery_at_arming
+
+
+def _is_taking_off(now: Situation, parameters: Parameters) -> bool:
+    guarded_s = parameters["COM_LKDOWN_TKO"] + parameters["COM_SPOOLUP_TIME"]
+    return now.armed and now.armed_for_us < 1e6 * guarded_s
+
+
+# In PX4's order. The mode that cannot run comes last and is no row: see `Failsafe`.
+ROWS: tuple[Row, ...] = (
+    Row(Trigger.STICKS_LOST, _sticks_lost, "NAV_RCL_ACT", _LINK_LOSS),
+    Row(Trigger.GROUND_STATION_LOST, _ground_station_lost, "NAV_DLL_ACT", _LINK_LOSS),
+    Row(Trigger.MISSION_OUT_OF_REACH, _out_of_reach, None, {0: Response(Action.RETURN)}),
+    Row(Trigger.FLIGHT_TIME, lambda now, parameters: now.flight_time_over, None, {0: Response(Action.RETURN)}),
+    Row(Trigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),
+    Row(Trigger.BATTERY_LOW, _battery(BatteryWarning.LOW), None, {0: _WARNING}),
+    Row(Trigger.BATTERY_CRITICAL, _battery(BatteryWarning.CRITICAL), "COM_LOW_BAT_ACT", _CRITICAL, _WARNING),
+    Row(Trigger.BATTERY_EMERGENCY, _battery(BatteryWarning.EMERGENCY), "COM_LOW_BAT_ACT", _EMERGENCY, _WARNING),
+    Row(
+        Trigger.ATTITUDE_AT_TAKEOFF,
+        lambda now, parameters: now.tipped_over and _is_taking_off(now, parameters),
+        None,
+        {0: Response(Action.DISARM)},
+    ),
+    Row(
+        Trigger.ATTITUDE,
+        lambda now, parameters: now.tipped_over and not _is_taking_off(now, parameters),
+        "CBRK_FLIGHTTERM",
+        {_TERMINATION_BREAKER: _WARNING},
+        Response(Action.TERMINATE),
+    ),
+)
+
+OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {
+    0: (Action.FALL_BACK_TO_POSITION, Mode.POSCTL),
+    1: (Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL),
+    2: (Action.FALL_BACK_TO_STABILIZED, Mode.STABILIZED),
+    3: (Action.RETURN, Mode.RETURN),
+    4: (Action.LAND, Mode.LAND),
+    5: (Action.HOLD, Mode.LOITER),
+    6: (Action.TERMINATE, Mode.TERMINATION),
+    7: (Action.DISARM, Mode.OFFBOARD),
+}
+"""COM_OBL_RC_ACT: what is done and which mode that means."""
+
+
+def responses_now(now: Situation, parameters: Parameters) -> list[tuple[Trigger, Response]]:
+    """The rows that count now."""
+    found: list[tuple[Trigger, Response]] = []
+    for row in ROWS:
+        if not row.counts(now, parameters):
+            continue
+        response = row.response(parameters)
+        if row.trigger in _BATTERY_ACTS and not _worse_than_at_arming(now):
+            # Somebody armed with a battery already that low: he knows.
+            response = _WARNING
+        if response.action is not Action.NONE:
+            found.append((row.trigger, response))
+    return found
+
+
+_BATTERY_ACTS = (Trigger.BATTERY_CRITICAL, Trigger.BATTERY_EMERGENCY)
+
+
+def mode_fallback(now: Situation, parameters: Parameters, intended: Mode) -> Action:
+    """What becomes of a mode that cannot run: offboard's own loss first, then sticks, then the return."""
+    action, mode = Action.NONE, intended
+    if mode is Mode.OFFBOARD and now.offboard_lost:
+        action, mode = OFFBOARD_LOSS.get(int(parameters["COM_OBL_RC_ACT"]), OFFBOARD_LOSS[0])
+        if action is Action.DISARM:
+            return action
+    if mode is Mode.POSCTL and mode in now.cannot_run:
+        action, mode = Action.FALL_BACK_TO_ALTITUDE, Mode.ALTCTL
+    if mode is Mode.ALTCTL and mode in now.cannot_run:
+        action, mode = Action.FALL_BACK_TO_STABILIZED, Mode.STABILIZED
+    return Action.RETURN if mode in now.cannot_run else action
+
+
+def markdown_table() -> str:
+    """The rows as the document has them."""
+    lines = ["| trigger | parameter | does | ends |", "|---|---|---|---|"]
+    for row in ROWS:
+        does = ", ".join(
+            f"{value}: {response.action.name.lower()}" if row.parameter else response.action.name.lower()
+            for value, response in row.responses.items()
+        )
+        if row.otherwise.action is not Action.NONE:
+            does += f", else {row.otherwise.action.name.lower()}"
+        ends = sorted({r.clears.value for r in row.responses.values() if r.action > Action.WARN}) or [
+            "with the trigger"
+        ]
+        lines.append(f"| {row.trigger} | {row.parameter or ''} | {does} | {', or '.join(ends)} |")
+    does = ", ".join(f"{value}: {action.name.lower()}" for value, (action, _) in OFFBOARD_LOSS.items())
+    lines.append(f"| setpoints stopped in OFFBOARD | COM_OBL_RC_ACT | {does} | with the trigger |")
+    lines.append(
+        f"| {Trigger.MODE_CANNOT_RUN} | | fall_back_to_altitude, fall_back_to_stabilized, return | with the trigger |"
+    )
+    return "\n".join(lines).replace("_", "\\_") + "\n"

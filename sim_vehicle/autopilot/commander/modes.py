@@ -1,0 +1,249 @@
+"""PX4's flight modes: what each needs and the one table of how they follow each other.
+
+Sources: commander/ModeUtil/mode_requirements.cpp, UserModeIntention.cpp and failsafe/failsafe.cpp of PX4.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+from functools import cache
+
+
+class Mode(IntEnum):
+    """The modes of a multicopter by PX4's NAVIGATION_STATE numbers."""
+
+    MANUAL = 0
+    ALTCTL = 1
+    POSCTL = 2
+    MISSION = 3
+    LOITER = 4
+    RETURN = 5
+    POSITION_SLOW = 6
+    ACRO = 10
+    DESCEND = 12
+    TERMINATION = 13
+    OFFBOARD = 14
+    STABILIZED = 15
+    TAKEOFF = 17
+    LAND = 18
+    FOLLOW_TARGET = 19
+    PRECISION_LAND = 20
+    ORBIT = 21
+
+
+class Need(StrEnum):
+    """What a mode cannot do without."""
+
+    STICKS = "sticks"
+    SETPOINTS = "setpoints arrive"
+    MISSION = "valid mission"
+    LOCAL_POSITION = "local position"
+    GLOBAL_POSITION = "global position"
+    HOME = "home position"
+
+
+# mode_requirements.cpp; attitude and rates, which every mode needs, are always there.
+_PLACE = frozenset({Need.LOCAL_POSITION, Need.GLOBAL_POSITION})
+NEEDS: dict[Mode, frozenset[Need]] = {
+    Mode.MANUAL: frozenset({Need.STICKS}),
+    Mode.ALTCTL: frozenset({Need.STICKS}),
+    Mode.POSCTL: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
+    Mode.POSITION_SLOW: frozenset({Need.STICKS, Need.LOCAL_POSITION}),
+    Mode.STABILIZED: frozenset({Need.STICKS}),
+    Mode.ACRO: frozenset({Need.STICKS}),
+    Mode.MISSION: _PLACE | {Need.MISSION},
+    Mode.LOITER: _PLACE,
+    Mode.RETURN: _PLACE | {Need.HOME},
+    Mode.TAKEOFF: frozenset({Need.LOCAL_POSITION}),
+    Mode.LAND: frozenset({Need.LOCAL_POSITION}),
+    Mode.PRECISION_LAND: frozenset({Need.LOCAL_POSITION}),
+    Mode.FOLLOW_TARGET: frozenset({Need.LOCAL_POSITION}),
+    Mode.ORBIT: frozenset({Need.LOCAL_POSITION}),
+    Mode.OFFBOARD: frozenset({Need.SETPOINTS}),
+    Mode.DESCEND: frozenset(),
+    Mode.TERMINATION: frozenset(),
+}
+
+# mode_req_prevent_arming: nobody can arm in these.
+NOT_ARMABLE = frozenset(
+    {
+        Mode.LAND,
+        Mode.RETURN,
+        Mode.DESCEND,
+        Mode.FOLLOW_TARGET,
+        Mode.PRECISION_LAND,
+        Mode.ORBIT,
+        Mode.TERMINATION,
+    }
+)
+# A vehicle that cannot be armed in its mode, or would take off again at once, goes back after disarming to
+# the mode before (UserModeIntention::change). Out of termination nothing leads.
+NOT_KEPT_AFTER_DISARMING = (NOT_ARMABLE - {Mode.TERMINATION}) | {Mode.TAKEOFF}
+
+
+def missing(mode: Mode, available: frozenset[Need]) -> frozenset[Need]:
+    """What ``mode`` needs and is not there."""
+    return NEEDS[mode] - available
+
+
+class Event(StrEnum):
+    """What can change the mode that is meant."""
+
+    REQUEST = "requested"
+    TAKEOFF_REACHED = "takeoff height reached"
+    MISSION_AFTER_TAKEOFF = "takeoff height reached, COM_TAKEOFF_ACT 1"
+    MISSION_FINISHED = "mission finished in the air"
+    STICKS = "sticks moved"
+    DISARMED = "disarmed"
+
+
+class Guard(StrEnum):
+    """Condition of a transition."""
+
+    ALWAYS = ""
+    ARMED = "armed"
+    CAN_RUN = "disarmed, or it can run"
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One row: from any of ``sources`` (None: from every mode) on ``event`` to ``target``.
+
+    A target of None is the last mode that was meant and in which the vehicle could be armed.
+    """
+
+    sources: tuple[Mode, ...] | None
+    event: Event
+    guard: Guard
+    target: Mode | None
+
+
+def _request(target: Mode, guard: Guard = Guard.CAN_RUN) -> Transition:
+    return Transition(None, Event.REQUEST, guard, target)
+
+
+_FLOWN_WITHOUT_STICKS = tuple(mode for mode in Mode if Need.STICKS not in NEEDS[mode] and mode is not Mode.TERMINATION)
+
+# Disarmed, PX4 lets every mode be chosen; armed it wants what the mode needs. LAND may always be chosen. Nothing
+# leads out of TERMINATION: `ModeState` holds it. What a failsafe flies instead of the mode that is meant is
+# decided in `failsafe` and never changes what is meant, but for a pilot who takes over.
+TRANSITIONS: tuple[Transition, ...] = (
+    _request(Mode.MANUAL),
+    _request(Mode.ALTCTL),
+    _request(Mode.POSCTL),
+    _request(Mode.POSITION_SLOW),
+    _request(Mode.STABILIZED),
+    _request(Mode.ACRO),
+    _request(Mode.MISSION),
+    _request(Mode.LOITER),
+    _request(Mode.RETURN),
+    _request(Mode.TAKEOFF),
+    _request(Mode.LAND, Guard.ALWAYS),
+    _request(Mode.PRECISION_LAND),
+    _request(Mode.FOLLOW_TARGET),
+    _request(Mode.ORBIT),
+    _request(Mode.OFFBOARD),
+    _request(Mode.TERMINATION, Guard.ALWAYS),
+    Transition((Mode.TAKEOFF,), Event.TAKEOFF_REACHED, Guard.ARMED, Mode.LOITER),
+    Transition((Mode.TAKEOFF,), Event.MISSION_AFTER_TAKEOFF, Guard.ARMED, Mode.MISSION),
+    Transition((Mode.MISSION,), Event.MISSION_FINISHED, Guard.ARMED, Mode.LOITER),
+    Transition(_FLOWN_WITHOUT_STICKS, Event.STICKS, Guard.ARMED, Mode.POSCTL),
+    Transition(tuple(sorted(NOT_KEPT_AFTER_DISARMING)), Event.DISARMED, Guard.ALWAYS, None),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What the guards ask about."""
+
+    armed: bool
+    available: frozenset[Need] = frozenset()
+
+    def hold(self, guard: Guard, target: Mode | None) -> bool:
+        """Whether a transition with this guard may happen."""
+        if guard is Guard.ALWAYS:
+            return True
+        if guard is Guard.ARMED:
+            return self.armed
+        return not self.armed or (target is not None and not missing(target, self.available))
+
+
+def find_transition(
+    mode: Mode, event: Event, conditions: Conditions, requested: Mode | None = None
+) -> Transition | None:
+    """The row of the table that applies; None where the event is refused or means nothing."""
+    for row in TRANSITIONS:
+        if row.event is not event or (event is Event.REQUEST and row.target is not requested):
+            continue
+        if (row.sources is None or mode in row.sources) and conditions.hold(row.guard, row.target):
+            return row
+    return None
+
+
+class ModeState:
+    """The mode that is meant, moved only along the table, and the mode that flies."""
+
+    def __init__(self) -> None:
+        # PX4 boots a multicopter without sticks into Hold.
+        self.intended = Mode.LOITER
+        self.flown = Mode.LOITER
+        """What flies, and what HEARTBEAT shows: ``intended``, or what a failsafe made of it."""
+        self.requested = False
+        """Whether a request was accepted since somebody last asked; the failsafes do."""
+        self._after_disarming = Mode.LOITER
+
+    def apply(self, event: Event, conditions: Conditions, requested: Mode | None = None) -> bool:
+        """Take the event; False where the table has no row for it."""
+        if self.flown is Mode.TERMINATION:
+            return False
+        row = find_transition(self.intended, event, conditions, requested)
+        if row is None:
+            return False
+        self.requested = self.requested or event is Event.REQUEST
+        self.mean(self._after_disarming if row.target is None else row.target)
+        return True
+
+    def mean(self, mode: Mode) -> None:
+        """Mean this mode from now on; the commander says what flies."""
+        self.intended = mode
+        if mode not in NOT_KEPT_AFTER_DISARMING:
+            self._after_disarming = mode
+
+
+def mode_diagram(rows: Iterable[Transition] = TRANSITIONS) -> str:
+    """The table as a mermaid state diagram."""
+    lines = ["stateDiagram-v2", f"    [*] --> {ModeState().intended.name}"]
+    for row in rows:
+        sources = [mode.name for mode in row.sources] if row.sources else ["ANY_MODE"]
+        target = row.target.name if row.target is not None else "MODE_BEFORE"
+        lines += [f"    {source} --> {target}: {row.event}{_condition(row)}" for source in sources]
+    return "\n".join(lines) + "\n"
+
+
+def _condition(row: Transition) -> str:
+    if row.guard is Guard.CAN_RUN and row.target is not None:
+        return f" [disarmed, or {', '.join(sorted(NEEDS[row.target]))}]"
+    return f" [{row.guard}]" if row.guard else ""
+
+
+@cache
+def available(
+    has_local: bool, has_global: bool, has_sticks: bool, has_setpoints: bool, has_mission: bool
+) -> frozenset[Need]:
+    """What modes may need, as far as it is there."""
+    there = {
+        Need.LOCAL_POSITION: has_local,
+        Need.HOME: True,
+        Need.GLOBAL_POSITION: has_global,
+        Need.STICKS: has_sticks,
+        Need.SETPOINTS: has_setpoints,
+        Need.MISSION: has_mission,
+    }
+    return frozenset(need for need, is_there in there.items() if is_there)
+
+
+@cache
+def cannot_run(there_is: frozenset[Need], has_setpoints: bool) -> frozenset[Mode]:
+    """The modes that cannot run, as the failsafes count: lost sticks have a row of their own."""
+    there = there_is | {Need.STICKS, Need.SETPOINTS} if has_setpoints else (there_is | {Need.STICKS}) - {Need.SETPOINTS}
+    return frozenset(mode for mode in Mode if missing(mode, there))

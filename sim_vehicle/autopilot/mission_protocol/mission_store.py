@@ -1,0 +1,88 @@
+"""The uploaded mission, geofence and rally points: one store a vehicle, which outlives its reboots."""
+
+from dataclasses import dataclass, field
+
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem, MissionType
+
+# dataman.h and the SITL board's configuration.
+MOST_ITEMS = {MissionType.MISSION: 10_000, MissionType.FENCE: 64, MissionType.RALLY: 32}
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One of the three lists."""
+
+    items: tuple[MissionItem, ...] = ()
+    checksum: int = 0
+
+
+@dataclass(slots=True)
+class MissionStore:
+    """What the links write and the navigator flies."""
+
+    mission: Plan = Plan()
+    fence: Plan = Plan()
+    rally: Plan = Plan()
+    current: int = 0
+    """The mission item that is flown, or will be."""
+    uploading: bool = False
+    """A link is receiving a list; no other may begin."""
+    mission_changes: int = 0
+    """Grows when the mission is another or somebody chose its current item; the navigator compares it."""
+    fence_changes: int = 0
+    progress: "Progress" = field(default_factory=lambda: Progress())
+
+    def plan(self, kind: int) -> Plan:
+        """The list of that type; an empty one for a type that does not exist."""
+        plans: dict[int, Plan] = {
+            MissionType.MISSION: self.mission,
+            MissionType.FENCE: self.fence,
+            MissionType.RALLY: self.rally,
+        }
+        return plans.get(kind, Plan())
+
+    def replace(self, kind: MissionType, plan: Plan, current: int | None = None) -> None:
+        """Store a list in whole. ``current``: the item that its sender marked; None keeps the present one."""
+        if kind is MissionType.FENCE:
+            self.fence = plan
+            self.fence_changes += 1
+        elif kind is MissionType.RALLY:
+            self.rally = plan
+        else:
+            self.mission = plan
+            last = max(len(plan.items) - 1, 0)
+            self.current = min(max(self.current if current is None else current, 0), last)
+            self.mission_changes += 1
+
+    def choose(self, number: int) -> bool:
+        """Make ``number`` the current item; False where there is none."""
+        if not 0 <= number < len(self.mission.items):
+            return False
+        if number != self.current:
+            self.current = number
+            self.mission_changes += 1
+        return True
+
+
+@dataclass(slots=True)
+class Progress:
+    """How far the mission is, as the navigator says."""
+
+    reached: int = -1
+    """The last item that was reached since the mission was begun or resumed; -1 for none."""
+    valid: bool = False
+    finished: bool = False
+    is_flown: bool = False
+    """The mode is MISSION, TAKEOFF or LAND."""
+
+    def state(self, count: int, current: int) -> int:
+        """MISSION_STATE of MISSION_CURRENT; 0 where PX4 keeps what it said before."""
+        if count == 0 or not self.valid:
+            return 1
+        if self.finished:
+            return 5
+        if self.is_flown:
+            return 3
+        if self.reached >= 0:
+            return 4
+        return 2 if current < 1 else 0

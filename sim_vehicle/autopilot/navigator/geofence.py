@@ -1,0 +1,131 @@
+"""The geofence: uploaded polygons and circles, and the greatest distance and height from home.
+
+Source: PX4's navigator/geofence.cpp and Navigator::geofence_breach_check. Heights of the uploaded shapes do not count.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sim_vehicle.autopilot.flight_tasks.target import Vector3, View
+from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.mission_protocol import mission_items
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Place
+from sim_vehicle.parameters.store import Parameters
+
+# GEOFENCE_CHECK_INTERVAL_US.
+CHECK_PERIOD_US = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One polygon or circle in local north and east, metres."""
+
+    keeps_in: bool
+    corners_m: tuple[tuple[float, float], ...]
+    """Of a circle: its centre alone."""
+    radius_m: float | None = None
+
+    def allows(self, north_m: float, east_m: float) -> bool:
+        """Whether the shape lets a vehicle be there."""
+        return self._contains(north_m, east_m) is self.keeps_in
+
+    def _contains(self, north_m: float, east_m: float) -> bool:
+        if self.radius_m is not None:
+            centre_north, centre_east = self.corners_m[0]
+            return math.hypot(north_m - centre_north, east_m - centre_east) < self.radius_m
+        # Crossings of a ray to the south with the sides, in PX4's order of comparisons.
+        inside = False
+        before_north, before_east = self.corners_m[-1]
+        for corner_north, corner_east in self.corners_m:
+            if (corner_east >= east_m) != (before_east >= east_m):
+                slope = (before_north - corner_north) / (before_east - corner_east)
+                inside ^= north_m <= slope * (east_m - corner_east) + corner_north
+            before_north, before_east = corner_north, corner_east
+        return inside
+
+
+class Geofence:
+    """What is allowed where, judged five times a second."""
+
+    def __init__(self, parameters: Parameters, origin: Origin) -> None:
+        self._parameters = parameters
+        self._origin = origin
+        self._shapes: tuple[Shape, ...] = ()
+        self._checked_us: int | None = None
+        self.breached = False
+        self.breach_text = ""
+        """What PX4 says about it when somebody tries to arm."""
+        self.texts: list[StatusText] = []
+
+    def load(self, items: Sequence[MissionItem], view: View) -> None:
+        """Take an uploaded fence; shapes that exclude home, or a flying vehicle, are left out."""
+        shapes = []
+        for shape in shapes_of(items, self._origin):
+            if not shape.allows(*view.home_ned_m[:2]):
+                self._say("Geofence invalid, doesn't contain Home position")
+            elif self._acts and not view.landed and not shape.allows(*view.position_ned_m[:2]):
+                self._say("Geofence invalid, doesn't contain current vehicle position")
+            else:
+                shapes.append(shape)
+        self._shapes = tuple(shapes)
+
+    def update(self, view: View, holds_after_breach: bool) -> None:
+        """Judge where the vehicle is. While it holds after a breach, the breach stays one."""
+        if not self._acts:
+            self.breached = False
+            return
+        if self._checked_us is not None and view.now_us - self._checked_us < CHECK_PERIOD_US:
+            return
+        self._checked_us = view.now_us
+        outside = self._breach(view.position_ned_m, view.home_ned_m)
+        self.breach_text = outside or self.breach_text
+        self.breached = outside is not None or (self.breached and holds_after_breach)
+
+    def allows(self, position_ned_m: Vector3, home_ned_m: Vector3) -> bool:
+        """Whether a place is inside everything: distance, height and shapes."""
+        return self._breach(position_ned_m, home_ned_m) is None
+
+    def _breach(self, position_ned_m: Vector3, home_ned_m: Vector3) -> str | None:
+        north, east, down = position_ned_m
+        most_away_m, most_high_m = self._parameters["GF_MAX_HOR_DIST"], self._parameters["GF_MAX_VER_DIST"]
+        if most_away_m > 0.0 and math.hypot(north - home_ned_m[0], east - home_ned_m[1]) >= most_away_m:
+            return "Geofence: exceeding maximum distance to Home"
+        if most_high_m > 0.0 and home_ned_m[2] - down >= most_high_m:
+            return "Geofence: exceeding maximum altitude above Home"
+        inside = all(shape.allows(north, east) for shape in self._shapes)
+        return None if inside else "Geofence: approaching or outside geofence"
+
+    @property
+    def _acts(self) -> bool:
+        return self._parameters["GF_ACTION"] != 0
+
+    def _say(self, text: str) -> None:
+        self.texts.append(StatusText(Severity.CRITICAL, text))
+
+
+def shapes_of(items: Sequence[MissionItem], origin: Origin) -> list[Shape]:
+    """The polygons and circles that a list of items describes; a polygon that is cut short is left out."""
+    shapes: list[Shape] = []
+    number = 0
+    while number < len(items):
+        item = items[number]
+        if item.command in mission_items.FENCE_CIRCLES:
+            keeps_in = item.command == mission_items.FENCE_CIRCLE_INCLUSION
+            shapes.append(Shape(keeps_in, (_place(item, origin),), item.params[0]))
+        elif item.command in mission_items.FENCE_POLYGONS:
+            count = int(item.params[0])
+            corners = items[number : number + count]
+            if len(corners) == count:
+                keeps_in = item.command == mission_items.FENCE_POLYGON_INCLUSION
+                shapes.append(Shape(keeps_in, tuple(_place(corner, origin) for corner in corners)))
+            number += count - 1
+        number += 1
+    return shapes
+
+
+def _place(item: MissionItem, origin: Origin) -> tuple[float, float]:
+    north, east, _ = origin.position_of(Place(item.latitude_deg, item.longitude_deg, origin.place.altitude_m))
+    return north, east

@@ -1,0 +1,315 @@
+"""MISSION: which item is flown, when it is over, and what comes next.
+
+Source: PX4's navigator mission_base.cpp, mission.cpp and mission_block.cpp, for multicopters. Items for cameras,
+gimbals and other payload are passed at once: this vehicle has none.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from sim_vehicle.autopilot.flight_tasks.smoothing import stop_point
+from sim_vehicle.autopilot.flight_tasks.target import (
+    Acceptance,
+    Arrival,
+    Kind,
+    Target,
+    Vector3,
+    View,
+    takeoff_acceptance,
+)
+from sim_vehicle.autopilot.messages import Severity, StatusText
+from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
+from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.geography import Origin
+from sim_vehicle.parameters.store import Parameters
+
+# Behind MIS_COMMAND_TOUT PX4 goes on past a winch, a gripper or a gimbal that does not answer.
+_WITH_TIMEOUT = (211, 1000, 42600)
+# A mission of jumps alone ends where it has jumped more often than it has items.
+_MOST_JUMPS_PER_ITEM = 1
+
+
+class Work(Enum):
+    """What has to be done before the item itself."""
+
+    ITEM = auto()
+    CLIMB = auto()
+    MOVE_TO_LAND = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class MissionCommand:
+    """A command that an item gives; the commander and the navigator see to it."""
+
+    command: int
+    params: tuple[float, float, float, float, float, float, float]
+
+
+class Mission:
+    """The run through the stored items."""
+
+    def __init__(self, store: MissionStore, parameters: Parameters, origin: Origin) -> None:
+        self._store = store
+        self._parameters = parameters
+        self._origin = origin
+        self._arrival = Arrival()
+        self._work = Work.ITEM
+        self._climb_down_m: float | None = None
+        self._jumps_left: dict[int, int] = {}
+        self._entered_us = 0
+        self._roi: MissionItem | None = None
+        self._was_disarmed = False
+        self._was_flown = False
+        self.runs = False
+        """An item is being flown."""
+        self.target = Target(Kind.IDLE, (0.0, 0.0, 0.0))
+        self.texts: list[StatusText] = []
+        self.commands: list[MissionCommand] = []
+        self._given: list[MissionCommand] = []
+
+    # --- beginning and ending ----------------------------------------------------------------------------------
+
+    def begin(self, view: View) -> None:
+        """The mode was entered: from the item that is current, or from the first if the mission is over."""
+        store = self._store
+        if self._was_disarmed and self._was_flown and store.current + 1 == len(store.mission.items):
+            store.current = 0
+            self._jumps_left = {}
+        self._was_disarmed, self._was_flown = False, True
+        self._announce(view)
+        self._replay_speed()
+        self._plan_climb(view)
+        self._set_item(view)
+
+    def changed(self, view: View) -> None:
+        """Another mission, or another current item, while the mode flies."""
+        self._jumps_left = {}
+        self._announce(view)
+        self._set_item(view)
+
+    def end(self) -> None:
+        """The mode was left: what was begun begins anew when it comes back."""
+        self._work, self._climb_down_m = Work.ITEM, None
+        self.runs, self._given = False, []
+        self._store.progress.reached = -1
+
+    def forget(self) -> None:
+        """Another mission was uploaded while the mode does not fly."""
+        self._was_flown, self._jumps_left = False, {}
+
+    def disarmed(self) -> None:
+        """The vehicle was disarmed while another mode flew, or this one was over."""
+        self._was_disarmed = True
+
+    def _announce(self, view: View) -> None:
+        self._work, self._roi = Work.ITEM, None
+        progress = self._store.progress
+        progress.reached, progress.finished = -1, False
+        if self._store.mission.items and progress.valid:
+            if not self.runs:
+                self._say("Executing Mission")
+            self.runs = True
+            return
+        self.runs = False
+        what = "refusing takeoff" if view.landed else "loitering"
+        self._say(f"No valid mission available, {what}", Severity.CRITICAL)
+
+    def _replay_speed(self) -> None:
+        """The last change of speed before the current item counts again."""
+        for item in reversed(self._store.mission.items[: self._store.current]):
+            if item.command == kinds.DO_CHANGE_SPEED:
+                self.commands.append(MissionCommand(item.command, item.params))
+                return
+
+    def _plan_climb(self, view: View) -> None:
+        """From below the first place it climbs before it goes there."""
+        self._climb_down_m = None
+        for item in self._store.mission.items[self._store.current :]:
+            if item.command in kinds.WITH_POSITION:
+                down_m = self._place(item, view)[2]
+                if view.position_ned_m[2] - down_m > self._parameters["NAV_MC_ALT_RAD"]:
+                    self._climb_down_m = down_m
+                return
+
+    # --- going on ----------------------------------------------------------------------------------------------
+
+    def update(self, view: View) -> None:
+        """Go on where the item is over; call it at the navigator's rate."""
+        if self._given:
+            # A command acts when its item counts as reached: a return at the end finds the mission finished
+            self.commands += self._given
+            self._given = []
+        if not self.runs:
+            return
+        self._look_at_roi(view)
+        item = self._store.mission.items[self._store.current]
+        if not self._is_over(item, view):
+            return
+        if self._work is not Work.CLIMB:
+            self._store.progress.reached = self._store.current
+        if not item.autocontinue:
+            return
+        if self._work is Work.ITEM and not self._advance():
+            self._finish(view)
+            return
+        self._set_item(view)
+
+    def _is_over(self, item: MissionItem, view: View) -> bool:
+        command = item.command
+        if self._work is Work.ITEM:
+            if command in (kinds.LAND, kinds.VTOL_LAND):
+                return view.landed
+            if command == kinds.LOITER_UNLIMITED:
+                return False
+            if command == kinds.DELAY:
+                return view.now_us - self._entered_us >= 1e6 * max(item.params[0], 0.0)
+            if command in _WITH_TIMEOUT:
+                return view.now_us - self._entered_us > 1e6 * self._parameters["MIS_COMMAND_TOUT"]
+            if command == kinds.CONDITION_GATE:
+                return self._is_through(item, view)
+            if command not in kinds.WITH_POSITION:
+                return True
+        return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)
+
+    def _acceptance(self, item: MissionItem, view: View) -> Acceptance:
+        horizontal_m, vertical_m = self._parameters["NAV_ACC_RAD"], self._parameters["NAV_MC_ALT_RAD"]
+        if self.target.kind is Kind.TAKEOFF:
+            return takeoff_acceptance(self.target, view, self._parameters)
+        if self._work is not Work.ITEM:
+            return Acceptance(horizontal_m, vertical_m)
+        if item.command == kinds.WAYPOINT and math.isfinite(item.params[1]) and item.params[1] > 0.0:
+            horizontal_m = item.params[1]
+        stays = item.command in (kinds.WAYPOINT, kinds.LOITER_TIME)
+        return Acceptance(
+            horizontal_m, vertical_m, inside_s=max(item.params[0], 0.0) if stays else 0.0, yaw_rad=self.target.yaw_rad
+        )
+
+    def _is_through(self, item: MissionItem, view: View) -> bool:
+        """Past the plane through the gate that faces the next place."""
+        north, east, _ = self._place(item, view)
+        to_north, to_east = self.target.position_ned_m[0] - north, self.target.position_ned_m[1] - east
+        return to_north * (view.position_ned_m[0] - north) + to_east * (view.position_ned_m[1] - east) >= 0.0
+
+    def _advance(self) -> bool:
+        """The next item's number, jumps taken; False behind the last."""
+        items, number = self._store.mission.items, self._store.current + 1
+        for _ in range(_MOST_JUMPS_PER_ITEM * len(items) + 1):
+            if number >= len(items):
+                break
+            item = items[number]
+            if item.command != kinds.DO_JUMP:
+                self._store.current = number
+                return True
+            left = self._jumps_left.get(number, int(item.params[1]))
+            if left > 0 and 0 <= int(item.params[0]) < len(items):
+                self._jumps_left[number] = left - 1
+                number = int(item.params[0])
+            else:
+                number += 1
+        self._jumps_left = {}
+        return False
+
+    def _finish(self, view: View) -> None:
+        self.runs = False
+        self._store.progress.finished = True
+        self._say("Mission finished, landed" if view.landed else "Mission finished, loitering")
+        if view.landed:
+            self.target = Target(Kind.IDLE, view.position_ned_m)
+        elif self.target.kind in (Kind.POSITION, Kind.HOLD):
+            self.target = Target(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
+        else:
+            self.target = Target(Kind.HOLD, view.position_ned_m)
+
+    # --- what an item means ------------------------------------------------------------------------------------
+
+    def _set_item(self, view: View) -> None:
+        self._entered_us = view.now_us
+        self._arrival.begin()
+        if not self.runs:
+            here = stop_point(view.position_ned_m, view.velocity_ned_m_s, self._parameters)
+            self.target = Target(Kind.IDLE if view.landed else Kind.HOLD, here)
+            return
+        item = self._store.mission.items[self._store.current]
+        if item.command == kinds.DO_JUMP:
+            self._begin_with_jump(view)
+            return
+        if item.command in kinds.WITH_POSITION:
+            self._fly_to(item, view)
+            return
+        self._work = Work.ITEM
+        if item.command == kinds.CONDITION_GATE:
+            self._fly_through(view)
+            return
+        if self.target.kind in (Kind.TAKEOFF, Kind.IDLE, Kind.LAND) and not view.landed:
+            self.target = Target(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
+        elif view.landed:
+            self.target = Target(Kind.IDLE, view.position_ned_m)
+        if item.command in (kinds.DO_SET_ROI, kinds.DO_SET_ROI_LOCATION, kinds.DO_SET_ROI_NONE):
+            is_place = item.frame != kinds.FRAME_MISSION and item.params[0] != kinds.ROI_NONE
+            is_place = is_place or item.command == kinds.DO_SET_ROI_LOCATION
+            self._roi = item if is_place and item.command != kinds.DO_SET_ROI_NONE else None
+        self._given.append(MissionCommand(item.command, item.params))
+
+    def _begin_with_jump(self, view: View) -> None:
+        self._store.current -= 1
+        if self._advance():
+            self._set_item(view)
+        else:
+            self._store.current += 1
+            self._finish(view)
+
+    def _fly_to(self, item: MissionItem, view: View) -> None:
+        place = self._place(item, view)
+        north, east, _ = view.position_ned_m
+        before, self._work = self._work, Work.ITEM
+        if before is Work.ITEM and self._climb_down_m is not None:
+            self._work = Work.CLIMB
+            height_m = view.home_ned_m[2] - self._climb_down_m
+            self._say(f"Climb to {height_m:.1f} meters above home")
+            kind = Kind.TAKEOFF if view.landed else Kind.HOLD
+            self.target = Target(kind, (north, east, self._climb_down_m))
+            self._climb_down_m = None
+        elif item.command == kinds.LAND:
+            self._land_at(place, before, view)
+        elif item.command in (kinds.LOITER_UNLIMITED, kinds.LOITER_TIME, kinds.LOITER_TO_ALTITUDE):
+            yaw_rad = item.yaw_rad if item.command != kinds.LOITER_TO_ALTITUDE else None
+            self.target = Target(Kind.HOLD, place, yaw_rad)
+        elif item.command == kinds.TAKEOFF:
+            self.target = Target(Kind.TAKEOFF if view.landed else Kind.POSITION, place)
+        else:
+            self.target = Target(Kind.POSITION, place, item.yaw_rad)
+
+    def _land_at(self, place: Vector3, before: Work, view: View) -> None:
+        is_far = view.distance_m(place) > self._parameters["NAV_ACC_RAD"]
+        if not view.landed and is_far and before is not Work.MOVE_TO_LAND:
+            self._work = Work.MOVE_TO_LAND
+            height = self.target.position_ned_m if self.target.kind is Kind.POSITION else view.position_ned_m
+            self.target = Target(Kind.POSITION, (place[0], place[1], height[2]))
+        else:
+            self.target = Target(Kind.LAND, place)
+
+    def _fly_through(self, view: View) -> None:
+        """A gate: the place to fly to is that of the next item that has one."""
+        for item in self._store.mission.items[self._store.current + 1 :]:
+            if item.command in kinds.WITH_POSITION:
+                self.target = Target(Kind.POSITION, self._place(item, view), item.yaw_rad)
+                return
+
+    def _look_at_roi(self, view: View) -> None:
+        """A region of interest turns the vehicle while it is farther than the radius at which places are reached."""
+        if self._roi is None or self.target.kind not in (Kind.POSITION, Kind.HOLD):
+            return
+        north, east, _ = self._place(self._roi, view)
+        to_north, to_east = north - view.position_ned_m[0], east - view.position_ned_m[1]
+        if math.hypot(to_north, to_east) > self._parameters["NAV_ACC_RAD"]:
+            yaw_rad = math.atan2(to_east, to_north)
+            self.target = Target(self.target.kind, self.target.position_ned_m, yaw_rad, self.target.speed_m_s)
+
+    def _place(self, item: MissionItem, view: View) -> Vector3:
+        return place_of(item, self._origin, view.home_ned_m)
+
+    def _say(self, text: str, severity: Severity = Severity.INFO) -> None:
+        self.texts.append(StatusText(severity, text))

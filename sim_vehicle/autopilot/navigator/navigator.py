@@ -1,0 +1,319 @@
+"""The modes that fly by themselves: which target each has, and when a mode is over.
+
+Source: PX4's navigator (navigator_main.cpp, loiter.cpp, takeoff.cpp, land.cpp) at its rate of 20 Hz.
+"""
+
+from sim_vehicle.autopilot.commander.modes import Mode
+from sim_vehicle.autopilot.flight_tasks.auto_flight import AutoFlight
+from sim_vehicle.autopilot.flight_tasks.follow import Follow
+from sim_vehicle.autopilot.flight_tasks.orbit import Orbit, OrbitStatus
+from sim_vehicle.autopilot.flight_tasks.smoothing import stop_point
+from sim_vehicle.autopilot.flight_tasks.target import (
+    Arrival,
+    Kind,
+    Target,
+    Vector3,
+    View,
+    climbs_to,
+    takeoff_acceptance,
+)
+from sim_vehicle.autopilot.messages import FollowTarget, Severity, StatusText
+from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
+from sim_vehicle.autopilot.navigator.geofence import Geofence
+from sim_vehicle.autopilot.navigator.mission import Mission
+from sim_vehicle.autopilot.navigator.mission_feasibility import MissionCheck
+from sim_vehicle.autopilot.navigator.rtl import Return
+from sim_vehicle.geography import Origin
+from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.setpoint import TrajectorySetpoint
+
+# The navigator listens to the position at 20 Hz.
+PERIOD_US = 50_000
+LANDING_MODES = (Mode.LAND, Mode.PRECISION_LAND)
+# MISSION_CURRENT calls the mission active in these (MavlinkMissionManager::update_mission_state).
+_MISSION_IS_ACTIVE = (Mode.MISSION, Mode.TAKEOFF, Mode.LAND)
+
+
+class Navigator:
+    """The mode and the view in; targets, and setpoints towards them, out."""
+
+    def __init__(self, parameters: Parameters, origin: Origin, missions: MissionStore, view: View) -> None:
+        self.view = view
+        self.fence = Geofence(parameters, origin)
+        self.mission = Mission(missions, parameters, origin)
+        self._parameters = parameters
+        self._origin = origin
+        self._missions = missions
+        self._flight = AutoFlight(parameters)
+        self._return = Return(parameters, origin)
+        self._orbit = Orbit(parameters)
+        self._follow = Follow(parameters, origin)
+        self._arrival = Arrival()
+        self._texts: list[StatusText] = []
+        self._mode = Mode.LOITER
+        self._target = Target(Kind.IDLE, view.position_ned_m)
+        self._takeoff_place: tuple[Vector3 | None, float | None] | None = None
+        self._reposition: Target | None = None
+        self._seen = (-1, -1, view.home_ned_m)
+        self._updated_us = view.now_us
+        self._holds_after_breach = False
+        self.takeoff_is_over = False
+        self.home_set_us = view.now_us
+
+    # --- what commands ask for -----------------------------------------------------------------------------------
+
+    def take_off_to(self, place_ned_m: Vector3 | None, down_m: float | None) -> None:
+        """NAV_TAKEOFF: over which place and how high; None means here, and MIS_TAKEOFF_ALT."""
+        self._takeoff_place = (place_ned_m, down_m)
+        if self._mode is Mode.TAKEOFF and self.view.armed:
+            self._begin_takeoff()
+
+    def hold_at(self, target: Target) -> bool:
+        """DO_REPOSITION, before the mode becomes LOITER; False where the fence forbids the place."""
+        if not self.fence.allows(target.position_ned_m, self.view.home_ned_m):
+            return False
+        self._reposition = target
+        if self._mode is Mode.LOITER:
+            self._take_reposition()
+        return True
+
+    @property
+    def held_place_ned_m(self) -> Vector3:
+        """The present target's place, or where the vehicle is."""
+        return self.shown_target_ned_m or self.view.position_ned_m
+
+    def stop_place_ned_m(self) -> Vector3:
+        """Where the vehicle would stand if it braked now."""
+        return stop_point(self.view.position_ned_m, self.view.velocity_ned_m_s, self._parameters)
+
+    def change_speed(self, speed_m_s: float | None) -> None:
+        """DO_CHANGE_SPEED; None goes back to MPC_XY_CRUISE."""
+        self._flight.cruise_m_s = speed_m_s
+
+    def change_orbit(
+        self,
+        radius_m: float | None,
+        speed_m_s: float | None,
+        yaw_behaviour: int | None,
+        centre_ned_m: tuple[float | None, float | None, float | None],
+    ) -> bool:
+        """DO_ORBIT, when the mode is ORBIT."""
+        return self._orbit.change(self.view, radius_m, speed_m_s, yaw_behaviour, centre_ned_m)
+
+    def follow(self, target: FollowTarget) -> None:
+        """FOLLOW_TARGET."""
+        self._follow.heard(target, self.view.now_us)
+
+    # --- modes ---------------------------------------------------------------------------------------------------
+
+    def enter(self, mode: Mode) -> None:
+        """The mode that flies is another, or the vehicle was armed in it. Disarmed, nothing is begun."""
+        previous, self._mode = self._mode, mode
+        if previous is Mode.MISSION and mode is not Mode.MISSION:
+            self.mission.end()
+        self._missions.progress.is_flown = mode in _MISSION_IS_ACTIVE
+        self.takeoff_is_over = False
+        if not self.view.armed:
+            return
+        self._flight.cruise_m_s = None
+        # A hold goes on where one is held already, or where a takeoff leads to.
+        kept = self._target_of(previous) if previous in _BY_TARGET else None
+        keeps = mode is Mode.LOITER and kept is not None and (previous is Mode.TAKEOFF or kept.kind is Kind.HOLD)
+        if not keeps:
+            self._flight.start(self.view, at_rest=mode is Mode.TAKEOFF)
+        if mode is Mode.LOITER:
+            self._begin_hold(kept if keeps else None)
+        elif mode is Mode.TAKEOFF:
+            self._begin_takeoff()
+        elif mode is Mode.RETURN:
+            self._return.begin(self.view, self._missions, previous is Mode.MISSION)
+        elif mode in LANDING_MODES or mode is Mode.DESCEND:
+            self._target = Target(Kind.LAND, self.stop_place_ned_m())
+        elif mode is Mode.MISSION:
+            self.mission.begin(self.view)
+        elif mode is Mode.ORBIT:
+            self._orbit.start(self.view)
+        elif mode is Mode.FOLLOW_TARGET:
+            self._follow.start(self.view)
+
+    def disarmed(self) -> None:
+        """Nothing is flown any more."""
+        self._target = Target(Kind.IDLE, self.view.position_ned_m)
+        self.mission.disarmed()
+
+    def _begin_hold(self, kept: Target | None) -> None:
+        if self._reposition is not None:
+            self._take_reposition()
+        elif kept is not None:
+            self._target = Target(Kind.HOLD, kept.position_ned_m, kept.yaw_rad)
+        elif self.view.landed:
+            self._target = Target(Kind.IDLE, self.view.position_ned_m)
+        else:
+            self._target = Target(Kind.HOLD, self.stop_place_ned_m())
+
+    def _take_reposition(self) -> None:
+        if self._reposition is not None and self.view.armed:
+            self._target = self._reposition
+        self._reposition = None
+        self._holds_after_breach = False
+
+    def _begin_takeoff(self) -> None:
+        place, down_m = self._takeoff_place or (None, None)
+        self._takeoff_place = None
+        north, east, here_down_m = self.view.position_ned_m
+        if place is not None:
+            north, east, _ = place
+        if down_m is None:
+            height_m = self._parameters["MIS_TAKEOFF_ALT"]
+            down_m = here_down_m - height_m
+            self._say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m")
+        if down_m > here_down_m:
+            down_m = here_down_m
+            self._say(Severity.CRITICAL, "Already higher than takeoff altitude")
+        self._arrival.begin()
+        self._target = Target(Kind.TAKEOFF, (north, east, down_m))
+
+    # --- time ----------------------------------------------------------------------------------------------------
+
+    def update(self) -> None:
+        """What the navigator does at its own rate; call it whenever there is a new view."""
+        view = self.view
+        if view.now_us - self._updated_us < PERIOD_US:
+            return
+        self._updated_us = view.now_us
+        self.notice_changes()
+        was_breached = self.fence.breached
+        self.fence.update(view, self._holds_after_breach)
+        if self.fence.breached and not was_breached and view.armed:
+            self._hold_after_breach()
+        if self._mode is not Mode.LOITER and not self.fence.breached:
+            self._holds_after_breach = False
+        if not view.armed:
+            return
+        if self._mode is Mode.MISSION:
+            self.mission.update(view)
+        elif self._mode is Mode.RETURN:
+            self._return.update(view)
+        elif self._mode is Mode.TAKEOFF:
+            accepts = takeoff_acceptance(self._target, view, self._parameters)
+            over = self._arrival.is_reached(self._target, accepts, view, self._parameters)
+            self.takeoff_is_over = self.takeoff_is_over or over
+
+    def _hold_after_breach(self) -> None:
+        """GF_ACTION 2 holds where the fence was found breached."""
+        if self._parameters["GF_ACTION"] == _FENCE_HOLDS:
+            self._holds_after_breach = True
+            self._reposition = Target(Kind.HOLD, self.view.position_ned_m)
+            if self._mode is Mode.LOITER:
+                self._target, self._reposition = self._reposition, None
+
+    def notice_changes(self) -> None:
+        """Uploads, another current item, another home: all are judged anew."""
+        missions = self._missions
+        seen = (missions.mission_changes, missions.fence_changes, self.view.home_ned_m)
+        if seen == self._seen:
+            return
+        before, self._seen = self._seen, seen
+        if seen[1] != before[1] or seen[2] != before[2]:
+            self.fence.load(missions.fence.items, self.view)
+        self._check_mission()
+        if seen[0] == before[0]:
+            return
+        if self._mode is Mode.MISSION and self.view.armed:
+            self.mission.changed(self.view)
+        else:
+            self.mission.forget()
+
+    def _check_mission(self) -> None:
+        check = MissionCheck(self._parameters, self._origin, self.fence, self.view)
+        self._missions.progress.valid = check.passes(self._missions.mission.items)
+        self.mission.texts += [StatusText(Severity.CRITICAL, text) for text in (*check.problems, *check.warnings)]
+
+    def demand(self, step_s: float) -> TrajectorySetpoint | None:
+        """The next setpoint of the mode; None lets the motors idle."""
+        view, mode = self.view, self._mode
+        if mode is Mode.ORBIT:
+            return self._orbit.demand(view, step_s)
+        if mode is Mode.FOLLOW_TARGET:
+            return self._follow.demand(view, step_s)
+        if mode is Mode.DESCEND:
+            return self.sink(step_s)
+        target = self._target_of(mode)
+        if view.landed and target.kind is not Kind.TAKEOFF:
+            return None
+        return self._flight.demand(target, view, step_s)
+
+    def sink(self, step_s: float) -> TrajectorySetpoint:
+        """FlightTaskDescend: down at MPC_LAND_SPEED, whatever is below."""
+        return self._flight.descend(self._target.position_ned_m, self.view, self._parameters["MPC_LAND_SPEED"], step_s)
+
+    def sink_here(self) -> None:
+        """Begin to sink where the vehicle can stop: a stick mode without sticks."""
+        self._flight.start(self.view)
+        self._target = Target(Kind.LAND, self.stop_place_ned_m())
+
+    def _target_of(self, mode: Mode) -> Target:
+        if mode is Mode.MISSION:
+            return self.mission.target
+        return self._return.target if mode is Mode.RETURN else self._target
+
+    def set_home_here(self) -> None:
+        """Where the vehicle is, is home: on arming and again on leaving the ground."""
+        self.set_home(self.view.position_ned_m, self.view.yaw_rad)
+
+    def set_home(self, position_ned_m: Vector3, yaw_rad: float) -> None:
+        """Where RETURN leads to, and from where heights count."""
+        self.view.home_ned_m, self.view.home_yaw_rad = position_ned_m, yaw_rad
+        self.home_set_us = self.view.now_us
+
+    # --- what is shown -------------------------------------------------------------------------------------------
+
+    @property
+    def wants_takeoff(self) -> bool:
+        """Whether a vehicle on the ground is to leave it."""
+        if self._mode not in _BY_TARGET:
+            return False
+        target = self._target_of(self._mode)
+        return target.kind is Kind.TAKEOFF and climbs_to(target, self.view, self._parameters)
+
+    @property
+    def phase(self) -> Kind | None:
+        """TAKEOFF and LAND are shown as such."""
+        return self._target_of(self._mode).kind if self._mode in _BY_TARGET else None
+
+    @property
+    def shown_target_ned_m(self) -> Vector3 | None:
+        """POSITION_TARGET_GLOBAL_INT's place: the target's, in a mode that has one."""
+        target = self._target_of(self._mode)
+        is_none = self._mode not in _BY_TARGET or target.kind is Kind.IDLE
+        return None if is_none else target.position_ned_m
+
+    @property
+    def progress(self) -> Progress:
+        """The mission's."""
+        return self._missions.progress
+
+    @property
+    def mission_is_in_progress(self) -> bool:
+        """While it is, landing does not disarm."""
+        return self._mode is Mode.MISSION and not self._missions.progress.finished
+
+    @property
+    def orbit_status(self) -> OrbitStatus | None:
+        """None while no orbit is flown."""
+        return self._orbit.status if self._mode is Mode.ORBIT and self.view.armed else None
+
+    def take_texts(self) -> list[StatusText]:
+        """What there is to say since the last call."""
+        sources = (self._texts, self.mission.texts, self._return.texts, self.fence.texts)
+        texts = [text for source in sources for text in source]
+        for source in sources if texts else ():
+            source.clear()
+        return texts
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self._texts.append(StatusText(severity, text))
+
+
+_FENCE_HOLDS = 2
+_BY_TARGET = (Mode.LOITER, Mode.TAKEOFF, Mode.RETURN, Mode.MISSION, *LANDING_MODES)

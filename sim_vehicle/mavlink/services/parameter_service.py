@@ -1,0 +1,198 @@
+"""The parameter protocol: list, read, set, and PX4's hash of all values.
+
+Source: PX4's mavlink/mavlink_parameters.cpp. What is wrong (a name, an index, a type) is not answered.
+"""
+
+import struct
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.parameters.store import Parameters
+
+_FLOAT, _WHOLE = struct.Struct("<f"), struct.Struct("<i")
+# PARAM_SET's value comes first after the header, of MAVLink 2 and 1.
+_MARKER_V2, _HEADER_V2, _HEADER_V1 = 0xFD, 10, 6
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterList:
+    """PARAM_REQUEST_LIST."""
+
+    target_system: int
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRead:
+    """PARAM_REQUEST_READ; a negative index stands for none: the name counts."""
+
+    target_system: int
+    name: str
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """PARAM_SET: the four bytes of its value mean a float or a whole number, as `is_whole` says."""
+
+    target_system: int
+    name: str
+    value: float
+    is_whole: bool | None
+    """None for a type that PX4 has not."""
+
+
+def _list(packet: dialect.MAVLink_param_request_list_message) -> ParameterList:
+    return ParameterList(packet.target_system)
+
+
+def _read(packet: dialect.MAVLink_param_request_read_message) -> ParameterRead:
+    return ParameterRead(packet.target_system, packet.param_id, packet.param_index)
+
+
+def _set(packet: dialect.MAVLink_param_set_message) -> ParameterSet:
+    # From the bytes: as a Python float some whole numbers would come back changed (signalling NaNs).
+    raw = packet.get_msgbuf()
+    begin = _HEADER_V2 if raw[0] == _MARKER_V2 else _HEADER_V1
+    is_whole = _IS_WHOLE.get(packet.param_type)
+    value = (_WHOLE if is_whole else _FLOAT).unpack_from(raw, begin)[0]
+    return ParameterSet(packet.target_system, packet.param_id, value, is_whole)
+
+
+_IS_WHOLE = {dialect.MAV_PARAM_TYPE_INT32: True, dialect.MAV_PARAM_TYPE_REAL32: False}
+
+READERS: dict[int, Callable[[dialect.MAVLink_message], object | None]] = {20: _read, 21: _list, 23: _set}
+
+
+HASH_NAME = "_HASH_CHECK"
+NO_INDEX = 0xFFFF
+# PX4 sends so many of a list at a time where the link is fast, and so many on a serial line.
+BURST, BURST_SERIAL = 20, 3
+# A whole PARAM_VALUE with header and checksum.
+PACKET_BYTES = 25 + 12
+# A changed value is told to everybody this long after it was set, whoever set it.
+ANNOUNCE_AFTER_US = 5_000
+_ALL_BITS = 0xFFFFFFFF
+
+
+class ParameterService:
+    """The vehicle's parameters on one link."""
+
+    def __init__(self, link: Channel, board: Board) -> None:
+        self._link = link
+        self._us = board.identity
+        self._parameters = board.parameters
+        self._names = board.parameters.names
+        self._index = {name: number for number, name in enumerate(self._names)}
+        self._next: int | None = None
+        """Index of what is sent next of a list; -1 for the hash, None while no list is sent."""
+        self._told = board.parameters.sets
+        self._announce_at_us: int | None = None
+
+    @property
+    def handlers(self) -> Mapping[type, Handler]:
+        return {ParameterList: self._list, ParameterRead: self._read, ParameterSet: self._set}
+
+    def update(self, now_us: int) -> None:
+        """Go on with the list; tell of what has changed."""
+        if self._next is not None:
+            self._send_burst()
+        if self._parameters.sets != self._told:
+            self._announce(now_us)
+
+    def _list(self, request: ParameterList) -> None:
+        if request.target_system == self._us.system:
+            # Asked again while sending, PX4 begins anew without the hash.
+            self._next = -1 if self._next is None else 0
+
+    def _read(self, request: ParameterRead) -> None:
+        if request.target_system != self._us.system:
+            return
+        if request.index >= 0:
+            if request.index < len(self._names):
+                self._send(self._names[request.index])
+        elif request.name == HASH_NAME:
+            self._link.send(_hash_value(self._parameters))
+        elif request.name in self._index:
+            self._send(request.name)
+
+    def _set(self, request: ParameterSet) -> None:
+        if request.target_system != self._us.system:
+            return
+        if request.name == HASH_NAME:
+            # A ground station that knows all values from its cache: it wants no more of them.
+            if self._parameters["MAV_HASH_CHK_EN"]:
+                self._next = None
+            return
+        definition = self._parameters.definition(request.name)
+        if definition is None or request.is_whole is not definition.is_whole:
+            return
+        self._parameters.set(request.name, request.value)
+        self._send(request.name)
+
+    def _send_burst(self) -> None:
+        for _ in range(self._link.burst(BURST, BURST_SERIAL, PACKET_BYTES)):
+            if self._next is None:
+                return
+            if self._next < 0:
+                self._link.send(_hash_value(self._parameters))
+            else:
+                self._send(self._names[self._next])
+            self._next = self._next + 1 if self._next + 1 < len(self._names) else None
+
+    def _announce(self, now_us: int) -> None:
+        if self._announce_at_us is None:
+            self._announce_at_us = now_us + ANNOUNCE_AFTER_US
+        if now_us < self._announce_at_us:
+            return
+        for name in self._parameters.set_after(self._told):
+            self._send(name)
+        self._told, self._announce_at_us = self._parameters.sets, None
+
+    def _send(self, name: str) -> None:
+        self._link.send(_parameter_value(self._parameters, name, self._index[name]))
+
+
+class _WholeValue(dialect.MAVLink_param_value_message):  # type: ignore[misc]
+    """PARAM_VALUE whose four bytes are a whole number, which no Python float carries unchanged."""
+
+    layout = struct.Struct("<iHH16sB")
+
+    def pack(self, mav: dialect.MAVLink, force_mavlink1: bool = False) -> bytes:
+        payload = self.layout.pack(
+            self.param_value, self.param_count, self.param_index, self._param_id_raw, self.param_type
+        )
+        packet: bytes = self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+        return packet
+
+
+def _parameter_value(parameters: Parameters, name: str, index: int) -> dialect.MAVLink_param_value_message:
+    definition, value = parameters.definition(name), parameters.stored(name)
+    assert definition is not None, "only names of the table are sent"
+    count = len(parameters.names)
+    if definition.is_whole:
+        return _WholeValue(name.encode(), int(value), dialect.MAV_PARAM_TYPE_INT32, count, index)
+    return dialect.MAVLink_param_value_message(name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32, count, index)
+
+
+def _hash_value(parameters: Parameters) -> dialect.MAVLink_param_value_message:
+    value = parameter_hash(parameters)
+    signed = value - (_ALL_BITS + 1) if value >> 31 else value
+    count = len(parameters.names)
+    return _WholeValue(HASH_NAME.encode(), signed, dialect.MAV_PARAM_TYPE_UINT32, count, NO_INDEX)
+
+
+def parameter_hash(parameters: Parameters) -> int:
+    """CRC-32 over every name and the four bytes of its value, begun at 0 and never inverted (param_hash_check)."""
+    crc = _ALL_BITS
+    for name in parameters.names:
+        definition, value = parameters.definition(name), parameters.stored(name)
+        whole = definition is not None and definition.is_whole
+        crc = zlib.crc32(
+            struct.pack("<i", value) if whole else struct.pack("<f", value), zlib.crc32(name.encode(), crc)
+        )
+    return crc ^ _ALL_BITS

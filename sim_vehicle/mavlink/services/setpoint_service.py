@@ -1,0 +1,115 @@
+"""What steers the flight on a link: setpoints, sticks, targets to follow."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.messages import (
+    AttitudeTarget,
+    FollowTarget,
+    GlobalTarget,
+    PositionTarget,
+    RadioChannels,
+    StickInput,
+)
+from sim_vehicle.mavlink.services.board import Board
+from sim_vehicle.mavlink.services.service import Channel, Handler
+from sim_vehicle.setpoint import Axis3
+
+_FORCE_BIT, _YAW_IGNORED, _YAW_RATE_IGNORED = 0x200, 0x400, 0x800
+_NO_RATES = (0x1, 0x2, 0x4)
+_NO_THRUST, _NO_ATTITUDE = 0x40, 0x80
+_FULL_STICK = 1000
+_UNKNOWN_SOURCE = 0
+"""The link puts its own number in."""
+
+
+def _global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> GlobalTarget:
+    mask = packet.type_mask
+    place = (packet.lat_int / 1e7, packet.lon_int / 1e7, packet.alt)
+    return GlobalTarget(
+        frame=packet.coordinate_frame,
+        place=None if mask & 0x7 or not math.isfinite(packet.alt) else place,
+        velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
+        acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
+        yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
+        yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
+        is_force=bool(mask & _FORCE_BIT),
+    )
+
+
+def _attitude_target(packet: dialect.MAVLink_set_attitude_target_message) -> AttitudeTarget:
+    mask = packet.type_mask
+    roll, pitch, yaw = (
+        _value(mask & bit, rate)
+        for bit, rate in zip(
+            _NO_RATES, (packet.body_roll_rate, packet.body_pitch_rate, packet.body_yaw_rate), strict=True
+        )
+    )
+    w, x, y, z = packet.q
+    thrust = _value(mask & _NO_THRUST, packet.thrust)
+    return AttitudeTarget(None if mask & _NO_ATTITUDE else (w, x, y, z), (roll, pitch, yaw), thrust)
+
+
+def _manual_control(packet: dialect.MAVLink_manual_control_message) -> StickInput:
+    """Values out of range count as centred; the throttle goes from 0 to 1000."""
+    throttle = packet.z / (_FULL_STICK / 2) - 1.0 if 0 <= packet.z <= _FULL_STICK else 0.0
+    return StickInput(_stick(packet.y), _stick(packet.x), throttle, _stick(packet.r), _UNKNOWN_SOURCE)
+
+
+def _stick(value: int) -> float:
+    return value / _FULL_STICK if abs(value) <= _FULL_STICK else 0.0
+
+
+def _radio_channels(packet: dialect.MAVLink_rc_channels_override_message) -> RadioChannels:
+    return RadioChannels(tuple(getattr(packet, f"chan{number}_raw") for number in range(1, 19)))
+
+
+def _follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget | None:
+    v_north, v_east, v_down = (value if math.isfinite(value) else 0.0 for value in packet.vel)
+    if not math.isfinite(packet.alt):
+        return None
+    return FollowTarget(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt, (v_north, v_east, v_down))
+
+
+def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
+    return _value(mask & 1, x), _value(mask & 2, y), _value(mask & 4, z)
+
+
+def _value(ignored: int, value: float) -> float | None:
+    return None if ignored or not math.isfinite(value) else value
+
+
+READERS: dict[int, Callable[[dialect.MAVLink_message], object | None]] = {
+    69: _manual_control,
+    70: _radio_channels,
+    82: _attitude_target,
+    86: _global_target,
+    144: _follow_target,
+}
+
+
+class SetpointService:
+    """Hands them to the autopilot, whatever the mode; PX4 answers none of them."""
+
+    def __init__(self, link: Channel, board: Board) -> None:
+        self._autopilot = board.autopilot
+        self._source = board.autopilot.commander.sticks.new_link_source()
+
+    @property
+    def handlers(self) -> Mapping[type, Handler]:
+        """Every kind of it."""
+        receive = self._autopilot.receive
+        return {
+            PositionTarget: self._autopilot.setpoint,
+            GlobalTarget: receive,
+            AttitudeTarget: receive,
+            RadioChannels: receive,
+            FollowTarget: receive,
+            StickInput: self._take_sticks,
+        }
+
+    def _take_sticks(self, sticks: StickInput) -> None:
+        self._autopilot.receive(replace(sticks, source=self._source))

@@ -1,0 +1,110 @@
+"""The aiding sensors' messages and the truth channel, filled as PX4's streams of those names fill them.
+
+Source: PX4's mavlink/streams/OPTICAL_FLOW_RAD.hpp, DISTANCE_SENSOR.hpp and HIL_STATE_QUATERNION.hpp.
+"""
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.hil.messages import Place
+from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.setpoint import Quaternion, Vector3
+
+_UNKNOWN_DISTANCE = -1.0
+_LASER, _LOOKS_DOWN = dialect.MAV_DISTANCE_SENSOR_LASER, dialect.MAV_SENSOR_ROTATION_PITCH_270
+_BAD_SIGNAL, _GOOD_SIGNAL = 1, 100
+# LeddarOne's beam, as PX4's driver states it: 6 degrees.
+_BEAM_RAD = 0.105
+_UNKNOWN_VARIANCE = 255
+_NO_AIRSPEED, _NO_ACCELERATION = (0, 0), (0, 0, 0)
+
+
+def optical_flow_rad(state: Telemetry) -> Message:
+    sample = state.flow
+    assert sample is not None, "streamed only once there is a sample"
+    flow_x, flow_y = sample.flow_frd_rad
+    turn_x, turn_y, turn_z = sample.gyroscope_frd_rad
+    return dialect.MAVLink_optical_flow_rad_message(
+        sample.time_us,
+        0,
+        sample.integration_us,
+        flow_x,
+        flow_y,
+        turn_x,
+        turn_y,
+        turn_z,
+        0,
+        sample.quality,
+        0,
+        _UNKNOWN_DISTANCE,
+    )
+
+
+def hil_optical_flow(sample: FlowSample) -> Message:
+    """The same sample for PX4's simulator port; the distance goes in a DISTANCE_SENSOR of its own."""
+    return dialect.MAVLink_hil_optical_flow_message(
+        sample.time_us,
+        0,
+        sample.integration_us,
+        *sample.flow_frd_rad,
+        *sample.gyroscope_frd_rad,
+        0,
+        sample.quality,
+        0,
+        _UNKNOWN_DISTANCE,
+    )
+
+
+def distance_sensor(state: Telemetry) -> Message:
+    assert state.range is not None, "streamed only once there is a sample"
+    return distance_looking_down(state.range)
+
+
+def distance_looking_down(sample: RangeSample) -> Message:
+    """In whole centimetres; what was not seen is one beyond the greatest, with a bad signal."""
+    least_cm, most_cm = round(100 * sample.distance_min_m), round(100 * sample.distance_max_m)
+    seen = sample.distance_m is not None
+    return dialect.MAVLink_distance_sensor_message(
+        (sample.time_us // 1000) & 0xFFFFFFFF,
+        least_cm,
+        most_cm,
+        most_cm + 1 if sample.distance_m is None else round(100 * sample.distance_m),
+        _LASER,
+        0,
+        _LOOKS_DOWN,
+        _UNKNOWN_VARIANCE,
+        _BEAM_RAD,
+        _BEAM_RAD,
+        (0.0, 0.0, 0.0, 0.0),
+        _GOOD_SIGNAL if seen else _BAD_SIGNAL,
+    )
+
+
+def hil_state_quaternion(state: Telemetry) -> Message:
+    """The truth, only ever sent on request."""
+    assert state.true_body is not None, "streamed only where there is a truth"
+    north, east, down, v_north, v_east, v_down, w, x, y, z, p, q, r = state.true_body.tolist()
+    place = state.origin.place_at((north, east, down))
+    return hil_state(state.sample.time_boot_us, (w, x, y, z), (p, q, r), place, (v_north, v_east, v_down))
+
+
+def hil_state(
+    time_us: int,
+    attitude_wxyz: Quaternion,
+    angular_velocity_frd_rad_s: Vector3,
+    place: Place,
+    velocity_ned_m_s: Vector3,
+) -> Message:
+    """HIL_STATE_QUATERNION; accelerations and airspeed are left at zero."""
+    return dialect.MAVLink_hil_state_quaternion_message(
+        time_us,
+        attitude_wxyz,
+        *angular_velocity_frd_rad_s,
+        round(1e7 * place.latitude_deg),
+        round(1e7 * place.longitude_deg),
+        round(1e3 * place.altitude_m),
+        *(round(100 * speed) for speed in velocity_ned_m_s),
+        *_NO_AIRSPEED,
+        *_NO_ACCELERATION,
+    )

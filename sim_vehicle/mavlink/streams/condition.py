@@ -1,0 +1,186 @@
+"""How the vehicle is: battery, outputs, slow sensors, versions; filled as PX4's streams of those names fill them.
+
+Source: PX4's mavlink/streams/*.hpp; the values of a vehicle at rest are those of a running PX4 SITL.
+"""
+
+import math
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.mavlink import framing
+from sim_vehicle.mavlink.encode import Message, boot_ms
+from sim_vehicle.mavlink.streams.telemetry import Telemetry
+
+# Between v1.16 and v1.17, the PX4 whose behaviour was measured: version 1.17.0, type alpha (64).
+FLIGHT_VERSION = 1 << 24 | 17 << 16 | 0 << 8 | 64
+# A SITL's: its host's, and its board's; a number for each vehicle of a swarm.
+OS_VERSION, BOARD_VERSION, FIRST_UID = 6 << 24 | 1 << 16 | 255, 1, 5_283_920_058_631_409_231
+# What PX4 says it can do: missions, parameters as floats and byte by byte, commands as whole numbers, files, attitude
+# and local position setpoints, termination, MAVLink 2, fence and rally points.
+CAPABILITIES = 0xE8FF
+# In place of a git hash, so that nobody takes this vehicle for PX4's own build.
+CUSTOM_VERSION = tuple(b"rebound\0")
+
+# MAV_SYS_STATUS_SENSOR as a PX4 SITL at rest has them: gyro, accelerometer, magnetometer, pressure, GPS, position
+# control and battery are there; sticks are wanted, too; and this is well beside them.
+_PRESENT = 0x1 | 0x2 | 0x4 | 0x8 | 0x20 | 0x4000 | 0x2000000
+_RC_RECEIVER, _GPS, _BATTERY, _PREARM_CHECK = 0x10000, 0x20, 0x2000000, 0x10000000
+_WELL = _PRESENT | 0x10 | 0x800 | 0x8000 | 0x200000 | 0x1000000
+_EXTENDED_WELL = 0x1
+# COM_RC_IN_MODE: sticks of no kind are expected.
+_NO_STICKS = 4
+_LOAD_PER_MILLE = 100
+
+_UNKNOWN_16 = 0xFFFF
+_UNKNOWN_TEMPERATURE = 0x7FFF
+_GRAVITY_M_S2 = 9.80665
+_FULL_STRENGTH = 100
+# PWM of the simulated outputs: off, and from least to greatest.
+PWM_OFF_US, PWM_LEAST_US, PWM_SPAN_US = 900, 1000, 1000
+OUTPUTS = 16
+
+
+def sys_status(state: Telemetry) -> Message:
+    """Health as PX4's checks see it; the processor's load is a SITL's."""
+    autopilot, battery = state.autopilot, state.autopilot.battery
+    enabled = _PRESENT if state.parameter("COM_RC_IN_MODE") == _NO_STICKS else _PRESENT | _RC_RECEIVER
+    health = _WELL | (_PREARM_CHECK if autopilot.checks_pass else 0)
+    if state.gps is None:
+        health &= ~_GPS
+    if battery.warning:
+        health &= ~_BATTERY
+    return dialect.MAVLink_sys_status_message(
+        _PRESENT,
+        enabled,
+        health,
+        _LOAD_PER_MILLE,
+        round(1e3 * battery.voltage_v),
+        round(100 * battery.current_a),
+        math.ceil(100 * battery.remaining),
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+        _EXTENDED_WELL,
+    )
+
+
+def battery_status(state: Telemetry) -> Message:
+    """The whole voltage in the first cell's place, as PX4 has it where it knows no single cells."""
+    battery = state.autopilot.battery
+    voltages = [_millivolts(battery.voltage_v)] + [_UNKNOWN_16] * 9
+    return dialect.MAVLink_battery_status_message(
+        0,
+        dialect.MAV_BATTERY_FUNCTION_ALL,
+        dialect.MAV_BATTERY_TYPE_LIPO,
+        _UNKNOWN_TEMPERATURE,
+        voltages,
+        round(100 * battery.current_a),
+        int(battery.consumed_mah),
+        -1,
+        round(100 * battery.remaining),
+        0,
+        battery.warning + 1,
+    )
+
+
+def servo_output_raw(state: Telemetry) -> Message:
+    motors = _pulse_widths(state)
+    return dialect.MAVLink_servo_output_raw_message(
+        state.sample.time_boot_us & 0xFFFFFFFF, 0, *motors, *([PWM_OFF_US] * (OUTPUTS - len(motors)))
+    )
+
+
+def actuator_output_status(state: Telemetry) -> Message:
+    motors = [float(width) for width in _pulse_widths(state)]
+    outputs = motors + [float(PWM_OFF_US)] * (OUTPUTS - len(motors))
+    return dialect.MAVLink_actuator_output_status_message(state.sample.time_boot_us, OUTPUTS, outputs + [0.0] * 16)
+
+
+def _pulse_widths(state: Telemetry) -> list[int]:
+    if not state.autopilot.arming.armed:
+        return [PWM_OFF_US] * 4
+    return [round(PWM_LEAST_US + PWM_SPAN_US * fraction) for fraction in state.sample.motor_fractions]
+
+
+def rc_channels(state: Telemetry) -> Message:
+    """What came as RC_CHANNELS_OVERRIDE: this vehicle has no receiver of its own."""
+    channels = state.autopilot.radio_channels
+    assert channels is not None, "streamed only once something was received"
+    pulses = channels.pulses_us
+    count = max((number for number, pulse in enumerate(pulses, 1) if pulse not in (0, _UNKNOWN_16)), default=0)
+    shown = [pulse if number <= count else _UNKNOWN_16 for number, pulse in enumerate(pulses, 1)]
+    return dialect.MAVLink_rc_channels_message(boot_ms(state.sample), count, *shown, _FULL_STRENGTH)
+
+
+def manual_control(state: Telemetry) -> Message:
+    """The sticks that count, whoever's they are (streams/MANUAL_CONTROL.hpp)."""
+    sticks = state.autopilot.commander.sticks.sticks
+    if sticks is None:
+        return dialect.MAVLink_manual_control_message(state.system, 0, 0, 500, 0, 0)
+    pitch, roll, yaw = (round(1000 * value) for value in (sticks.pitch, sticks.roll, sticks.yaw))
+    return dialect.MAVLink_manual_control_message(state.system, pitch, roll, round(500 * (sticks.throttle + 1)), yaw, 0)
+
+
+def scaled_imu(state: Telemetry) -> Message:
+    sample = state.sample
+    force = [_int16(1e3 * value / _GRAVITY_M_S2) for value in sample.specific_force_frd_m_s2]
+    rates = [_int16(1e3 * value) for value in sample.angular_velocity_frd_rad_s]
+    field = [_int16(1e3 * value) for value in state.magnetic_field_frd_gauss]
+    temperature = round(100 * state.air.temperature_c) if state.air is not None else 0
+    return dialect.MAVLink_scaled_imu_message(boot_ms(sample), *force, *rates, *field, temperature)
+
+
+def scaled_pressure(state: Telemetry) -> Message:
+    air = state.air
+    assert air is not None, "streamed only once there is a sample"
+    return dialect.MAVLink_scaled_pressure_message(
+        boot_ms(state.sample), air.pressure_hpa, 0.0, round(100 * air.temperature_c)
+    )
+
+
+def system_time(state: Telemetry) -> Message:
+    time_us = state.sample.time_boot_us
+    return dialect.MAVLink_system_time_message(state.epoch_at_boot_us + time_us, boot_ms(state.sample))
+
+
+def ping(state: Telemetry) -> Message:
+    """PX4's own, to everybody; the number counts seconds, which is how often it is sent to a companion."""
+    time_us = state.sample.time_boot_us
+    return dialect.MAVLink_ping_message(time_us, time_us // 1_000_000, 0, 0)
+
+
+def autopilot_version(state: Telemetry) -> Message:
+    versions = (FLIGHT_VERSION, FLIGHT_VERSION, OS_VERSION, BOARD_VERSION)
+    hashes = (CUSTOM_VERSION, CUSTOM_VERSION, (0,) * 8)
+    ids = (0, 0, FIRST_UID + state.system - 1, (state.system,) + (0,) * 17)
+    return dialect.MAVLink_autopilot_version_message(CAPABILITIES, *versions, *hashes, *ids)
+
+
+def flight_information(state: Telemetry) -> Message:
+    arming = state.autopilot.arming
+    epoch_us = state.epoch_at_boot_us
+    armed_us = epoch_us + arming.armed_at_us if arming.armed else 0
+    taken_off_us = epoch_us + arming.taken_off_at_us if arming.armed and arming.taken_off else 0
+    return dialect.MAVLink_flight_information_message(
+        boot_ms(state.sample), armed_us, taken_off_us, int(state.parameter("COM_FLIGHT_UUID"))
+    )
+
+
+def attitude_target(state: Telemetry) -> Message:
+    """The attitude control's setpoint; it has none for the rates."""
+    return framing.AttitudeTarget(
+        boot_ms(state.sample), *state.attitude_setpoint_wxyz(), 0.0, 0.0, 0.0, state.sample.thrust_fraction, 0
+    )
+
+
+def _millivolts(voltage_v: float) -> int:
+    return min(max(round(1e3 * voltage_v), 0), _UNKNOWN_16 - 1)
+
+
+def _int16(value: float) -> int:
+    return min(max(int(value), -32_768), 32_767)

@@ -1,0 +1,177 @@
+"""Where the vehicle is on the Earth: messages filled as PX4's streams of those names fill them.
+
+Source: PX4's mavlink/streams/*.hpp, one file a message.
+"""
+
+import math
+
+from pymavlink.dialects.v20 import development as dialect
+
+from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.mavlink import framing
+from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
+from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.setpoint import TrajectorySetpoint
+
+# What PX4's simulated receiver states (sensor_gps_sim).
+_HDOP_CENTI, _VDOP_CENTI, _SPEED_ACCURACY_MM_S = 70, 110, 400
+_UNKNOWN_16, _UNKNOWN_8 = 0xFFFF, 0xFF
+# ESTIMATOR_STATUS.flags: everything but "constant position" (bit 7).
+_ALL_KNOWN = 0x37F
+# Innovation test ratios of a filter that fits its sensors; the built-in estimate has none of its own.
+_GOOD_RATIO = 0.05
+
+
+def global_position_int(state: Telemetry) -> Message:
+    estimate = state.published
+    place = state.origin.place_at(estimate.position_ned_m)
+    v_north, v_east, v_down = estimate.velocity_ned_m_s
+    return framing.GlobalPositionInt(
+        boot_ms(estimate),
+        round(1e7 * place.latitude_deg),
+        round(1e7 * place.longitude_deg),
+        round(1e3 * place.altitude_m),
+        round(1e3 * (state.autopilot.home_ned_m[2] - estimate.position_ned_m[2])),
+        _int16(100 * v_north),
+        _int16(100 * v_east),
+        _int16(100 * v_down),
+        _heading_centidegrees(yaw_of(estimate.attitude_wxyz)),
+    )
+
+
+def gps_raw_int(state: Telemetry) -> Message:
+    fix = state.gps
+    if fix is None or state.parameter("SIM_GPS_USED") < 4:
+        satellites = int(state.parameter("SIM_GPS_USED")) if fix is not None else 0
+        unknown = (_UNKNOWN_16,) * 4
+        return dialect.MAVLink_gps_raw_int_message(state.sample.time_boot_us, 0, 0, 0, 0, *unknown, satellites)
+    v_north, v_east, _ = fix.velocity_ned_m_s
+    altitude_mm, accuracy_mm = round(1e3 * fix.place.altitude_m), round(1e3 * fix.accuracy_m)
+    return dialect.MAVLink_gps_raw_int_message(
+        fix.time_us,
+        dialect.GPS_FIX_TYPE_3D_FIX,
+        round(1e7 * fix.place.latitude_deg),
+        round(1e7 * fix.place.longitude_deg),
+        altitude_mm,
+        _HDOP_CENTI,
+        _VDOP_CENTI,
+        min(round(100 * math.hypot(v_north, v_east)), _UNKNOWN_16 - 1),
+        _heading_centidegrees(math.atan2(v_east, v_north)),
+        int(state.parameter("SIM_GPS_USED")),
+        altitude_mm,
+        accuracy_mm,
+        accuracy_mm,
+        _SPEED_ACCURACY_MM_S,
+    )
+
+
+def gps_global_origin(state: Telemetry) -> Message:
+    place = state.origin.place
+    return dialect.MAVLink_gps_global_origin_message(
+        round(1e7 * place.latitude_deg), round(1e7 * place.longitude_deg), round(1e3 * place.altitude_m), 0
+    )
+
+
+def home_position(state: Telemetry) -> Message:
+    home = state.autopilot.home_ned_m
+    place, yaw = state.origin.place_at(home), state.autopilot.home_yaw_rad
+    return dialect.MAVLink_home_position_message(
+        round(1e7 * place.latitude_deg),
+        round(1e7 * place.longitude_deg),
+        round(1e3 * place.altitude_m),
+        *home,
+        (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)),
+        0.0,
+        0.0,
+        0.0,
+        state.autopilot.home_set_us,
+    )
+
+
+def altitude(state: Telemetry) -> Message:
+    """Without a range finder nothing is known of the terrain."""
+    height_m = -state.published.position_ned_m[2]
+    origin_m = state.origin.place.altitude_m
+    seen = state.range.distance_m if state.range is not None else None
+    return dialect.MAVLink_altitude_message(
+        state.published.time_boot_us,
+        state.air.altitude_m if state.air is not None else NAN,
+        origin_m + height_m,
+        height_m,
+        height_m + state.autopilot.home_ned_m[2],
+        NAN if seen is None else height_m - seen,
+        NAN if seen is None else seen,
+    )
+
+
+def vfr_hud(state: Telemetry) -> Message:
+    """No airspeed is measured."""
+    estimate = state.published
+    v_north, v_east, v_down = estimate.velocity_ned_m_s
+    return dialect.MAVLink_vfr_hud_message(
+        NAN,
+        math.hypot(v_north, v_east),
+        int(_heading_centidegrees(yaw_of(estimate.attitude_wxyz)) / 100),
+        int(100 * estimate.thrust_fraction) if state.autopilot.arming.armed else 0,
+        state.origin.place.altitude_m - estimate.position_ned_m[2],
+        -v_down,
+    )
+
+
+def estimator_status(state: Telemetry) -> Message:
+    return dialect.MAVLink_estimator_status_message(
+        state.published.time_boot_us,
+        _ALL_KNOWN,
+        *([_GOOD_RATIO] * 5),
+        NAN,
+        math.sqrt(2 * state.position_variance_m2),
+        math.sqrt(state.position_variance_m2),
+    )
+
+
+def position_target_global_int(state: Telemetry) -> Message | None:
+    """Where a mode that flies by itself is going; nothing in all others."""
+    target, applied = state.autopilot.auto_target_ned_m, state.autopilot.applied
+    if target is None:
+        return None
+    flown = applied if isinstance(applied, TrajectorySetpoint) else None
+    place = state.origin.place_at(target)
+    velocity = flown.velocity_ned_m_s if flown is not None else (None, None, None)
+    return dialect.MAVLink_position_target_global_int_message(
+        boot_ms(state.published),
+        dialect.MAV_FRAME_GLOBAL_INT,
+        0,
+        round(1e7 * place.latitude_deg),
+        round(1e7 * place.longitude_deg),
+        place.altitude_m,
+        *(value or 0.0 for value in velocity),
+        0.0,
+        0.0,
+        0.0,
+        (flown.yaw_rad or 0.0) if flown is not None else 0.0,
+        0.0,
+    )
+
+
+def orbit_execution_status(state: Telemetry) -> Message | None:
+    """The circle that is flown; nothing while there is none."""
+    orbit = state.autopilot.navigator.orbit_status
+    if orbit is None:
+        return None
+    place = state.origin.place_at(orbit.centre_ned_m)
+    return dialect.MAVLink_orbit_execution_status_message(
+        state.published.time_boot_us,
+        orbit.radius_m,
+        dialect.MAV_FRAME_GLOBAL,
+        round(1e7 * place.latitude_deg),
+        round(1e7 * place.longitude_deg),
+        place.altitude_m,
+    )
+
+
+def _heading_centidegrees(yaw_rad: float) -> int:
+    return int(100 * math.degrees(yaw_rad % (2 * math.pi))) % 36_000
+
+
+def _int16(value: float) -> int:
+    return min(max(round(value), -32_768), 32_767)

@@ -1,0 +1,304 @@
+"""Which message is due when: PX4's rule, which decides what a client really receives.
+
+Source: PX4's mavlink/mavlink_stream.cpp (MavlinkStream::update), mavlink_main.cpp (configure_stream) and
+mavlink_receiver.cpp (set_message_interval). Asked for 200 Hz, the rule
+sends a 250 Hz topic at 125 Hz; asked for 100 Hz, in gaps of 12 and 8 ms.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from operator import ne
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_vehicle.mavlink import encode
+from sim_vehicle.mavlink.encode import Message
+from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
+from sim_vehicle.mavlink.streams import aiding, condition, navigation
+from sim_vehicle.mavlink.streams.on_request import ANSWERS
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.streams.topics import NEVER_SENT, OPTIONAL, Topic, Topics
+
+NOT_STREAMED_US = -1
+EVERY_TIME_US = 0
+
+
+@dataclass(frozen=True, slots=True)
+class StreamKind:
+    """A message that can be streamed."""
+
+    message_id: int
+    topic: Topic
+    build: Callable[[Telemetry], Message | None]
+    """None where there is nothing to say at the moment."""
+    notes: tuple[Topic, ...] = ()
+    """Slower topics whose news the message marks as such: `Telemetry.renewed`, in this order."""
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether a slow line leaves its rate alone."""
+        return self.message_id in CONSTANT_IDS
+
+
+HEARTBEAT_ID = 0
+# Streams that PX4 never slows: HEARTBEAT and PING.
+CONSTANT_IDS = (HEARTBEAT_ID, 4)
+_AROUND_PAYLOAD = 12
+# Topics whose messages are sent on request even if they were sent already.
+SENT_AGAIN = (Topic.ALWAYS_NEW, Topic.ORIGIN)
+# On every link, whatever its set.
+HEARTBEAT_HZ = 1.0
+
+# In the order in which PX4 sends them: what needs low latency comes first.
+KINDS: tuple[StreamKind, ...] = (
+    StreamKind(HEARTBEAT_ID, Topic.ALWAYS_NEW, encode.heartbeat),
+    StreamKind(111, Topic.ALWAYS_NEW, encode.timesync),
+    StreamKind(105, Topic.SAMPLE, encode.highres_imu, notes=(Topic.MAGNETIC_FIELD, Topic.AIR)),
+    StreamKind(32, Topic.POSITION, encode.local_position_ned),
+    StreamKind(30, Topic.SAMPLE, encode.attitude),
+    StreamKind(331, Topic.POSITION, encode.odometry),
+    StreamKind(31, Topic.SAMPLE, encode.attitude_quaternion),
+    StreamKind(83, Topic.POSITION, condition.attitude_target),
+    StreamKind(132, Topic.RANGE, aiding.distance_sensor),
+    StreamKind(106, Topic.FLOW, aiding.optical_flow_rad),
+    StreamKind(436, Topic.STATUS, encode.current_mode),
+    StreamKind(245, Topic.ALWAYS_NEW, encode.extended_sys_state),
+    StreamKind(85, Topic.POSITION, encode.position_target_local_ned),
+    StreamKind(1, Topic.SAMPLE, condition.sys_status),
+    StreamKind(241, Topic.SAMPLE, encode.vibration),
+    StreamKind(148, Topic.ALWAYS_NEW, condition.autopilot_version),
+    StreamKind(33, Topic.POSITION, navigation.global_position_int),
+    StreamKind(141, Topic.POSITION, navigation.altitude),
+    StreamKind(74, Topic.POSITION, navigation.vfr_hud),
+    StreamKind(36, Topic.SAMPLE, condition.servo_output_raw),
+    StreamKind(24, Topic.GPS, navigation.gps_raw_int),
+    StreamKind(87, Topic.POSITION, navigation.position_target_global_int),
+    StreamKind(230, Topic.POSITION, navigation.estimator_status),
+    StreamKind(360, Topic.ORBIT, navigation.orbit_execution_status),
+    StreamKind(49, Topic.ORIGIN, navigation.gps_global_origin),
+    StreamKind(242, Topic.ALWAYS_NEW, navigation.home_position),
+    StreamKind(147, Topic.BATTERY, condition.battery_status),
+    StreamKind(2, Topic.ALWAYS_NEW, condition.system_time),
+    StreamKind(4, Topic.ALWAYS_NEW, condition.ping),
+    StreamKind(65, Topic.RADIO, condition.rc_channels),
+    StreamKind(69, Topic.STICKS, condition.manual_control),
+    StreamKind(29, Topic.AIR, condition.scaled_pressure),
+    StreamKind(26, Topic.SAMPLE, condition.scaled_imu),
+    StreamKind(375, Topic.SAMPLE, condition.actuator_output_status),
+    StreamKind(264, Topic.ALWAYS_NEW, condition.flight_information),
+    # The truth, as PX4's simulation has it too: for whoever studies a flight, on request alone.
+    StreamKind(115, Topic.TRUTH, aiding.hil_state_quaternion),
+)
+
+
+def interval_from_rate(rate_hz: float | None) -> int:
+    """As configure_stream has it; None stands for no stream, a negative rate for no limit."""
+    if rate_hz is None:
+        return NOT_STREAMED_US
+    return EVERY_TIME_US if rate_hz < 0 else int(1_000_000 / rate_hz)
+
+
+def interval_from_request(interval_us: float) -> int:
+    """The whole microseconds that PX4 makes of a requested interval by way of a rate, in 32-bit floats."""
+    rate_hz = np.float32(1_000_000) / np.float32(interval_us)
+    if not np.isfinite(rate_hz) or rate_hz <= 0.000001:
+        return NOT_STREAMED_US
+    return max(int(np.float32(1_000_000) / rate_hz), 1)
+
+
+class Pace(NamedTuple):
+    """How a link slows its streams: see `line.py`."""
+
+    early_us: int
+    share: float = 1.0
+
+
+FAST_PACE = Pace(Line().early_us)
+
+
+class Stream:
+    """One running or stopped stream: due when `now_us > due_after_us`; then tell it that it was `sent`."""
+
+    __slots__ = (
+        "_last_us",
+        "_paced_us",
+        "default_interval_us",
+        "due_after_us",
+        "interval_us",
+        "kind",
+        "noted",
+        "pace",
+        "seen",
+    )
+
+    def __init__(
+        self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US, pace: Pace = FAST_PACE
+    ) -> None:
+        self.kind = kind
+        self.pace = pace
+        self.seen = NEVER_SENT
+        self.noted = [NEVER_SENT for _ in kind.notes]
+        self.default_interval_us = default_interval_us
+        self.restart(default_interval_us, now_us)
+
+    def restart(self, interval_us: int, now_us: int) -> None:
+        """Begin anew, as a stream that was just created."""
+        self._last_us = now_us
+        self.set_interval(interval_us)
+
+    def set_interval(self, interval_us: int) -> None:
+        """Go on with another interval."""
+        self.interval_us = interval_us
+        self._plan()
+
+    def set_pace(self, pace: Pace) -> None:
+        """Go on with what the link can carry."""
+        self.pace = pace
+        self._plan()
+
+    def _plan(self) -> None:
+        self._paced_us = int(self.interval_us / self.pace.share)
+        self.due_after_us = self._last_us + self._paced_us - self.pace.early_us
+
+    def renewed(self, versions: list[int]) -> tuple[bool, ...]:
+        """Which of the noted topics have news since the last message."""
+        noted, self.noted = self.noted, [versions[topic] for topic in self.kind.notes]
+        return tuple(map(ne, self.noted, noted))
+
+    def sent(self, now_us: int) -> None:
+        """Keep the mean rate by counting from when it was due, unless that is long ago."""
+        interval_us = self._paced_us
+        late = now_us - self._last_us >= 1.5 * interval_us
+        self._last_us = now_us if late else self._last_us + interval_us
+        self.due_after_us = self._last_us + interval_us - self.pace.early_us
+
+
+# Now and then the link's loop comes too late and misses one sample: PX4 asked for 250 Hz sends 246.
+MISSED_LOOPS_SHARE = 0.012
+
+
+class LateLoops:
+    """The link's loop that now and then comes too late for a sample, which then nobody receives."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._missed_last = False
+
+    def misses_this_one(self) -> bool:
+        """Never two in a row: the gaps that were measured are of one sample."""
+        missed = self._random.random() < MISSED_LOOPS_SHARE and not self._missed_last
+        self._missed_last = missed
+        return missed
+
+
+class Streams:
+    """All streams of one link; their messages go to its ``outbox``."""
+
+    def __init__(
+        self, state: Telemetry, topics: Topics, outbox: Outbox, link: LinkKind, seed: int, line: Line = FAST_LINE
+    ) -> None:
+        self._state = state
+        self._outbox = outbox
+        self._line = line
+        self._now_us = state.sample.time_boot_us
+        rates_hz = {HEARTBEAT_ID: HEARTBEAT_HZ, **link.rates_hz}
+        self._streams = [
+            Stream(kind, self._now_us, interval_from_rate(rates_hz.get(kind.message_id))) for kind in KINDS
+        ]
+        self._by_id = {stream.kind.message_id: stream for stream in self._streams}
+        self._versions = topics.versions
+        self._loops = LateLoops(seed)
+        self._run()
+
+    def _run(self) -> None:
+        """Find the streams that run, and at what pace the line lets them."""
+        self._running = [stream for stream in self._streams if stream.interval_us >= 0]
+        if self._line.baud is None:
+            return
+        planned = [(stream, _size(stream.kind), stream.interval_us) for stream in self._running if self._exists(stream)]
+        varying = [(size, interval_us) for stream, size, interval_us in planned if not stream.kind.is_constant]
+        constant = [(size, interval_us) for stream, size, interval_us in planned if stream.kind.is_constant]
+        share, early_us = self._line.share(varying, constant), self._line.early_us
+        for stream in self._streams:
+            stream.set_pace(Pace(early_us, 1.0 if stream.kind.is_constant else share))
+
+    def _exists(self, stream: Stream) -> bool:
+        return stream.kind.topic not in OPTIONAL or self._versions[stream.kind.topic] != NEVER_SENT
+
+    def update(self) -> None:
+        """Send what is due at the newest sample."""
+        self._now_us = now_us = self._state.sample.time_boot_us
+        if self._loops.misses_this_one():
+            return
+        versions, outbox, state = self._versions, self._outbox, self._state
+        for stream in self._running:
+            if now_us <= stream.due_after_us:
+                continue
+            kind = stream.kind
+            version = versions[kind.topic]
+            if version == stream.seen:
+                continue
+            stream.seen = version
+            stream.sent(now_us)
+            if kind.notes:
+                state.renewed = stream.renewed(versions)
+            message = kind.build(state)
+            if message is not None:
+                outbox.send(message)
+
+    # --- commands ----------------------------------------------------------------------------------------
+
+    def set_interval(self, message_id: int, interval_us: float) -> bool:
+        """SET_MESSAGE_INTERVAL; the heartbeat's cannot be changed."""
+        stream = self._by_id.get(message_id)
+        if stream is None or message_id == HEARTBEAT_ID:
+            return False
+        if interval_us < -0.00001:
+            wanted_us = NOT_STREAMED_US
+        elif interval_us > 0.00001:
+            wanted_us = interval_from_request(interval_us)
+        else:
+            wanted_us = stream.default_interval_us
+        if stream.interval_us >= 0 and wanted_us >= 0:
+            stream.set_interval(wanted_us)
+        else:
+            stream.restart(wanted_us, self._now_us)
+        self._run()
+        return True
+
+    def announce_interval(self, message_id: int) -> None:
+        """MESSAGE_INTERVAL: what was asked for, not what is received; -1 where nothing is streamed."""
+        stream = self._by_id.get(message_id)
+        interval_us = NOT_STREAMED_US if stream is None else stream.interval_us
+        self._outbox.send(encode.message_interval(message_id, interval_us))
+
+    def send_now(self, message_id: int, index: int = 0) -> bool:
+        """REQUEST_MESSAGE: as in PX4 nothing is sent that the stream has already sent, but the origin always."""
+        answer = ANSWERS.get(message_id)
+        if answer is not None:
+            messages = answer(index)
+            for message in messages:
+                self._outbox.send(message)
+            return bool(messages)
+        stream = self._by_id.get(message_id)
+        if stream is None:
+            return False
+        version = self._versions[stream.kind.topic]
+        if stream.kind.topic not in SENT_AGAIN and version == stream.seen:
+            return False
+        stream.seen = version
+        if stream.kind.notes:
+            self._state.renewed = stream.renewed(self._versions)
+        message = stream.kind.build(self._state)
+        if message is None:
+            return False
+        self._outbox.send(message)
+        return True
+
+
+def _size(kind: StreamKind) -> int:
+    """As PX4 reckons: the whole payload, header and checksum."""
+    return encode.payload_bytes(kind.message_id) + _AROUND_PAYLOAD

@@ -1,0 +1,69 @@
+"""What the streams send: the state of the vehicle as its messages show it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_vehicle.autopilot.autopilot import Autopilot
+from sim_vehicle.autopilot.estimate import Estimate
+from sim_vehicle.estimator.samples import FlowSample, RangeSample
+from sim_vehicle.geography import Origin
+from sim_vehicle.hil.messages import Air, HilGps
+from sim_vehicle.mavlink.streams.vibration import Vibration
+from sim_vehicle.world import Vector3
+
+
+@dataclass(slots=True)
+class Telemetry:
+    """What the streams send: the newest sample, the last published position, and who flies."""
+
+    sample: Estimate
+    published: Estimate
+    autopilot: Autopilot
+    vibration: Vibration
+    position_variance_m2: float
+    velocity_variance_m2_s2: float
+    attitude_variance_rad2: float
+    flow: FlowSample | None = None
+    range: RangeSample | None = None
+    true_body: npt.NDArray[np.float64] | None = None
+    """The plant's own state (13,), for the truth channel alone."""
+    attitude_setpoint: npt.NDArray[np.float64] | None = None
+    """The attitude control's R_d (3, 3), body to NED."""
+    gps: HilGps | None = None
+    air: Air | None = None
+    magnetic_field_frd_gauss: Vector3 = (0.0, 0.0, 0.0)
+    renewed: tuple[bool, ...] = (False, False)
+    """For the message that is being made: see `StreamKind.notes`."""
+    epoch_at_boot_us: int = 0
+    """Unix time at the vehicle's boot."""
+    system: int = 1
+    """MAV_SYS_ID."""
+
+    @property
+    def origin(self) -> Origin:
+        """Where the local frame lies on the Earth."""
+        return self.autopilot.origin
+
+    def parameter(self, name: str) -> float:
+        """The value of a parameter that counts now."""
+        return self.autopilot.parameters[name]
+
+    def attitude_setpoint_wxyz(self) -> tuple[float, float, float, float]:
+        """The attitude control's setpoint; level where there is none."""
+        if self.attitude_setpoint is None:
+            return 1.0, 0.0, 0.0, 0.0
+        return quaternion_from_matrix(self.attitude_setpoint.tolist())
+
+
+def quaternion_from_matrix(rows: list[list[float]]) -> tuple[float, float, float, float]:
+    """Of a rotation matrix; the largest component is found first, so that no division is by a small number."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
+    largest = max(range(4), key=squares.__getitem__)
+    n = 2 * math.sqrt(max(squares[largest], 1e-12))
+    sums = ((n / 4, (h - f) / n, (c - g) / n, (d - b) / n), ((h - f) / n, n / 4, (b + d) / n, (c + g) / n))
+    more = (((c - g) / n, (b + d) / n, n / 4, (f + h) / n), ((d - b) / n, (c + g) / n, (f + h) / n, n / 4))
+    return (*sums, *more)[largest]
