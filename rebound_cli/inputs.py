@@ -59,6 +59,17 @@ def load_mission_document(
     return document
 
 
+def load_flown(file: Path) -> Document:
+    """What a run's folder says was flown; older ones have settings of detectors, too, that no drone has any more."""
+    from companion.detection.registry import BASELINES
+
+    document = load_document(file)
+    companion = document.data.get("companion")
+    if isinstance(companion, dict):
+        document.data["companion"] = {key: value for key, value in companion.items() if key not in BASELINES}
+    return document
+
+
 def _apply_options(document: Document, sets: Sequence[str], airframe: str | None, seed: int | None) -> None:
     apply_overrides(document, sets)
     for option, value in (("airframe", airframe), ("seed", seed)):

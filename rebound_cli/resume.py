@@ -6,8 +6,8 @@ from typing import Any
 
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
-from rebound_cli.documents import Document, Override, apply_override, load_document
-from rebound_cli.inputs import mission_from
+from rebound_cli.documents import Document, Override, apply_override
+from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text
 
 
@@ -17,7 +17,7 @@ class ResumeError(ConfigurationError):
 
 def resume_of(run: Path, mission: Mission) -> dict[str, Any]:
     """The mission's `resume:` part. Works for flights that ended early, and for those whose process was killed."""
-    flown = mission_from(load_document(run / RESOLVED_NAME))
+    flown = mission_from(load_flown(run / RESOLVED_NAME))
     if flown.items != mission.items:
         raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
     events = _events(run / EVENTS_NAME)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from bench.baselines.config import BaselineConfig
 from bench.detectors.wire import BUILDERS, Heard
 from companion.detection.interface import Situation
-from companion.detection.registry import DETECTORS
 from companion.detection.watch import advance, start_watch
 from companion.estimate.impact import ImpactEstimate
 from companion.link.streams import wanted_streams
@@ -47,10 +47,10 @@ class Found:
     final: ImpactEstimate
 
 
-def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
+def configuration(detector: str, factor: float = 1.0) -> BaselineConfig:
     """Default settings but for the detector's name, and its thresholds times `factor`."""
     if factor == 1.0:
-        return CompanionConfig(detector=detector)
+        return BaselineConfig(detector=detector)
     config = alarms_only(detector)
     own = getattr(config, detector)
     changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
@@ -58,20 +58,20 @@ def configuration(detector: str, factor: float = 1.0) -> CompanionConfig:
     return config.model_copy(update={detector: settings})
 
 
-def alarms_only(detector: str) -> CompanionConfig:
+def alarms_only(detector: str) -> BaselineConfig:
     """Default settings where nobody asks which way a collision pushed: some detectors report thousands."""
-    config = CompanionConfig(detector=detector)
+    config = BaselineConfig(detector=detector)
     return config.model_copy(update={"estimate": config.estimate.model_copy(update={"fits_normal": False})})
 
 
 def swept_fields(detector: str) -> tuple[str, ...]:
     """Names of the settings that are swept together."""
-    fields: dict[str, object] = type(getattr(CompanionConfig(), detector)).model_fields
+    fields: dict[str, object] = type(getattr(BaselineConfig(), detector)).model_fields
     return SWEPT_FIELDS.get(detector, (next(iter(fields)),))
 
 
 def detector_names() -> tuple[str, ...]:
-    return tuple(DETECTORS)
+    return tuple(BaselineConfig.detectors)
 
 
 def streams_asked_hz(rate: int) -> dict[MessageId, float]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from companion.mission.model import Mission
+from bench.baselines.config import BaselineMission
 from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts
@@ -156,7 +156,7 @@ class Result:
 
 def fly(flight: Flight) -> Result:
     """Fly it in lockstep, all MAVLink bytes and the log on."""
-    mission = Mission.model_validate(dict(flight.mission))
+    mission = BaselineMission.model_validate(dict(flight.mission))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
     airframe = Airframe.model_validate(with_base({"based_on": flight.airframe, "estimate": ESTIMATE, **flight.changes}))
     with tempfile.TemporaryDirectory() as name:

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.baselines.config import BaselineMission
 from bench.paper.flights import DETECTOR, GAMMA_S, LAW
 from bench.processes import in_processes
 from bench.sensitivity import stop_sensitivity_text
 from rebound_cli import __version__
-from rebound_cli.documents import Document
+from rebound_cli.documents import Document, validated
 from rebound_cli.flight_log import read_flight_log
-from rebound_cli.inputs import load_mission_document, mission_from, world_from
+from rebound_cli.inputs import load_mission_document, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import TLOG_NAME, FlightRecorder, make_place
@@ -95,7 +96,7 @@ def case_document(case: Case) -> Document:
 def fly_case(case: Case) -> CaseFigures:
     """One lockstep flight with its log on, in a folder of its own that is removed afterwards."""
     document = case_document(case)
-    mission, world = mission_from(document), world_from(document)
+    mission, world = validated(BaselineMission, document, document.data), world_from(document)
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:

@@ -40,7 +40,8 @@ def conclude(results: Sequence[Result]) -> Findings:
     return Findings(
         "Sample scenario",
         _rows(result, track),
-        f"{sampling_text(results)} `rebound fly missions/paper.yaml --lockstep` flies the same.\n\n"
+        f"{sampling_text(results)} `rebound fly missions/paper.yaml --lockstep` flies the same, "
+        "with the drone's own detector.\n\n"
         "![position, velocity and fold](images/paper/sample_scenario.png)\n",
         {"sample_scenario.png": _figure(track)},
     )

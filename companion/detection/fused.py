@@ -3,7 +3,7 @@
 By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs of a
 contact, each against what this vehicle shows in its own flight:
 
-* sideways: a departure of f_x, f_y from their running mean (see `lateral`), with room for the drag that changes as
+* sideways: a departure of f_x, f_y from their running mean, with room for the drag that changes as
   the vehicle turns;
 * vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
   fall, a dropped payload and every manoeuvre stay inside;

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
-from companion.detection.registry import DETECTORS
 from companion.detection.sight import Sameness, Sight, heard, why_blind
 from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
@@ -91,7 +90,7 @@ def start_watch(config: CompanionConfig, now_us: int) -> Watch:
     """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
     prepare()
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
-    detector = DETECTORS[config.detector](getattr(config, config.detector), averaging_us)
+    detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
     return Watch(config, detector, detector.initial(), ImpactEstimator(config.estimate), Sight(now_us, now_us), now_us)
 
 

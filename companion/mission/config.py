@@ -1,18 +1,13 @@
 """The mission's `companion:` part: every key optional, every default with its reason."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from companion.detection.fused_config import FusedConfig
-from companion.detection.fuzzy import FuzzyConfig
-from companion.detection.hybrid import HybridConfig
-from companion.detection.lateral import LateralConfig
-from companion.detection.momentum import MomentumConfig
-from companion.detection.registry import DETECTORS, check_known_detector
+from companion.detection.registry import BASELINES, DETECTORS, MakeDetector, check_known_detector
 from companion.detection.sight import SightConfig
-from companion.detection.threshold import ThresholdConfig
-from companion.detection.tracking import TrackingConfig
 from companion.written import NotNegative, Positive, Written
 
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
@@ -165,18 +160,15 @@ class OperatorConfig(Written):
 class CompanionConfig(Written):
     """All settings of the companion."""
 
+    detectors: ClassVar[Mapping[str, MakeDetector]] = DETECTORS
+    """What `detector` may name. Whoever has others extends this class by them, and by a key for each one's settings."""
+
     detector: str = "fused"
     """Its own settings are those under its name."""
     min_detection_height_m: NotNegative = 0.5
     """Ground handling, landing gear and ground effect are below this height above the arming position: nothing is
     detected before a take-off has reached it, nor below it in a landing. In between a low flight is a flight."""
     fused: FusedConfig = FusedConfig()
-    fuzzy: FuzzyConfig = FuzzyConfig()
-    hybrid: HybridConfig = HybridConfig()
-    lateral: LateralConfig = LateralConfig()
-    momentum: MomentumConfig = MomentumConfig()
-    threshold: ThresholdConfig = ThresholdConfig()
-    tracking: TrackingConfig = TrackingConfig()
     sight: SightConfig = SightConfig()
     streams: StreamsConfig = StreamsConfig()
     estimate: EstimateConfig = EstimateConfig()
@@ -192,8 +184,16 @@ class CompanionConfig(Written):
         names = ("side_threshold_m_s2", "threshold_m_s2")
         return next((float(getattr(settings, name)) for name in names if hasattr(settings, name)), None)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _no_settings_of_baselines(cls, data: object) -> object:
+        """They would have no effect; why not is said better than of any other unknown key."""
+        for key in sorted(BASELINES.intersection(data) if isinstance(data, dict) else ()):
+            check_known_detector(key, cls.detectors)
+        return data
+
     @field_validator("detector")
     @classmethod
     def _known_detector(cls, name: str) -> str:
-        check_known_detector(name, DETECTORS)
+        check_known_detector(name, cls.detectors)
         return name

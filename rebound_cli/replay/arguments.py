@@ -18,7 +18,7 @@ def add_replay(commands: Commands) -> None:
         "--rate", type=rate_hz, metavar="HZ", help="HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
     )
     add_companion(replay)
-    add_set(replay, "change a setting, e.g. companion.lateral.threshold_m_s2=6")
+    add_set(replay, "change a setting, e.g. companion.fused.side_threshold_m_s2=6")
     replay.add_argument(
         "--expect", type=_expected, metavar="none|N", help="exit 1 unless there are exactly so many collisions"
     )

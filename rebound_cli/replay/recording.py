@@ -12,8 +12,8 @@ from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.mission.model import Mission
 from companion.shell.tlog import read_tlog
-from rebound_cli.documents import load_document, validated
-from rebound_cli.inputs import mission_from
+from rebound_cli.documents import validated
+from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.run_folder import (
     EVENTS_NAME,
@@ -102,7 +102,7 @@ def settings_file(folder: Path) -> Path:
 
 def _settings(folder: Path) -> Mission | GuardConfig:
     file = settings_file(folder)
-    document = load_document(file)
+    document = load_flown(file)
     return mission_from(document) if file.name == RESOLVED_NAME else validated(GuardConfig, document, document.data)
 
 

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass, replace
 
-from companion.detection.registry import DETECTORS
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -68,7 +67,7 @@ def replay_flight(log: Log, recording: Recording) -> Replay:
 
 def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
     """What the log lacks, and what the detector loses by it."""
-    detector = DETECTORS[config.detector](getattr(config, config.detector), 0)
+    detector = config.detectors[config.detector](getattr(config, config.detector), 0)
     kinds = {type(heard.sample) for heard in log.heard}
     missing = [
         f"without {message.name} '{config.detector}' loses: {loss}"

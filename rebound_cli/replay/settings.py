@@ -5,11 +5,16 @@ from pathlib import Path
 
 from companion.mission.config import CompanionConfig
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
+from rebound_cli.inputs import load_flown
+from rebound_cli.run_folder import GUARD_NAME, RESOLVED_NAME
 
 
 def companion_settings(path: Path | None, sets: Sequence[str], detector: str | None) -> CompanionConfig:
     """Of the file only the `companion:` part counts. Raises DocumentError."""
-    document = load_document(path) if path is not None else empty_document("no mission file")
+    if path is None:
+        document = empty_document("no mission file")
+    else:
+        document = load_flown(path) if path.name in (GUARD_NAME, RESOLVED_NAME) else load_document(path)
     apply_overrides(document, sets)
     if detector is not None:
         apply_override(document, Override(f"--detector {detector}", ("companion", "detector"), detector))

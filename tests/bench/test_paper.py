@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.baselines.config import BaselineMission
 from bench.head_on import head_on
 from bench.main import main
 from bench.paper import (
@@ -23,7 +24,6 @@ from bench.paper import (
 from bench.paper.approach import approach
 from bench.paper.flights import Contact, Flight, Result, fly, share_received
 from bench.paper.table import Row, around, at_least, at_most, rows_text, within_factor
-from companion.mission.model import Mission
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
 
@@ -117,7 +117,7 @@ def test_the_share_of_a_hit_that_was_received():
 @pytest.mark.parametrize("study", command.STUDIES)
 def test_every_study_states_the_papers_detector_law_and_gain(study):
     for flight in study.flights(2):
-        mission = Mission.model_validate(dict(flight.mission))
+        mission = BaselineMission.model_validate(dict(flight.mission))
         assert (mission.companion.detector, mission.recovery.law, mission.recovery.gamma) == ("lateral", "paper", 0.5)
         assert flight.mission["companion"]["detector"] == "lateral"
         assert flight.mission["recovery"] == {"law": "paper", "gamma": 0.5}
@@ -130,7 +130,7 @@ def test_directions_fill_the_circle():
 
 
 def test_the_wall_stands_square_to_the_flight_before_braking_begins():
-    mission = Mission.model_validate(approach(4.0, heading_deg=120.0))
+    mission = BaselineMission.model_validate(approach(4.0, heading_deg=120.0))
     go_to, wall = mission.items[1].go_to, mission.sim["walls"][0]
     towards = np.array(go_to.position_ned_m[:2]) / np.hypot(*go_to.position_ned_m[:2])
     assert wall["normal_ned"][:2] == pytest.approx(-towards)

@@ -12,13 +12,12 @@ import random
 import statistics
 import time
 
+from bench.baselines.config import BaselineConfig, GuardsConfig
 from companion.detection.interface import Situation
-from companion.detection.registry import DETECTORS
 from companion.detection.watch import advance, start_watch
 from companion.estimate.normal import begin, further
 from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
-from companion.mission.config import CompanionConfig, GuardsConfig
 
 INTERVAL_US = 4_000
 SAMPLES = 20_000
@@ -48,7 +47,7 @@ def flight(with_others: bool) -> list[tuple[int, list[Sample]]]:
 
 
 def microseconds(name: str, steps: list[tuple[int, list[Sample]]]) -> float:
-    watch = start_watch(CompanionConfig(detector=name), 0)
+    watch = start_watch(BaselineConfig(detector=name), 0)
     begun = time.perf_counter()
     for t, samples in steps:
         advance(watch, samples, IN_FLIGHT, t)
@@ -89,7 +88,7 @@ def main() -> None:
     os.sched_setaffinity(0, {sorted(os.sched_getaffinity(0))[0]})
     alone, together = flight(False), flight(True)
     print("microseconds for each IMU sample: alone, with all other messages")
-    for name in sorted(DETECTORS):
+    for name in sorted(BaselineConfig.detectors):
         figures = [statistics.median(microseconds(name, steps) for _ in range(ROUNDS)) for steps in (alone, together)]
         print(f"{name:10} {figures[0]:6.1f} {figures[1]:6.1f}")
     print_search()

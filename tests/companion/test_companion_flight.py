@@ -348,9 +348,7 @@ def test_the_recovery_stays_inside_the_fence():
 
 
 def test_an_item_that_cannot_be_reached_ends_in_the_vehicles_own_hold():
-    f = at_wall(
-        companion={"detector": "lateral", "lateral": {"threshold_m_s2": 1000.0}, "flight": {"arrival_timeout_s": 3.0}}
-    )
+    f = at_wall(companion={"min_detection_height_m": 100.0, "flight": {"arrival_timeout_s": 3.0}})
     f.run_to_end()
     report = f.companion.report()
     assert report.outcome == "aborted"

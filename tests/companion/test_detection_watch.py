@@ -5,6 +5,7 @@ import pickle
 
 import pytest
 
+from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Phase, Situation
 from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, ImuSample, LocalPosition, Sample
@@ -15,7 +16,7 @@ WANTED = Situation()
 
 
 def lateral(**changes):
-    return CompanionConfig(detector="lateral", **changes)
+    return BaselineConfig(detector="lateral", **changes)
 
 
 def fly(watch, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WANTED, start_us=INTERVAL_US):

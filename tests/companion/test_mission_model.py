@@ -20,7 +20,7 @@ GOOD = {
     "recovery": {"law": "paper", "gamma": [0.5, 0.4]},
     "fence": {"radius_m": 15, "max_height_m": 6},
     "on_interrupt": "hold",
-    "companion": {"detector": "lateral"},
+    "companion": {"detector": "fused"},
     "sim": {"airframe": "foldable", "anything": ["goes"]},
 }
 
@@ -53,7 +53,7 @@ def test_the_least_mission_has_defaults_for_the_rest():
     assert mission.on_collision.then == "hold"
     assert mission.recovery.gamma_per_axis == (0.5, 0.5)
     assert mission.companion.detector == "fused"
-    assert mission.companion.lateral.threshold_m_s2 == 4.0
+    assert mission.companion.fused.side_threshold_m_s2 == 1.75
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_the_least_mission_has_defaults_for_the_rest():
     [
         (["wind"], 3, "Extra inputs", ("wind",)),
         (["items", 1, "go_to", "sped"], 3, "Extra inputs", ("items", 1, "go_to", "sped")),
-        (["companion", "lateral"], {"treshold": 3}, "Extra inputs", ("companion", "lateral", "treshold")),
+        (["companion", "fused"], {"treshold": 3}, "Extra inputs", ("companion", "fused", "treshold")),
         (["items", 1, "go_to", "speed_m_s"], 0, "greater than 0", ("items", 1, "go_to", "speed_m_s")),
         (["items", 1, "go_to", "speed_m_s"], 50, "less than or equal to 12", ("items", 1, "go_to", "speed_m_s")),
         (["items", 1, "go_to", "speed_m_s"], "fast", "valid number", ("items", 1, "go_to", "speed_m_s")),

@@ -67,9 +67,9 @@ def test_the_corner_is_two_walls_that_meet():
     assert first.point_ned_m[0] + first.width_m / 2 >= second.point_ned_m[1]
 
 
-def test_the_papers_scenario_states_the_papers_law_and_its_detector():
+def test_the_papers_scenario_states_the_papers_law_and_gain():
     data = load_document(FOLDER / "paper.yaml").data
-    assert data["recovery"] == {"law": "paper", "gamma": 0.5} and data["companion"]["detector"] == "lateral"
+    assert data["recovery"] == {"law": "paper", "gamma": 0.5}
 
 
 def test_the_papers_scenario_has_the_papers_wall_and_target():

@@ -120,12 +120,12 @@ def test_set_changes_any_value_and_makes_missing_parts():
         sets=[
             "items.1.go_to.speed_m_s=2.5",
             "sim.wind_ned_m_s=[0, 1, 0]",
-            "companion.lateral.threshold_m_s2=6",
+            "companion.fused.side_threshold_m_s2=6",
         ]
     )
     mission, world = mission_from(changed), world_from(changed)
     assert mission.items[1].go_to.speed_m_s == 2.5
-    assert mission.companion.lateral.threshold_m_s2 == 6
+    assert mission.companion.fused.side_threshold_m_s2 == 6
     assert world.scene.wind_ned_m_s == (0, 1, 0)
 
 
@@ -138,8 +138,9 @@ def test_set_changes_any_value_and_makes_missing_parts():
         ("items.first=2", "it has no 'first'"),
         ("name.x=2", "'name' is a single value"),
         ("items.1.go_to.speed_m_s", "give PATH=VALUE"),
-        ("companion.detectr=lateral", "did you mean 'detector'?"),
+        ("companion.detectr=fused", "did you mean 'detector'?"),
         ("companion.detector=psychic", "there is no detector 'psychic'"),
+        ("companion.detector=lateral", "a baseline of `python -m bench detectors`"),
         ("items.1.go_to.speed_m_s=fast", "must be a valid number, not 'fast'"),
     ],
 )

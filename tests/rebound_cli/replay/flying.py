@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.baselines.config import BaselineConfig
 from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState, LocalPosition
-from companion.mission.config import CompanionConfig
 from companion.px4_mode import OFFBOARD
 from rebound_cli.logs.log import Heard, Log
 
-LATERAL = CompanionConfig(detector="lateral")
+LATERAL = BaselineConfig(detector="lateral")
 SECOND = 1_000_000
 HIT_US = 6 * SECOND
 

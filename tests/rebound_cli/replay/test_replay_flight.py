@@ -15,10 +15,7 @@ from tests.rebound_cli.command import WALL
 @pytest.fixture(scope="module")
 def wall_flight(tmp_path_factory):
     folder = tmp_path_factory.mktemp("flights") / "wall"
-    assert (
-        main(["fly", str(WALL), "--lockstep", "--json", "--set", "companion.detector=lateral", "--out", str(folder)])
-        == 0
-    )
+    assert main(["fly", str(WALL), "--lockstep", "--json", "--out", str(folder)]) == 0
     return folder
 
 
@@ -62,9 +59,18 @@ def test_another_setting_is_another_flight(flight):
     # Given a folder in which somebody has raised the threshold afterwards
     resolved = flight / "resolved.yaml"
     mission = yaml.safe_load(resolved.read_text())
-    mission["companion"]["lateral"]["threshold_m_s2"] = 40.0
+    mission["companion"]["fused"]["side_threshold_m_s2"] = 40.0
     resolved.write_text(yaml.safe_dump(mission))
     assert reproduce(read_recording(flight)).first_difference is not None
+
+
+def test_a_folder_from_before_the_baselines_left_the_drone_is_decided_again(flight):
+    # Given a folder whose resolved mission has the settings of a detector that drones had once
+    resolved = flight / "resolved.yaml"
+    mission = yaml.safe_load(resolved.read_text())
+    mission["companion"]["lateral"] = {"threshold_m_s2": 4.0}
+    resolved.write_text(yaml.safe_dump(mission))
+    assert reproduce(read_recording(flight)).first_difference is None
 
 
 def test_a_changed_packet_is_found(flight):
@@ -88,7 +94,7 @@ def test_steps_in_which_nothing_came_count(flight):
 
 
 def test_another_detector_or_rate_is_looked_at_without_comparing(wall_flight, tmp_path, capsys):
-    code, text, _ = replay(capsys, wall_flight, "--rate", "50", "--detector", "lateral", "--out", tmp_path)
+    code, text, _ = replay(capsys, wall_flight, "--rate", "50", "--detector", "fused", "--out", tmp_path)
     assert code == 0
     assert "with --detector, --rate the flight's own decisions cannot come again" in text
     assert "IMU at 50 Hz (recorded at 250)" in text
@@ -129,7 +135,9 @@ def test_arguments_that_make_no_sense_are_refused(wall_flight, tmp_path, capsys)
         ((tmp_path,), "no flight.tlog in this folder"),
         ((tmp_path / "none.ulg",), "no such file"),
         ((wall_flight, "--detector", "magic"), "there is no detector 'magic'"),
-        ((wall_flight, "--set", "companion.lateral.treshold_m_s2=1"), "did you mean 'threshold_m_s2'?"),
+        ((wall_flight, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
+        ((wall_flight, "--detector", "lateral"), "a baseline of `python -m bench detectors`"),
+        ((wall_flight, "--set", "companion.lateral.threshold_m_s2=1"), "a baseline of `python -m bench detectors`"),
     ):
         code, _, error = replay(capsys, *arguments)
         assert code == 1 and words in error, error

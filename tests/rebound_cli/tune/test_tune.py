@@ -126,7 +126,7 @@ def tune(capsys, *arguments):
 
 def test_the_settings_written_are_what_fly_reads(tmp_path, capsys):
     log, out = healthy_log(tmp_path / "healthy.ulg", 12.0), tmp_path / "mine.yaml"
-    code, text, _ = tune(capsys, log, "--detector", "lateral", "--airframe", "foldable", "--out", out)
+    code, text, _ = tune(capsys, log, "--detector", "fused", "--airframe", "foldable", "--out", out)
     assert code == 0
     assert "no false alarm, never blind" in text and "under way" in text
     # Then the file says what was printed, every number with its reason above it
@@ -148,16 +148,16 @@ def test_the_settings_written_are_what_fly_reads(tmp_path, capsys):
 def test_figures_for_a_program(tmp_path, capsys):
     log = healthy_log(tmp_path / "healthy.ulg", 12.0)
     begin = tmp_path / "begin.yaml"
-    begin.write_text("companion: {detector: lateral, lateral: {threshold_m_s2: 8.0}, link: {silence_s: 2.5}}")
+    begin.write_text("companion: {detector: fused, fused: {side_threshold_m_s2: 8.0}, link: {silence_s: 2.5}}")
     code, text, _ = tune(capsys, log, "--companion", begin, "--airframe", "foldable", "--json")
     found = json.loads(text)
     assert code == 0
     assert found["flights"][0]["noise_rms_frd_m_s2"]["under way"] == pytest.approx([0.3] * 3, rel=0.1)
-    assert {"setting": "threshold_m_s2", "value": 8.0, "share": None} in found["margins"]
+    assert {"setting": "side_threshold_m_s2", "value": 8.0, "share": None} in found["margins"]
     places = {setting["place"]: setting["value"] for setting in found["settings"]}
     # What the file to begin with says of other things is kept
     assert places["companion.link.silence_s"] == 2.5
-    assert places["companion.lateral.threshold_m_s2"] == 8.0
+    assert places["companion.fused.side_threshold_m_s2"] == 8.0
 
 
 def test_logs_that_teach_nothing_are_refused(tmp_path, capsys):

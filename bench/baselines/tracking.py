@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from companion.detection.contact import judge
+from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.estimate.rotation import ned_to_body
 from companion.estimate.strapdown import LEVEL

@@ -29,7 +29,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.contact import judge
+from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.estimate.rotation import body_to_ned
 from companion.estimate.strapdown import GRAVITY_M_S2, LEVEL

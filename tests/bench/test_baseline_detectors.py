@@ -4,12 +4,11 @@ import math
 
 import pytest
 
-from companion.detection.fuzzy import flip_deg, inclination_deg, intensity
+from bench.baselines.config import BaselineConfig
+from bench.baselines.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
-from companion.detection.registry import DETECTORS
 from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
-from companion.mission.config import CompanionConfig
 from companion.recovery.direction import plus
 
 TICK_US = 4_000
@@ -20,7 +19,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
     """North at 2 m/s behind a setpoint that goes on; pushed by `push(t)`, m/s^2."""
-    watch = start_watch(CompanionConfig(detector=detector), 0)
+    watch = start_watch(BaselineConfig(detector=detector), 0)
     velocity, position, impacts = (2.0, 0.0, 0.0), (0.0, 0.0, -3.0), []
     for t in range(TICK_US, until_us, TICK_US):
         p, thrust = push(t), lift(t)
@@ -49,7 +48,7 @@ def wall(strength, length_us=60_000):
     return lambda t: (-strength, 0.0, 0.0) if HIT_US <= t < HIT_US + length_us else (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("detector", sorted(DETECTORS))
+@pytest.mark.parametrize("detector", sorted(BaselineConfig.detectors))
 def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it_is_off(detector):
     """Twice what the published threshold asks for, for sixty milliseconds; the vehicle is thrown back at 0.4 m/s."""
     impacts = fly(detector, wall(40.0))
@@ -62,7 +61,7 @@ def test_every_detector_sees_a_hard_hit_once_and_is_silent_before_it_and_when_it
 LATENCY_MS = {"fused": 0, "lateral": 0, "fuzzy": 0, "hybrid": 4, "threshold": 88, "momentum": 60, "tracking": 400}
 
 
-@pytest.mark.parametrize("detector", sorted(DETECTORS))
+@pytest.mark.parametrize("detector", sorted(BaselineConfig.detectors))
 def test_how_late_each_is_follows_from_what_it_looks_at(detector):
     (impact,) = fly(detector, wall(40.0))
     late_ms = 1e-3 * (impact.impact.sample_time_boot_us - HIT_US)
@@ -71,7 +70,7 @@ def test_how_late_each_is_follows_from_what_it_looks_at(detector):
         assert late_ms > 0.2 * LATENCY_MS[detector]
 
 
-@pytest.mark.parametrize("detector", sorted(DETECTORS))
+@pytest.mark.parametrize("detector", sorted(BaselineConfig.detectors))
 def test_a_climb_with_its_thrust_told_is_no_hit(detector):
     def climb(t):
         return 9.81 + 3.0 * max(0.0, math.sin((t - HIT_US) * 4e-6)) if HIT_US < t < HIT_US + 785_000 else 9.81

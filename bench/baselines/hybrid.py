@@ -24,7 +24,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from companion.detection.contact import judge
+from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.detection.thrust import ThrustGain
 from companion.estimate.strapdown import ZERO

@@ -16,7 +16,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from companion.detection.contact import judge
+from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.estimate.strapdown import GRAVITY_M_S2, ZERO
 from companion.messages import ImuSample, MessageId, Sample, Vector3

@@ -3,6 +3,9 @@
 By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z, and on x and y only drag and
 noise. A wall pushes sideways. The first sample whose sideways force departs from its running mean (the drag) by
 the threshold or more is a hit.
+
+Not of an article: this project's own, so that the paper's studies have a detector on the accelerometer alone. Checked
+against nobody's program.
 """
 
 import math

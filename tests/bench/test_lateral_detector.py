@@ -5,8 +5,8 @@ import random
 
 import pytest
 
+from bench.baselines.lateral import LateralConfig, LateralDetector
 from companion.detection.interface import Phase, Situation
-from companion.detection.lateral import LateralConfig, LateralDetector
 from companion.messages import ImuSample
 
 B_S, K_S = 30.0, 500.0

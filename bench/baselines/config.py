@@ -1,0 +1,40 @@
+"""A companion's settings, and a mission, in which a baseline can be chosen as the drone's own detector is."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from bench.baselines.fuzzy import FuzzyConfig, FuzzyDetector
+from bench.baselines.hybrid import HybridConfig, HybridDetector
+from bench.baselines.lateral import LateralConfig, LateralDetector
+from bench.baselines.momentum import MomentumConfig, MomentumDetector
+from bench.baselines.threshold import ThresholdConfig, ThresholdDetector
+from bench.baselines.tracking import TrackingConfig, TrackingDetector
+from companion.detection.registry import DETECTORS, MakeDetector
+from companion.mission.config import CompanionConfig
+from companion.mission.model import Mission
+
+
+class BaselineConfig(CompanionConfig):
+    """All settings of the companion, and those of each baseline under its name."""
+
+    detectors: ClassVar[Mapping[str, MakeDetector]] = {
+        **DETECTORS,
+        FuzzyDetector.name: FuzzyDetector,
+        HybridDetector.name: HybridDetector,
+        LateralDetector.name: LateralDetector,
+        MomentumDetector.name: MomentumDetector,
+        ThresholdDetector.name: ThresholdDetector,
+        TrackingDetector.name: TrackingDetector,
+    }
+    fuzzy: FuzzyConfig = FuzzyConfig()
+    hybrid: HybridConfig = HybridConfig()
+    lateral: LateralConfig = LateralConfig()
+    momentum: MomentumConfig = MomentumConfig()
+    threshold: ThresholdConfig = ThresholdConfig()
+    tracking: TrackingConfig = TrackingConfig()
+
+
+class BaselineMission(Mission):
+    """A mission that any of them may fly."""
+
+    companion: BaselineConfig = BaselineConfig()
