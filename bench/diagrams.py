@@ -3,16 +3,20 @@
 import sys
 from pathlib import Path
 
+from bench.import_graph import package_diagram
 from bench.marked import with_part
 from companion.flight.states import TABLE as FLIGHT
 from companion.guard.states import TABLE as GUARD
 from sim_vehicle.autopilot.commander.failsafe_table import markdown_table as failsafe_table
 from sim_vehicle.autopilot.commander.modes import mode_diagram
 
+ROOT = Path(__file__).parent.parent
+
 
 def with_diagrams(text: str) -> str:
     """The document with everything between its `generated` marks made anew. Raises MarkedPartError."""
     contents = {
+        "package diagram": f"```mermaid\n{package_diagram(ROOT)}```\n",
         "flight diagram": f"```mermaid\n{FLIGHT.mermaid_diagram()}```\n",
         "flight table": FLIGHT.markdown_table(),
         "guard diagram": f"```mermaid\n{GUARD.mermaid_diagram()}```\n",
