@@ -22,7 +22,7 @@ from rebound_cli.timing import Timing, undisturbed
 LONGEST_WAIT_S = 0.05
 # A socket holds no more: Linux counts each datagram as 768 bytes or more of the 212,992 in net.core.rmem_default.
 MOST_DATAGRAMS = 300
-# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.commander).
+# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
 HANDING_OVER_US = 10_000_000
 
 

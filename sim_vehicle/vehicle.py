@@ -13,7 +13,7 @@ from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.telemetry import Telemetry
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.streams.vibration import Vibration
+from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.physics.plant import Plant, PlantOutput
@@ -76,7 +76,7 @@ class SimulatedVehicle:
             sample=first,
             published=first,
             autopilot=self._autopilot,
-            vibration=Vibration(),
+            vibration=VibrationMetrics(),
             position_variance_m2=airframe.estimate.position_noise_m**2,
             velocity_variance_m2_s2=airframe.estimate.velocity_noise_m_s**2,
             attitude_variance_rad2=airframe.estimate.attitude_noise_rad**2,

@@ -14,7 +14,7 @@ UPRIGHT = 0.7
 
 
 @dataclass(frozen=True, slots=True)
-class Flown:
+class FlownCase:
     """A mission with its result."""
 
     case: MissionCase
@@ -32,9 +32,9 @@ class Missions:
     cases: Sequence[MissionCase]
     results: Mapping[int, Json]
 
-    def of(self, airframe: str, which: Callable[[Json], bool] = lambda _: True) -> list[Flown]:
+    def of(self, airframe: str, which: Callable[[Json], bool] = lambda _: True) -> list[FlownCase]:
         return [
-            Flown(self.cases[number], result)
+            FlownCase(self.cases[number], result)
             for number, result in sorted(self.results.items())
             if self.cases[number].airframe == airframe and self.cases[number].feed_forward and which(result)
         ]
@@ -58,10 +58,10 @@ class Missions:
             hit for flown in self.of(airframe) for hit in flown.result["hits"] if low_m_s <= hit["speed_m_s"] < high_m_s
         ]
 
-    def failed(self) -> Iterator[Flown]:
+    def failed(self) -> Iterator[FlownCase]:
         for number, result in sorted(self.results.items()):
             if result["failures"] and self.cases[number].feed_forward:
-                yield Flown(self.cases[number], result)
+                yield FlownCase(self.cases[number], result)
 
 
 def answered(hits: Sequence[Json]) -> list[Json]:

@@ -14,18 +14,18 @@ from bench.campaign_report.mission_bars import (
 )
 from bench.detectors_report.bars import Bar
 from bench.detectors_report.numbers import per_cent, share
-from bench.recoveries.hits import AIRFRAMES, Case
+from bench.recoveries.hits import AIRFRAMES, RecoveryCase
 
 SOONER_WANTED = 0.25
 # A millimetre beside the distance that is wanted is that distance.
 CLEAR_SLACK_M = 0.001
 
-Pair = tuple[Case, Json, Json]
+Pair = tuple[RecoveryCase, Json, Json]
 
 
-def pairs(cases: Sequence[Case], results: Mapping[int, Json], airframe: str) -> list[Pair]:
+def pairs(cases: Sequence[RecoveryCase], results: Mapping[int, Json], airframe: str) -> list[Pair]:
     """The same hit with `paper` and with `adaptive`, of those in which something was hit."""
-    by_law: dict[str, dict[object, tuple[Case, Json]]] = {"paper": {}, "adaptive": {}}
+    by_law: dict[str, dict[object, tuple[RecoveryCase, Json]]] = {"paper": {}, "adaptive": {}}
     for number, result in results.items():
         case = cases[number]
         if case.airframe == airframe and case.law in by_law and "past_m" in result:
@@ -34,7 +34,7 @@ def pairs(cases: Sequence[Case], results: Mapping[int, Json], airframe: str) -> 
     return [(by_law["adaptive"][key][0], by_law["paper"][key][1], by_law["adaptive"][key][1]) for key in both]
 
 
-def law_bars(cases: Sequence[Case], results: Mapping[int, Json]) -> list[Bar]:
+def law_bars(cases: Sequence[RecoveryCase], results: Mapping[int, Json]) -> list[Bar]:
     return [bar for airframe in AIRFRAMES for bar in _of_airframe(airframe, pairs(cases, results, airframe))]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from bench.campaign_report.flown import Flown, Missions
+from bench.campaign_report.flown import FlownCase, Missions
 from bench.paper.figures import finish, new_figure
 from bench.random_missions.generator import AIRFRAMES, random_mission
 from rebound_cli.figure.outline import footprint
@@ -30,7 +30,7 @@ def missions_figure(missions: Missions) -> Figure:
     return figure
 
 
-def _draw_map(axis: Any, shown: list[Flown]) -> None:
+def _draw_map(axis: Any, shown: list[FlownCase]) -> None:
     case = shown[0].case
     mission = random_mission(case)
     for name, obstacle in Scene.model_validate(mission.data["sim"]).obstacles():

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from bench.campaign.plan import Json
-from bench.campaign_report.flown import Flown, Missions, answered, level, square
+from bench.campaign_report.flown import FlownCase, Missions, answered, level, square
 from bench.campaign_report.mission_bars import OVERSHOOT_MOST_M
 from bench.detectors_report.numbers import per_cent, share
 from bench.paper.table import markdown
@@ -93,7 +93,7 @@ def causes_text(missions: Missions) -> str:
     return markdown(("first cause", *AIRFRAMES), rows) if rows else "None.\n"
 
 
-def _cause(flown: Flown) -> str:
+def _cause(flown: FlownCase) -> str:
     return str(flown.result["failures"][0][0])
 
 
@@ -114,7 +114,7 @@ def failures_text(missions: Missions) -> str:
     return markdown(("seed", "airframe", "room", "stream", "wind", "cause", "again"), rows, left=7) if rows else ""
 
 
-def command_again(flown: Flown) -> str:
+def command_again(flown: FlownCase) -> str:
     airframe = "" if flown.case.airframe == AIRFRAMES[0] else f" --airframe {flown.case.airframe}"
     drawn = " --vehicles drawn" if flown.case.is_drawn else ""
     return f"python -m bench campaign --only {flown.case.seed}{airframe}{drawn}"

@@ -8,8 +8,8 @@ import numpy as np
 
 from bench.detectors.hits import built_in
 from bench.detectors.mishaps import FAMILIES
-from bench.detectors.pilot import Asked, Pilot, as_known
-from bench.detectors.recording import Recording
+from bench.detectors.pilot import Pilot, PilotDemand, as_known
+from bench.detectors.recording import VehicleRecording
 from bench.detectors.watching import (
     ASKED_HZ,
     SWEPT_FACTORS,
@@ -44,10 +44,10 @@ class FlightCase:
 
 
 @dataclass(slots=True)
-class Flown:
+class FlownHealthy:
     """A recorded flight and the phase of each interval."""
 
-    recording: Recording
+    recording: VehicleRecording
     phases: list[str]
 
 
@@ -67,7 +67,7 @@ def work_out_flight(case: FlightCase) -> dict[str, Any]:
     return result
 
 
-def _reports(case: FlightCase, flown: Flown, wire: Wire, rate: int) -> dict[str, Any]:
+def _reports(case: FlightCase, flown: FlownHealthy, wire: Wire, rate: int) -> dict[str, Any]:
     arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
     situations = flown.recording.situations
     index_at = {step.time_boot_us: step.index for step in arrived}
@@ -91,14 +91,14 @@ def _told(time_boot_us: int, phase: str, kind: Any) -> Sequence[Any]:
     return [round(1e-6 * time_boot_us, 3), phase, kind.value]
 
 
-def fly_healthy(case: FlightCase, airframe: Airframe) -> Flown:
+def fly_healthy(case: FlightCase, airframe: Airframe) -> FlownHealthy:
     """From the ground to the ground; a flight that its fault ends is recorded up to there."""
     rng = np.random.default_rng([case.seed, 2])
     mishaps = FAMILIES[case.family](np.random.default_rng([case.seed, 4]))
     scene = Scene.model_validate({"faults": mishaps.faults})
     plant = Plant(airframe, scene, case.seed, keeps_path=False)
     pilot = Pilot(plant, airframe, rng, AIRBORNE_S)
-    flown = Flown(Recording(), [])
+    flown = FlownHealthy(VehicleRecording(), [])
     ground_m = plant.state.body[2]
     for asked in pilot.fly():
         output = plant.step(asked.setpoint, asked.armed)
@@ -110,7 +110,7 @@ def fly_healthy(case: FlightCase, airframe: Airframe) -> Flown:
     return flown
 
 
-def _situation(asked: Asked, height_m: float) -> Situation:
+def _situation(asked: PilotDemand, height_m: float) -> Situation:
     return Situation(
         off_reason=asked.off_reason,
         armed=asked.armed,

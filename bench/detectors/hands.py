@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bench.detectors.hits import AIRFRAMES, HEIGHT_M, SWITCHED_ON_AFTER_S, built_in
-from bench.detectors.recording import Recording
+from bench.detectors.recording import VehicleRecording
 from bench.detectors.watching import ASKED_HZ, configuration, streams_asked_hz, watch_all
 from bench.detectors.wire import Wire
 from companion.detection.interface import Situation
@@ -60,7 +60,7 @@ def work_out_hand(case: HandCase) -> dict[str, Any]:
     return result
 
 
-def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[Recording, float]:
+def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[VehicleRecording, float]:
     """Until some time after the hand has let go; and when it came, by the vehicle's clock in microseconds."""
     rng = np.random.default_rng([case.seed, 5])
     heading, drift_m_s = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, DRIFT_MAX_M_S)
@@ -71,7 +71,7 @@ def hover_in_hand(case: HandCase, airframe: Airframe) -> tuple[Recording, float]
     scene = Scene.model_validate({"faults": [{**grip, "between_s": [from_s, until_s]}]})
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
     cruise = Cruise(airframe, scene, (0.0, 0.0, -HEIGHT_M), velocity, yaw_rad, case.seed)
-    recording = Recording()
+    recording = VehicleRecording()
     while cruise.time_boot_us < 1e6 * (until_s + LOOKED_AFTER_S):
         setpoint = cruise.setpoint()
         output = cruise.step(setpoint)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bench.detectors.recording import Recording
+from bench.detectors.recording import VehicleRecording
 from bench.detectors.scoring import score_hit
 from bench.detectors.watching import detector_names
 from companion.detection.interface import Situation
@@ -121,7 +121,7 @@ def built_in(name: str) -> Airframe:
     return load_built_in(name)
 
 
-def hit_of(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
+def hit_of(case: HitCase, airframe: Airframe) -> tuple[VehicleRecording, Hit]:
     """The case's flight; one past a pole is flown again nearer to its middle. Raises NoTouch."""
     for share in POLE_OFFSET_SHARES[:-1]:
         try:
@@ -132,7 +132,9 @@ def hit_of(case: HitCase, airframe: Airframe) -> tuple[Recording, Hit]:
     return fly_hit(case, airframe, POLE_OFFSET_SHARES[-1])
 
 
-def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET_SHARES[0]) -> tuple[Recording, Hit]:
+def fly_hit(
+    case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET_SHARES[0]
+) -> tuple[VehicleRecording, Hit]:
     """Straight on into the obstacle, or hovering until it comes, and on for a moment. Raises NoTouch."""
     rng = np.random.default_rng([case.seed, 1])
     towards = _velocity(case, airframe, rng)
@@ -143,7 +145,7 @@ def fly_hit(case: HitCase, airframe: Airframe, offset_share: float = POLE_OFFSET
     obstacle = _obstacle(case, airframe, start + free_s * velocity, towards, rng, offset_share)
     scene = Scene.model_validate(_coming(obstacle, -towards, free_s) if case.is_struck else obstacle)
     cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
-    recording, interval_s = Recording(), 1e-6 * airframe.imu.integration_interval_us
+    recording, interval_s = VehicleRecording(), 1e-6 * airframe.imu.integration_interval_us
     plant, truth, hit_row = cruise.plant, cruise.plant.truth, cruise.plant.state.hit
     left = round((free_s + PATIENCE_S) / interval_s)
     touched = False

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Final
 
-from bench.detectors.recording import Recording
-from bench.detectors.wire import Heard
+from bench.detectors.recording import VehicleRecording
+from bench.detectors.wire import HeardStep
 from companion.messages import Sample
 from sim_vehicle.faults.spec import WireFault
 from sim_vehicle.faults.wire import Wire
@@ -19,7 +19,7 @@ LOOK_EVERY_US = 1000
 _NUMBER_BYTES = 4
 
 
-def over_link(sent: Sequence[Heard], recording: Recording, fault: WireFault, seed: int) -> list[Heard]:
+def over_link(sent: Sequence[HeardStep], recording: VehicleRecording, fault: WireFault, seed: int) -> list[HeardStep]:
     """What arrives, and when, of the samples that were sent: each message a packet of its own.
 
     `index` is the interval of the arrival, whose situation the companion knows then.
@@ -27,7 +27,7 @@ def over_link(sent: Sequence[Heard], recording: Recording, fault: WireFault, see
     wire = Wire([fault], seed)
     packets: list[Sample] = []
     sent_at = {step.index: step.samples for step in sent}
-    arrived: list[Heard] = []
+    arrived: list[HeardStep] = []
     times_us = [sample.time_boot_us for sample in recording.samples]
     ends_us = [*times_us[1:], times_us[-1] + LOOK_EVERY_US]
     for index, (begins_us, end_us) in enumerate(zip(times_us, ends_us, strict=True)):
@@ -40,5 +40,5 @@ def over_link(sent: Sequence[Heard], recording: Recording, fault: WireFault, see
             frames = []
             if numbers:
                 samples = tuple(packets[int.from_bytes(number, "little")] for number in numbers)
-                arrived.append(Heard(index, now_us, samples))
+                arrived.append(HeardStep(index, now_us, samples))
     return arrived

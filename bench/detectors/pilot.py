@@ -29,11 +29,11 @@ LANDED_AFTER_S = 1.0
 FLIP_RATE_RAD_S = 12.0
 FLIP_THRUST = 0.5
 
-Manoeuvre = Iterator["Asked"]
+Manoeuvre = Iterator["PilotDemand"]
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class PilotDemand:
     """What is asked of the vehicle in an interval (None: idling motors), and what the flight knows about it."""
 
     phase: str
@@ -72,11 +72,11 @@ class Pilot:
 
     def _stand(self, seconds: float) -> Manoeuvre:
         for _ in range(self._intervals(seconds)):
-            yield Asked("ground", landed_state=LandedState.ON_GROUND, off_reason="ready")
+            yield PilotDemand("ground", landed_state=LandedState.ON_GROUND, off_reason="ready")
 
     def _take_off(self) -> Manoeuvre:
         for asked in self._line("takeoff", (0.0, 0.0, -TAKEOFF_M - 1.0), float(self._rng.uniform(0.7, 1.5)), 1.0):
-            yield Asked(asked.phase, asked.setpoint, landed_state=LandedState.TAKEOFF, off_reason="takeoff")
+            yield PilotDemand(asked.phase, asked.setpoint, landed_state=LandedState.TAKEOFF, off_reason="takeoff")
 
     def _land(self) -> Manoeuvre:
         """Over a free spot, down at a speed of ordinary landings, motors off a while after the touch."""
@@ -92,10 +92,10 @@ class Pilot:
                 setpoint = TrajectorySetpoint((x, y, None), (0.0, 0.0, speed_m_s), FREE, self._yaw_rad)
             on_ground += 1
             landed += self._position()[2] > resting_m - TOUCH_MARGIN_M
-            yield Asked("landing", setpoint, landed_state=LandedState.LANDING)
+            yield PilotDemand("landing", setpoint, landed_state=LandedState.LANDING)
         for armed in (True, False):
             for _ in range(self._intervals(0.6)):
-                yield Asked("landed", None, armed, landed_state=LandedState.ON_GROUND)
+                yield PilotDemand("landed", None, armed, landed_state=LandedState.ON_GROUND)
 
     # --- in the air -----------------------------------------------------------------------------------------------
 
@@ -148,7 +148,7 @@ class Pilot:
             # The rest of the turn is left to the attitude control, which then takes the short way.
             if turned_rad > 1.7 * math.pi:
                 break
-            yield Asked("flip", setpoint)
+            yield PilotDemand("flip", setpoint)
         yield from self._hold("caught", self._at_velocity((0.0, 0.0, 0.0)), 2.5)
 
     # --- how ------------------------------------------------------------------------------------------------------
@@ -161,11 +161,11 @@ class Pilot:
                 position, velocity, acceleration = profile.at(count * self._step_s)
                 self.asked_ned_m = position
                 setpoint = TrajectorySetpoint(position, velocity, acceleration, self._yaw_rad)
-            yield Asked(phase, setpoint)
+            yield PilotDemand(phase, setpoint)
 
     def _hold(self, phase: str, setpoint: TrajectorySetpoint, seconds: float) -> Manoeuvre:
         for _ in range(self._intervals(seconds)):
-            yield Asked(phase, setpoint)
+            yield PilotDemand(phase, setpoint)
         self.asked_ned_m = self._position()
 
     def _at_velocity(self, velocity_ned_m_s: Vector3) -> TrajectorySetpoint:

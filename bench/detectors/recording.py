@@ -16,7 +16,7 @@ Vector3 = tuple[float, float, float]
 
 
 @dataclass(slots=True)
-class Recording:
+class VehicleRecording:
     """One entry an interval in each list. `published` is the state estimate as of 8 ms, as PX4 publishes it."""
 
     samples: list[PlantOutput] = field(default_factory=list)

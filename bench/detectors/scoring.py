@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.detectors.links import LINKS, over_link
-from bench.detectors.recording import Recording
+from bench.detectors.recording import VehicleRecording
 from bench.detectors.watching import (
     ASKED_HZ,
     SWEPT_FACTORS,
@@ -15,7 +15,7 @@ from bench.detectors.watching import (
     streams_asked_hz,
     watch_all,
 )
-from bench.detectors.wire import Heard, Wire
+from bench.detectors.wire import HeardStep, Wire
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample
 from sim_vehicle.airframe import Airframe
@@ -48,7 +48,9 @@ class Possible:
         return sum(first < time_us <= found_boot_us for time_us in self.imu_times_boot_us)
 
 
-def first_possible(recording: Recording, arrived: Sequence[Heard], touch_boot_us: float, floor_m_s2: float) -> Possible:
+def first_possible(
+    recording: VehicleRecording, arrived: Sequence[HeardStep], touch_boot_us: float, floor_m_s2: float
+) -> Possible:
     """By the truth: the first received sample whose averaging window holds the contact's force above the floor."""
     # A sample's own interval: over a bad link it may arrive in a later one.
     stamps = (sample.time_boot_us for sample in recording.samples)
@@ -66,7 +68,7 @@ def first_possible(recording: Recording, arrived: Sequence[Heard], touch_boot_us
 
 
 def score_hit(
-    recording: Recording,
+    recording: VehicleRecording,
     hit: Hit,
     airframe: Airframe,
     seed: int,
@@ -102,7 +104,9 @@ def score_hit(
     return result
 
 
-def _is_found(name: str, factor: float, arrived: Sequence[Heard], recording: Recording, touch_us: float) -> bool:
+def _is_found(
+    name: str, factor: float, arrived: Sequence[HeardStep], recording: VehicleRecording, touch_us: float
+) -> bool:
     found, _, _ = watch_all(configuration(name, factor), arrived, recording.situations)
     return _first_of(found, touch_us) is not None
 
@@ -141,7 +145,7 @@ def _ratio(estimate: ImpactEstimate, hit: Hit) -> float:
     return estimate.impulse_m_s / change if change > 0.0 else 0.0
 
 
-def _clipped(recording: Recording, hit: Hit) -> bool:
+def _clipped(recording: VehicleRecording, hit: Hit) -> bool:
     """Whether the accelerometer reached its range during the contact."""
     before = after = recording.samples[0].clipping_counts
     for sample in recording.samples:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bench.baselines.config import BaselineConfig
-from bench.detectors.wire import BUILDERS, Heard
+from bench.detectors.wire import BUILDERS, HeardStep
 from companion.detection.interface import Situation
 from companion.detection.watch import advance, start_watch
 from companion.estimate.impact import ImpactEstimate
@@ -83,7 +83,7 @@ def streams_asked_hz(rate: int) -> dict[MessageId, float]:
 
 
 def watch_all(
-    config: CompanionConfig, heard: Sequence[Heard], situations: Sequence[Situation]
+    config: CompanionConfig, heard: Sequence[HeardStep], situations: Sequence[Situation]
 ) -> tuple[list[Found], list[ImpactEstimate], int]:
     """Collisions reported, touches that were reported as none, and how often the detector said it was blind."""
     watch = start_watch(config, heard[0].time_boot_us)

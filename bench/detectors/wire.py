@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.detectors.recording import Recording
+from bench.detectors.recording import VehicleRecording
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -31,7 +31,7 @@ from sim_vehicle.physics.plant import PlantOutput
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardStep:
     """The samples that come in with one of the link's loops; `index` is the recording's interval."""
 
     index: int
@@ -42,11 +42,11 @@ class Heard:
 class Wire:
     """The link of a recorded vehicle; `heard` any number of times, at other rates."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: VehicleRecording) -> None:
         self._recording = recording
         self._builders: dict[MessageId, Builder] = {}
 
-    def heard(self, asked_hz: Mapping[MessageId, float], seed: int) -> list[Heard]:
+    def heard(self, asked_hz: Mapping[MessageId, float], seed: int) -> list[HeardStep]:
         """All that arrives on a link that is asked for these rates when the recording begins."""
         samples, published = self._recording.samples, self._recording.published
         kinds = [kind for kind in KINDS if kind.message_id in asked_hz]
@@ -74,7 +74,7 @@ class Wire:
                 stream.sent(now_us)
                 due.append(build(index))
             if due:
-                arrived.append(Heard(index, now_us, tuple(due)))
+                arrived.append(HeardStep(index, now_us, tuple(due)))
         return arrived
 
     def _builder(self, message: MessageId) -> "Builder":
@@ -98,7 +98,7 @@ def _milliseconds(sample: PlantOutput) -> int:
     return sample.time_boot_us // 1000 * 1000
 
 
-def _imu(recording: Recording) -> Builder:
+def _imu(recording: VehicleRecording) -> Builder:
     samples = recording.samples
     rows = _as_floats([(*s.specific_force_frd_m_s2, *s.angular_velocity_frd_rad_s) for s in samples])
 
@@ -109,7 +109,7 @@ def _imu(recording: Recording) -> Builder:
     return build
 
 
-def _local_position(recording: Recording) -> Builder:
+def _local_position(recording: VehicleRecording) -> Builder:
     published = recording.published
     rows = _as_floats([(*s.position_ned_m, *s.velocity_ned_m_s) for s in published])
 
@@ -120,7 +120,7 @@ def _local_position(recording: Recording) -> Builder:
     return build
 
 
-def _odometry(recording: Recording) -> Builder:
+def _odometry(recording: VehicleRecording) -> Builder:
     published = recording.published
     rows = _as_floats([(*s.position_ned_m, *s.velocity_ned_m_s) for s in published])
 
@@ -132,7 +132,7 @@ def _odometry(recording: Recording) -> Builder:
     return build
 
 
-def _attitude(recording: Recording) -> Builder:
+def _attitude(recording: VehicleRecording) -> Builder:
     samples = recording.samples
     rows = _as_floats([(*s.attitude_wxyz, *s.angular_velocity_frd_rad_s) for s in samples])
 
@@ -143,7 +143,7 @@ def _attitude(recording: Recording) -> Builder:
     return build
 
 
-def _attitude_target(recording: Recording) -> Builder:
+def _attitude_target(recording: VehicleRecording) -> Builder:
     samples = recording.samples
     rows = _as_floats([(s.thrust_fraction,) for s in samples])
 
@@ -155,8 +155,8 @@ def _attitude_target(recording: Recording) -> Builder:
     return build
 
 
-def _vibration(recording: Recording) -> Builder:
-    samples, metrics, levels = recording.samples, vibration.Vibration(), []
+def _vibration(recording: VehicleRecording) -> Builder:
+    samples, metrics, levels = recording.samples, vibration.VibrationMetrics(), []
     for sample in samples[1:]:
         metrics.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         levels.append((metrics.gyroscope_rad_s, metrics.accelerometer_m_s2))
@@ -169,7 +169,7 @@ def _vibration(recording: Recording) -> Builder:
     return build
 
 
-def _extended_state(recording: Recording) -> Builder:
+def _extended_state(recording: VehicleRecording) -> Builder:
     situations = recording.situations
 
     def build(index: int) -> Sample:
@@ -178,7 +178,7 @@ def _extended_state(recording: Recording) -> Builder:
     return build
 
 
-BUILDERS: dict[MessageId, Callable[[Recording], Builder]] = {
+BUILDERS: dict[MessageId, Callable[[VehicleRecording], Builder]] = {
     MessageId.HIGHRES_IMU: _imu,
     MessageId.LOCAL_POSITION_NED: _local_position,
     MessageId.ODOMETRY: _odometry,

@@ -9,8 +9,8 @@ import numpy as np
 
 from bench.head_on import AFTER_S, HeadOnHit, head_on
 from bench.paper.figures import CONTACT, finish, new_figure
-from bench.paper.flights import Flight, Floats, Result
-from bench.paper.study import Findings
+from bench.paper.flights import Floats, StudyFlight, StudyResult
+from bench.paper.study import StudyFindings
 from bench.paper.table import around
 from sim_vehicle.airframe import load_built_in
 
@@ -65,12 +65,12 @@ class SpringResponse:
         return float(self.fold_m(np.array(time_s))), float(self.rate_m_s(np.array(time_s)))
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     """Nothing flies: a single hit is enough."""
     return []
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     airframe = load_built_in("foldable")
     arms = airframe.arms
     ours = SpringResponse(arms.damping_per_s, arms.stiffness_per_s2, IMPACT_M_S)
@@ -108,7 +108,7 @@ def conclude(results: Sequence[Result]) -> Findings:
             0.02,
         ),
     )
-    return Findings(
+    return StudyFindings(
         "Parameter identification", rows, _text(ours, arms.hysteresis_m), {"arm.png": _figure(single, arms)}
     )
 

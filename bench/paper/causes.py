@@ -16,9 +16,9 @@ from bench.paper.flight_tests import (
     worst_overshoot_by_estimate_m,
     worst_overshoot_m,
 )
-from bench.paper.flights import Flight, Result
-from bench.paper.study import Findings, sampling_text
-from bench.paper.table import Row, at_least, at_most, markdown, number
+from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.study import StudyFindings, sampling_text
+from bench.paper.table import ClaimRow, at_least, at_most, markdown, number
 
 SPEED_M_S = 2.0
 SEEDS = 6
@@ -70,9 +70,9 @@ CAUSES = (
 DRAWN = ((AS_IT_IS, "rigid"), (LOST, "rigid"), (CLIPPED, "rigid"), (CLIPPED, "foldable"))
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     return [
-        Flight(
+        StudyFlight(
             (cause.airframe, cause.name),
             approach(SPEED_M_S, cause.heading_deg, cruise_s=cause.cruise_s, companion=cause.companion),
             cause.airframe,
@@ -85,15 +85,15 @@ def flights(seeds: int) -> list[Flight]:
     ]
 
 
-def conclude(results: Sequence[Result]) -> Findings:
-    return Findings("Why rigid differs", _rows(results), _text(results), {"causes.png": _figure(results)})
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
+    return StudyFindings("Why rigid differs", _rows(results), _text(results), {"causes.png": _figure(results)})
 
 
-def _of(results: Sequence[Result], airframe: str, name: str) -> list[Result]:
+def _of(results: Sequence[StudyResult], airframe: str, name: str) -> list[StudyResult]:
     return [result for result in results if result.flight.key == (airframe, name) and result.contacts]
 
 
-def _rows(results: Sequence[Result]) -> tuple[Row, ...]:
+def _rows(results: Sequence[StudyResult]) -> tuple[ClaimRow, ...]:
     lost, clipped = _of(results, "rigid", LOST), _of(results, "rigid", CLIPPED)
     again = [result for result in lost if is_lost(result)]
     foldable = _of(results, "foldable", LEANING)
@@ -126,7 +126,7 @@ def _rows(results: Sequence[Result]) -> tuple[Row, ...]:
     )
 
 
-def _text(results: Sequence[Result]) -> str:
+def _text(results: Sequence[StudyResult]) -> str:
     rows = []
     for cause in CAUSES:
         flown = _of(results, cause.airframe, cause.name)
@@ -193,7 +193,7 @@ lost on the way, or when its filter does not know how hard a hit can be, and not
 """
 
 
-def _figure(results: Sequence[Result]) -> Figure:
+def _figure(results: Sequence[StudyResult]) -> Figure:
     figure, axes = new_figure(1, len(DRAWN), "A hit at 2 m/s: one thing changed at a time", width=3.9)
     titles = (
         "rigid, as it is",

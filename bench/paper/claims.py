@@ -10,9 +10,9 @@ from bench.head_on import head_on
 from bench.paper.approach import approach
 from bench.paper.figures import add_legend, draw_position, draw_velocity, finish, new_figure
 from bench.paper.flight_tests import safety_text
-from bench.paper.flights import Flight, Floats, Result
-from bench.paper.study import Findings, sampling_text
-from bench.paper.table import Row, around, at_least, at_most, markdown, within_factor
+from bench.paper.flights import Floats, StudyFlight, StudyResult
+from bench.paper.study import StudyFindings, sampling_text
+from bench.paper.table import ClaimRow, around, at_least, at_most, markdown, within_factor
 from rebound_cli.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.physics.plant import Plant
@@ -79,15 +79,15 @@ def hover_share(mass_kg: float) -> float:
     return float(np.mean(fractions[SETTLING_S * seconds :]))
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     off = {"lateral": {"threshold_m_s2": NEVER_M_S2}}
     return [
-        Flight(("bouncing", "off"), approach(BOUNCING_M_S, companion=off), "foldable", 1, is_drawn=True),
-        Flight(("bouncing", "on"), approach(BOUNCING_M_S), "foldable", 1, is_drawn=True),
+        StudyFlight(("bouncing", "off"), approach(BOUNCING_M_S, companion=off), "foldable", 1, is_drawn=True),
+        StudyFlight(("bouncing", "on"), approach(BOUNCING_M_S), "foldable", 1, is_drawn=True),
     ]
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     off, on = results
     pulses = {name: [pulse(name, speed) for speed in PULSE_SPEEDS_M_S] for name in ("foldable", "rigid")}
     rows = (
@@ -104,10 +104,10 @@ def conclude(results: Sequence[Result]) -> Findings:
         ),
     )
     pictures = {"pulse.png": _pulse_figure(pulses), "bouncing.png": _bouncing_figure(off, on)}
-    return Findings("Other claims", rows, _text(pulses, results), pictures)
+    return StudyFindings("Other claims", rows, _text(pulses, results), pictures)
 
 
-def _contact_rows(foldable: Sequence[Pulse], rigid: Sequence[Pulse]) -> tuple[Row, ...]:
+def _contact_rows(foldable: Sequence[Pulse], rigid: Sequence[Pulse]) -> tuple[ClaimRow, ...]:
     return (
         within_factor(
             "foldable: contact as an accelerometer's pulse, 1 m/s",
@@ -139,7 +139,7 @@ def _contact_rows(foldable: Sequence[Pulse], rigid: Sequence[Pulse]) -> tuple[Ro
     )
 
 
-def _force_rows(foldable: Sequence[Pulse]) -> tuple[Row, ...]:
+def _force_rows(foldable: Sequence[Pulse]) -> tuple[ClaimRow, ...]:
     fastest = foldable[-1]
     airframe = load_built_in("foldable")
     least_n = airframe.mass_kg * SPEED_CHANGE_M_S**2 / (2 * airframe.arms.fold_max_m)
@@ -167,7 +167,7 @@ def _force_rows(foldable: Sequence[Pulse]) -> tuple[Row, ...]:
     )
 
 
-def _frame_rows() -> tuple[Row, ...]:
+def _frame_rows() -> tuple[ClaimRow, ...]:
     airframe = load_built_in("foldable")
     open_m = 2 * airframe.geometry.motor_radius_m
     folded_m = open_m - 2 * airframe.arms.fold_max_m
@@ -190,7 +190,7 @@ def _frame_rows() -> tuple[Row, ...]:
     )
 
 
-def _text(pulses: dict[str, list[Pulse]], results: Sequence[Result]) -> str:
+def _text(pulses: dict[str, list[Pulse]], results: Sequence[StudyResult]) -> str:
     head = (
         "airframe",
         "m/s",
@@ -244,7 +244,7 @@ def _pulse_figure(pulses: dict[str, list[Pulse]]) -> Figure:
     return figure
 
 
-def _bouncing_figure(off: Result, on: Result) -> Figure:
+def _bouncing_figure(off: StudyResult, on: StudyResult) -> Figure:
     figure, axes = new_figure(2, 2, "The same wall at 1 m/s without and with recovery (foldable)")
     for column, (result, title) in enumerate(((off, "recovery off"), (on, "recovery on"))):
         assert result.track is not None, "the wall is hit"

@@ -17,8 +17,8 @@ from bench.paper import (
 )
 from bench.paper.arguments import DEFAULT_SEEDS
 from bench.paper.flights import fly
-from bench.paper.study import Findings, Study, concluded
-from bench.paper.table import Row, rows_text
+from bench.paper.study import Study, StudyFindings, concluded
+from bench.paper.table import ClaimRow, rows_text
 from bench.processes import in_processes
 from rebound_cli import __version__
 from rebound_cli.run_folder import make_folder
@@ -55,7 +55,7 @@ def run_paper(options: Namespace) -> int:
     return 0
 
 
-def verdict_text(rows: Sequence[Row]) -> str:
+def verdict_text(rows: Sequence[ClaimRow]) -> str:
     """How many rows agree, and which do not."""
     judged = [row for row in rows if row.is_judged]
     differing = [row for row in judged if not row.agrees]
@@ -64,7 +64,7 @@ def verdict_text(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def write(folder: Path, findings: Sequence[Findings], seeds: int) -> None:
+def write(folder: Path, findings: Sequence[StudyFindings], seeds: int) -> None:
     """Pictures beside the document; its result section made anew, the rest left as it is. Raises MarkedPartError."""
     pictures = folder / PICTURES_FOLDER
     pictures.mkdir(parents=True, exist_ok=True)
@@ -74,7 +74,7 @@ def write(folder: Path, findings: Sequence[Findings], seeds: int) -> None:
     write_part(folder / DOCUMENT_NAME, PART, results_text(findings, seeds), TITLE)
 
 
-def results_text(findings: Sequence[Findings], seeds: int) -> str:
+def results_text(findings: Sequence[StudyFindings], seeds: int) -> str:
     """Markdown: the table of all rows first, then each study."""
     rows = [row for found in findings for row in found.rows]
     differing = [row for row in rows if row.is_judged and not row.agrees]

@@ -15,9 +15,9 @@ from bench.paper.flight_tests import (
     worst_overshoot_by_estimate_m,
     worst_overshoot_m,
 )
-from bench.paper.flights import Flight, Result
-from bench.paper.study import Findings, sampling_text
-from bench.paper.table import Row, at_most, markdown, number
+from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.study import StudyFindings, sampling_text
+from bench.paper.table import ClaimRow, at_most, markdown, number
 
 SPEEDS_M_S = (1.0, 2.0, 3.0, 4.0, 5.0)
 AIRFRAMES = ("foldable", "rigid")
@@ -39,7 +39,7 @@ def off_axis_deg(heading: float) -> float:
     return abs((heading + QUARTER_DEG / 2.0) % QUARTER_DEG - QUARTER_DEG / 2.0)
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     groups = [(airframe, 0.0) for airframe in AIRFRAMES] + [("foldable", SLANT_DEG)]
     return [
         _flight(airframe, slant_deg, speed_m_s, seed)
@@ -49,23 +49,23 @@ def flights(seeds: int) -> list[Flight]:
     ]
 
 
-def _flight(airframe: str, slant_deg: float, speed_m_s: float, seed: int) -> Flight:
+def _flight(airframe: str, slant_deg: float, speed_m_s: float, seed: int) -> StudyFlight:
     heading = heading_deg(seed)
     mission = approach(speed_m_s, heading, slant_deg=slant_deg if seed % 2 else -slant_deg)
-    return Flight((airframe, speed_m_s, heading, slant_deg), mission, airframe, seed)
+    return StudyFlight((airframe, speed_m_s, heading, slant_deg), mission, airframe, seed)
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     foldable = _group(results, "foldable", 0.0)
-    return Findings("Walls from any side", _rows(foldable), _text(results), {"directions.png": _figure(results)})
+    return StudyFindings("Walls from any side", _rows(foldable), _text(results), {"directions.png": _figure(results)})
 
 
-def _group(results: Sequence[Result], airframe: str, slant_deg: float) -> list[Result]:
+def _group(results: Sequence[StudyResult], airframe: str, slant_deg: float) -> list[StudyResult]:
     keys = (airframe, slant_deg)
     return [r for r in results if (r.flight.key[0], r.flight.key[3]) == keys and r.contacts]
 
 
-def _rows(foldable: Sequence[Result]) -> tuple[Row, ...]:
+def _rows(foldable: Sequence[StudyResult]) -> tuple[ClaimRow, ...]:
     rows = []
     for speed_m_s in SPEEDS_M_S:
         flown = [result for result in foldable if result.flight.key[1] == speed_m_s]
@@ -94,7 +94,7 @@ def _rows(foldable: Sequence[Result]) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _touches_text(results: Sequence[Result]) -> str:
+def _touches_text(results: Sequence[StudyResult]) -> str:
     """Where, and how: all of it in the sense in which the strictest count is not zero."""
     sides = ", ".join(f"{side:.0f}°" for side in sorted(off_axis_deg(result.flight.key[2]) for result in results))
     later = [contact for result in results for contact in result.contacts[1:]]
@@ -144,7 +144,7 @@ then lie 2 cm below the centre of mass, and the wall's push, 6 N s, pitches the 
 """
 
 
-def _text(results: Sequence[Result]) -> str:
+def _text(results: Sequence[StudyResult]) -> str:
     seeds = len(results) // ((len(AIRFRAMES) + 1) * len(SPEEDS_M_S))
     parts = [
         f"{seeds} flights a speed, seeds 1 to {seeds}. The vehicle flies square at a wall whose side to the nose is "
@@ -162,7 +162,7 @@ def _text(results: Sequence[Result]) -> str:
     return "\n".join(parts)
 
 
-def _cells(speed_m_s: float, results: Sequence[Result]) -> list[str]:
+def _cells(speed_m_s: float, results: Sequence[StudyResult]) -> list[str]:
     rebounds = [result.first.hit.rebound_speed_m_s / result.first.impact_speed_m_s for result in results]
     peak_n = max(contact.hit.peak_force_n for result in results for contact in result.contacts)
     return [
@@ -181,7 +181,7 @@ def _cells(speed_m_s: float, results: Sequence[Result]) -> list[str]:
     ]
 
 
-def _figure(results: Sequence[Result]) -> Figure:
+def _figure(results: Sequence[StudyResult]) -> Figure:
     figure, axes = new_figure(
         1, 2, "Walls from any side: how far the hit makes the vehicle lean into the wall", width=6.0
     )

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.paper.flights import Track
+from bench.paper.flights import StudyTrack
 
 CENTRE = {"color": "tab:blue", "linewidth": 1.8}
 ASKED = {"color": "tab:orange", "linewidth": 1.4, "linestyle": "--"}
@@ -23,7 +23,7 @@ def new_figure(rows: int, columns: int, title: str, width: float = 5.2, height: 
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def draw_position(axis: Any, track: Track, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
+def draw_position(axis: Any, track: StudyTrack, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
     """Where the centre was, where it was asked to be, and the wall."""
     asked_s, asked_m = np.append(track.setpoint_at_s, end_s), np.append(track.setpoint_m, track.setpoint_m[-1])
     axis.plot(asked_s, asked_m, drawstyle="steps-post", label="setpoint sent", **ASKED)
@@ -41,7 +41,7 @@ def draw_position(axis: Any, track: Track, title: str, start_s: float = -1.0, en
     finish(axis, title, "distance from take-off point\ninto the wall [m]")
 
 
-def draw_velocity(axis: Any, track: Track, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
+def draw_velocity(axis: Any, track: StudyTrack, title: str, start_s: float = -1.0, end_s: float = 5.0) -> None:
     """Speed into the wall; negative is away from it."""
     axis.plot(track.time_s, track.speed_m_s, label="vehicle's centre", **CENTRE)
     axis.axhline(0.0, color="0.7", linewidth=0.8)
@@ -50,7 +50,7 @@ def draw_velocity(axis: Any, track: Track, title: str, start_s: float = -1.0, en
     finish(axis, title, "velocity into the wall [m/s]")
 
 
-def draw_fold(axis: Any, track: Track, title: str, start_s: float = -0.05, end_s: float = 0.35) -> None:
+def draw_fold(axis: Any, track: StudyTrack, title: str, start_s: float = -0.05, end_s: float = 0.35) -> None:
     """How far each arm is folded."""
     for arm, (name, style) in enumerate(
         (("front right", "-"), ("rear left", "-."), ("front left", "--"), ("rear right", ":"))
@@ -61,7 +61,7 @@ def draw_fold(axis: Any, track: Track, title: str, start_s: float = -0.05, end_s
     finish(axis, title, "fold of the arm [mm]")
 
 
-def mark_moments(axis: Any, track: Track) -> None:
+def mark_moments(axis: Any, track: StudyTrack) -> None:
     """First touch and detection as lines; further contacts as ticks along the bottom."""
     axis.axvline(0.0, color=CONTACT, linewidth=1.1, label="first contact")
     if track.detections_s:

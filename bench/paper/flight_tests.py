@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from bench.paper.approach import approach
 from bench.paper.figures import add_legend, draw_position, draw_velocity, new_figure
-from bench.paper.flights import Flight, Result
-from bench.paper.study import Findings, sampling_text
-from bench.paper.table import Row, around, at_least, at_most, markdown, number
+from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.study import StudyFindings, sampling_text
+from bench.paper.table import ClaimRow, around, at_least, at_most, markdown, number
 from rebound_cli.summary import BREAKING_FORCE_N
 
 PAPER_SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
@@ -23,42 +23,42 @@ NO_OVERSHOOT_M = 0.05
 LOST_SHARE = 0.1
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     return [
-        Flight((airframe, speed_m_s), approach(speed_m_s), airframe, seed, is_drawn=seed == 1)
+        StudyFlight((airframe, speed_m_s), approach(speed_m_s), airframe, seed, is_drawn=seed == 1)
         for airframe in AIRFRAMES
         for speed_m_s in (*PAPER_SPEEDS_M_S, *BEYOND_M_S)
         for seed in range(1, SEEDS + 1)
     ]
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     pictures = {}
     for airframe in AIRFRAMES:
         pictures[f"flight_tests_{airframe}.png"] = _figure(results, airframe, PAPER_SPEEDS_M_S)
         pictures[f"beyond_{airframe}.png"] = _figure(results, airframe, BEYOND_M_S)
-    return Findings("Flight tests", _rows(results), _text(results), pictures)
+    return StudyFindings("Flight tests", _rows(results), _text(results), pictures)
 
 
-def of(results: Sequence[Result], airframe: str, speeds: Sequence[float]) -> list[Result]:
+def of(results: Sequence[StudyResult], airframe: str, speeds: Sequence[float]) -> list[StudyResult]:
     """The flights of one airframe at these speeds that hit the wall."""
     return [r for r in results if r.flight.key[0] == airframe and r.flight.key[1] in speeds and r.contacts]
 
 
-def is_lost(result: Result) -> bool:
+def is_lost(result: StudyResult) -> bool:
     """Whether the first hit was lost between the sensor and the companion."""
     return result.first.share_received < LOST_SHARE
 
 
-def worst_overshoot_m(results: Sequence[Result]) -> float:
+def worst_overshoot_m(results: Sequence[StudyResult]) -> float:
     return max((overshoot for result in results for overshoot in result.overshoots_m), default=0.0)
 
 
-def worst_overshoot_by_estimate_m(results: Sequence[Result]) -> float:
+def worst_overshoot_by_estimate_m(results: Sequence[StudyResult]) -> float:
     return max((overshoot for result in results for overshoot in result.overshoots_by_estimate_m), default=0.0)
 
 
-def _rows(results: Sequence[Result]) -> tuple[Row, ...]:
+def _rows(results: Sequence[StudyResult]) -> tuple[ClaimRow, ...]:
     foldable = of(results, "foldable", PAPER_SPEEDS_M_S)
     rigid = of(results, "rigid", PAPER_SPEEDS_M_S)
     seen = [result for result in rigid if not is_lost(result)]
@@ -89,7 +89,7 @@ def _rows(results: Sequence[Result]) -> tuple[Row, ...]:
     )
 
 
-def _text(results: Sequence[Result]) -> str:
+def _text(results: Sequence[StudyResult]) -> str:
     parts = [
         f"Head-on, seeds 1 to {SEEDS} at each speed; the pictures show seed 1. {sampling_text(results)} "
         "3 m/s and above are beyond the paper's flights.\n"
@@ -135,7 +135,7 @@ def safety_text(peak_force_n: float) -> str:
     return f"{factor:.2f}" if factor >= 1.0 else f"**{factor:.2f}**"
 
 
-def _cells(speed_m_s: float, results: Sequence[Result]) -> list[str]:
+def _cells(speed_m_s: float, results: Sequence[StudyResult]) -> list[str]:
     first = [result.first for result in results]
     peak_n = max(contact.hit.peak_force_n for result in results for contact in result.contacts)
     back_m = [
@@ -160,7 +160,7 @@ def _cells(speed_m_s: float, results: Sequence[Result]) -> list[str]:
     ]
 
 
-def _figure(results: Sequence[Result], airframe: str, speeds: Sequence[float]) -> Figure:
+def _figure(results: Sequence[StudyResult], airframe: str, speeds: Sequence[float]) -> Figure:
     """Position and velocity of seed 1 at each speed, one column a speed."""
     title = f"{airframe}: straight into a wall, recovery setpoint γ v_c back (γ = 0.5)"
     figure, axes = new_figure(2, len(speeds), title, width=3.9, height=3.2)

@@ -38,7 +38,7 @@ LEAN_LOOKED_AT_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class StudyFlight:
     """A mission's content, an airframe (a built-in one with changes) and a seed; `key` is the study's own."""
 
     key: tuple[Any, ...]
@@ -50,7 +50,7 @@ class Flight:
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class StudyContact:
     """A hit, and what the companion made of it: None where it did not see it. SI units."""
 
     hit: Hit
@@ -98,7 +98,7 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class StudyTrack:
     """A flight along the line into the wall that it hit first. Seconds since that contact; metres, m/s.
 
     Places count from the take-off point, into the wall positive.
@@ -120,12 +120,12 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class StudyResult:
     """What the studies need of a flight."""
 
-    flight: Flight
+    flight: StudyFlight
     is_completed: bool
-    contacts: tuple[Contact, ...]
+    contacts: tuple[StudyContact, ...]
     recontacts: int
     """Touches after the first, before the vehicle had recovered, 20 ms or more after the last ended."""
     false_detections: int
@@ -133,10 +133,10 @@ class Result:
     integration_interval_us: int
     greatest_lean_rad: float
     """Of the thrust towards the wall in the second after the first touch: what presses the vehicle back on."""
-    track: Track | None
+    track: StudyTrack | None
 
     @property
-    def first(self) -> Contact:
+    def first(self) -> StudyContact:
         return self.contacts[0]
 
     @property
@@ -154,7 +154,7 @@ class Result:
         return [each_m for each_m in past_m if each_m is not None]
 
 
-def fly(flight: Flight) -> Result:
+def fly(flight: StudyFlight) -> StudyResult:
     """Fly it in lockstep, all MAVLink bytes and the log on."""
     mission = BaselineMission.model_validate(dict(flight.mission))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
@@ -170,7 +170,7 @@ def fly(flight: Flight) -> Result:
     settled_duration_s = mission.companion.settled.duration_s
     matches = match_contacts(flown.report.collisions, flown.truth.hits, settled_duration_s)
     interval_us = airframe.imu.integration_interval_us
-    return Result(
+    return StudyResult(
         flight=flight,
         is_completed=flown.report.outcome == "completed",
         contacts=_contacts(flown, flown.truth, log, airframe, settled_duration_s),
@@ -185,7 +185,7 @@ def fly(flight: Flight) -> Result:
 
 def _contacts(
     flown: Flown, truth: FlightTruth, log: FlightLog, airframe: Airframe, settled_duration_s: float
-) -> tuple[Contact, ...]:
+) -> tuple[StudyContact, ...]:
     collisions = flown.report.collisions
     matches = match_contacts(collisions, truth.hits, settled_duration_s)
     entries = build_summary(flown, FlightFacts("", None, None, settled_duration_s))["collisions"]
@@ -196,7 +196,7 @@ def _contacts(
         collision = None if number is None else collisions[number]
         seen = None if number is None else entries[number]["truth"]
         contacts.append(
-            Contact(
+            StudyContact(
                 hit=hit,
                 share_received=share_received(log.imu_time_boot_us, airframe.imu.integration_interval_us, hit),
                 latency_s=None if seen is None else 1e-3 * seen["detection_latency_ms"],
@@ -234,7 +234,7 @@ def _greatest_lean_rad(truth: FlightTruth) -> float:
     return float(np.arcsin(np.clip(-np.array(hit.normal_ned) @ thrust_ned, -1.0, 1.0)).max())
 
 
-def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Track:
+def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> StudyTrack:
     report, hit = flown.report, truth.hits[0]
     into_wall = -np.array(hit.normal_ned)
     # What the vehicle was told lies in its own frame, and is drawn where that was at the first touch.
@@ -254,7 +254,7 @@ def _track(flown: Flown, truth: FlightTruth, log: FlightLog, scene: Scene) -> Tr
     kept = (time_s >= -TRACK_BEFORE_S) & (time_s <= TRACK_AFTER_S)
     setpoint_at_s = seconds(log.setpoint_at_us)
     asked = (setpoint_at_s >= -TRACK_BEFORE_S) & (setpoint_at_s <= TRACK_AFTER_S)
-    return Track(
+    return StudyTrack(
         time_s=time_s[kept],
         place_m=(truth.series["position_ned_m"][kept] - origin) @ into_wall,
         speed_m_s=truth.series["velocity_ned_m_s"][kept] @ into_wall,

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from bench.paper.approach import approach
 from bench.paper.figures import finish, new_figure
-from bench.paper.flights import Flight, Result
-from bench.paper.study import Findings
-from bench.paper.table import Row, at_least, at_most, markdown
+from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.study import StudyFindings
+from bench.paper.table import ClaimRow, at_least, at_most, markdown
 
 AIRFRAMES = ("foldable", "rigid")
 SPEED_M_S = 1.5
@@ -49,11 +49,11 @@ SAMPLINGS = (
 SLOWEST, FASTEST = SAMPLINGS[0], SAMPLINGS[6]
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     return [_flight(a, s, n) for a in AIRFRAMES for s in SAMPLINGS for n in range(1, SEEDS[a] + 1)]
 
 
-def _flight(airframe: str, sampling: Sampling, seed: int) -> Flight:
+def _flight(airframe: str, sampling: Sampling, seed: int) -> StudyFlight:
     companion = {
         "streams": {"highres_imu_hz": sampling.asked_hz, "min_highres_imu_hz": 1.0, "window_s": 1.0},
         "estimate": {"imu_averaging_interval_s": 1e-6 * sampling.interval_us},
@@ -62,21 +62,23 @@ def _flight(airframe: str, sampling: Sampling, seed: int) -> Flight:
     cruise_s = CRUISE_S + 0.0377 * seed
     mission = approach(SPEED_M_S, height_m=HEIGHT_M, cruise_s=cruise_s, companion=companion)
     changes = {"imu": {"integration_interval_us": sampling.interval_us}}
-    return Flight((airframe, sampling), mission, airframe, seed, changes)
+    return StudyFlight((airframe, sampling), mission, airframe, seed, changes)
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     flown = [result for result in results if result.contacts]
-    return Findings("Detection against the sensor's rate", _rows(flown), _text(flown), {"imu_rate.png": _figure(flown)})
+    return StudyFindings(
+        "Detection against the sensor's rate", _rows(flown), _text(flown), {"imu_rate.png": _figure(flown)}
+    )
 
 
-def detected_share(results: Sequence[Result], airframe: str, sampling: Sampling) -> float:
+def detected_share(results: Sequence[StudyResult], airframe: str, sampling: Sampling) -> float:
     """Share of the flights whose first hit was detected."""
     seen = [result.first.is_detected for result in results if result.flight.key == (airframe, sampling)]
     return float(np.mean(seen)) if seen else float("nan")
 
 
-def _rows(results: Sequence[Result]) -> tuple[Row, ...]:
+def _rows(results: Sequence[StudyResult]) -> tuple[ClaimRow, ...]:
     worst_foldable = min(detected_share(results, "foldable", s) for s in SAMPLINGS if s.asked_hz >= 50.0)
     return (
         at_least(
@@ -106,7 +108,7 @@ def _rows(results: Sequence[Result]) -> tuple[Row, ...]:
     )
 
 
-def _text(results: Sequence[Result]) -> str:
+def _text(results: Sequence[StudyResult]) -> str:
     head = (
         "mean of [ms]",
         "asked [Hz]",
@@ -138,7 +140,7 @@ raw sample is clipped at 16 g, so that a rigid hit shows as at most 157 m/s² ·
 {markdown(head, rows, left=0)}"""
 
 
-def _figure(results: Sequence[Result]) -> Figure:
+def _figure(results: Sequence[StudyResult]) -> Figure:
     figure, axes = new_figure(1, 2, f"First hit detected, head-on at {SPEED_M_S:g} m/s", width=6.0)
     for axis, airframe in zip(axes[0], AIRFRAMES, strict=True):
         for label in dict.fromkeys(s.label for s in SAMPLINGS):

@@ -40,7 +40,7 @@ POSSIBLE_AFTER_US = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class ResultsCase:
     """One flight of the table."""
 
     airframe: str
@@ -64,7 +64,7 @@ class HitFigures:
 class CaseFigures:
     """What one flight adds to the table."""
 
-    case: Case
+    case: ResultsCase
     is_completed: bool
     contacts: int
     false_detections: int
@@ -76,7 +76,7 @@ def run_results(options: Namespace) -> int:
     """Fly every case and write the table. 0 when the file is written, whatever it says."""
     make_place(options.out)
     cases = [
-        Case(airframe, speed_m_s, seed)
+        ResultsCase(airframe, speed_m_s, seed)
         for airframe in AIRFRAMES
         for speed_m_s in SPEEDS_M_S
         for seed in range(1, options.seeds + 1)
@@ -87,13 +87,13 @@ def run_results(options: Namespace) -> int:
     return 0
 
 
-def case_document(case: Case) -> Document:
+def case_document(case: ResultsCase) -> Document:
     """The mission of one flight, with the speed and all that is pinned put in."""
     sets = [f"{SPEED_PATH}={case.speed_m_s}", *PINNED]
     return load_mission_document(MISSION_FILE, sets, case.airframe, case.seed)
 
 
-def fly_case(case: Case) -> CaseFigures:
+def fly_case(case: ResultsCase) -> CaseFigures:
     """One lockstep flight with its log on, in a folder of its own that is removed afterwards."""
     document = case_document(case)
     mission, world = validated(BaselineMission, document, document.data), world_from(document)

@@ -16,9 +16,9 @@ from bench.paper.figures import (
     mark_moments,
     new_figure,
 )
-from bench.paper.flights import GAMMA_S, Flight, Result, Track
-from bench.paper.study import Findings, sampling_text
-from bench.paper.table import Row, around
+from bench.paper.flights import GAMMA_S, StudyFlight, StudyResult, StudyTrack
+from bench.paper.study import StudyFindings, sampling_text
+from bench.paper.table import ClaimRow, around
 from rebound_cli.inputs import load_mission_document
 
 MISSION_FILE = Path("missions/paper.yaml")
@@ -28,16 +28,16 @@ SEED = 1
 CROSSING_M_S, CONTACT_AFTER_S, IMPACT_M_S, REBOUND_M_S = 1.5, 0.2, 1.4, 0.28
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     mission = pinned(load_mission_document(MISSION_FILE, []).data)
-    return [Flight(("sample",), mission, "foldable", SEED, is_drawn=True)]
+    return [StudyFlight(("sample",), mission, "foldable", SEED, is_drawn=True)]
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     (result,) = results
     track = result.track
     assert track is not None, "the wall of the sample scenario is hit"
-    return Findings(
+    return StudyFindings(
         "Sample scenario",
         _rows(result, track),
         f"{sampling_text(results)} `rebound fly missions/paper.yaml --lockstep` flies the same, "
@@ -47,7 +47,7 @@ def conclude(results: Sequence[Result]) -> Findings:
     )
 
 
-def _rows(result: Result, track: Track) -> tuple[Row, ...]:
+def _rows(result: StudyResult, track: StudyTrack) -> tuple[ClaimRow, ...]:
     contact = result.first
     # x = 0 is crossed by the guards: from there to the touch they travel to the wall's 0.3 m.
     guard_m = track.place_m + (track.wall_m - track.touch_m)
@@ -85,7 +85,7 @@ def _rows(result: Result, track: Track) -> tuple[Row, ...]:
     )
 
 
-def _figure(track: Track) -> Figure:
+def _figure(track: StudyTrack) -> Figure:
     figure, axes = new_figure(2, 2, "The paper's sample scenario: wall 0.3 m ahead, target 2 m ahead")
     draw_position(axes[0, 0], track, "b: position", -0.5, 3.0)
     draw_velocity(axes[0, 1], track, "c: velocity", -0.5, 3.0)

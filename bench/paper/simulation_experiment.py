@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from bench.paper.approach import approach
 from bench.paper.figures import add_legend, draw_position, draw_velocity, new_figure
-from bench.paper.flights import GAMMA_S, Flight, Result, Track, Vector3
-from bench.paper.study import Findings, sampling_text
-from bench.paper.table import Row, around, at_most
+from bench.paper.flights import GAMMA_S, StudyFlight, StudyResult, StudyTrack, Vector3
+from bench.paper.study import StudyFindings, sampling_text
+from bench.paper.table import ClaimRow, around, at_most
 
 # The paper's figure of simulation and experiment; x(t_c) of its simulation is 0.6 m, of its experiment 0.4 m.
 SPEED_M_S, BACK_M, HEIGHT_M = 2.1, 1.05, 0.5
@@ -22,12 +22,14 @@ SEEDS = 8
 COMPANION = {"min_detection_height_m": 0.3}
 
 
-def flights(seeds: int) -> list[Flight]:
+def flights(seeds: int) -> list[StudyFlight]:
     mission = approach(SPEED_M_S, height_m=HEIGHT_M, companion=COMPANION)
-    return [Flight(("experiment", seed), mission, "foldable", seed, is_drawn=seed == 1) for seed in range(1, SEEDS + 1)]
+    return [
+        StudyFlight(("experiment", seed), mission, "foldable", seed, is_drawn=seed == 1) for seed in range(1, SEEDS + 1)
+    ]
 
 
-def conclude(results: Sequence[Result]) -> Findings:
+def conclude(results: Sequence[StudyResult]) -> StudyFindings:
     detected = [result.first for result in results if result.contacts and result.first.is_detected]
     errors_m_s = [(contact.impact_speed_estimate_m_s or 0.0) - contact.impact_speed_m_s for contact in detected]
     known_m = _back_m([(c.position_estimate_ned_m, c.setpoint_ned_m) for c in detected])
@@ -35,7 +37,7 @@ def conclude(results: Sequence[Result]) -> Findings:
     track = results[0].track
     assert track is not None, "the wall is hit"
     rows = _rows(float(np.mean([c.impact_speed_m_s for c in detected])), known_m, true_m, errors_m_s)
-    return Findings(
+    return StudyFindings(
         "Simulation against experiment",
         rows,
         _text(results, errors_m_s, known_m, true_m),
@@ -48,7 +50,7 @@ def _back_m(places: Sequence[tuple[Vector3 | None, Vector3 | None]]) -> float:
     return float(np.mean([before[0] - setpoint[0] for before, setpoint in places if before and setpoint]))
 
 
-def _rows(speed_m_s: float, known_m: float, true_m: float, errors_m_s: Sequence[float]) -> tuple[Row, ...]:
+def _rows(speed_m_s: float, known_m: float, true_m: float, errors_m_s: Sequence[float]) -> tuple[ClaimRow, ...]:
     rms_m_s = float(np.sqrt(np.mean(np.square(errors_m_s))))
     flown = len(errors_m_s)
     return (
@@ -83,7 +85,7 @@ def _rows(speed_m_s: float, known_m: float, true_m: float, errors_m_s: Sequence[
     )
 
 
-def _text(results: Sequence[Result], errors_m_s: Sequence[float], known_m: float, true_m: float) -> str:
+def _text(results: Sequence[StudyResult], errors_m_s: Sequence[float], known_m: float, true_m: float) -> str:
     worst = max(errors_m_s, key=abs)
     return f"""\
 ![position and velocity](images/paper/simulation_experiment.png)
@@ -99,7 +101,7 @@ def _text(results: Sequence[Result], errors_m_s: Sequence[float], known_m: float
 """
 
 
-def _figure(track: Track) -> Figure:
+def _figure(track: StudyTrack) -> Figure:
     figure, axes = new_figure(1, 2, "A hit at 2.1 m/s with γ = 0.5: the setpoint lies 1.05 m back")
     draw_position(axes[0, 0], track, "position")
     draw_velocity(axes[0, 1], track, "velocity")

@@ -6,16 +6,16 @@ from typing import Protocol
 
 from matplotlib.figure import Figure
 
-from bench.paper.flights import Flight, Result
-from bench.paper.table import Row
+from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.table import ClaimRow
 
 
 @dataclass(frozen=True, slots=True)
-class Findings:
+class StudyFindings:
     """`text` is Markdown; pictures by the name of their file; `sampling` stands beside the table of the rows."""
 
     title: str
-    rows: tuple[Row, ...]
+    rows: tuple[ClaimRow, ...]
     text: str
     pictures: Mapping[str, Figure] = field(default_factory=dict)
     sampling: str = ""
@@ -27,18 +27,18 @@ class Study(Protocol):
     Only the study of walls from any side grows with the seeds. The others fly what their pictures and rows need.
     """
 
-    def flights(self, seeds: int) -> list[Flight]: ...
+    def flights(self, seeds: int) -> list[StudyFlight]: ...
 
-    def conclude(self, results: Sequence[Result]) -> Findings: ...
+    def conclude(self, results: Sequence[StudyResult]) -> StudyFindings: ...
 
 
-def concluded(study: Study, results: Sequence[Result]) -> Findings:
+def concluded(study: Study, results: Sequence[StudyResult]) -> StudyFindings:
     """The study's findings, with how the inertial sensor was received in its flights."""
     sampling = sampling_text(results) if results else "Single hits of the simulated body: no telemetry in it."
     return replace(study.conclude(results), sampling=sampling)
 
 
-def sampling_text(results: Sequence[Result]) -> str:
+def sampling_text(results: Sequence[StudyResult]) -> str:
     """How the inertial sensor was received: the range over these flights."""
     rates = sorted(result.imu_received_hz for result in results)
     intervals = sorted({result.integration_interval_us for result in results})

@@ -7,7 +7,7 @@ PASSED, FAILED = "agrees", "**differs**"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ClaimRow:
     """One number. `low` and `high` are what ours may be; a row without bounds only reports."""
 
     claim: str
@@ -40,27 +40,27 @@ class Row:
         return f"at least {number(self.low)}" if self.low is not None else ""
 
 
-def around(claim: str, paper: str, expected: float, ours: float, unit: str, share: float, note: str = "") -> Row:
+def around(claim: str, paper: str, expected: float, ours: float, unit: str, share: float, note: str = "") -> ClaimRow:
     """A row whose tolerance is a share of the expected value: less than half, so that no factor of two fits."""
     assert 0.0 < share < 0.5, "a factor of two would pass"
     margin = share * abs(expected)
-    return Row(claim, paper, ours, unit, expected - margin, expected + margin, note)
+    return ClaimRow(claim, paper, ours, unit, expected - margin, expected + margin, note)
 
 
 def within_factor(
     claim: str, paper: str, expected: float, ours: float, unit: str, factor: float, note: str = ""
-) -> Row:
+) -> ClaimRow:
     """A row for a number that the paper gives in round figures ("≈") and without saying how it was measured."""
     assert 1.0 < factor < 2.0, "a factor of two would pass"
-    return Row(claim, paper, ours, unit, expected / factor, expected * factor, note)
+    return ClaimRow(claim, paper, ours, unit, expected / factor, expected * factor, note)
 
 
-def at_most(claim: str, paper: str, high: float, ours: float, unit: str, note: str = "") -> Row:
-    return Row(claim, paper, ours, unit, None, high, note)
+def at_most(claim: str, paper: str, high: float, ours: float, unit: str, note: str = "") -> ClaimRow:
+    return ClaimRow(claim, paper, ours, unit, None, high, note)
 
 
-def at_least(claim: str, paper: str, low: float, ours: float, unit: str, note: str = "") -> Row:
-    return Row(claim, paper, ours, unit, low, None, note)
+def at_least(claim: str, paper: str, low: float, ours: float, unit: str, note: str = "") -> ClaimRow:
+    return ClaimRow(claim, paper, ours, unit, low, None, note)
 
 
 def number(value: float) -> str:
@@ -69,7 +69,7 @@ def number(value: float) -> str:
     return "0" if float(text) == 0.0 else text
 
 
-def rows_text(rows: Sequence[Row]) -> str:
+def rows_text(rows: Sequence[ClaimRow]) -> str:
     return markdown(
         ("claim", "paper", "ours", "tolerance", "verdict", "remark"),
         [

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from bench.random_missions.crashes import heights_m
 from bench.random_missions.flight import JudgedFlight
-from bench.random_missions.phases import Phase, phases_of
+from bench.random_missions.phases import MissionPhase, phases_of
 from companion.report import CollisionReport
 from sim_vehicle.truth import Hit
 
@@ -34,12 +34,12 @@ class Role(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Contact:
+class JudgedContact:
     """`collision`: number of the companion's report of it, None where it was not noticed."""
 
     hit: Hit
     role: Role
-    phase: Phase
+    phase: MissionPhase
     collision: int | None
 
     @property
@@ -57,23 +57,23 @@ def _approach(hit: Hit) -> Floats:
     return velocity
 
 
-def contacts_of(flight: JudgedFlight) -> list[Contact]:
+def contacts_of(flight: JudgedFlight) -> list[JudgedContact]:
     """In the order in which they began."""
     phases = phases_of(flight.events, flight.truth.epoch_at_boot_us)
-    found: list[Contact] = []
+    found: list[JudgedContact] = []
     episode: list[Hit] = []
     for hit in flight.truth.hits:
         phase = phases.at(hit.contact_at_boot_us)
-        is_landing = phase in (Phase.LANDING, Phase.OVER, Phase.GROUND)
+        is_landing = phase in (MissionPhase.LANDING, MissionPhase.OVER, MissionPhase.GROUND)
         collision = None if is_landing else _seen_as(hit, flight.report.collisions)
         if is_landing:
             role = Role.LANDING
-        elif not episode or (phase is not Phase.RECOVERING and not _follows(hit, episode[-1])):
+        elif not episode or (phase is not MissionPhase.RECOVERING and not _follows(hit, episode[-1])):
             role, episode = Role.HIT, [hit]
         else:
             role = Role.AGAIN if any(same_surface(hit, earlier) for earlier in episode) else Role.NEXT
             episode.append(hit)
-        found.append(Contact(hit, role, phase, collision))
+        found.append(JudgedContact(hit, role, phase, collision))
     return found
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.random_missions.flight import JudgedFlight
-from bench.random_missions.phases import Phase, phases_of
+from bench.random_missions.phases import MissionPhase, phases_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def crashes(flight: JudgedFlight) -> Iterator[tuple[str, str]]:
         if sink_m_s > LANDING_SPEED_MOST_M_S:
             yield "fell", f"reached the ground with {sink_m_s:.1f} m/s {_at(flight, time_us[index])}"
         phase = phases_of(flight.events, flight.truth.epoch_at_boot_us).at(float(time_us[index]))
-        if phase not in (Phase.LANDING, Phase.OVER):
+        if phase not in (MissionPhase.LANDING, MissionPhase.OVER):
             yield "touched the ground", f"while {phase.value} {_at(flight, time_us[index])}"
     fence, start = flight.mission.fence, np.array(flight.start_ned_m)
     places = series["position_ned_m"][:: max(1, len(time_us) // 2000)] - start

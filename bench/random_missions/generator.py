@@ -7,7 +7,7 @@ from typing import Any
 
 from bench.random_missions.draw import DIGITS, Draw, towards
 from bench.random_missions.items import LOWEST_M, Route, motion_item, policy, quiet_item
-from bench.random_missions.rooms import MAX_HEIGHT_M, Room, draw_room
+from bench.random_missions.rooms import MAX_HEIGHT_M, DrawnRoom, draw_room
 from bench.random_missions.vehicle import companion_settings, drawn_vehicle
 from companion.errors import ReboundError
 from companion.mission.model import Mission
@@ -151,7 +151,7 @@ def _wind(draw: Draw) -> tuple[Part, float]:
     return found, most_m_s
 
 
-def _over_start(room: Room, draw: Draw, height_m: float) -> bool:
+def _over_start(room: DrawnRoom, draw: Draw, height_m: float) -> bool:
     """A level beam that the climb meets off-centre. Not where a ceiling leaves no way beside it."""
     if room.ceiling_m is not None or height_m < LOWEST_BEAM_M + 0.5:
         return False
@@ -164,7 +164,7 @@ def _over_start(room: Room, draw: Draw, height_m: float) -> bool:
     return True
 
 
-def _cart(room: Room, draw: Draw, route: Route) -> str:
+def _cart(room: DrawnRoom, draw: Draw, route: Route) -> str:
     """A box that comes to where the vehicle would hover, through free air, and goes away again."""
     way, speed_m_s = draw.heading(), draw.number(0.5, 2.0)
     far_m, size_m = draw.number(4.0, 6.0), draw.number(0.4, 1.0)
@@ -190,7 +190,7 @@ def _cart(room: Room, draw: Draw, route: Route) -> str:
     return _CART_EXTRA
 
 
-def _block(room: Room, draw: Draw, route: Route) -> str:
+def _block(room: DrawnRoom, draw: Draw, route: Route) -> str:
     """A low block on the edge of which a guard comes down, by less than its half."""
     size = [draw.number(0.4, 1.0), draw.number(0.4, 1.0), draw.number(0.2, 0.5)]
     way = draw.heading()
@@ -200,7 +200,7 @@ def _block(room: Room, draw: Draw, route: Route) -> str:
     return _BLOCK_EXTRA
 
 
-def _last(draw: Draw, room: Room) -> Part:
+def _last(draw: Draw, room: DrawnRoom) -> Part:
     if draw.happens(0.5):
         return {"land": {}}
     highest_m = min(room.highest_m, MAX_HEIGHT_M)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.random_missions.draw import DIGITS, Draw, NorthEast, towards
-from bench.random_missions.rooms import Room
+from bench.random_missions.rooms import DrawnRoom
 
 Part = dict[str, Any]
 
@@ -25,7 +25,7 @@ class Route:
     """Where the mission would be, were nothing hit."""
 
     draw: Draw
-    room: Room
+    room: DrawnRoom
     place_ne_m: NorthEast
     height_m: float
 

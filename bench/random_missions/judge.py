@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from bench.random_missions.contacts import Contact, Role, contacts_of, without_contact
+from bench.random_missions.contacts import JudgedContact, Role, contacts_of, without_contact
 from bench.random_missions.crashes import crashes
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.memory import given_up, repeated
@@ -50,7 +50,7 @@ def failures(flight: JudgedFlight) -> list[Failure]:
     return found
 
 
-def _noticing(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[Failure]:
+def _noticing(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[Failure]:
     for contact in contacts:
         if contact.role is Role.HIT and contact.collision is None and contact.closing_m_s >= NOTICED_M_S:
             text = f"{contact.hit.obstacle} at {contact.speed_m_s:.2f} m/s ({contact.closing_m_s:.2f} square to it)"
@@ -59,7 +59,7 @@ def _noticing(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[Fai
         yield Failure("answered a hit that was none", _at(flight, collision.sample_time_boot_us))
 
 
-def _places(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[str]:
+def _places(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[str]:
     """Goals, holds, home and landings, where the vehicle really was."""
     steps = program(flight.mission.items)
     goes_home = False
@@ -112,7 +112,7 @@ def _place(flight: JudgedFlight, event: Event) -> Floats:
     return place
 
 
-def _wandered_m(flight: JudgedFlight, begin: Event, end: Event, contacts: Sequence[Contact]) -> float:
+def _wandered_m(flight: JudgedFlight, begin: Event, end: Event, contacts: Sequence[JudgedContact]) -> float:
     """Furthest from where it was at first, unless something touched it."""
     first_us, last_us = flight.boot_us(begin), flight.boot_us(end)
     if any(first_us <= contact.hit.contact_at_boot_us <= last_us for contact in contacts):

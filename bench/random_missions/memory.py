@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from bench.random_missions.contacts import Contact, Role, same_surface
+from bench.random_missions.contacts import JudgedContact, Role, same_surface
 from bench.random_missions.flight import JudgedFlight
-from bench.random_missions.phases import Phase
+from bench.random_missions.phases import MissionPhase
 from companion.mission.items import GoToItem
 from companion.mission.program import program
 from companion.report import Event
@@ -25,9 +25,9 @@ OPEN_M = 1.5
 _LOOKS = 50
 
 
-def repeated(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[str]:
+def repeated(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> Iterator[str]:
     """Hits on a place that an earlier hit had shown, on a way that ought to have kept off it."""
-    answered: list[Contact] = []
+    answered: list[JudgedContact] = []
     for contact in contacts:
         if contact.role is not Role.HIT or contact.hit.contact_point_ned_m is None:
             continue
@@ -39,20 +39,20 @@ def repeated(flight: JudgedFlight, contacts: Sequence[Contact]) -> Iterator[str]
             answered.append(contact)
 
 
-def _keeps_off(flight: JudgedFlight, contact: Contact) -> bool:
+def _keeps_off(flight: JudgedFlight, contact: JudgedContact) -> bool:
     """A second try is meant to meet what stopped the first, a velocity is flown as it is."""
-    if contact.phase is Phase.RETURNING:
+    if contact.phase is MissionPhase.RETURNING:
         return True
     before = [event for event in flight.events if flight.boot_us(event) <= contact.hit.contact_at_boot_us]
     index = next((int(str(event.data["step"])) for event in reversed(before) if event.kind == "item"), None)
-    if contact.phase is not Phase.ITEM or index is None:
+    if contact.phase is not MissionPhase.ITEM or index is None:
         return False
     item = program(flight.mission.items)[index].item
     policy = item.on_collision or flight.mission.on_collision
     return item.name in ("go_to", "path", "orbit") and policy.then != "retry"
 
 
-def _is_known(contact: Contact, earlier: Contact) -> bool:
+def _is_known(contact: JudgedContact, earlier: JudgedContact) -> bool:
     """By where the vehicle takes the places to be: one that has lost its position by a metre cannot keep off them."""
     here, there = (_believed(touch.hit) for touch in (contact, earlier))
     return same_surface(contact.hit, earlier.hit) and float(np.linalg.norm(here - there)) <= KNOWN_M

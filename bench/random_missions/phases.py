@@ -8,7 +8,7 @@ from enum import Enum
 from companion.report import Event
 
 
-class Phase(Enum):
+class MissionPhase(Enum):
     GROUND = "on the ground"
     CLIMB = "take-off"
     ITEM = "item"
@@ -20,14 +20,14 @@ class Phase(Enum):
 
 
 _BEGUN_BY = {
-    "armed": Phase.CLIMB,
-    "item": Phase.ITEM,
-    "detection": Phase.RECOVERING,
-    "hold": Phase.HOLDING,
-    "return": Phase.RETURNING,
-    "landing": Phase.LANDING,
-    "done": Phase.OVER,
-    "aborted": Phase.OVER,
+    "armed": MissionPhase.CLIMB,
+    "item": MissionPhase.ITEM,
+    "detection": MissionPhase.RECOVERING,
+    "hold": MissionPhase.HOLDING,
+    "return": MissionPhase.RETURNING,
+    "landing": MissionPhase.LANDING,
+    "done": MissionPhase.OVER,
+    "aborted": MissionPhase.OVER,
 }
 
 
@@ -36,11 +36,11 @@ class Phases:
     """Times in microseconds of the vehicle's boot clock."""
 
     begins_us: tuple[float, ...]
-    phases: tuple[Phase, ...]
+    phases: tuple[MissionPhase, ...]
 
-    def at(self, boot_us: float) -> Phase:
+    def at(self, boot_us: float) -> MissionPhase:
         index = bisect_right(self.begins_us, boot_us) - 1
-        return self.phases[index] if index >= 0 else Phase.GROUND
+        return self.phases[index] if index >= 0 else MissionPhase.GROUND
 
     def end_of(self, boot_us: float) -> float | None:
         """When the phase of this moment ended; None if it did not."""

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.campaign.plan import Json
-from bench.random_missions.contacts import Contact, Role
+from bench.random_missions.contacts import JudgedContact, Role
 from bench.random_missions.crashes import tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.phases import phases_of
@@ -34,9 +34,9 @@ _LOOK_EVERY = 10
 _DIGITS = 4
 
 
-def recoveries(flight: JudgedFlight, contacts: Sequence[Contact]) -> list[Json]:
+def recoveries(flight: JudgedFlight, contacts: Sequence[JudgedContact]) -> list[Json]:
     """One for each hit, with what it touched until it had recovered; landings are none."""
-    episodes: list[list[Contact]] = []
+    episodes: list[list[JudgedContact]] = []
     for contact in contacts:
         if contact.role is Role.HIT:
             episodes.append([contact])
@@ -45,7 +45,7 @@ def recoveries(flight: JudgedFlight, contacts: Sequence[Contact]) -> list[Json]:
     return [_figures(flight, episode) for episode in episodes]
 
 
-def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
+def _figures(flight: JudgedFlight, episode: Sequence[JudgedContact]) -> Json:
     first = episode[0]
     normal = first.hit.normal_ned
     found: Json = {
@@ -69,7 +69,7 @@ def _figures(flight: JudgedFlight, episode: Sequence[Contact]) -> Json:
     return found | (_recovery(flight, seen[-1], episode) if seen else {})
 
 
-def _recovery(flight: JudgedFlight, contact: Contact, episode: Sequence[Contact]) -> Json:
+def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[JudgedContact]) -> Json:
     """After the last hit of an episode that was seen, to the setpoint that is flown to in the end."""
     hit, series = contact.hit, flight.truth.series
     collision, ended_us = _last_of_recovery(flight, contact)
@@ -112,7 +112,7 @@ def _past_m(hit: Hit, collision: CollisionReport, positions_ned_m: Floats) -> fl
     return max(0.0, float(((positions_ned_m - place_ned_m) @ direction).max(initial=0.0)))
 
 
-def _last_of_recovery(flight: JudgedFlight, contact: Contact) -> tuple[CollisionReport, float | None]:
+def _last_of_recovery(flight: JudgedFlight, contact: JudgedContact) -> tuple[CollisionReport, float | None]:
     """What the companion told last in the recovery from a contact, and the boot time at which that was over.
 
     Of a contact that goes on, from one wall of a corner to the other, it can tell more than once.
@@ -124,7 +124,7 @@ def _last_of_recovery(flight: JudgedFlight, contact: Contact) -> tuple[Collision
     return told[-1], ended_us
 
 
-def _returned(flight: JudgedFlight, first: Contact, before: Contact, touch: Contact) -> bool:
+def _returned(flight: JudgedFlight, first: JudgedContact, before: JudgedContact, touch: JudgedContact) -> bool:
     """Whether the centre had come back to a surface that is touched again; one that goes from corner to corner has."""
     if touch.role is not Role.AGAIN:
         return False
@@ -139,7 +139,7 @@ def _returned(flight: JudgedFlight, first: Contact, before: Contact, touch: Cont
     return (has_left or is_answered) and max(off_m) - off_m[-1] > CAME_BACK_M
 
 
-def _clear_m(flight: JudgedFlight, episode: Sequence[Contact], resting: Rows) -> float | None:
+def _clear_m(flight: JudgedFlight, episode: Sequence[JudgedContact], resting: Rows) -> float | None:
     """How much further from everything touched than when it was touched; the nearest while the vehicle rests."""
     series = flight.truth.series
     nearest = []

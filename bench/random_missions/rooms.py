@@ -22,7 +22,7 @@ FENCE_OFF_WALLS_M = 0.3
 
 
 @dataclass(slots=True)
-class Room:
+class DrawnRoom:
     """Obstacles as a mission's `sim:` part has them. Heights are above the ground."""
 
     kind: str
@@ -52,7 +52,7 @@ class Room:
         return {name: found for name, found in parts.items() if found}
 
 
-def draw_room(draw: Draw) -> Room:
+def draw_room(draw: Draw) -> DrawnRoom:
     """One of the kinds, with more in it now and then."""
     room = draw.one_of(list(KINDS))(draw)
     if draw.happens(0.3):
@@ -75,9 +75,9 @@ def wall(name: str, foot_ne_m: NorthEast, facing_rad: float, width_m: float, lea
     }
 
 
-def _closed(draw: Draw) -> Room:
+def _closed(draw: Draw) -> DrawnRoom:
     """Four walls, none of them quite square, somewhere around the start; the fence is often the room itself."""
-    room = Room("closed room")
+    room = DrawnRoom("closed room")
     turn = draw.heading()
     ahead, behind, right, left = (draw.number(1.5, 4.5) for _ in range(4))
     reach = [(ahead, right), (-behind, right), (-behind, -left), (ahead, -left)]
@@ -103,9 +103,9 @@ def _closed(draw: Draw) -> Room:
     return room
 
 
-def _free_walls(draw: Draw) -> Room:
+def _free_walls(draw: Draw) -> DrawnRoom:
     """One to three walls of any width, standing anywhere at any angle, some leaning."""
-    room = Room("free walls")
+    room = DrawnRoom("free walls")
     for number in range(draw.whole(1, 3)):
         bearing, distance_m = draw.heading(), draw.number(2.0, 5.0)
         slant = math.radians(draw.number(-60.0, 60.0))
@@ -120,9 +120,9 @@ def _free_walls(draw: Draw) -> Room:
     return room
 
 
-def _corner(draw: Draw) -> Room:
+def _corner(draw: Draw) -> DrawnRoom:
     """Two walls that meet at 60 to 130 degrees, the start between them."""
-    room = Room("corner")
+    room = DrawnRoom("corner")
     bearing, distance_m = draw.heading(), draw.number(2.5, 5.0)
     half = math.radians(draw.number(30.0, 65.0))
     apex = towards((0.0, 0.0), bearing, distance_m)
@@ -140,9 +140,9 @@ def _corner(draw: Draw) -> Room:
     return room
 
 
-def _corridor(draw: Draw) -> Room:
+def _corridor(draw: Draw) -> DrawnRoom:
     """Two walls that face each other, 2 to 4.5 m apart."""
-    room = Room("corridor")
+    room = DrawnRoom("corridor")
     along, width_m = draw.heading(), draw.number(2.0, 4.5)
     right_m = draw.number(0.9, width_m - 0.9)
     for name, side, off_m in (("right wall", 1.0, right_m), ("left wall", -1.0, width_m - right_m)):
@@ -154,15 +154,15 @@ def _corridor(draw: Draw) -> Room:
     return room
 
 
-def _poles(draw: Draw) -> Room:
-    room = Room("poles")
+def _poles(draw: Draw) -> DrawnRoom:
+    room = DrawnRoom("poles")
     _add_poles(room, draw, draw.whole(3, 7))
     return room
 
 
-def _boxes(draw: Draw) -> Room:
+def _boxes(draw: Draw) -> DrawnRoom:
     """Pillars, cupboards and low blocks."""
-    room = Room("boxes")
+    room = DrawnRoom("boxes")
     for number in range(draw.whole(1, 3)):
         size = [draw.number(0.3, 1.5), draw.number(0.3, 1.5), draw.number(0.6, 5.0)]
         half_m = 0.5 * math.hypot(size[0], size[1])
@@ -173,10 +173,10 @@ def _boxes(draw: Draw) -> Room:
     return room
 
 
-KINDS: tuple[Callable[[Draw], Room], ...] = (_closed, _free_walls, _corner, _corridor, _poles, _boxes)
+KINDS: tuple[Callable[[Draw], DrawnRoom], ...] = (_closed, _free_walls, _corner, _corridor, _poles, _boxes)
 
 
-def _add_poles(room: Room, draw: Draw, count: int) -> None:
+def _add_poles(room: DrawnRoom, draw: Draw, count: int) -> None:
     for _ in range(count):
         place = towards((0.0, 0.0), draw.heading(), draw.number(START_CLEAR_M + 0.6, 5.0))
         radius_m = draw.number(0.02, 0.3)
@@ -185,7 +185,7 @@ def _add_poles(room: Room, draw: Draw, count: int) -> None:
         room.aims.append(place)
 
 
-def _add_ceiling(room: Room, draw: Draw) -> None:
+def _add_ceiling(room: DrawnRoom, draw: Draw) -> None:
     """Level, or tilted by up to 5 degrees, over everything."""
     room.ceiling_m = draw.number(2.4, 3.4)
     tilt, way = math.radians(draw.number(0.0, 5.0)) if draw.happens(0.3) else 0.0, draw.heading()

@@ -8,7 +8,7 @@ from pathlib import Path
 from bench.campaign.plan import Campaign, Json
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.marked import checked_text, write_part
-from bench.recoveries.hits import AIRFRAMES, LAWS, SLANTS_DEG, SPEEDS_M_S, Case, of, recoveries_campaign
+from bench.recoveries.hits import AIRFRAMES, LAWS, SLANTS_DEG, SPEEDS_M_S, RecoveryCase, of, recoveries_campaign
 
 PART = "recoveries"
 
@@ -29,7 +29,7 @@ def write_table(path: Path, campaign: Campaign, results: Results, seeds: int) ->
     print(f"Written to {path}.")
 
 
-def _lines(cases: Sequence[Case], results: dict[int, Json], seeds: int) -> Iterator[str]:
+def _lines(cases: Sequence[RecoveryCase], results: dict[int, Json], seeds: int) -> Iterator[str]:
     yield f"`python -m bench campaign recoveries --seeds {seeds}`: {len(cases)} flights through the whole wire;"
     yield "each cell `paper` → `adaptive`. Settled: median; the others: the worst. Clear: the guards' distance at rest."
     yield "Touched again: flights, and in brackets those of them in which the centre had come back to the wall."
@@ -62,7 +62,7 @@ def _touched_again(flights: list[Json]) -> str:
     return f"{again} ({back})"
 
 
-def _summary(cases: Sequence[Case], results: dict[int, Json]) -> str:
+def _summary(cases: Sequence[RecoveryCase], results: dict[int, Json]) -> str:
     ratios = []
     paper, adaptive = (
         {(c.airframe, c.slant_deg, c.speed_m_s, c.seed): results.get(n) for n, c in enumerate(cases) if c.law == law}

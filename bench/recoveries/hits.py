@@ -35,7 +35,7 @@ HOLD_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class RecoveryCase:
     """A hit at a speed on a wall that stands square to the way or slanted."""
 
     law: str
@@ -45,9 +45,9 @@ class Case:
     seed: int
 
 
-def cases(seeds: int) -> list[Case]:
+def cases(seeds: int) -> list[RecoveryCase]:
     return [
-        Case(law, airframe, slant, speed, seed)
+        RecoveryCase(law, airframe, slant, speed, seed)
         for airframe in AIRFRAMES
         for slant in SLANTS_DEG
         for speed in SPEEDS_M_S
@@ -60,7 +60,7 @@ def recoveries_campaign(seeds: int) -> Campaign:
     return Campaign("recoveries", {"seeds": seeds}, cases(seeds), work_out)
 
 
-def mission_data(case: Case) -> dict[str, Any]:
+def mission_data(case: RecoveryCase) -> dict[str, Any]:
     """The mission: up, into the wall, hold, down."""
     speed = case.speed_m_s
     wall_m = round(0.5 * speed**2 / RUN_UP_M_S2 + STEADY_S * speed + 1.0, 3)
@@ -84,7 +84,7 @@ def mission_data(case: Case) -> dict[str, Any]:
     }
 
 
-def work_out(case: Case) -> Json:
+def work_out(case: RecoveryCase) -> Json:
     """Fly it in lockstep; what happened after the first hit, by the simulator's truth. SI units."""
     mission = Mission.model_validate(mission_data(case))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": case.airframe, "seed": case.seed})
@@ -137,7 +137,7 @@ def _returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
     return returned
 
 
-def of(all_cases: Sequence[Case], results: dict[int, Json], **wanted: object) -> list[Json]:
+def of(all_cases: Sequence[RecoveryCase], results: dict[int, Json], **wanted: object) -> list[Json]:
     """The results of the cases with these fields."""
     return [
         results[number]

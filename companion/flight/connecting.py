@@ -3,7 +3,7 @@
 from collections import deque
 
 from companion.flight.context import FlightContext, Inputs, Move, Target
-from companion.flight.guards import battery_complaint
+from companion.flight.early_end import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, RequestMessage, VehicleCommand
@@ -43,12 +43,12 @@ class Connect:
         self, flight: FlightContext, requests: deque[VehicleCommand], inputs: Inputs, now_us: int
     ) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
-        if flight.commander.busy:
+        if flight.command_client.busy:
             flight.command_outcome(inputs, False, now_us)
-        if flight.commander.busy:
+        if flight.command_client.busy:
             return
         if requests:
-            flight.commander.begin(requests.popleft())
+            flight.command_client.begin(requests.popleft())
             flight.command_outcome(Inputs(), False, now_us)
         else:
             self._measuring_since_us = now_us

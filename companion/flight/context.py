@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
-from companion.flight.commander import Commander, CommandOutcome
+from companion.flight.command_client import CommandClient, CommandOutcome
 from companion.flight.course import Pace
 from companion.flight.leaning import Leaning
 from companion.flight.pressing import Pressing
@@ -135,7 +135,7 @@ class FlightContext:
     mission: Mission
     vehicle: Vehicle
     streams: StreamMonitor
-    commander: Commander = field(default_factory=Commander)
+    command_client: CommandClient = field(default_factory=CommandClient)
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
     target: Target | None = None  # as last streamed
@@ -202,7 +202,7 @@ class FlightContext:
     @property
     def own_modes(self) -> tuple[int | None, ...]:
         """The modes that mean that the companion has the vehicle; none while it does not hold it."""
-        return () if self.expected_mode is None else (self.expected_mode, self.commander.requested_mode)
+        return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
 
     def may_ask(self, now_us: int) -> bool:
         """Whether a command that moves a held vehicle may leave: not on old news, which the pilot may have made untrue.
@@ -213,7 +213,7 @@ class FlightContext:
         if self.expected_mode is None or self.vehicle.is_mode_known:
             return True
         is_silent = now_us - self.vehicle.last_heard_us >= OLD_NEWS_US
-        return is_silent and self.vehicle.doubted_mode is None and self.commander.is_unsaid
+        return is_silent and self.vehicle.doubted_mode is None and self.command_client.is_unsaid
 
     def is_time_to_give_away(self, since_us: int, now_us: int) -> bool:
         """Whether a mode may be asked for that ends the holding: straight after a report of the mode.
@@ -226,8 +226,8 @@ class FlightContext:
         return is_over or (self.vehicle.mode_heard_us == now_us and self.vehicle.is_mode_known)
 
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
-        """Let the commander work on its command; failures are told."""
-        send, outcome = self.commander.step(inputs.acks, seen, now_us, self.may_ask(now_us))
+        """Let the command client go on with its command; failures are told."""
+        send, outcome = self.command_client.step(inputs.acks, seen, now_us, self.may_ask(now_us))
         if send is not None:
             self.outbox.append(send)
         if outcome is not None and not outcome.succeeded:

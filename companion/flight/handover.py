@@ -1,7 +1,7 @@
 """State aborted: give the vehicle to its own hold or land mode where that is wanted, then be silent."""
 
 from companion.flight.authority import Holder, who_decided
-from companion.flight.commander import ACK_TIMEOUT_US, ATTEMPTS
+from companion.flight.command_client import ACK_TIMEOUT_US, ATTEMPTS
 from companion.flight.context import FlightContext, Inputs, Move, Target
 from companion.messages import SetArmed, SetMode
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, mode_name
@@ -27,8 +27,8 @@ class HandOver:
 
     The mode is asked for straight after a report of the present one, so that whoever has taken the vehicle by then is
     seen first; whoever takes it later may have it, too. A vehicle that refuses to hold is asked to land. When the
-    commander gives up (about 2.5 s without an answer), and after LONGEST_US at the latest, the setpoints stop all the
-    same, and PX4's own loss-of-offboard action takes over.
+    command client gives up (about 2.5 s without an answer), and after LONGEST_US at the latest, the setpoints stop all
+    the same, and PX4's own loss-of-offboard action takes over.
     """
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
@@ -40,9 +40,9 @@ class HandOver:
         self._mode = AUTO_LAND if flight.mission.on_interrupt == "land" else AUTO_LOITER
         # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
         self._disarming = flight.arming_requested and flight.armed_at_us is None
-        flight.commander.cancel()
+        flight.command_client.cancel()
         if self._disarming:
-            flight.commander.begin(SetArmed(False))
+            flight.command_client.begin(SetArmed(False))
 
     def target(self, now_us: int) -> Target | None:
         return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target
@@ -63,7 +63,7 @@ class HandOver:
             if not flight.is_time_to_give_away(self._began_us, now_us):
                 return None
             self._is_asked = True
-            flight.commander.begin(SetMode(self._mode))
+            flight.command_client.begin(SetMode(self._mode))
         outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
         if outcome is None:
             return None
@@ -73,7 +73,7 @@ class HandOver:
             # PX4 holds only with a global position; without one (motion capture alone) it still lands.
             self._mode = AUTO_LAND
             flight.tell(now_us, "mode", "the vehicle does not hold: asking it to land")
-            flight.commander.begin(SetMode(self._mode))
+            flight.command_client.begin(SetMode(self._mode))
             return None
         self._finish(flight)
         return None
@@ -90,4 +90,4 @@ class HandOver:
 
     def _finish(self, flight: FlightContext) -> None:
         self.finished = True
-        flight.commander.cancel()
+        flight.command_client.cancel()

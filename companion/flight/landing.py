@@ -18,7 +18,7 @@ class Land:
         self._target = flight.target
         self._landing = False
         flight.is_landing = True
-        flight.commander.begin(SetMode(AUTO_LAND))
+        flight.command_client.begin(SetMode(AUTO_LAND))
 
     def target(self, now_us: int) -> Target | None:
         return None if self._landing else self._target
@@ -55,10 +55,10 @@ class TakeBack:
         self._recovery = recovery
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
-        self._is_asked = flight.commander.requested_mode == OFFBOARD
+        self._is_asked = flight.command_client.requested_mode == OFFBOARD
         self._ask_us = now_us + (0 if self._is_asked else LEAD_US)
         if not self._is_asked:
-            flight.commander.cancel()
+            flight.command_client.cancel()
 
     def target(self, now_us: int) -> Target | None:
         return self._recovery.target(now_us)
@@ -67,7 +67,7 @@ class TakeBack:
         if not self._is_taken and now_us >= self._ask_us:
             if not self._is_asked:
                 self._is_asked = True
-                flight.commander.begin(SetMode(OFFBOARD))
+                flight.command_client.begin(SetMode(OFFBOARD))
             outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
             if outcome is not None and not outcome.succeeded:
                 return Move(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")

@@ -7,7 +7,7 @@ from companion.flight import expecting
 from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
-from companion.flight.guards import ON_THE_GROUND, guard
+from companion.flight.early_end import ON_THE_GROUND, early_end
 from companion.flight.handover import HandOver, LetGo
 from companion.flight.landing import Land, TakeBack
 from companion.flight.progress import FlyItems, HoldAfterRecovery
@@ -37,7 +37,7 @@ class Machine:
         """Take all moves that are due; whether there were any."""
         before = self.activity
         if self.state not in FINAL_STATES:
-            self._take(guard(self.flight, self.state, inputs, now_us), now_us)
+            self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
         for estimate in inputs.impacts:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
                 if isinstance(self.activity, FlyItems):

@@ -68,7 +68,7 @@ class TakeOff:
         if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
             self._step = Step.MODE
             flight.expected_mode = flight.vehicle.custom_mode
-            flight.commander.begin(SetMode(OFFBOARD))
+            flight.command_client.begin(SetMode(OFFBOARD))
             return self._switch(flight, Inputs(), now_us)
         return None
 
@@ -81,7 +81,7 @@ class TakeOff:
         flight.expected_mode = OFFBOARD
         self._step = Step.ARM
         flight.arming_requested = True
-        flight.commander.begin(SetArmed(True))
+        flight.command_client.begin(SetArmed(True))
         return self._arm(flight, Inputs(), now_us)
 
     def _arm(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:

@@ -39,7 +39,7 @@ class StepAside:
         else:
             self._is_begun = True
             goal = flight.collisions[-1].setpoint_ned_m
-            flight.commander.begin(place_of(here, latest.position_ned_m, goal))
+            flight.command_client.begin(place_of(here, latest.position_ned_m, goal))
             flight.command_outcome(Inputs(), False, now_us)
 
 

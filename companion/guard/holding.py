@@ -29,7 +29,7 @@ class TakeOver:
         self._began_us = now_us
         flight = guard.flight
         if flight.vehicle.custom_mode != OFFBOARD:
-            flight.commander.begin(SetMode(OFFBOARD))
+            flight.command_client.begin(SetMode(OFFBOARD))
 
     def target(self, now_us: int) -> Target | None:
         return self.recover.target(now_us)
@@ -122,7 +122,7 @@ class GiveBack:
 
     def _ask(self, guard: GuardContext) -> None:
         if guard.flight.vehicle.custom_mode != self.wish:
-            guard.flight.commander.begin(SetMode(self.wish))
+            guard.flight.command_client.begin(SetMode(self.wish))
 
     def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
         flight = guard.flight

@@ -135,7 +135,7 @@ class GuardMachine:
         if self.state is State.GIVING_BACK and report.custom_mode == OFFBOARD:
             # Late: it was asked for, and given up.
             flight.expected_mode = expected = OFFBOARD
-        requested = flight.commander.requested_mode
+        requested = flight.command_client.requested_mode
         if isinstance(self.activity, GiveBack):
             requested = self.activity.wish
         holder = who_decided(report, expected, requested)
@@ -173,7 +173,7 @@ class GuardMachine:
     def _begin(self, move: Move, now_us: int) -> Activity:
         guard, flight = self.guard, self.guard.flight
         if self.state not in HOLDING:
-            flight.commander.cancel()
+            flight.command_client.cancel()
             flight.expected_mode = None
             if flight.collisions:
                 flight.collisions[-1].is_over = True
@@ -202,7 +202,7 @@ class GuardMachine:
         guard, flight = self.guard, self.guard.flight
         mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
         flight.tell(now_us, "take_over", f"taking over from {mode}", mode=mode)
-        flight.commander.cancel()
+        flight.command_client.cancel()
         return TakeOver(guard, Recover(flight, now_us), now_us)
 
     def _recover(self) -> Recover:

@@ -22,7 +22,7 @@ class StandDown:
         self._target: Target | None = None
         if for_sticks and flight.vehicle.custom_mode == OFFBOARD and flight.target is not None:
             self._target = flight.target.at_rest()
-            flight.commander.begin(SetMode(POSCTL))
+            flight.command_client.begin(SetMode(POSCTL))
 
     @property
     def hands_over(self) -> bool:
@@ -39,5 +39,5 @@ class StandDown:
             outcome = flight.command_outcome(inputs.flight, is_seen, now_us)
             if outcome is not None or now_us > self._until_us:
                 self._target = None
-                flight.commander.cancel()
+                flight.command_client.cancel()
         return Move(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None

@@ -71,12 +71,12 @@ class Connect:
     def _ask(self, guard: GuardContext, commands: list[VehicleCommand], inputs: GuardInputs, now_us: int) -> None:
         """A refused stream is no reason to stop: what counts is what then arrives."""
         flight = guard.flight
-        if flight.commander.busy:
+        if flight.command_client.busy:
             flight.command_outcome(inputs.flight, False, now_us)
-        if flight.commander.busy:
+        if flight.command_client.busy:
             return
         if commands:
-            flight.commander.begin(commands.pop(0))
+            flight.command_client.begin(commands.pop(0))
             flight.command_outcome(Inputs(), False, now_us)
         else:
             self._measuring_since_us = now_us

@@ -54,7 +54,7 @@ class StreamControl(Protocol):
         """Send one message at once; False for an unknown one and for one that has nothing new."""
 
 
-class Flight(Protocol):
+class CommandedFlight(Protocol):
     """What commands may do to the flight."""
 
     def request_mode(self, mode: Mode, says_so: str | None = None) -> Result:
@@ -113,7 +113,7 @@ def answer(command: Command, result: Result) -> CommandAck:
     return CommandAck(command.command, result, command.source_system, command.source_component)
 
 
-def execute(command: Command, flight: Flight) -> Result | None:
+def execute(command: Command, flight: CommandedFlight) -> Result | None:
     """The commander's part: does it and returns its answer; None leaves the command unanswered."""
     handler = _HANDLERS.get(command.command)
     return Result.UNSUPPORTED if handler is None else handler(command, flight)
@@ -141,7 +141,7 @@ def _sent(was_sent: bool) -> Result:
     return Result.ACCEPTED if was_sent else Result.DENIED
 
 
-def _set_mode(command: Command, flight: Flight) -> Result:
+def _set_mode(command: Command, flight: CommandedFlight) -> Result:
     base, main, sub = _byte(command.param1), _byte(command.param2), _byte(command.param3)
     mode = mode_from_request(base, main, sub)
     if mode is not None:
@@ -150,7 +150,7 @@ def _set_mode(command: Command, flight: Flight) -> Result:
     return flight.refuse_mode(f"Unsupported {kind} mode")
 
 
-def _arm_disarm(command: Command, flight: Flight) -> Result | None:
+def _arm_disarm(command: Command, flight: CommandedFlight) -> Result | None:
     action, forced = _whole(command.param1), _whole(command.param2) == FORCE
     if action not in (0, 1):
         flight.complain(f"Unsupported ARM_DISARM param: {command.param1:.3f}")
@@ -158,11 +158,11 @@ def _arm_disarm(command: Command, flight: Flight) -> Result | None:
     return flight.arm() if action == 1 else flight.disarm(forced)
 
 
-def _land(command: Command, flight: Flight) -> Result:
+def _land(command: Command, flight: CommandedFlight) -> Result:
     return flight.request_mode(Mode.LAND, says_so="Landing at current position")
 
 
-def _return(command: Command, flight: Flight) -> Result:
+def _return(command: Command, flight: CommandedFlight) -> Result:
     return flight.request_mode(Mode.RETURN, says_so="Returning to launch")
 
 

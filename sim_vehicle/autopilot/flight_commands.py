@@ -10,7 +10,7 @@ from typing import Protocol
 from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
 from sim_vehicle.autopilot.commander.modes import Mode
-from sim_vehicle.autopilot.flight_tasks.target import Kind, Target, Vector3
+from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, Vector3
 from sim_vehicle.autopilot.messages import Command, Result, Severity
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.navigator.mission import MissionCommand
@@ -68,7 +68,7 @@ def _reposition(command: Command, flight: SteeredFlight) -> Result:
     return flight.request_mode(Mode.LOITER)
 
 
-def _repositioned(command: Command, flight: SteeredFlight) -> Target:
+def _repositioned(command: Command, flight: SteeredFlight) -> NavigatorTarget:
     """Where DO_REPOSITION leads: a place, another height over the same, another heading, or a stop."""
     navigator = flight.navigator
     place, yaw_rad, altitude_m = _place(command, flight), _given(command.param4), _given(command.param7)
@@ -77,7 +77,7 @@ def _repositioned(command: Command, flight: SteeredFlight) -> Target:
         stays = yaw_rad is not None or altitude_m is not None
         place = navigator.held_place_ned_m if stays else navigator.stop_place_ned_m()
     speed_m_s = _given(command.param1)
-    return Target(
+    return NavigatorTarget(
         Kind.HOLD, (place[0], place[1], down_m), yaw_rad, speed_m_s if speed_m_s and speed_m_s > 0.0 else None
     )
 
@@ -88,11 +88,11 @@ def _change_altitude(command: Command, flight: SteeredFlight) -> Result:
         navigator = flight.navigator
         north, east, _ = navigator.held_place_ned_m
         down_m = navigator.view.position_ned_m[2] if altitude_m is None else flight.origin.place.altitude_m - altitude_m
-        _hold_at(Target(Kind.HOLD, (north, east, down_m)), "Altitude change", flight)
+        _hold_at(NavigatorTarget(Kind.HOLD, (north, east, down_m)), "Altitude change", flight)
     return flight.request_mode(Mode.LOITER)
 
 
-def _hold_at(target: Target, what: str, flight: SteeredFlight) -> None:
+def _hold_at(target: NavigatorTarget, what: str, flight: SteeredFlight) -> None:
     if not flight.navigator.hold_at(target):
         flight.say(Severity.CRITICAL, f"{what} is outside geofence")
 

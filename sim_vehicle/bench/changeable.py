@@ -7,7 +7,7 @@ from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.mavlink.faulty_link import FaultyLink
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.restamp import check_messages
-from sim_vehicle.physics.layout import Constants, State
+from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle, build_world
@@ -27,7 +27,7 @@ class ChangeableVehicle(SimulatedVehicle):
         return FaultyLink(options, self._board, number, seed, self._faults)
 
     @property
-    def state(self) -> State:
+    def state(self) -> PlantState:
         """What is really so."""
         return self._plant.state
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from sim_vehicle.bench.bench import Bench, Condition, Handle, ObstacleSpec, Setup
 from sim_vehicle.bench.faults import FaultRequest
-from sim_vehicle.bench.timeline import Event
+from sim_vehicle.bench.timeline import TimelineEntry
 from sim_vehicle.bench.truth import Truth
 from sim_vehicle.errors import ConditionNotMet
 from sim_vehicle.mavlink.link import LinkOptions
@@ -44,7 +44,7 @@ class LockstepVehicle:
         return self._bench.vehicle.truth
 
     @property
-    def timeline(self) -> tuple[Event, ...]:
+    def timeline(self) -> tuple[TimelineEntry, ...]:
         """What has happened so far."""
         return self._bench.timeline.events
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.layout import FEET, Constants, State
+from sim_vehicle.physics.layout import FEET, Constants, PlantState
 from sim_vehicle.physics.meeting import deepest_point
 from sim_vehicle.physics.rotation import matrix_from_quaternion, yaw_of
 from sim_vehicle.world import Motion, Wall
@@ -25,7 +25,7 @@ DURATION_S = LEAD_S + FOLLOW_S + RETREAT_S
 
 
 def strike(
-    state: State, constants: Constants, speed_m_s: float, bearing_deg: float, elevation_deg: float, name: str
+    state: PlantState, constants: Constants, speed_m_s: float, bearing_deg: float, elevation_deg: float, name: str
 ) -> Wall:
     """The plate; its motion begins now and takes DURATION_S.
 
@@ -54,7 +54,7 @@ def strike(
     )
 
 
-def _extent_m(state: State, constants: Constants, direction_ned: Floats) -> float:
+def _extent_m(state: PlantState, constants: Constants, direction_ned: Floats) -> float:
     """How far guards and hub reach from the centre of mass in a direction."""
     rotation, where, furthest_m = np.empty((3, 3)), np.empty(3), 0.0
     matrix_from_quaternion(state.body, rotation)

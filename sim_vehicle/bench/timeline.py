@@ -7,7 +7,7 @@ from sim_vehicle.truth import Hit
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class TimelineEntry:
     """One line of the timeline."""
 
     time_boot_s: float
@@ -22,20 +22,20 @@ class Timeline:
 
     def __init__(self, vehicle: ChangeableVehicle) -> None:
         self._vehicle = vehicle
-        self._events: list[Event] = []
+        self._events: list[TimelineEntry] = []
         self._mode, self._is_armed = vehicle.mode, vehicle.is_armed
         self._texts = vehicle.texts
         self._hits = self._begun = 0
         self._open: list[int] = []
 
     @property
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[TimelineEntry, ...]:
         """Oldest first; a hit is known when it is over and stands where it began."""
         return tuple(sorted(self._events, key=lambda event: event.time_boot_s))
 
     def note(self, text: str) -> None:
         """Something that was done to the vehicle."""
-        self._events.append(Event(self._vehicle.time_boot_us / 1e6, text))
+        self._events.append(TimelineEntry(self._vehicle.time_boot_us / 1e6, text))
 
     def look(self) -> None:
         """Note what has changed in the last interval."""
@@ -70,10 +70,10 @@ class Timeline:
                 self.note(f"fault {spans[index].kind} is over")
 
 
-def _of_hit(hit: Hit) -> Event:
+def _of_hit(hit: Hit) -> TimelineEntry:
     speed_m_s = -sum(
         (own - its) * n
         for own, its, n in zip(hit.impact_velocity_ned_m_s, hit.surface_velocity_ned_m_s, hit.normal_ned, strict=True)
     )
     text = f"hits '{hit.obstacle}' at {speed_m_s:.2f} m/s, for {1e3 * hit.contact_duration_s:.0f} ms"
-    return Event(1e-6 * hit.contact_at_boot_us, f"{text}, with at most {hit.peak_force_n:.0f} N")
+    return TimelineEntry(1e-6 * hit.contact_at_boot_us, f"{text}, with at most {hit.peak_force_n:.0f} N")

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.inertia import times
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, Constants, Gains, State
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, Constants, Gains, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 
 Floats = npt.NDArray[np.float64]
@@ -16,7 +16,7 @@ ATTITUDE_LOOP_HZ = 150
 
 
 @njit
-def attitude_control(state: State, constants: Constants, yaw_rate_rad_s: float, gains: Gains) -> None:
+def attitude_control(state: PlantState, constants: Constants, yaw_rate_rad_s: float, gains: Gains) -> None:
     """Set the moment tau of ``state``: tau = -k_R e_R - k_W e_W + W x J W + J' W (eq. 5).
 
     e_R = (R_d^T R - R^T R_d)^vee / 2 and e_W = W - R^T R_d W_d (eq. 4), where the asked rate W_d is the
@@ -41,7 +41,7 @@ def attitude_control(state: State, constants: Constants, yaw_rate_rad_s: float, 
 
 
 @njit
-def rate_control(state: State, constants: Constants, asked_frd_rad_s: Floats, gains: Gains) -> None:
+def rate_control(state: PlantState, constants: Constants, asked_frd_rad_s: Floats, gains: Gains) -> None:
     """Set the moment of ``state`` for asked body rates: eq. 5 without its e_R."""
     rates = np.empty(3)
     for i in range(3):
@@ -52,7 +52,7 @@ def rate_control(state: State, constants: Constants, asked_frd_rad_s: Floats, ga
 
 
 @njit
-def _carried(state: State, rates: Floats) -> Floats:
+def _carried(state: PlantState, rates: Floats) -> Floats:
     """W x J W + J' W, what the body's own turning calls for."""
     p, q, r_z = rates[0], rates[1], rates[2]
     x, y, z = times(state.inertia, p, q, r_z)
@@ -61,13 +61,13 @@ def _carried(state: State, rates: Floats) -> Floats:
 
 
 @njit
-def take_thrust(state: State, constants: Constants, thrust: float) -> None:
+def take_thrust(state: PlantState, constants: Constants, thrust: float) -> None:
     """The collective thrust f as it is asked for, a fraction of all that the motors have."""
     state.collective_n = thrust * 4 * constants.motor_max_n
 
 
 @njit
-def allocate_motors(state: State, constants: Constants, motor_radius_m: float) -> None:
+def allocate_motors(state: PlantState, constants: Constants, motor_radius_m: float) -> None:
     """Share thrust and moment among the motors: roll and pitch first, then thrust, then yaw.
 
     A vehicle that cannot have everything must at least stay upright; yaw matters least.

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import GRAVITY_M_S2, Asked, Gains, State
+from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
 
 Floats = npt.NDArray[np.float64]
@@ -21,12 +21,12 @@ YAW_STEP_MAX_RAD = 0.5
 THRUST_MIN = 0.12
 HORIZONTAL_MARGIN = 0.3
 
-# Rows of `Asked`.
+# Rows of `SetpointRows`.
 ASK_POSITION, ASK_VELOCITY, ASK_ACCELERATION = range(3)
 
 
 @njit
-def position_control(state: State, mass_kg: float, motor_max_n: float, asked: Asked, gains: Gains) -> None:
+def position_control(state: PlantState, mass_kg: float, motor_max_n: float, asked: SetpointRows, gains: Gains) -> None:
     """Set thrust f and attitude R_d of ``state`` from what is asked (NED, SI).
 
     The D acts on the measured slope only: the paper's d/dt e_v would kick at every new setpoint.
@@ -46,7 +46,7 @@ def position_control(state: State, mass_kg: float, motor_max_n: float, asked: As
 
 
 @njit
-def _axis_acceleration(axis: int, state: State, asked: Asked, gains: Gains) -> float:
+def _axis_acceleration(axis: int, state: PlantState, asked: SetpointRows, gains: Gains) -> float:
     """One axis of eq. 6: v_d = k_p e_x, then PID on e_v; feed-forwards added where they are asked for."""
     feed_forward: float = asked.value[ASK_ACCELERATION, axis] if asked.given[ASK_ACCELERATION, axis] else 0.0
     controls_velocity = asked.given[ASK_POSITION, axis] or asked.given[ASK_VELOCITY, axis]
@@ -91,7 +91,7 @@ def _thrust(acceleration: Floats, tilt_max_rad: float, most_m_s2: float) -> None
 
 
 @njit
-def _attitude(state: State, thrust: Floats) -> None:
+def _attitude(state: PlantState, thrust: Floats) -> None:
     """R_d with b3 against the thrust and the nose towards the asked yaw."""
     b3 = -thrust / math.sqrt(thrust @ thrust)
     yaw_now = yaw_of(state.estimate)

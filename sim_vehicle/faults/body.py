@@ -5,7 +5,7 @@ import numpy as np
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import BatterySag, FreeFall, HandCatch, MotorFailure, PayloadDrop, Push
 from sim_vehicle.faults.wind import risen
-from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.layout import Disturbance, PlantState
 
 
 class Motors(Group[MotorFailure | FreeFall | BatterySag]):
@@ -15,7 +15,7 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
         super().__init__()
         self.voltage_share = 1.0
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         shares, self.voltage_share = [1.0] * 4, 1.0
         for fault in self._faults:
             start_s, end_s = fault.window_s
@@ -37,14 +37,14 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
 class Load(Group[PayloadDrop]):
     """What the vehicle still carries."""
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         disturbance.carried_kg = sum(drop.mass_kg for drop in self._faults if time_s < drop.window_s[0])
 
 
 class Pushes(Group[Push]):
     """Forces on a point of the body, one at a time."""
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         disturbance.pushes = 0
         for push in self._faults:
             start_s, end_s = push.window_s
@@ -62,7 +62,7 @@ class Hands(Group[HandCatch]):
         super().__init__()
         self._held: HandCatch | None = None
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         held = None
         for catch in self._faults:
             start_s, end_s = catch.window_s

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import AidingLoss, EstimatorAfterClipping, EstimatorReset
-from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.layout import Disturbance, PlantState
 
 Floats = npt.NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
         super().remove(fault)
         self._pending = [reset for reset in self._pending if reset is not fault]
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         self._velocity *= np.exp(-self._step_s / self._settles_s)
         self._jump(time_s)
         self._switch(time_s, state)
@@ -55,7 +55,7 @@ class Estimate(Group[EstimatorReset | EstimatorAfterClipping | AidingLoss]):
             self._settles_s = reset.settles_s
             self.reset_counter += 1
 
-    def _switch(self, time_s: float, state: State) -> None:
+    def _switch(self, time_s: float, state: PlantState) -> None:
         """After a clipped hit resets follow, each leaving an error of its own."""
         for fault in self._faults:
             if not isinstance(fault, EstimatorAfterClipping):

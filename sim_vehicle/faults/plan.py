@@ -30,7 +30,7 @@ from sim_vehicle.faults.spec import (
     Vibration,
 )
 from sim_vehicle.faults.wind import Air
-from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.layout import Disturbance, PlantState
 from sim_vehicle.truth import FaultSpan
 from sim_vehicle.world import Vector3
 
@@ -59,7 +59,7 @@ class Faults:
             ((Vibration,), self._shaking),
             ((EstimatorReset, EstimatorAfterClipping, AidingLoss), self._estimate),
         )
-        self._acts: list[Callable[[float, State, Disturbance], None]] = []
+        self._acts: list[Callable[[float, PlantState, Disturbance], None]] = []
         self._faults: dict[int, Fault] = {}
         self._count = 0
         self._ahead: list[tuple[float, int]] = []
@@ -101,11 +101,11 @@ class Faults:
         """What is left of the supply's voltage."""
         return self._motors.voltage_share
 
-    def begin(self, state: State) -> None:
+    def begin(self, state: PlantState) -> None:
         """Write what is different from the start on."""
         self._shaking.scatter(state, self._rng)
 
-    def before(self, state: State, disturbance: Disturbance) -> None:
+    def before(self, state: PlantState, disturbance: Disturbance) -> None:
         """Write what holds for the interval that begins now, and note what has begun and ended."""
         time_us = int(state.time_us)
         time_s = time_us / 1e6

@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import ImuBias, ImuStuck, Vibration
-from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.layout import Disturbance, PlantState
 
 _AXES = ("accelerometer_x", "accelerometer_y", "accelerometer_z", "gyroscope_x", "gyroscope_y", "gyroscope_z")
 
@@ -14,7 +14,7 @@ _AXES = ("accelerometer_x", "accelerometer_y", "accelerometer_z", "gyroscope_x",
 class Shaking(Group[Vibration]):
     """Vibration of the rotors, several sources of it adding as powers do."""
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         squares = np.zeros((2, 4))
         for vibration in self._faults:
             start_s, end_s = vibration.window_s
@@ -29,7 +29,7 @@ class Shaking(Group[Vibration]):
         disturbance.shakes = int(squares.any())
 
     @staticmethod
-    def scatter(state: State, rng: np.random.Generator) -> None:
+    def scatter(state: PlantState, rng: np.random.Generator) -> None:
         """Let the rotors start at different places of their turn."""
         state.rotor_phase[:] = rng.uniform(0.0, 2.0 * math.pi, 4)
 
@@ -41,7 +41,7 @@ class InertialSensor(Group[ImuBias | ImuStuck]):
         super().__init__()
         self._raw_per_interval = raw_per_interval
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         biases, stuck = np.zeros(6), np.zeros(6, np.int64)
         for fault in self._faults:
             start_s, end_s = fault.window_s

@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import Gust, Turbulence
-from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.layout import Disturbance, PlantState
 from sim_vehicle.world import Vector3
 
 _FOOT_M = 0.3048
@@ -98,7 +98,7 @@ class Air(Group[Gust | Turbulence]):
         super().remove(fault)
         self._drydens = [(kept, dryden) for kept, dryden in self._drydens if kept is not fault]
 
-    def act(self, time_s: float, state: State, disturbance: Disturbance) -> None:
+    def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
         wind = self._steady_ned_m_s.copy()
         for gust in self._faults:
             if isinstance(gust, Gust):

@@ -25,14 +25,14 @@ STARTING_TIMEOUT_US = 20_000_000
 FIRST_ANSWER_WORDS = "PX4 answers"
 
 
-class Phase(Enum):
+class ExchangePhase(Enum):
     WAITING = auto()
     STARTING = auto()
     READY = auto()
     AWAITING = auto()
 
 
-class Event(Enum):
+class ExchangeEvent(Enum):
     CONNECTED = auto()
     SENT = auto()
     ANSWERED = auto()
@@ -41,16 +41,16 @@ class Event(Enum):
 
 
 # Every move there is; anything else is a fault of the program around it and raises KeyError.
-MOVES: dict[tuple[Phase, Event], Phase] = {
-    (Phase.WAITING, Event.CONNECTED): Phase.STARTING,
-    (Phase.STARTING, Event.SENT): Phase.STARTING,
-    (Phase.STARTING, Event.ANSWERED): Phase.READY,
-    (Phase.STARTING, Event.CLOSED): Phase.WAITING,
-    (Phase.READY, Event.SENT): Phase.AWAITING,
-    (Phase.READY, Event.CLOSED): Phase.WAITING,
-    (Phase.AWAITING, Event.ANSWERED): Phase.READY,
-    (Phase.AWAITING, Event.OVERDUE): Phase.READY,
-    (Phase.AWAITING, Event.CLOSED): Phase.WAITING,
+MOVES: dict[tuple[ExchangePhase, ExchangeEvent], ExchangePhase] = {
+    (ExchangePhase.WAITING, ExchangeEvent.CONNECTED): ExchangePhase.STARTING,
+    (ExchangePhase.STARTING, ExchangeEvent.SENT): ExchangePhase.STARTING,
+    (ExchangePhase.STARTING, ExchangeEvent.ANSWERED): ExchangePhase.READY,
+    (ExchangePhase.STARTING, ExchangeEvent.CLOSED): ExchangePhase.WAITING,
+    (ExchangePhase.READY, ExchangeEvent.SENT): ExchangePhase.AWAITING,
+    (ExchangePhase.READY, ExchangeEvent.CLOSED): ExchangePhase.WAITING,
+    (ExchangePhase.AWAITING, ExchangeEvent.ANSWERED): ExchangePhase.READY,
+    (ExchangePhase.AWAITING, ExchangeEvent.OVERDUE): ExchangePhase.READY,
+    (ExchangePhase.AWAITING, ExchangeEvent.CLOSED): ExchangePhase.WAITING,
 }
 
 
@@ -58,7 +58,7 @@ class Exchange:
     """One PX4 after the other. ``now_us`` is the machine's time, ``time_us`` the vehicle's and PX4's."""
 
     def __init__(self) -> None:
-        self.phase = Phase.WAITING
+        self.phase = ExchangePhase.WAITING
         self.notices: list[str] = []
         """Sentences for the person at the terminal; whoever shows them clears the list."""
         self._forget()
@@ -75,25 +75,25 @@ class Exchange:
 
     def connected(self, now_us: int) -> None:
         """PX4 has connected: the vehicle that it gets must be a new one, with its clock at zero."""
-        self._move(Event.CONNECTED)
+        self._move(ExchangeEvent.CONNECTED)
         self._forget()
         self._connected_at_us = now_us
         self._sent_at_us = now_us - STARTING_PERIOD_US
 
     def closed(self) -> None:
         """The connection has ended; PX4 does not come back to it, only a new PX4 does."""
-        self._move(Event.CLOSED)
+        self._move(ExchangeEvent.CLOSED)
         self._forget()
 
     def next_sample_at_us(self) -> int | None:
         """The machine's time from which the next sample may go out; None while an answer is awaited."""
-        if self.phase is Phase.STARTING:
+        if self.phase is ExchangePhase.STARTING:
             return self._sent_at_us + STARTING_PERIOD_US
-        return self._sent_at_us if self.phase is Phase.READY else None
+        return self._sent_at_us if self.phase is ExchangePhase.READY else None
 
     def sent(self, time_us: int, now_us: int) -> None:
         """A sample of that time has gone out."""
-        self._move(Event.SENT)
+        self._move(ExchangeEvent.SENT)
         self._sent_time_us = time_us
         self._sent_at_us = now_us
 
@@ -104,29 +104,29 @@ class Exchange:
                 "PX4's clock does not follow the simulator's: build PX4 with lockstep, which `make px4_sitl` does."
             )
         self.motor_fractions = controls.motor_fractions if controls.armed else MOTORS_STOPPED
-        if self.phase is Phase.STARTING:
+        if self.phase is ExchangePhase.STARTING:
             self.notices.append(f"{FIRST_ANSWER_WORDS}: lockstep from {1e-6 * controls.time_us:.3f} s on.")
-            self._move(Event.ANSWERED)
-        elif self.phase is Phase.AWAITING and controls.time_us == self._sent_time_us:
-            self._move(Event.ANSWERED)
+            self._move(ExchangeEvent.ANSWERED)
+        elif self.phase is ExchangePhase.AWAITING and controls.time_us == self._sent_time_us:
+            self._move(ExchangeEvent.ANSWERED)
         else:
             # An answer to a sample before the last: sent while booting, or given up already.
             self.late_answers += 1
 
     def look_at_clock(self, now_us: int) -> None:
         """Give up an answer that is overdue, and say when PX4 does not begin to answer at all."""
-        if self.phase is Phase.AWAITING and now_us - self._sent_at_us >= ANSWER_TIMEOUT_US:
-            self._move(Event.OVERDUE)
+        if self.phase is ExchangePhase.AWAITING and now_us - self._sent_at_us >= ANSWER_TIMEOUT_US:
+            self._move(ExchangeEvent.OVERDUE)
             if self.overdue_answers == 0:
                 self.notices.append(f"PX4 has not answered for {1e-6 * ANSWER_TIMEOUT_US:.0f} s; waiting for it.")
             self.overdue_answers += 1
         is_late = now_us - self._connected_at_us >= STARTING_TIMEOUT_US
-        if self.phase is Phase.STARTING and is_late and not self._is_starting_explained:
+        if self.phase is ExchangePhase.STARTING and is_late and not self._is_starting_explained:
             self._is_starting_explained = True
             self.notices.append(
                 f"PX4 has sent no motor commands for {1e-6 * STARTING_TIMEOUT_US:.0f} s after connecting: "
                 "look at its console, and whether its airframe is a multicopter with PWM_MAIN_FUNC1..4 set."
             )
 
-    def _move(self, event: Event) -> None:
+    def _move(self, event: ExchangeEvent) -> None:
         self.phase = MOVES[self.phase, event]

@@ -103,7 +103,7 @@ def local_position_ned(state: Telemetry) -> Message:
 def attitude(state: Telemetry) -> Message:
     sample = state.sample
     angles = (*roll_pitch_of(sample.attitude_wxyz), yaw_of(sample.attitude_wxyz))
-    return framing.Attitude(boot_ms(sample), *angles, *sample.angular_velocity_frd_rad_s)
+    return framing.PackedAttitude(boot_ms(sample), *angles, *sample.angular_velocity_frd_rad_s)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
@@ -116,7 +116,7 @@ def attitude_quaternion(state: Telemetry) -> Message:
 def odometry(state: Telemetry) -> Message:
     """Velocity is NED too (child frame 1), unlike what the message's definition suggests."""
     estimate = state.published
-    return framing.Odometry(
+    return framing.PackedOdometry(
         estimate.time_boot_us,
         *estimate.position_ned_m,
         *estimate.attitude_wxyz,

@@ -60,7 +60,7 @@ class HighresImu(Packed, of=dialect.MAVLink_highres_imu_message):
     __slots__ = ()
 
 
-class Attitude(Packed, of=dialect.MAVLink_attitude_message):
+class PackedAttitude(Packed, of=dialect.MAVLink_attitude_message):
     __slots__ = ()
 
 
@@ -68,7 +68,7 @@ class AttitudeQuaternion(Packed, of=dialect.MAVLink_attitude_quaternion_message)
     __slots__ = ()
 
 
-class AttitudeTarget(Packed, of=dialect.MAVLink_attitude_target_message):
+class PackedAttitudeTarget(Packed, of=dialect.MAVLink_attitude_target_message):
     __slots__ = ()
 
 
@@ -80,5 +80,5 @@ class GlobalPositionInt(Packed, of=dialect.MAVLink_global_position_int_message):
     __slots__ = ()
 
 
-class Odometry(Packed, of=dialect.MAVLink_odometry_message):
+class PackedOdometry(Packed, of=dialect.MAVLink_odometry_message):
     __slots__ = ()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim_vehicle.physics.layout import ASKED_ATTITUDE, ASKED_RATES, ASKED_TRAJECTORY, Asked
+from sim_vehicle.physics.layout import ASKED_ATTITUDE, ASKED_RATES, ASKED_TRAJECTORY, SetpointRows
 from sim_vehicle.physics.record import boxed, new_record
 from sim_vehicle.physics.rotation import matrix_from_quaternion
 from sim_vehicle.setpoint import AttitudeSetpoint, RatesSetpoint, Setpoint, TrajectorySetpoint
@@ -12,7 +12,7 @@ class AskedSetpoint:
     """A record of the kernels that follows the setpoints; `box` is what they are handed."""
 
     def __init__(self) -> None:
-        self._asked = new_record(Asked)
+        self._asked = new_record(SetpointRows)
         self.box = boxed(self._asked)
         # Views into the record, taken once: looking a field up in Python costs microseconds.
         self._value, self._given = self._asked.value.reshape(-1), self._asked.given.reshape(-1)

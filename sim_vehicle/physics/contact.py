@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import GUARDS, HUB, Contact, Scratch, State
+from sim_vehicle.physics.layout import GUARDS, HUB, ContactSprings, PlantState, Scratch
 from sim_vehicle.physics.meeting import meet
 from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, NEAR, points_at
 from sim_vehicle.physics.rotation import matrix_from_quaternion
@@ -20,7 +20,7 @@ FRICTION_SPEED_M_S = 0.02
 
 
 @njit
-def arm_force(fold_m: float, fold_speed_m_s: float, contact: Contact) -> float:
+def arm_force(fold_m: float, fold_speed_m_s: float, contact: ContactSprings) -> float:
     """Force along an arm at this fold and folding speed, newtons, never negative (eq. 2, then the stop)."""
     force = contact.arm_stiffness * fold_m + contact.arm_damping * fold_speed_m_s
     beyond = fold_m - contact.fold_max_m
@@ -30,7 +30,9 @@ def arm_force(fold_m: float, fold_speed_m_s: float, contact: Contact) -> float:
 
 
 @njit
-def point_force(point: int, depth: float, speed_in: float, share: float, relaxed_m: float, contact: Contact) -> float:
+def point_force(
+    point: int, depth: float, speed_in: float, share: float, relaxed_m: float, contact: ContactSprings
+) -> float:
     """Normal force on one point at ``depth`` (m) going in at ``speed_in`` (m/s), newtons.
 
     A guard whose arm is still folded from before touches only when pressed in further than ``relaxed_m``.
@@ -56,7 +58,7 @@ def contact_wrench(
     rotation: Floats,
     behind: Ints,
     near: Ints,
-    contact: Contact,
+    contact: ContactSprings,
     faces: Floats,
     scratch: Scratch,
     normal_forces: Floats,
@@ -123,7 +125,7 @@ def _add_push(
 
 
 @njit
-def relax_arms(state: State, step_s: float, contact: Contact, relaxed_m: Floats) -> None:
+def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxed_m: Floats) -> None:
     """Write how far each arm would be folded after ``step_s`` with nothing pressing it.
 
     An arm under a wall can follow a leaving vehicle as fast as its own force is zero, b_s l' = -k_s l (faster out of
@@ -146,7 +148,7 @@ def relax_arms(state: State, step_s: float, contact: Contact, relaxed_m: Floats)
 
 
 @njit
-def _returning_m_s(fold_m: float, contact: Contact) -> float:
+def _returning_m_s(fold_m: float, contact: ContactSprings) -> float:
     """How fast an arm without mass goes out."""
     returning: float = contact.arm_stiffness * fold_m / contact.arm_damping
     beyond = fold_m - contact.fold_max_m
@@ -158,12 +160,12 @@ def _returning_m_s(fold_m: float, contact: Contact) -> float:
 
 @njit
 def settle_arms(
-    state: State,
+    state: PlantState,
     behind: Ints,
     near: Ints,
     touches: bool,
     step_s: float,
-    contact: Contact,
+    contact: ContactSprings,
     faces: Floats,
     scratch: Scratch,
 ) -> None:
@@ -183,7 +185,9 @@ def settle_arms(
 
 
 @njit
-def settle_contacts(state: State, behind: Ints, near: Ints, contact: Contact, faces: Floats, scratch: Scratch) -> None:
+def settle_contacts(
+    state: PlantState, behind: Ints, near: Ints, contact: ContactSprings, faces: Floats, scratch: Scratch
+) -> None:
     """Press the arms that a face presses, and note how deep every part is."""
     # The rotation of the step's end: the next step must find the arm exactly where this one leaves it.
     matrix_from_quaternion(state.body, scratch.turned)

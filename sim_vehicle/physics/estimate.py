@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import Disturbance, State
+from sim_vehicle.physics.layout import Disturbance, PlantState
 from sim_vehicle.physics.rotation import matrix_from_quaternion, turn
 
 Floats = npt.NDArray[np.float64]
@@ -67,7 +67,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
 
 
 @njit
-def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturbance: Disturbance) -> None:
+def update_estimate(state: PlantState, errors: EstimateErrors, noise: Floats, disturbance: Disturbance) -> None:
     """Renew ``state.estimate`` at the end of an interval; ``noise`` is (9,), standard normal."""
     slots = errors.past.shape[0]
     if slots == 0:
@@ -89,7 +89,7 @@ def update_estimate(state: State, errors: EstimateErrors, noise: Floats, disturb
 
 
 @njit
-def note_what_is_clipped(state: State, errors: EstimateErrors) -> None:
+def note_what_is_clipped(state: PlantState, errors: EstimateErrors) -> None:
     """Write what clipping hid in this interval beside the body; it shows as late as everything else does."""
     hidden, off = errors.hidden_ned_m_s[errors.cursor[0]], state.clipped_off_m_s
     hidden[:] = 0.0
@@ -122,7 +122,7 @@ def miss_what_was_clipped(errors: EstimateErrors) -> None:
 
 
 @njit
-def update_slope(state: State, errors: EstimateErrors, step_s: float) -> None:
+def update_slope(state: PlantState, errors: EstimateErrors, step_s: float) -> None:
     """Low-pass the slope of the estimated velocity over one interval."""
     if errors.past.shape[0] == 0:
         return

@@ -23,9 +23,9 @@ from sim_vehicle.physics.layout import (
     HIT_SURFACE_VELOCITY,
     HIT_VELOCITY,
     SAME_HIT_US,
-    Contact,
+    ContactSprings,
+    PlantState,
     Scratch,
-    State,
 )
 from sim_vehicle.physics.meeting import meet
 from sim_vehicle.physics.proximity import NEAR
@@ -37,12 +37,12 @@ Ints = npt.NDArray[np.int64]
 
 @njit
 def note_contact(
-    state: State,
+    state: PlantState,
     offset_us: float,
     step_s: float,
     near: Ints,
     normal_forces: Floats,
-    contact: Contact,
+    contact: ContactSprings,
     faces: Floats,
     mass_kg: float,
     scratch: Scratch,
@@ -91,7 +91,7 @@ def note_contact(
 
 
 @njit
-def moving_energy(state: State, mass_kg: float) -> float:
+def moving_energy(state: PlantState, mass_kg: float) -> float:
     """Kinetic energy of the vehicle against what it hits, joules."""
     against = state.hit[HIT_SURFACE_VELOCITY]
     x, y, z = state.body[3] - against[0], state.body[4] - against[1], state.body[5] - against[2]
@@ -101,14 +101,14 @@ def moving_energy(state: State, mass_kg: float) -> float:
 
 
 @njit
-def close_old_hit(state: State) -> None:
+def close_old_hit(state: PlantState) -> None:
     """End the hit in progress once everything has been clear for long enough."""
     if state.hit[HIT_ACTIVE] == 1.0 and state.time_us - state.hit[HIT_LAST_US] >= SAME_HIT_US:
         _finish(state)
 
 
 @njit
-def _finish(state: State) -> None:
+def _finish(state: PlantState) -> None:
     state.finished_hits[state.finished_count] = state.hit
     state.finished_count += 1
     state.hit[HIT_ACTIVE] = 0.0

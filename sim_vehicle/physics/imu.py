@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, Scratch, State
+from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState, Scratch
 
 Floats = npt.NDArray[np.float64]
 
 
 @njit
 def add_raw_sample(
-    state: State, scratch: Scratch, noise: Floats, raw: int, constants: Constants, disturbance: Disturbance
+    state: PlantState, scratch: Scratch, noise: Floats, raw: int, constants: Constants, disturbance: Disturbance
 ) -> None:
     """Add one raw sample (mean specific force over the raw interval, body FRD) to the interval's sums.
 
@@ -56,7 +56,7 @@ def add_raw_sample(
 
 
 @njit
-def shake(state: State, raw_s: float, constants: Constants, disturbance: Disturbance, shaken: Floats) -> None:
+def shake(state: PlantState, raw_s: float, constants: Constants, disturbance: Disturbance, shaken: Floats) -> None:
     """Turn the rotors on and write the vibration that they make on the raw axes into ``shaken`` (6,), m/s2 and rad/s.
 
     An unbalanced rotor pulls outward as it turns, with the square of its speed, as thrust goes: once a turn across the

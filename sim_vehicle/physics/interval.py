@@ -23,11 +23,11 @@ from sim_vehicle.physics.layout import (
     ASKED_RATES,
     ASKED_TRAJECTORY,
     POINTS,
-    Asked,
     Constants,
     Disturbance,
+    PlantState,
     Scratch,
-    State,
+    SetpointRows,
 )
 from sim_vehicle.physics.proximity import find_close, find_near, wake_faces
 from sim_vehicle.physics.report import write_report
@@ -53,8 +53,8 @@ TOUCH_MARGIN_M = 0.0005
 
 @njit
 def advance_interval(
-    state: State,
-    asked: Asked,
+    state: PlantState,
+    asked: SetpointRows,
     motors: int,
     noise: Floats,
     fine_steps: int,
@@ -145,7 +145,7 @@ def advance_boxed(
 
 
 @njit
-def run_loops(state: State, asked: Asked, constants: Constants) -> None:
+def run_loops(state: PlantState, asked: SetpointRows, constants: Constants) -> None:
     """Run whichever inner loop is due: position at 100 Hz, attitude at 150 Hz (paper, section V).
 
     Asked for an attitude or rates, the loops above are left out and begin anew when they are next needed.
@@ -170,14 +170,14 @@ def run_loops(state: State, asked: Asked, constants: Constants) -> None:
 
 
 @njit
-def rest_loops(state: State) -> None:
+def rest_loops(state: PlantState) -> None:
     """Start the next flight with clean integrals, facing as the vehicle stands."""
     state.velocity_integral[:] = 0.0
     state.yaw_setpoint_rad = yaw_of(state.estimate)
 
 
 @njit
-def spin_motors(state: State, constants: Constants, disturbance: Disturbance) -> None:
+def spin_motors(state: PlantState, constants: Constants, disturbance: Disturbance) -> None:
     """First-order lag of each motor's thrust towards what it gives of its command, over one raw interval."""
     share = 1.0 - math.exp(-1e-6 * constants.raw_interval_us / constants.motor_time_constant_s)
     for motor in range(4):
@@ -188,7 +188,7 @@ def spin_motors(state: State, constants: Constants, disturbance: Disturbance) ->
 
 @njit
 def move_body(
-    state: State,
+    state: PlantState,
     awake: bool,
     fine_steps: int,
     constants: Constants,

@@ -23,7 +23,7 @@ ARM_DIRECTIONS_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0
 ROTOR_YAW_SIGNS = np.array([1.0, 1.0, -1.0, -1.0])
 
 
-class Contact:
+class ContactSprings:
     """Springs and dampers of everything that can touch, in newtons, metres and seconds."""
 
     arm_stiffness: float
@@ -89,7 +89,7 @@ class Gains:
     descent_max_m_s: float
 
 
-class Constants(Gains, Contact):
+class Constants(Gains, ContactSprings):
     """Everything about the vehicle that does not change in a flight."""
 
     mass_kg: float
@@ -111,7 +111,7 @@ class Constants(Gains, Contact):
 ASKED_TRAJECTORY, ASKED_ATTITUDE, ASKED_RATES = range(3)
 
 
-class Asked:
+class SetpointRows:
     """A setpoint as the loops read it: rows position, velocity, acceleration, all NED and SI."""
 
     value: Matrix3
@@ -123,7 +123,7 @@ class Asked:
     thrust: float  # of all motors over their greatest
 
 
-class State:
+class PlantState:
     """Everything about the vehicle that changes, but for which points are behind which faces."""
 
     time_us: int  # since boot
@@ -308,11 +308,11 @@ def calm(wind_ned_m_s: tuple[float, float, float]) -> Disturbance:
     return new_record(Disturbance, wind_ned_m_s=np.array(wind_ned_m_s), motor_share=np.ones(4))
 
 
-def initial_state(position_ned_m: tuple[float, float, float], yaw_rad: float) -> State:
+def initial_state(position_ned_m: tuple[float, float, float], yaw_rad: float) -> PlantState:
     """A vehicle at rest, level, motors off; ``position_ned_m`` is its centre of mass."""
     attitude = [math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2)]
     return new_record(
-        State,
+        PlantState,
         body=[*position_ned_m, 0.0, 0.0, 0.0, *attitude, 0.0, 0.0, 0.0],
         estimate=[*position_ned_m, 0.0, 0.0, 0.0, *attitude],
         yaw_setpoint_rad=yaw_rad,

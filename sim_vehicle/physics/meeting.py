@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import inlined, njit
-from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, Contact, Scratch
+from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, FEET, GUARDS, HUB, ContactSprings, Scratch
 from sim_vehicle.world import (
     FACE_ACROSS,
     FACE_ALONG,
@@ -35,7 +35,7 @@ NOWHERE = -1e9
 
 
 @inlined
-def part_centre(point: int, rotation: Floats, position: Floats, contact: Contact, out: Floats) -> None:
+def part_centre(point: int, rotation: Floats, position: Floats, contact: ContactSprings, out: Floats) -> None:
     """Write the middle (NED, m) of a guard or the hub, or where a foot is, into ``out``."""
     along_arm, below = 0.0, 0.0
     arm = point
@@ -52,7 +52,7 @@ def part_centre(point: int, rotation: Floats, position: Floats, contact: Contact
 
 @inlined
 def deepest_point(
-    point: int, normal: Floats, rotation: Floats, position: Floats, contact: Contact, out: Floats
+    point: int, normal: Floats, rotation: Floats, position: Floats, contact: ContactSprings, out: Floats
 ) -> tuple[float, float]:
     """Write the place (NED, m) of a guard, hub or foot that lies furthest against ``normal`` into ``out``; return the
     share of the normal that lies in the guard's plane (1 for hub and feet) and how much further the part reaches (m).
@@ -83,7 +83,7 @@ def deepest_point(
 
 @njit
 def meet(
-    point: int, face: int, rotation: Floats, position: Floats, contact: Contact, faces: Floats, scratch: Scratch
+    point: int, face: int, rotation: Floats, position: Floats, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> tuple[float, float]:
     """Depth of a part in a face (m, negative in front of it) and the share of the normal in the guard's plane.
 
@@ -110,7 +110,7 @@ def meet(
 
 @njit
 def _meet_round(
-    point: int, face: int, rotation: Floats, position: Floats, contact: Contact, faces: Floats, scratch: Scratch
+    point: int, face: int, rotation: Floats, position: Floats, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> tuple[float, float]:
     """The same for a round. The hoop is round too: a disc, and everything nearer to it than half of its height.
 
@@ -148,7 +148,7 @@ def _meet_round(
 
 
 @njit
-def _way_out_of_hoop(face: int, rotation: Floats, contact: Contact, faces: Floats, scratch: Scratch) -> float:
+def _way_out_of_hoop(face: int, rotation: Floats, contact: ContactSprings, faces: Floats, scratch: Scratch) -> float:
     """How far (m) a round's line that goes through a hoop's disc is from its rim, the shortest way; 0 if it does not.
 
     Leaves the way as the normal, not of unit length, and where the line goes through in `scratch.on_line`. The way is
@@ -186,7 +186,7 @@ def _way_out_of_hoop(face: int, rotation: Floats, contact: Contact, faces: Float
 
 
 @njit
-def _nearest_to_hoop(face: int, rotation: Floats, contact: Contact, faces: Floats, scratch: Scratch) -> bool:
+def _nearest_to_hoop(face: int, rotation: Floats, contact: ContactSprings, faces: Floats, scratch: Scratch) -> bool:
     """Write the points of a round's line and of a hoop's inner disc nearest to each other, by going to and fro
     between them: the line's into `scratch.on_line`, the way from there as the normal. Returns whether it is an end.
     """

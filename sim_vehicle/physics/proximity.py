@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import FEET, POINTS, Contact, Scratch
+from sim_vehicle.physics.layout import FEET, POINTS, ContactSprings, Scratch
 from sim_vehicle.physics.meeting import deepest_point, depth_in, meet, nearest_on_line, part_centre, within
 from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
 
@@ -27,7 +27,9 @@ WAKE_MARGIN_M = 0.03
 
 
 @njit
-def wake_faces(body: Floats, interval_s: float, contact: Contact, faces: Floats, near: Ints, scratch: Scratch) -> bool:
+def wake_faces(
+    body: Floats, interval_s: float, contact: ContactSprings, faces: Floats, near: Ints, scratch: Scratch
+) -> bool:
     """Set the faces that no part can reach in an interval of the inertial sensor ASLEEP; whether any is awake."""
     speed = math.sqrt(body[3] * body[3] + body[4] * body[4] + body[5] * body[5])
     awake = False
@@ -42,7 +44,7 @@ def wake_faces(body: Floats, interval_s: float, contact: Contact, faces: Floats,
 
 
 @njit
-def find_near(body: Floats, contact: Contact, faces: Floats, near: Ints, scratch: Scratch) -> bool:
+def find_near(body: Floats, contact: ContactSprings, faces: Floats, near: Ints, scratch: Scratch) -> bool:
     """Mark the faces that some part could reach; return whether there is any."""
     found = False
     for face in range(near.shape[0]):
@@ -69,7 +71,7 @@ def _is_within_reach(body: Floats, face: int, reach_m: float, faces: Floats, scr
 
 @njit
 def find_close(
-    body: Floats, behind: Ints, near: Ints, margin_m: float, contact: Contact, faces: Floats, scratch: Scratch
+    body: Floats, behind: Ints, near: Ints, margin_m: float, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> bool:
     """Raise to CLOSE the near faces that a guard or the hub touches or may touch within ``margin_m`` of travel;
     note which parts have passed by a flat face; return whether any is CLOSE.
@@ -100,7 +102,7 @@ def find_close(
 
 @njit
 def note_passing(
-    point: int, face: int, body: Floats, behind: Ints, contact: Contact, faces: Floats, scratch: Scratch
+    point: int, face: int, body: Floats, behind: Ints, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> None:
     """A part whose middle gets behind a face's plane beside its rectangle has passed it by and is not pushed by it
     until it is in front again.

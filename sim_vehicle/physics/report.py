@@ -1,7 +1,7 @@
 """One row of numbers out of the kernels at the end of an interval: reading a record in Python is slow."""
 
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import Constants, State
+from sim_vehicle.physics.layout import Constants, PlantState
 from sim_vehicle.physics.record import Floats
 
 # What really is: time (us), position, velocity, attitude, folds, contact force. `truth.py` keeps these.
@@ -15,7 +15,7 @@ REPORT_COLUMNS = 43
 
 
 @njit
-def write_report(state: State, constants: Constants, row: Floats) -> None:
+def write_report(state: PlantState, constants: Constants, row: Floats) -> None:
     """Fill ``row`` (REPORT_COLUMNS,) from the state."""
     row[0] = state.time_us
     for i in range(10):

@@ -12,10 +12,10 @@ from sim_vehicle.physics.layout import (
     GRAVITY_M_S2,
     ROTOR_YAW_SIGNS,
     Constants,
-    Contact,
+    ContactSprings,
     Disturbance,
+    PlantState,
     Scratch,
-    State,
 )
 from sim_vehicle.physics.rotation import matrix_from_quaternion, normalise
 from sim_vehicle.world import FACE_POINT, FACE_VELOCITY
@@ -35,7 +35,7 @@ def derivative(
     touches: bool,
     constants: Constants,
     disturbance: Disturbance,
-    contact: Contact,
+    contact: ContactSprings,
     faces: Floats,
     rotation: Floats,
     normal_forces: Floats,
@@ -117,14 +117,14 @@ def move_faces(moving: Ints, step_s: float, faces: Floats) -> None:
 
 @njit
 def runge_kutta_step(
-    state: State,
+    state: PlantState,
     behind: Ints,
     near: Ints,
     touches: bool,
     step_s: float,
     constants: Constants,
     disturbance: Disturbance,
-    contact: Contact,
+    contact: ContactSprings,
     faces: Floats,
     moving: Ints,
     forces: Floats,

@@ -5,13 +5,13 @@ import math
 import numpy as np
 
 from sim_vehicle.physics.estimate import EstimateErrors
-from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, State
+from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState
 from sim_vehicle.physics.record import Floats
 from sim_vehicle.world import Vector3
 
 
 def trim(
-    state: State,
+    state: PlantState,
     errors: EstimateErrors,
     constants: Constants,
     disturbance: Disturbance,
@@ -38,7 +38,7 @@ def trim(
     _remember(state, errors, 1e-6 * constants.raw_interval_us * constants.raw_per_interval)
 
 
-def _remember(state: State, errors: EstimateErrors, interval_s: float) -> None:
+def _remember(state: PlantState, errors: EstimateErrors, interval_s: float) -> None:
     """Let the estimate have seen the steady flight before."""
     slots, position, velocity = len(errors.past), state.body[0:3].copy(), state.body[3:6]
     for step in range(slots):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from sim_vehicle.errors import PortInUse
-from sim_vehicle.hil.exchange import Exchange, Phase
+from sim_vehicle.hil.exchange import Exchange, ExchangePhase
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.mavlink.hil import HilDecoder, HilEncoder
 from sim_vehicle.shell.truth_file import save_truth
@@ -56,7 +56,7 @@ class _Session:
         self._vehicle = vehicle
         self._link = link
         self._tell = tell
-        self._pace = Pace(speed)
+        self._pace = HilPace(speed)
         self._exchange = Exchange()
         self._encoder, self._decoder = HilEncoder(), HilDecoder()
         self._lockstep_from: tuple[int, int] | None = None
@@ -98,7 +98,7 @@ class _Session:
         allowed_us = exchange.next_sample_at_us()
         if allowed_us is None:
             return round(1e6 * _LONGEST_WAIT_S)
-        if exchange.phase is Phase.READY:
+        if exchange.phase is ExchangePhase.READY:
             if self._lockstep_from is None:
                 self._lockstep_from = (now_us, vehicle.time_boot_us)
             allowed_us = self._pace.due_us(vehicle.time_boot_us + vehicle.interval_us, now_us)
@@ -111,7 +111,7 @@ class _Session:
         except ConnectionError:
             return 0
         exchange.sent(vehicle.time_boot_us, now_us)
-        return round(1e6 * _LONGEST_WAIT_S) if exchange.phase is Phase.AWAITING else 0
+        return round(1e6 * _LONGEST_WAIT_S) if exchange.phase is ExchangePhase.AWAITING else 0
 
     def _receive(self, wait_us: int) -> bytes | None:
         """What PX4 sent, b"" when it has gone, None when nothing came in time."""
@@ -127,7 +127,7 @@ class _Session:
         self._exchange.notices.clear()
 
 
-class Pace:
+class HilPace:
     """Keeps the vehicle's clock on the machine's, times a speed."""
 
     def __init__(self, speed: float) -> None:

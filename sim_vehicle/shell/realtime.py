@@ -32,7 +32,7 @@ def serve(
     ``advance``: in place of the vehicle's own, what one interval consists of.
     """
     control, advance = control or Control(speed), advance or vehicle.advance
-    pace = Pace(vehicle.time_boot_us, control.speed)
+    pace = RealtimePace(vehicle.time_boot_us, control.speed)
     try:
         while not stop():
             control.carry_out()
@@ -55,7 +55,7 @@ def serve(
             save_truth(truth_path, vehicle.truth, pace.epoch_at_boot_us(), pace.stalls)
 
 
-class Pace:
+class RealtimePace:
     """Keeps a vehicle's clock on the machine's monotonic one."""
 
     def __init__(

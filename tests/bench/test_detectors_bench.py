@@ -3,7 +3,7 @@
 import pytest
 
 from bench.detectors.hits import airframe_of, draw_case, fly_hit
-from bench.detectors.recording import Recording
+from bench.detectors.recording import VehicleRecording
 from bench.detectors.scoring import first_possible
 from bench.detectors.watching import ASKED_HZ, streams_asked_hz
 from bench.detectors.wire import BUILDERS, Wire
@@ -19,7 +19,7 @@ from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, 
 @pytest.mark.parametrize("rate", ASKED_HZ)
 def test_the_samples_without_bytes_are_those_of_the_whole_wire(rate, monkeypatch):
     # Given a vehicle that takes off, whose link was asked for the bench's rates before anything else
-    recording, seed = Recording(), 11 + rate
+    recording, seed = VehicleRecording(), 11 + rate
     step = Plant.step
 
     def recorded_step(plant, setpoint, armed):

@@ -22,8 +22,8 @@ from bench.paper import (
     simulation_experiment,
 )
 from bench.paper.approach import approach
-from bench.paper.flights import Contact, Flight, Result, fly, share_received
-from bench.paper.table import Row, around, at_least, at_most, rows_text, within_factor
+from bench.paper.flights import StudyContact, StudyFlight, StudyResult, fly, share_received
+from bench.paper.table import ClaimRow, around, at_least, at_most, rows_text, within_factor
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT
 
@@ -48,7 +48,7 @@ def test_a_tolerance_catches_a_wrong_sign_and_a_factor_of_two(row):
 def test_limits_are_judged_from_one_side():
     assert at_most("", "", 0.05, 0.05, "m").agrees and not at_most("", "", 0.05, 0.051, "m").agrees
     assert at_least("", "", 3.0, 3.0, "hits").agrees and not at_least("", "", 3.0, 2.0, "hits").agrees
-    assert Row("", "", 5.0, "", None, None).verdict == "for comparison"
+    assert ClaimRow("", "", 5.0, "", None, None).verdict == "for comparison"
     with pytest.raises(AssertionError):
         around("", "", 1.0, 1.0, "", 0.5)
 
@@ -139,7 +139,7 @@ def test_the_wall_stands_square_to_the_flight_before_braking_begins():
 
 
 @pytest.fixture(scope="module")
-def sample() -> Result:
+def sample() -> StudyResult:
     return fly(sample_scenario.flights(1)[0])
 
 
@@ -165,7 +165,7 @@ def test_a_setpoint_on_the_wrong_side_or_twice_as_far_would_be_red(sample):
     x, y, z = contact.hit.contact_position_ned_m
     back_m, off_m = x - contact.setpoint_in_world_ned_m[0], contact.hit.frame_offset_ned_m[0]
     for wrong_m in (-back_m, 2 * back_m, back_m / 2):
-        moved: Contact = dataclasses.replace(contact, setpoint_ned_m=(x - wrong_m + off_m, y, z))
+        moved: StudyContact = dataclasses.replace(contact, setpoint_ned_m=(x - wrong_m + off_m, y, z))
         rows = sample_scenario.conclude([dataclasses.replace(sample, contacts=(moved,))]).rows
         assert [row.claim for row in rows if not row.agrees] == [claim]
 
@@ -259,7 +259,7 @@ def test_only_what_stands_between_the_marks_is_written_anew(tmp_path, sample):
 
 
 def test_a_foldable_flight_at_one_metre_per_second_neither_returns_nor_overshoots():
-    result = fly(Flight(("quick",), approach(1.0, cruise_s=1.5), "foldable", 1))
+    result = fly(StudyFlight(("quick",), approach(1.0, cruise_s=1.5), "foldable", 1))
     assert result.is_completed and len(result.contacts) == 1
     assert result.first.is_detected and result.overshoots_m[0] <= flight_tests.NO_OVERSHOOT_M
     assert 0.15 < result.first.hit.rebound_speed_m_s / result.first.impact_speed_m_s < 0.3

@@ -4,14 +4,14 @@ import pytest
 
 from bench.random_missions.campaign import MissionCase, work_out_mission
 from bench.recoveries.command import _lines
-from bench.recoveries.hits import Case, cases, work_out
+from bench.recoveries.hits import RecoveryCase, cases, work_out
 
 pytestmark = pytest.mark.slow
 
 
 def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
     """This cell; docs/campaign.md has the median of all."""
-    paper, adaptive = (work_out(Case(law, "foldable", 0, 2.0, 1)) for law in ("paper", "adaptive"))
+    paper, adaptive = (work_out(RecoveryCase(law, "foldable", 0, 2.0, 1)) for law in ("paper", "adaptive"))
     assert (paper["outcome"], adaptive["outcome"]) == ("completed", "completed")
     assert adaptive["settled_s"] < 0.8 * paper["settled_s"]
     assert adaptive["past_m"] < 0.05 and adaptive["recontacts"] == 0
@@ -21,7 +21,7 @@ def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_w
 
 def test_a_vehicle_that_the_hit_spins_keeps_its_height():
     """Rigid, 5 m/s, 30 degrees: 16 rad/s of yaw. Braking at once loses half a metre."""
-    flight = work_out(Case("adaptive", "rigid", 30, 5.0, 1))
+    flight = work_out(RecoveryCase("adaptive", "rigid", 30, 5.0, 1))
     assert flight["outcome"] == "completed"
     assert flight["lost_m"] < 0.1
     assert flight["past_m"] < 0.05
@@ -32,7 +32,7 @@ def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_th
     airframe, speed_m_s
 ):
     """What a real PX4 does with such a hit (docs/px4.md): it says "into the wall", and is right a second later."""
-    flight = work_out(Case("adaptive", airframe, 0, speed_m_s, 1))
+    flight = work_out(RecoveryCase("adaptive", airframe, 0, speed_m_s, 1))
     assert (flight["outcome"], flight["recontacts"], flight["returned"]) == ("completed", 0, 0)
     assert flight["past_m"] < 0.05
     assert flight["clear_m"] > 0.25 * speed_m_s

@@ -4,19 +4,19 @@ import pytest
 
 from bench.main import main
 from bench.paper import results
-from bench.paper.results import Case, CaseFigures, HitFigures, case_document, fly_case, results_text
+from bench.paper.results import CaseFigures, HitFigures, ResultsCase, case_document, fly_case, results_text
 
 pytestmark = pytest.mark.slow
 
 
 def test_the_papers_detector_law_and_gain_are_stated_in_every_flight():
-    data = case_document(Case("rigid", 2.5, 7)).data
+    data = case_document(ResultsCase("rigid", 2.5, 7)).data
     assert data["companion"]["detector"] == "lateral"
     assert (data["recovery"]["law"], data["recovery"]["gamma"]) == ("paper", 0.5)
 
 
 def test_one_flight_gives_the_figures_of_its_hit():
-    figures = fly_case(Case("foldable", 1.5, 3))
+    figures = fly_case(ResultsCase("foldable", 1.5, 3))
     assert figures.is_completed
     assert (figures.contacts, figures.false_detections, figures.recontacts) == (1, 0, 0)
     (hit,) = figures.hits
@@ -39,7 +39,7 @@ def hit(**changes):
 
 def case(seed, *hits, **changes):
     values = {"is_completed": True, "contacts": 1, "false_detections": 0, "recontacts": 0}
-    return CaseFigures(case=Case("foldable", 2.0, seed), hits=hits, **(values | changes))
+    return CaseFigures(case=ResultsCase("foldable", 2.0, seed), hits=hits, **(values | changes))
 
 
 def test_a_row_counts_all_flights_and_takes_the_worst_where_the_worst_matters():

@@ -7,7 +7,7 @@ import pytest
 
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.authority import Holder, who_decided
-from companion.flight.commander import ATTEMPTS, Commander
+from companion.flight.command_client import ATTEMPTS, CommandClient
 from companion.flight.trajectory import LineProfile
 from companion.link.identity import Identity, identify
 from companion.link.vehicle import ModeReport, Vehicle
@@ -106,15 +106,15 @@ def test_the_noise_of_a_good_estimate_does_not_keep_a_vehicle_from_settling():
         assert since[-1] is not None
 
 
-# --- commander
+# --- command client
 
 
-def drive(commander, until_us, answers=None, seen_at_us=None, step_us=10_000):
+def drive(client, until_us, answers=None, seen_at_us=None, step_us=10_000):
     """Step on virtual time; `answers`: time -> result. Returns send times and the outcome with its time."""
     sends, answers = [], dict(answers or {})
     for now_us in range(0, until_us, step_us):
         acks = [CommandAck(176, answers.pop(now_us))] if now_us in answers else []
-        send, outcome = commander.step(acks, seen_at_us is not None and now_us >= seen_at_us, now_us)
+        send, outcome = client.step(acks, seen_at_us is not None and now_us >= seen_at_us, now_us)
         if send is not None:
             sends.append((now_us, send.confirmation))
         if outcome is not None:
@@ -123,9 +123,9 @@ def drive(commander, until_us, answers=None, seen_at_us=None, step_us=10_000):
 
 
 def begun(command):
-    commander = Commander()
-    commander.begin(command)
-    return commander
+    client = CommandClient()
+    client.begin(command)
+    return client
 
 
 def test_an_unanswered_command_is_repeated_and_given_up():
@@ -158,26 +158,26 @@ def test_a_final_refusal_is_final(result):
 
 
 def test_other_commands_count_when_accepted_and_answers_to_others_do_not():
-    commander = begun(RequestMessage(148))
-    commander.step([], False, 0)
-    assert commander.step([CommandAck(400, CommandResult.ACCEPTED)], False, 1000) == (None, None)
-    _, outcome = commander.step([CommandAck(512, CommandResult.ACCEPTED)], False, 2000)
+    client = begun(RequestMessage(148))
+    client.step([], False, 0)
+    assert client.step([CommandAck(400, CommandResult.ACCEPTED)], False, 1000) == (None, None)
+    _, outcome = client.step([CommandAck(512, CommandResult.ACCEPTED)], False, 2000)
     assert outcome.succeeded
-    assert not commander.busy
+    assert not client.busy
 
 
 def test_arming_counts_when_it_is_seen():
-    commander = begun(SetArmed(True))
-    commander.step([], False, 0)
-    assert commander.step([CommandAck(400, CommandResult.ACCEPTED)], False, 1000)[1] is None
-    assert commander.step([], True, 2000)[1].succeeded
+    client = begun(SetArmed(True))
+    client.step([], False, 0)
+    assert client.step([CommandAck(400, CommandResult.ACCEPTED)], False, 1000)[1] is None
+    assert client.step([], True, 2000)[1].succeeded
 
 
 def test_only_a_mode_on_its_way_is_a_requested_mode():
-    commander = begun(SetMode(AUTO_LAND))
-    assert commander.requested_mode == AUTO_LAND
-    commander.cancel()
-    assert commander.requested_mode is None
+    client = begun(SetMode(AUTO_LAND))
+    assert client.requested_mode == AUTO_LAND
+    client.cancel()
+    assert client.requested_mode is None
 
 
 # --- authority

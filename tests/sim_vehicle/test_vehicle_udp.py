@@ -16,7 +16,7 @@ from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import px4_ports
-from sim_vehicle.shell.realtime import Pace, serve
+from sim_vehicle.shell.realtime import RealtimePace, serve
 from sim_vehicle.shell.truth_file import load_truth
 from sim_vehicle.shell.udp_ports import UdpPeerPort
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -132,7 +132,7 @@ class Machine:
 def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_ms: int):
     """800 ms away: the interval that was due then is flown, the other 796 ms are left out."""
     machine = Machine()
-    pace = Pace(0, 1.0, machine.monotonic_ns, machine.sleep_s)
+    pace = RealtimePace(0, 1.0, machine.monotonic_ns, machine.sleep_s)
     start_ns, boot_us = machine.now_ns, 0
     while machine.now_ns - start_ns < 2_000_000_000:
         pace.wait_until(boot_us + 4_000)
@@ -146,7 +146,7 @@ def test_lateness_is_caught_up_unless_the_machine_was_away(hangs_ms: int, lost_m
 
 def test_an_interval_is_never_flown_before_it_has_passed():
     machine = Machine()
-    pace = Pace(4_000, 1.0, machine.monotonic_ns, machine.sleep_s)
+    pace = RealtimePace(4_000, 1.0, machine.monotonic_ns, machine.sleep_s)
     begun_ns = machine.now_ns
     pace.wait_until(8_000)
     assert machine.now_ns - begun_ns == 4_000_000

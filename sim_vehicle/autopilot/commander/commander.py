@@ -9,7 +9,7 @@ from sim_vehicle.autopilot.commander.arming import Arming, Reason, preflight_pro
 from sim_vehicle.autopilot.commander.battery import Battery
 from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
 from sim_vehicle.autopilot.commander.failsafe import Failsafe
-from sim_vehicle.autopilot.commander.failsafe_table import Action, Situation
+from sim_vehicle.autopilot.commander.failsafe_table import Action, FailsafeSituation
 from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
 from sim_vehicle.autopilot.commander.ground_station import GroundStation
 from sim_vehicle.autopilot.commander.manual_control import Gesture, ManualInput
@@ -17,8 +17,8 @@ from sim_vehicle.autopilot.commander.modes import (
     NEEDS,
     NOT_ARMABLE,
     Conditions,
-    Event,
     Mode,
+    ModeEvent,
     ModeState,
     Need,
     available,
@@ -80,7 +80,7 @@ class Commander:
     def request_mode(self, mode: Mode) -> Result:
         """Change the mode as a command asks."""
         self._ever_requested = True
-        if not self.modes.apply(Event.REQUEST, self._conditions, mode):
+        if not self.modes.apply(ModeEvent.REQUEST, self._conditions, mode):
             return Result.TEMPORARILY_REJECTED
         self._judge()
         return Result.ACCEPTED
@@ -135,7 +135,7 @@ class Commander:
         self._say(Severity.INFO, f"Disarmed by {reason}")
         self._navigator.view.armed = False
         self._navigator.disarmed()
-        self.modes.apply(Event.DISARMED, self._conditions)
+        self.modes.apply(ModeEvent.DISARMED, self._conditions)
         self._judge()
 
     # --- the cycle -------------------------------------------------------------------------------------------
@@ -156,15 +156,15 @@ class Commander:
             self._watch(attitude_wxyz)
             self._judge()
 
-    def _what_is_over(self) -> Event | None:
+    def _what_is_over(self) -> ModeEvent | None:
         """Commander::checkForMissionUpdate."""
         progress = self._navigator.progress
         if self.modes.flown is Mode.MISSION:
-            return Event.MISSION_FINISHED if progress.finished else None
+            return ModeEvent.MISSION_FINISHED if progress.finished else None
         if self.modes.flown is not Mode.TAKEOFF or not self._navigator.takeoff_is_over:
             return None
         goes_on = self._parameters["COM_TAKEOFF_ACT"] == 1 and progress.valid
-        return Event.MISSION_AFTER_TAKEOFF if goes_on else Event.TAKEOFF_REACHED
+        return ModeEvent.MISSION_AFTER_TAKEOFF if goes_on else ModeEvent.TAKEOFF_REACHED
 
     def _obey_sticks(self) -> None:
         if self.sticks.gesture is Gesture.ARM:
@@ -181,7 +181,7 @@ class Commander:
             return
         if not self.sticks.moving or self.failsafe.acts or not self._sticks_override:
             return
-        if self.modes.apply(Event.STICKS, self._conditions):
+        if self.modes.apply(ModeEvent.STICKS, self._conditions):
             self._say(Severity.INFO, "Pilot took over using sticks")
             self._judge()
 
@@ -226,10 +226,10 @@ class Commander:
             self.modes.flown = decision.flown
             self._navigator.enter(decision.flown)
 
-    def _situation(self) -> Situation:
+    def _situation(self) -> FailsafeSituation:
         armed, progress = self.arming.armed, self._navigator.progress
         back = self._flies_setpoints and (self.signal.is_back or not self.failsafe.acts)
-        return Situation(
+        return FailsafeSituation(
             armed=armed,
             intended=self.modes.intended,
             armed_for_us=self._now_us - self.arming.armed_at_us if armed else 0,

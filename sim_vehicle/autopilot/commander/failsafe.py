@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from sim_vehicle.autopilot.commander.failsafe_table import (
     Action,
     Clears,
+    FailsafeSituation,
+    FailsafeTrigger,
     Response,
-    Situation,
     Takeover,
-    Trigger,
     mode_fallback,
     responses_now,
 )
@@ -82,7 +82,7 @@ class Failsafe:
         self.action = Action.NONE
         self.took_over = False
         """The pilot has taken over from a failsafe that would still act."""
-        self._active: dict[Trigger, _Active] = {}
+        self._active: dict[FailsafeTrigger, _Active] = {}
         self._last_us: int | None = None
         self._armed = False
         self._intended: Mode | None = None
@@ -96,7 +96,7 @@ class Failsafe:
         """Whether something else flies than what is meant."""
         return self.action > Action.WARN
 
-    def update(self, now_us: int, now: Situation, parameters: Parameters) -> Decision:
+    def update(self, now_us: int, now: FailsafeSituation, parameters: Parameters) -> Decision:
         """Judge the situation."""
         elapsed_us = 0 if self._last_us is None else now_us - self._last_us
         self._last_us = now_us
@@ -138,12 +138,12 @@ class Failsafe:
 
     # --- which actions are in force ------------------------------------------------------------------------
 
-    def _check(self, now: Situation, parameters: Parameters) -> None:
+    def _check(self, now: FailsafeSituation, parameters: Parameters) -> None:
         for trigger, response in responses_now(now, parameters):
             self._set_off(trigger, response, parameters)
         fallback = mode_fallback(now, parameters, now.intended)
         if fallback is not Action.NONE:
-            self._set_off(Trigger.MODE_CANNOT_RUN, Response(fallback, takeover=Takeover.ALWAYS), parameters)
+            self._set_off(FailsafeTrigger.MODE_CANNOT_RUN, Response(fallback, takeover=Takeover.ALWAYS), parameters)
         for trigger, active in list(self._active.items()):
             if not active.checked:
                 active.failing = False
@@ -151,7 +151,7 @@ class Failsafe:
                     del self._active[trigger]
             active.checked = False
 
-    def _set_off(self, trigger: Trigger, response: Response, parameters: Parameters) -> None:
+    def _set_off(self, trigger: FailsafeTrigger, response: Response, parameters: Parameters) -> None:
         active = self._active.get(trigger)
         if active is not None:
             # The action may change meanwhile; how it ends and who may end it stays.
@@ -177,7 +177,7 @@ class Failsafe:
 
     # --- which of them flies -------------------------------------------------------------------------------
 
-    def _select(self, now: Situation, parameters: Parameters, changed: bool) -> tuple[Decision, Action, bool]:
+    def _select(self, now: FailsafeSituation, parameters: Parameters, changed: bool) -> tuple[Decision, Action, bool]:
         """The decision, the action that waits behind it, and whether the pilot has it."""
         if self.action is Action.TERMINATE or now.intended is Mode.TERMINATION:
             return Decision(Action.TERMINATE, now.intended), Action.NONE, False
@@ -199,14 +199,14 @@ class Failsafe:
             action, delayed = Action.WARN, Action.NONE
         return Decision(action, intended), delayed, took_over
 
-    def _takes_over(self, now: Situation, takeover: Takeover, changed: bool) -> bool:
+    def _takes_over(self, now: FailsafeSituation, takeover: Takeover, changed: bool) -> bool:
         switched = changed and self.acts
         if takeover is Takeover.ALWAYS:
             return self.took_over or switched or now.sticks_moved
         return takeover is Takeover.BY_MODE_SWITCH and (self.took_over or switched)
 
 
-def _that_can_run(action: Action, now: Situation) -> Action:
+def _that_can_run(action: Action, now: FailsafeSituation) -> Action:
     if action not in _LADDER:
         return action
     for step in _LADDER[_LADDER.index(action) :]:

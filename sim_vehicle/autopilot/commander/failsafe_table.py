@@ -47,7 +47,7 @@ class Takeover(IntEnum):
     NEVER = 3
 
 
-class Trigger(StrEnum):
+class FailsafeTrigger(StrEnum):
     """What sets a failsafe off."""
 
     STICKS_LOST = "manual control lost"
@@ -72,7 +72,7 @@ class Response:
     takeover: Takeover = Takeover.AFTER_DELAY
 
 
-class Situation(NamedTuple):
+class FailsafeSituation(NamedTuple):
     """What the failsafes judge, as the commander has it in this cycle. A tuple: one is made fifty times a second."""
 
     armed: bool
@@ -97,11 +97,11 @@ class Situation(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class FailsafeRow:
     """A trigger, when it counts, and what follows."""
 
-    trigger: Trigger
-    counts: Callable[[Situation, Parameters], bool]
+    trigger: FailsafeTrigger
+    counts: Callable[[FailsafeSituation, Parameters], bool]
     parameter: str | None
     """Its value chooses the response; without one the only response is that of 0."""
     responses: Mapping[int, Response]
@@ -163,55 +163,61 @@ def _excepted(mode: Mode, mask: float) -> bool:
     return bool(_EXCEPTION_OF.get(mode, 0) & int(mask))
 
 
-def _sticks_lost(now: Situation, parameters: Parameters) -> bool:
+def _sticks_lost(now: FailsafeSituation, parameters: Parameters) -> bool:
     wanted = parameters["COM_RC_IN_MODE"] != _NO_STICKS and not now.sticks_lost_at_arming
     return now.sticks_lost and wanted and not _excepted(now.intended, parameters["COM_RCL_EXCEPT"])
 
 
-def _ground_station_lost(now: Situation, parameters: Parameters) -> bool:
+def _ground_station_lost(now: FailsafeSituation, parameters: Parameters) -> bool:
     if parameters["NAV_DLL_ACT"] == 0 or now.intended is Mode.LAND or not now.armed:
         return False
     return now.ground_station_lost and not _excepted(now.intended, parameters["COM_DLL_EXCEPT"])
 
 
-def _out_of_reach(now: Situation, parameters: Parameters) -> bool:
+def _out_of_reach(now: FailsafeSituation, parameters: Parameters) -> bool:
     """Nobody could call the vehicle back, and it has nothing left to do."""
     no_sticks = parameters["COM_RC_IN_MODE"] == _NO_STICKS or _excepted(now.intended, parameters["COM_RCL_EXCEPT"])
     alone = no_sticks and parameters["NAV_DLL_ACT"] == 0 and now.ground_station_lost
     return now.intended is Mode.MISSION and now.mission_finished and alone
 
 
-def _battery(level: BatteryWarning) -> Callable[[Situation, Parameters], bool]:
+def _battery(level: BatteryWarning) -> Callable[[FailsafeSituation, Parameters], bool]:
     return lambda now, parameters: now.battery is level
 
 
-def _worse_than_at_arming(now: Situation) -> bool:
+def _worse_than_at_arming(now: FailsafeSituation) -> bool:
     return now.battery > now.battery_at_arming
 
 
-def _is_taking_off(now: Situation, parameters: Parameters) -> bool:
+def _is_taking_off(now: FailsafeSituation, parameters: Parameters) -> bool:
     guarded_s = parameters["COM_LKDOWN_TKO"] + parameters["COM_SPOOLUP_TIME"]
     return now.armed and now.armed_for_us < 1e6 * guarded_s
 
 
 # In PX4's order. The mode that cannot run comes last and is no row: see `Failsafe`.
-ROWS: tuple[Row, ...] = (
-    Row(Trigger.STICKS_LOST, _sticks_lost, "NAV_RCL_ACT", _LINK_LOSS),
-    Row(Trigger.GROUND_STATION_LOST, _ground_station_lost, "NAV_DLL_ACT", _LINK_LOSS),
-    Row(Trigger.MISSION_OUT_OF_REACH, _out_of_reach, None, {0: Response(Action.RETURN)}),
-    Row(Trigger.FLIGHT_TIME, lambda now, parameters: now.flight_time_over, None, {0: Response(Action.RETURN)}),
-    Row(Trigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),
-    Row(Trigger.BATTERY_LOW, _battery(BatteryWarning.LOW), None, {0: _WARNING}),
-    Row(Trigger.BATTERY_CRITICAL, _battery(BatteryWarning.CRITICAL), "COM_LOW_BAT_ACT", _CRITICAL, _WARNING),
-    Row(Trigger.BATTERY_EMERGENCY, _battery(BatteryWarning.EMERGENCY), "COM_LOW_BAT_ACT", _EMERGENCY, _WARNING),
-    Row(
-        Trigger.ATTITUDE_AT_TAKEOFF,
+ROWS: tuple[FailsafeRow, ...] = (
+    FailsafeRow(FailsafeTrigger.STICKS_LOST, _sticks_lost, "NAV_RCL_ACT", _LINK_LOSS),
+    FailsafeRow(FailsafeTrigger.GROUND_STATION_LOST, _ground_station_lost, "NAV_DLL_ACT", _LINK_LOSS),
+    FailsafeRow(FailsafeTrigger.MISSION_OUT_OF_REACH, _out_of_reach, None, {0: Response(Action.RETURN)}),
+    FailsafeRow(
+        FailsafeTrigger.FLIGHT_TIME, lambda now, parameters: now.flight_time_over, None, {0: Response(Action.RETURN)}
+    ),
+    FailsafeRow(FailsafeTrigger.FENCE, lambda now, parameters: now.fence_breached, "GF_ACTION", _FENCE, _WARNING),
+    FailsafeRow(FailsafeTrigger.BATTERY_LOW, _battery(BatteryWarning.LOW), None, {0: _WARNING}),
+    FailsafeRow(
+        FailsafeTrigger.BATTERY_CRITICAL, _battery(BatteryWarning.CRITICAL), "COM_LOW_BAT_ACT", _CRITICAL, _WARNING
+    ),
+    FailsafeRow(
+        FailsafeTrigger.BATTERY_EMERGENCY, _battery(BatteryWarning.EMERGENCY), "COM_LOW_BAT_ACT", _EMERGENCY, _WARNING
+    ),
+    FailsafeRow(
+        FailsafeTrigger.ATTITUDE_AT_TAKEOFF,
         lambda now, parameters: now.tipped_over and _is_taking_off(now, parameters),
         None,
         {0: Response(Action.DISARM)},
     ),
-    Row(
-        Trigger.ATTITUDE,
+    FailsafeRow(
+        FailsafeTrigger.ATTITUDE,
         lambda now, parameters: now.tipped_over and not _is_taking_off(now, parameters),
         "CBRK_FLIGHTTERM",
         {_TERMINATION_BREAKER: _WARNING},
@@ -232,9 +238,9 @@ OFFBOARD_LOSS: dict[int, tuple[Action, Mode]] = {
 """COM_OBL_RC_ACT: what is done and which mode that means."""
 
 
-def responses_now(now: Situation, parameters: Parameters) -> list[tuple[Trigger, Response]]:
+def responses_now(now: FailsafeSituation, parameters: Parameters) -> list[tuple[FailsafeTrigger, Response]]:
     """The rows that count now."""
-    found: list[tuple[Trigger, Response]] = []
+    found: list[tuple[FailsafeTrigger, Response]] = []
     for row in ROWS:
         if not row.counts(now, parameters):
             continue
@@ -247,10 +253,10 @@ def responses_now(now: Situation, parameters: Parameters) -> list[tuple[Trigger,
     return found
 
 
-_BATTERY_ACTS = (Trigger.BATTERY_CRITICAL, Trigger.BATTERY_EMERGENCY)
+_BATTERY_ACTS = (FailsafeTrigger.BATTERY_CRITICAL, FailsafeTrigger.BATTERY_EMERGENCY)
 
 
-def mode_fallback(now: Situation, parameters: Parameters, intended: Mode) -> Action:
+def mode_fallback(now: FailsafeSituation, parameters: Parameters, intended: Mode) -> Action:
     """What becomes of a mode that cannot run: offboard's own loss first, then sticks, then the return."""
     action, mode = Action.NONE, intended
     if mode is Mode.OFFBOARD and now.offboard_lost:
@@ -280,7 +286,6 @@ def markdown_table() -> str:
         lines.append(f"| {row.trigger} | {row.parameter or ''} | {does} | {', or '.join(ends)} |")
     does = ", ".join(f"{value}: {action.name.lower()}" for value, (action, _) in OFFBOARD_LOSS.items())
     lines.append(f"| setpoints stopped in OFFBOARD | COM_OBL_RC_ACT | {does} | with the trigger |")
-    lines.append(
-        f"| {Trigger.MODE_CANNOT_RUN} | | fall_back_to_altitude, fall_back_to_stabilized, return | with the trigger |"
-    )
+    does = "fall_back_to_altitude, fall_back_to_stabilized, return"
+    lines.append(f"| {FailsafeTrigger.MODE_CANNOT_RUN} | | {does} | with the trigger |")
     return "\n".join(lines).replace("_", "\\_") + "\n"

@@ -86,7 +86,7 @@ def missing(mode: Mode, available: frozenset[Need]) -> frozenset[Need]:
     return NEEDS[mode] - available
 
 
-class Event(StrEnum):
+class ModeEvent(StrEnum):
     """What can change the mode that is meant."""
 
     REQUEST = "requested"
@@ -97,7 +97,7 @@ class Event(StrEnum):
     DISARMED = "disarmed"
 
 
-class Guard(StrEnum):
+class ModeCondition(StrEnum):
     """Condition of a transition."""
 
     ALWAYS = ""
@@ -113,13 +113,13 @@ class Transition:
     """
 
     sources: tuple[Mode, ...] | None
-    event: Event
-    guard: Guard
+    event: ModeEvent
+    guard: ModeCondition
     target: Mode | None
 
 
-def _request(target: Mode, guard: Guard = Guard.CAN_RUN) -> Transition:
-    return Transition(None, Event.REQUEST, guard, target)
+def _request(target: Mode, guard: ModeCondition = ModeCondition.CAN_RUN) -> Transition:
+    return Transition(None, ModeEvent.REQUEST, guard, target)
 
 
 _FLOWN_WITHOUT_STICKS = tuple(mode for mode in Mode if Need.STICKS not in NEEDS[mode] and mode is not Mode.TERMINATION)
@@ -138,17 +138,17 @@ TRANSITIONS: tuple[Transition, ...] = (
     _request(Mode.LOITER),
     _request(Mode.RETURN),
     _request(Mode.TAKEOFF),
-    _request(Mode.LAND, Guard.ALWAYS),
+    _request(Mode.LAND, ModeCondition.ALWAYS),
     _request(Mode.PRECISION_LAND),
     _request(Mode.FOLLOW_TARGET),
     _request(Mode.ORBIT),
     _request(Mode.OFFBOARD),
-    _request(Mode.TERMINATION, Guard.ALWAYS),
-    Transition((Mode.TAKEOFF,), Event.TAKEOFF_REACHED, Guard.ARMED, Mode.LOITER),
-    Transition((Mode.TAKEOFF,), Event.MISSION_AFTER_TAKEOFF, Guard.ARMED, Mode.MISSION),
-    Transition((Mode.MISSION,), Event.MISSION_FINISHED, Guard.ARMED, Mode.LOITER),
-    Transition(_FLOWN_WITHOUT_STICKS, Event.STICKS, Guard.ARMED, Mode.POSCTL),
-    Transition(tuple(sorted(NOT_KEPT_AFTER_DISARMING)), Event.DISARMED, Guard.ALWAYS, None),
+    _request(Mode.TERMINATION, ModeCondition.ALWAYS),
+    Transition((Mode.TAKEOFF,), ModeEvent.TAKEOFF_REACHED, ModeCondition.ARMED, Mode.LOITER),
+    Transition((Mode.TAKEOFF,), ModeEvent.MISSION_AFTER_TAKEOFF, ModeCondition.ARMED, Mode.MISSION),
+    Transition((Mode.MISSION,), ModeEvent.MISSION_FINISHED, ModeCondition.ARMED, Mode.LOITER),
+    Transition(_FLOWN_WITHOUT_STICKS, ModeEvent.STICKS, ModeCondition.ARMED, Mode.POSCTL),
+    Transition(tuple(sorted(NOT_KEPT_AFTER_DISARMING)), ModeEvent.DISARMED, ModeCondition.ALWAYS, None),
 )
 
 
@@ -159,21 +159,21 @@ class Conditions:
     armed: bool
     available: frozenset[Need] = frozenset()
 
-    def hold(self, guard: Guard, target: Mode | None) -> bool:
+    def hold(self, guard: ModeCondition, target: Mode | None) -> bool:
         """Whether a transition with this guard may happen."""
-        if guard is Guard.ALWAYS:
+        if guard is ModeCondition.ALWAYS:
             return True
-        if guard is Guard.ARMED:
+        if guard is ModeCondition.ARMED:
             return self.armed
         return not self.armed or (target is not None and not missing(target, self.available))
 
 
 def find_transition(
-    mode: Mode, event: Event, conditions: Conditions, requested: Mode | None = None
+    mode: Mode, event: ModeEvent, conditions: Conditions, requested: Mode | None = None
 ) -> Transition | None:
     """The row of the table that applies; None where the event is refused or means nothing."""
     for row in TRANSITIONS:
-        if row.event is not event or (event is Event.REQUEST and row.target is not requested):
+        if row.event is not event or (event is ModeEvent.REQUEST and row.target is not requested):
             continue
         if (row.sources is None or mode in row.sources) and conditions.hold(row.guard, row.target):
             return row
@@ -192,14 +192,14 @@ class ModeState:
         """Whether a request was accepted since somebody last asked; the failsafes do."""
         self._after_disarming = Mode.LOITER
 
-    def apply(self, event: Event, conditions: Conditions, requested: Mode | None = None) -> bool:
+    def apply(self, event: ModeEvent, conditions: Conditions, requested: Mode | None = None) -> bool:
         """Take the event; False where the table has no row for it."""
         if self.flown is Mode.TERMINATION:
             return False
         row = find_transition(self.intended, event, conditions, requested)
         if row is None:
             return False
-        self.requested = self.requested or event is Event.REQUEST
+        self.requested = self.requested or event is ModeEvent.REQUEST
         self.mean(self._after_disarming if row.target is None else row.target)
         return True
 
@@ -221,7 +221,7 @@ def mode_diagram(rows: Iterable[Transition] = TRANSITIONS) -> str:
 
 
 def _condition(row: Transition) -> str:
-    if row.guard is Guard.CAN_RUN and row.target is not None:
+    if row.guard is ModeCondition.CAN_RUN and row.target is not None:
         return f" [disarmed, or {', '.join(sorted(NEEDS[row.target]))}]"
     return f" [{row.guard}]" if row.guard else ""
 

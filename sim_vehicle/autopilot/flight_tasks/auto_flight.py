@@ -4,7 +4,7 @@ import math
 from enum import IntEnum
 
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, Vector3, towards, turned_towards
-from sim_vehicle.autopilot.flight_tasks.target import Kind, Target, View
+from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 
@@ -39,7 +39,7 @@ class AutoFlight:
         self._smoother.start(view.position_ned_m, (0.0, 0.0, 0.0) if at_rest else view.velocity_ned_m_s)
         self._yaw_rad = self._asked_yaw_rad = view.yaw_rad
 
-    def demand(self, target: Target, view: View, step_s: float) -> TrajectorySetpoint | None:
+    def demand(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint | None:
         """The next setpoint; None lets the motors idle."""
         if target.kind is Kind.IDLE:
             return None
@@ -50,7 +50,7 @@ class AutoFlight:
             return self.descend(target.position_ned_m, view, land_speed_m_s(view.height_m, self._parameters), step_s)
         return self._fly(target, view, step_s)
 
-    def _fly(self, target: Target, view: View, step_s: float) -> TrajectorySetpoint:
+    def _fly(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint:
         smoother = self._smoother
         place = smoother.position_ned_m if self._waits_for_yaw() else target.position_ned_m
         smoother.advance(place, step_s, self._cruise_m_s(target))
@@ -61,7 +61,7 @@ class AutoFlight:
             yaw_rad=self._yaw_rad,
         )
 
-    def _cruise_m_s(self, target: Target) -> float:
+    def _cruise_m_s(self, target: NavigatorTarget) -> float:
         wanted = target.speed_m_s or self.cruise_m_s or self._parameters["MPC_XY_CRUISE"]
         return min(wanted, self._parameters["MPC_XY_VEL_MAX"])
 
@@ -71,7 +71,7 @@ class AutoFlight:
         away_rad = abs(math.remainder(self._asked_yaw_rad - self._yaw_rad, 2 * math.pi))
         return away_rad > math.radians(self._parameters["MIS_YAW_ERR"])
 
-    def _climb(self, target: Target, view: View, step_s: float) -> TrajectorySetpoint:
+    def _climb(self, target: NavigatorTarget, view: View, step_s: float) -> TrajectorySetpoint:
         """Climb at the takeoff's speed; the height follows the vehicle, so that only the speed counts."""
         north, east, down = target.position_ned_m
         height, parameters = view.position_ned_m[2], self._parameters
@@ -97,7 +97,7 @@ class AutoFlight:
 
     # --- heading ---------------------------------------------------------------------------------------------
 
-    def _turn(self, target: Target, view: View, step_s: float) -> None:
+    def _turn(self, target: NavigatorTarget, view: View, step_s: float) -> None:
         if target.yaw_rad is not None:
             self._asked_yaw_rad = target.yaw_rad
         elif target.kind in (Kind.POSITION, Kind.HOLD):
@@ -105,7 +105,7 @@ class AutoFlight:
         most_rad = math.radians(self._parameters["MPC_YAWRAUTO_MAX"]) * step_s
         self._yaw_rad = turned_towards(self._yaw_rad, self._asked_yaw_rad, most_rad)
 
-    def _yaw_of_mode(self, target: Target, view: View) -> float:
+    def _yaw_of_mode(self, target: NavigatorTarget, view: View) -> float:
         """Where the nose should point; within NAV_ACC_RAD of that point it stays as it is."""
         mode = self._parameters["MPC_YAW_MODE"]
         north, east, _ = view.position_ned_m

@@ -25,7 +25,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class NavigatorTarget:
     """A place to fly to, local NED. A heading of None is left to MPC_YAW_MODE."""
 
     kind: Kind
@@ -71,14 +71,14 @@ class Acceptance:
     """Being higher is being there, as on a takeoff."""
 
 
-def takeoff_acceptance(target: Target, view: View, parameters: Parameters) -> Acceptance:
+def takeoff_acceptance(target: NavigatorTarget, view: View, parameters: Parameters) -> Acceptance:
     """Only the height counts, and a low one is not reached by standing on the ground."""
     height_m, vertical_m = view.home_ned_m[2] - target.position_ned_m[2], parameters["NAV_MC_ALT_RAD"]
     vertical_m = height_m / 2 if 0.0 < height_m < vertical_m else vertical_m
     return Acceptance(math.inf, vertical_m, passes_above=True)
 
 
-def climbs_to(target: Target, view: View, parameters: Parameters) -> bool:
+def climbs_to(target: NavigatorTarget, view: View, parameters: Parameters) -> bool:
     """Whether PX4 leaves the ground for it: not where the way there is next to level.
 
     Who asks for a takeoff to latitude and longitude 0 sees it: armed, the vehicle stands until it disarms itself
@@ -104,7 +104,7 @@ class Arrival:
         self._there_since_us: int | None = None
         self._is_aligned = False
 
-    def is_reached(self, target: Target, accepts: Acceptance, view: View, parameters: Parameters) -> bool:
+    def is_reached(self, target: NavigatorTarget, accepts: Acceptance, view: View, parameters: Parameters) -> bool:
         """Whether the vehicle has been where it should be for long enough."""
         if self._there_since_us is None:
             if view.landed or not _is_near(target, accepts, view):
@@ -114,7 +114,7 @@ class Arrival:
         return self._is_aligned and view.now_us >= self._there_since_us + accepts.inside_s * _MICROSECONDS
 
 
-def _is_near(target: Target, accepts: Acceptance, view: View) -> bool:
+def _is_near(target: NavigatorTarget, accepts: Acceptance, view: View) -> bool:
     too_low_m = view.position_ned_m[2] - target.position_ned_m[2]
     is_high_enough = too_low_m < accepts.vertical_m if accepts.passes_above else abs(too_low_m) <= accepts.vertical_m
     return is_high_enough and view.distance_m(target.position_ned_m) <= accepts.horizontal_m

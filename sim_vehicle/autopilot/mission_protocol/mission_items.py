@@ -6,7 +6,7 @@ be global; one without must be in MAV_FRAME_MISSION. What PX4 does not keep come
 
 import math
 
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem, MissionResult, MissionType, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, StoredItem, WireItem
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.setpoint import Vector3
@@ -88,7 +88,7 @@ _WITHOUT_PLACE = PAYLOAD | {
 _DEGREES_PER_UNIT = 1e-7
 
 
-def parse(wire: WireItem) -> MissionItem | MissionResult:
+def parse(wire: WireItem) -> StoredItem | MissionResult:
     """The item as it is stored, or why it is refused."""
     if wire.frame in _GLOBAL_FRAMES or (wire.is_int and wire.frame in _GLOBAL_INT_FRAMES):
         return _with_place(wire)
@@ -97,7 +97,7 @@ def parse(wire: WireItem) -> MissionItem | MissionResult:
     return MissionResult.UNSUPPORTED_FRAME
 
 
-def _with_place(wire: WireItem) -> MissionItem | MissionResult:
+def _with_place(wire: WireItem) -> StoredItem | MissionResult:
     kept = _KEPT.get(wire.command)
     if kept is None:
         return MissionResult.UNSUPPORTED
@@ -111,7 +111,7 @@ def _with_place(wire: WireItem) -> MissionItem | MissionResult:
     return _item(wire, params, wire.x * scale, wire.y * scale)
 
 
-def _without_place(wire: WireItem) -> MissionItem | MissionResult:
+def _without_place(wire: WireItem) -> StoredItem | MissionResult:
     if wire.command not in _WITHOUT_PLACE:
         return MissionResult.UNSUPPORTED
     if wire.command in (ROI, DO_SET_ROI) and _whole(wire.params[0]) not in (ROI_NONE, ROI_WPNEXT, ROI_WPINDEX):
@@ -119,10 +119,10 @@ def _without_place(wire: WireItem) -> MissionItem | MissionResult:
     return _item(wire, wire.params, wire.x, wire.y)
 
 
-def _item(wire: WireItem, params: tuple[float, ...], x: float, y: float) -> MissionItem:
+def _item(wire: WireItem, params: tuple[float, ...], x: float, y: float) -> StoredItem:
     p1, p2, p3, p4 = params
     command = DO_SET_ROI if wire.command == ROI else wire.command
-    return MissionItem(wire.frame, command, wire.autocontinue, (p1, p2, p3, p4, x, y, wire.z))
+    return StoredItem(wire.frame, command, wire.autocontinue, (p1, p2, p3, p4, x, y, wire.z))
 
 
 def _kept(rule: str, value: float) -> float:
@@ -139,7 +139,7 @@ def _whole(value: float) -> int:
     return int(value + 0.5) if math.isfinite(value) else -1
 
 
-def fits(item: MissionItem, kind: int) -> bool:
+def fits(item: StoredItem, kind: int) -> bool:
     """Whether the item may stand in a list of that type."""
     if kind == MissionType.MISSION:
         return item.command not in NOT_IN_A_MISSION
@@ -147,7 +147,7 @@ def fits(item: MissionItem, kind: int) -> bool:
     return kind != MissionType.FENCE or not has_too_few_corners
 
 
-def place_of(item: MissionItem, origin: Origin, home_ned_m: Vector3) -> Vector3:
+def place_of(item: StoredItem, origin: Origin, home_ned_m: Vector3) -> Vector3:
     """Where an item with a place lies."""
     north, east, down = origin.position_of(Place(item.latitude_deg, item.longitude_deg, item.altitude_m))
     return north, east, home_ned_m[2] - item.altitude_m if item.is_relative else down

@@ -31,7 +31,7 @@ class MissionResult(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Peer:
+class MissionPeer:
     """Who sent a message, or is to get one."""
 
     system: int
@@ -65,7 +65,7 @@ class WireItem:
 
 
 @dataclass(frozen=True, slots=True)
-class MissionItem:
+class StoredItem:
     """A stored item: what PX4 keeps of what it was sent."""
 
     frame: int
@@ -99,13 +99,13 @@ class MissionItem:
 
 @dataclass(frozen=True, slots=True)
 class RequestList:
-    peer: Peer
+    peer: MissionPeer
     type: int
 
 
 @dataclass(frozen=True, slots=True)
 class RequestItem:
-    peer: Peer
+    peer: MissionPeer
     number: int
     type: int
     is_int: bool
@@ -113,52 +113,52 @@ class RequestItem:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    peer: Peer
+    peer: MissionPeer
     count: int
     type: int
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
-    peer: Peer
+class SentItem:
+    peer: MissionPeer
     item: WireItem
     type: int
 
 
 @dataclass(frozen=True, slots=True)
 class Ack:
-    peer: Peer
+    peer: MissionPeer
     result: int
     type: int
 
 
 @dataclass(frozen=True, slots=True)
 class ClearAll:
-    peer: Peer
+    peer: MissionPeer
     type: int
 
 
 @dataclass(frozen=True, slots=True)
 class SetCurrent:
-    peer: Peer
+    peer: MissionPeer
     number: int
 
 
-MissionMessage: TypeAlias = RequestList | RequestItem | Count | Item | Ack | ClearAll | SetCurrent
+MissionMessage: TypeAlias = RequestList | RequestItem | Count | SentItem | Ack | ClearAll | SetCurrent
 
 
 @dataclass(frozen=True, slots=True)
 class SendCount:
-    peer: Peer
+    peer: MissionPeer
     count: int
     type: int
 
 
 @dataclass(frozen=True, slots=True)
 class SendItem:
-    peer: Peer
+    peer: MissionPeer
     number: int
-    item: MissionItem
+    item: StoredItem
     is_current: bool
     type: int
     is_int: bool
@@ -166,7 +166,7 @@ class SendItem:
 
 @dataclass(frozen=True, slots=True)
 class SendRequest:
-    peer: Peer
+    peer: MissionPeer
     number: int
     type: int
     is_int: bool
@@ -174,7 +174,7 @@ class SendRequest:
 
 @dataclass(frozen=True, slots=True)
 class SendAck:
-    peer: Peer
+    peer: MissionPeer
     result: MissionResult
     type: int
 

@@ -11,19 +11,19 @@ from typing import Any
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items
 from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem, MissionResult, MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore, Plan
 
 # MAVLINK_MISSION_RETRY_TIMEOUT_DEFAULT and MAVLINK_MISSION_PROTOCOL_TIMEOUT_DEFAULT.
 RETRY_US = 250_000
 TIMEOUT_US = 5_000_000
 
-_NOBODY = wire.Peer(0, 0)
+_NOBODY = wire.MissionPeer(0, 0)
 _NO_CLEAR, _NO_CURRENT = "WPM: IGN CLEAR CMD: Busy", "WPM: IGN WP CURR CMD: Busy"
 _DOWNLOAD_RUNS = "Mission download request ignored, already active"
 
 
-class State(Enum):
+class TransferState(Enum):
     """What the link is doing."""
 
     IDLE = auto()
@@ -37,7 +37,7 @@ class MissionTransfer:
     """Messages and the time in; answers and texts out. The lists themselves are the store's."""
 
     def __init__(self, store: MissionStore) -> None:
-        self.state = State.IDLE
+        self.state = TransferState.IDLE
         self.texts: list[StatusText] = []
         self._store = store
         self._answers: list[wire.MissionAnswer] = []
@@ -47,7 +47,7 @@ class MissionTransfer:
         self._is_int = True
         self._next = 0
         self._count = 0
-        self._items: list[MissionItem] = []
+        self._items: list[StoredItem] = []
         self._marked: int | None = None
         self._checksum = 0
         self._sent_us: int | None = None
@@ -62,7 +62,7 @@ class MissionTransfer:
     def update(self, now_us: int) -> list[wire.MissionAnswer]:
         """Let time pass: repeats and time-outs."""
         self._now_us = now_us
-        if self.state is not State.IDLE:
+        if self.state is not TransferState.IDLE:
             self._wait()
         return self._taken()
 
@@ -75,9 +75,9 @@ class MissionTransfer:
     def _wait(self) -> None:
         now_us = self._now_us
         is_quiet = self._sent_us is not None and now_us - self._sent_us > RETRY_US
-        if self.state is State.RECEIVING and is_quiet and not self._is_over():
+        if self.state is TransferState.RECEIVING and is_quiet and not self._is_over():
             self._ask_for_next()
-        elif self.state is State.SENDING and is_quiet and self._next == 0 and not self._is_over():
+        elif self.state is TransferState.SENDING and is_quiet and self._next == 0 and not self._is_over():
             self._send_count()
         elif self._is_over():
             self._say("Mission sync timeout")
@@ -89,7 +89,7 @@ class MissionTransfer:
     # --- download ----------------------------------------------------------------------------------------------
 
     def _begin_download(self, message: wire.RequestList) -> None:
-        self.state, self._type, self._peer = State.SENDING, message.type, message.peer
+        self.state, self._type, self._peer = TransferState.SENDING, message.type, message.peer
         self._heard_us = self._now_us
         self._next, self._count = 0, len(self._store.plan(message.type).items)
         self._send_count()
@@ -123,7 +123,7 @@ class MissionTransfer:
             is_current = self._store.current == number
             self._answers.append(wire.SendItem(self._peer, number, items[number], is_current, self._type, self._is_int))
             return
-        self.state = State.IDLE
+        self.state = TransferState.IDLE
         self._acknowledge(MissionResult.ERROR)
         self._say("WPM: REJ. CMD: Req. WP was unexpected")
 
@@ -141,7 +141,7 @@ class MissionTransfer:
             self._say("REJ. WP CMD: partner id mismatch")
         elif message.type == self._type:
             self._heard_us = self._now_us
-            self.state = State.IDLE
+            self.state = TransferState.IDLE
 
     # --- upload ------------------------------------------------------------------------------------------------
 
@@ -160,7 +160,7 @@ class MissionTransfer:
             self._store.replace(MissionType(message.type), Plan())
             self._acknowledge(MissionResult.ACCEPTED)
         else:
-            self.state, self._store.uploading = State.RECEIVING, True
+            self.state, self._store.uploading = TransferState.RECEIVING, True
             self._next, self._count, self._marked = 0, message.count, None
             self._items = []
             self._ask_for_next()
@@ -183,7 +183,7 @@ class MissionTransfer:
         self._sent_us = self._now_us
         self._answers.append(wire.SendRequest(self._peer, self._next, self._type, self._is_int))
 
-    def _take_item(self, message: wire.Item) -> None:
+    def _take_item(self, message: wire.SentItem) -> None:
         if not self._is_from_partner(message):
             return
         self._heard_us = self._now_us
@@ -214,7 +214,7 @@ class MissionTransfer:
         self._end_upload()
         self._acknowledge(MissionResult.ACCEPTED)
 
-    def _acknowledge_again(self, message: wire.Item) -> None:
+    def _acknowledge_again(self, message: wire.SentItem) -> None:
         """After the last item: its sender may not have got our acknowledgement."""
         if not self._is_from_partner(message):
             return
@@ -224,12 +224,12 @@ class MissionTransfer:
             self._say("IGN MISSION_ITEM: No transfer")
             self._acknowledge(MissionResult.ERROR)
 
-    def _refuse_item(self, message: wire.Item) -> None:
+    def _refuse_item(self, message: wire.SentItem) -> None:
         if self._is_from_partner(message):
             self._say("IGN MISSION_ITEM: Busy")
             self._acknowledge(MissionResult.ERROR)
 
-    def _is_from_partner(self, message: wire.Item) -> bool:
+    def _is_from_partner(self, message: wire.SentItem) -> bool:
         self._is_int = message.item.is_int
         if message.peer != self._peer:
             self._say("REJ. MIS ITEM: partner id mismatch")
@@ -244,8 +244,8 @@ class MissionTransfer:
         self._end_upload()
 
     def _end_upload(self) -> None:
-        self._store.uploading = self._store.uploading and self.state is not State.RECEIVING
-        self.state = State.IDLE
+        self._store.uploading = self._store.uploading and self.state is not TransferState.RECEIVING
+        self.state = TransferState.IDLE
 
     def _answer_upload(self, message: wire.Ack) -> None:
         """The peer cannot send items of the other kind, or gives up."""
@@ -288,26 +288,26 @@ def _refused(text: str, severity: Severity = Severity.CRITICAL) -> Callable[[Mis
 
 # The table: what a message means in each state.
 _M = MissionTransfer
-_HANDLERS: dict[tuple[type, State], Callable[[Any, Any], None]] = {
-    (wire.RequestList, State.IDLE): _M._begin_download,
-    (wire.RequestList, State.SENDING): _M._begin_download_again,
-    (wire.RequestList, State.RECEIVING): _refused(_DOWNLOAD_RUNS, Severity.INFO),
-    (wire.RequestItem, State.IDLE): _M._ignore_request,
-    (wire.RequestItem, State.SENDING): _M._send_item,
-    (wire.RequestItem, State.RECEIVING): _M._refuse_request,
-    (wire.Count, State.IDLE): _M._begin_upload,
-    (wire.Count, State.SENDING): _M._refuse_upload,
-    (wire.Count, State.RECEIVING): _M._repeat_request,
-    (wire.Item, State.IDLE): _M._acknowledge_again,
-    (wire.Item, State.SENDING): _M._refuse_item,
-    (wire.Item, State.RECEIVING): _M._take_item,
-    (wire.Ack, State.IDLE): _M._ignore_ack,
-    (wire.Ack, State.SENDING): _M._end_download,
-    (wire.Ack, State.RECEIVING): _M._answer_upload,
-    (wire.ClearAll, State.IDLE): _M._clear,
-    (wire.ClearAll, State.SENDING): _refused(_NO_CLEAR),
-    (wire.ClearAll, State.RECEIVING): _refused(_NO_CLEAR),
-    (wire.SetCurrent, State.IDLE): _M._set_current,
-    (wire.SetCurrent, State.SENDING): _refused(_NO_CURRENT),
-    (wire.SetCurrent, State.RECEIVING): _refused(_NO_CURRENT),
+_HANDLERS: dict[tuple[type, TransferState], Callable[[Any, Any], None]] = {
+    (wire.RequestList, TransferState.IDLE): _M._begin_download,
+    (wire.RequestList, TransferState.SENDING): _M._begin_download_again,
+    (wire.RequestList, TransferState.RECEIVING): _refused(_DOWNLOAD_RUNS, Severity.INFO),
+    (wire.RequestItem, TransferState.IDLE): _M._ignore_request,
+    (wire.RequestItem, TransferState.SENDING): _M._send_item,
+    (wire.RequestItem, TransferState.RECEIVING): _M._refuse_request,
+    (wire.Count, TransferState.IDLE): _M._begin_upload,
+    (wire.Count, TransferState.SENDING): _M._refuse_upload,
+    (wire.Count, TransferState.RECEIVING): _M._repeat_request,
+    (wire.SentItem, TransferState.IDLE): _M._acknowledge_again,
+    (wire.SentItem, TransferState.SENDING): _M._refuse_item,
+    (wire.SentItem, TransferState.RECEIVING): _M._take_item,
+    (wire.Ack, TransferState.IDLE): _M._ignore_ack,
+    (wire.Ack, TransferState.SENDING): _M._end_download,
+    (wire.Ack, TransferState.RECEIVING): _M._answer_upload,
+    (wire.ClearAll, TransferState.IDLE): _M._clear,
+    (wire.ClearAll, TransferState.SENDING): _refused(_NO_CLEAR),
+    (wire.ClearAll, TransferState.RECEIVING): _refused(_NO_CLEAR),
+    (wire.SetCurrent, TransferState.IDLE): _M._set_current,
+    (wire.SetCurrent, TransferState.SENDING): _refused(_NO_CURRENT),
+    (wire.SetCurrent, TransferState.RECEIVING): _refused(_NO_CURRENT),
 }

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from sim_vehicle.autopilot.flight_tasks.target import Vector3, View
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters
@@ -60,7 +60,7 @@ class Geofence:
         """What PX4 says about it when somebody tries to arm."""
         self.texts: list[StatusText] = []
 
-    def load(self, items: Sequence[MissionItem], view: View) -> None:
+    def load(self, items: Sequence[StoredItem], view: View) -> None:
         """Take an uploaded fence; shapes that exclude home, or a flying vehicle, are left out."""
         shapes = []
         for shape in shapes_of(items, self._origin):
@@ -106,7 +106,7 @@ class Geofence:
         self.texts.append(StatusText(Severity.CRITICAL, text))
 
 
-def shapes_of(items: Sequence[MissionItem], origin: Origin) -> list[Shape]:
+def shapes_of(items: Sequence[StoredItem], origin: Origin) -> list[Shape]:
     """The polygons and circles that a list of items describes; a polygon that is cut short is left out."""
     shapes: list[Shape] = []
     number = 0
@@ -126,6 +126,6 @@ def shapes_of(items: Sequence[MissionItem], origin: Origin) -> list[Shape]:
     return shapes
 
 
-def _place(item: MissionItem, origin: Origin) -> tuple[float, float]:
+def _place(item: StoredItem, origin: Origin) -> tuple[float, float]:
     north, east, _ = origin.position_of(Place(item.latitude_deg, item.longitude_deg, origin.place.altitude_m))
     return north, east

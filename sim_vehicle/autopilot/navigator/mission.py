@@ -13,7 +13,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
     Acceptance,
     Arrival,
     Kind,
-    Target,
+    NavigatorTarget,
     Vector3,
     View,
     takeoff_acceptance,
@@ -21,7 +21,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
@@ -48,7 +48,7 @@ class MissionCommand:
     params: tuple[float, float, float, float, float, float, float]
 
 
-class Mission:
+class MissionFlight:
     """The run through the stored items."""
 
     def __init__(self, store: MissionStore, parameters: Parameters, origin: Origin) -> None:
@@ -60,12 +60,12 @@ class Mission:
         self._climb_down_m: float | None = None
         self._jumps_left: dict[int, int] = {}
         self._entered_us = 0
-        self._roi: MissionItem | None = None
+        self._roi: StoredItem | None = None
         self._was_disarmed = False
         self._was_flown = False
         self.runs = False
         """An item is being flown."""
-        self.target = Target(Kind.IDLE, (0.0, 0.0, 0.0))
+        self.target = NavigatorTarget(Kind.IDLE, (0.0, 0.0, 0.0))
         self.texts: list[StatusText] = []
         self.commands: list[MissionCommand] = []
         self._given: list[MissionCommand] = []
@@ -157,7 +157,7 @@ class Mission:
             return
         self._set_item(view)
 
-    def _is_over(self, item: MissionItem, view: View) -> bool:
+    def _is_over(self, item: StoredItem, view: View) -> bool:
         command = item.command
         if self._work is Work.ITEM:
             if command in (kinds.LAND, kinds.VTOL_LAND):
@@ -174,7 +174,7 @@ class Mission:
                 return True
         return self._arrival.is_reached(self.target, self._acceptance(item, view), view, self._parameters)
 
-    def _acceptance(self, item: MissionItem, view: View) -> Acceptance:
+    def _acceptance(self, item: StoredItem, view: View) -> Acceptance:
         horizontal_m, vertical_m = self._parameters["NAV_ACC_RAD"], self._parameters["NAV_MC_ALT_RAD"]
         if self.target.kind is Kind.TAKEOFF:
             return takeoff_acceptance(self.target, view, self._parameters)
@@ -187,7 +187,7 @@ class Mission:
             horizontal_m, vertical_m, inside_s=max(item.params[0], 0.0) if stays else 0.0, yaw_rad=self.target.yaw_rad
         )
 
-    def _is_through(self, item: MissionItem, view: View) -> bool:
+    def _is_through(self, item: StoredItem, view: View) -> bool:
         """Past the plane through the gate that faces the next place."""
         north, east, _ = self._place(item, view)
         to_north, to_east = self.target.position_ned_m[0] - north, self.target.position_ned_m[1] - east
@@ -217,11 +217,11 @@ class Mission:
         self._store.progress.finished = True
         self._say("Mission finished, landed" if view.landed else "Mission finished, loitering")
         if view.landed:
-            self.target = Target(Kind.IDLE, view.position_ned_m)
+            self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         elif self.target.kind in (Kind.POSITION, Kind.HOLD):
-            self.target = Target(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
+            self.target = NavigatorTarget(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
         else:
-            self.target = Target(Kind.HOLD, view.position_ned_m)
+            self.target = NavigatorTarget(Kind.HOLD, view.position_ned_m)
 
     # --- what an item means ------------------------------------------------------------------------------------
 
@@ -230,7 +230,7 @@ class Mission:
         self._arrival.begin()
         if not self.runs:
             here = stop_point(view.position_ned_m, view.velocity_ned_m_s, self._parameters)
-            self.target = Target(Kind.IDLE if view.landed else Kind.HOLD, here)
+            self.target = NavigatorTarget(Kind.IDLE if view.landed else Kind.HOLD, here)
             return
         item = self._store.mission.items[self._store.current]
         if item.command == kinds.DO_JUMP:
@@ -244,9 +244,9 @@ class Mission:
             self._fly_through(view)
             return
         if self.target.kind in (Kind.TAKEOFF, Kind.IDLE, Kind.LAND) and not view.landed:
-            self.target = Target(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
+            self.target = NavigatorTarget(Kind.HOLD, self.target.position_ned_m, self.target.yaw_rad)
         elif view.landed:
-            self.target = Target(Kind.IDLE, view.position_ned_m)
+            self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         if item.command in (kinds.DO_SET_ROI, kinds.DO_SET_ROI_LOCATION, kinds.DO_SET_ROI_NONE):
             is_place = item.frame != kinds.FRAME_MISSION and item.params[0] != kinds.ROI_NONE
             is_place = is_place or item.command == kinds.DO_SET_ROI_LOCATION
@@ -261,7 +261,7 @@ class Mission:
             self._store.current += 1
             self._finish(view)
 
-    def _fly_to(self, item: MissionItem, view: View) -> None:
+    def _fly_to(self, item: StoredItem, view: View) -> None:
         place = self._place(item, view)
         north, east, _ = view.position_ned_m
         before, self._work = self._work, Work.ITEM
@@ -270,32 +270,32 @@ class Mission:
             height_m = view.home_ned_m[2] - self._climb_down_m
             self._say(f"Climb to {height_m:.1f} meters above home")
             kind = Kind.TAKEOFF if view.landed else Kind.HOLD
-            self.target = Target(kind, (north, east, self._climb_down_m))
+            self.target = NavigatorTarget(kind, (north, east, self._climb_down_m))
             self._climb_down_m = None
         elif item.command == kinds.LAND:
             self._land_at(place, before, view)
         elif item.command in (kinds.LOITER_UNLIMITED, kinds.LOITER_TIME, kinds.LOITER_TO_ALTITUDE):
             yaw_rad = item.yaw_rad if item.command != kinds.LOITER_TO_ALTITUDE else None
-            self.target = Target(Kind.HOLD, place, yaw_rad)
+            self.target = NavigatorTarget(Kind.HOLD, place, yaw_rad)
         elif item.command == kinds.TAKEOFF:
-            self.target = Target(Kind.TAKEOFF if view.landed else Kind.POSITION, place)
+            self.target = NavigatorTarget(Kind.TAKEOFF if view.landed else Kind.POSITION, place)
         else:
-            self.target = Target(Kind.POSITION, place, item.yaw_rad)
+            self.target = NavigatorTarget(Kind.POSITION, place, item.yaw_rad)
 
     def _land_at(self, place: Vector3, before: Work, view: View) -> None:
         is_far = view.distance_m(place) > self._parameters["NAV_ACC_RAD"]
         if not view.landed and is_far and before is not Work.MOVE_TO_LAND:
             self._work = Work.MOVE_TO_LAND
             height = self.target.position_ned_m if self.target.kind is Kind.POSITION else view.position_ned_m
-            self.target = Target(Kind.POSITION, (place[0], place[1], height[2]))
+            self.target = NavigatorTarget(Kind.POSITION, (place[0], place[1], height[2]))
         else:
-            self.target = Target(Kind.LAND, place)
+            self.target = NavigatorTarget(Kind.LAND, place)
 
     def _fly_through(self, view: View) -> None:
         """A gate: the place to fly to is that of the next item that has one."""
         for item in self._store.mission.items[self._store.current + 1 :]:
             if item.command in kinds.WITH_POSITION:
-                self.target = Target(Kind.POSITION, self._place(item, view), item.yaw_rad)
+                self.target = NavigatorTarget(Kind.POSITION, self._place(item, view), item.yaw_rad)
                 return
 
     def _look_at_roi(self, view: View) -> None:
@@ -306,9 +306,9 @@ class Mission:
         to_north, to_east = north - view.position_ned_m[0], east - view.position_ned_m[1]
         if math.hypot(to_north, to_east) > self._parameters["NAV_ACC_RAD"]:
             yaw_rad = math.atan2(to_east, to_north)
-            self.target = Target(self.target.kind, self.target.position_ned_m, yaw_rad, self.target.speed_m_s)
+            self.target = NavigatorTarget(self.target.kind, self.target.position_ned_m, yaw_rad, self.target.speed_m_s)
 
-    def _place(self, item: MissionItem, view: View) -> Vector3:
+    def _place(self, item: StoredItem, view: View) -> Vector3:
         return place_of(item, self._origin, view.home_ned_m)
 
     def _say(self, text: str, severity: Severity = Severity.INFO) -> None:

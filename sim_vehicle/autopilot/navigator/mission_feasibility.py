@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
@@ -38,7 +38,7 @@ class MissionCheck:
         self.problems: list[str] = []
         self.warnings: list[str] = []
 
-    def passes(self, items: Sequence[MissionItem]) -> bool:
+    def passes(self, items: Sequence[StoredItem]) -> bool:
         """Whether the mission may be flown; an empty one may not."""
         self.problems, self.warnings = [], []
         if not items:
@@ -50,7 +50,7 @@ class MissionCheck:
         self._check_fence(items)
         return not self.problems
 
-    def _all_can_be_flown(self, items: Sequence[MissionItem]) -> bool:
+    def _all_can_be_flown(self, items: Sequence[StoredItem]) -> bool:
         for number, item in enumerate(items, start=1):
             if item.command in _NOT_FLOWN:
                 self.problems.append(f"Mission rejected: item {number}: unsupported cmd: {item.command}")
@@ -63,7 +63,7 @@ class MissionCheck:
             return False
         return True
 
-    def _check_first_place(self, items: Sequence[MissionItem]) -> None:
+    def _check_first_place(self, items: Sequence[StoredItem]) -> None:
         """MIS_DIST_1WP is only a warning."""
         home, most_m = self._view.home_ned_m, self._parameters["MIS_DIST_1WP"]
         for item in items:
@@ -75,7 +75,7 @@ class MissionCheck:
                     self.warnings.append(text)
                 return
 
-    def _check_takeoff(self, items: Sequence[MissionItem]) -> None:
+    def _check_takeoff(self, items: Sequence[StoredItem]) -> None:
         has_place = False
         for item in items:
             if item.command == kinds.TAKEOFF:
@@ -88,7 +88,7 @@ class MissionCheck:
                     return
             has_place = has_place or item.command not in _PLACELESS
 
-    def _check_ends(self, items: Sequence[MissionItem]) -> None:
+    def _check_ends(self, items: Sequence[StoredItem]) -> None:
         """MIS_TKO_LAND_REQ."""
         takes_off = any(item.command == kinds.TAKEOFF for item in items)
         lands = any(item.command == kinds.LAND for item in items)
@@ -103,7 +103,7 @@ class MissionCheck:
             what = "Landing item or remove Takeoff" if takes_off else "Takeoff item or remove Landing"
             self.problems.append(f"Mission rejected: Add {what}.")
 
-    def _check_fence(self, items: Sequence[MissionItem]) -> None:
+    def _check_fence(self, items: Sequence[StoredItem]) -> None:
         for number, item in enumerate(items, start=1):
             if item.command not in kinds.WITH_POSITION:
                 continue

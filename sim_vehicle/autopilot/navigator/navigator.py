@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.flight_tasks.smoothing import stop_point
 from sim_vehicle.autopilot.flight_tasks.target import (
     Arrival,
     Kind,
-    Target,
+    NavigatorTarget,
     Vector3,
     View,
     climbs_to,
@@ -20,7 +20,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 from sim_vehicle.autopilot.messages import FollowTarget, Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
 from sim_vehicle.autopilot.navigator.geofence import Geofence
-from sim_vehicle.autopilot.navigator.mission import Mission
+from sim_vehicle.autopilot.navigator.mission import MissionFlight
 from sim_vehicle.autopilot.navigator.mission_feasibility import MissionCheck
 from sim_vehicle.autopilot.navigator.rtl import Return
 from sim_vehicle.geography import Origin
@@ -40,7 +40,7 @@ class Navigator:
     def __init__(self, parameters: Parameters, origin: Origin, missions: MissionStore, view: View) -> None:
         self.view = view
         self.fence = Geofence(parameters, origin)
-        self.mission = Mission(missions, parameters, origin)
+        self.mission = MissionFlight(missions, parameters, origin)
         self._parameters = parameters
         self._origin = origin
         self._missions = missions
@@ -51,9 +51,9 @@ class Navigator:
         self._arrival = Arrival()
         self._texts: list[StatusText] = []
         self._mode = Mode.LOITER
-        self._target = Target(Kind.IDLE, view.position_ned_m)
+        self._target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
         self._takeoff_place: tuple[Vector3 | None, float | None] | None = None
-        self._reposition: Target | None = None
+        self._reposition: NavigatorTarget | None = None
         self._seen = (-1, -1, view.home_ned_m)
         self._updated_us = view.now_us
         self._holds_after_breach = False
@@ -68,7 +68,7 @@ class Navigator:
         if self._mode is Mode.TAKEOFF and self.view.armed:
             self._begin_takeoff()
 
-    def hold_at(self, target: Target) -> bool:
+    def hold_at(self, target: NavigatorTarget) -> bool:
         """DO_REPOSITION, before the mode becomes LOITER; False where the fence forbids the place."""
         if not self.fence.allows(target.position_ned_m, self.view.home_ned_m):
             return False
@@ -128,7 +128,7 @@ class Navigator:
         elif mode is Mode.RETURN:
             self._return.begin(self.view, self._missions, previous is Mode.MISSION)
         elif mode in LANDING_MODES or mode is Mode.DESCEND:
-            self._target = Target(Kind.LAND, self.stop_place_ned_m())
+            self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
         elif mode is Mode.MISSION:
             self.mission.begin(self.view)
         elif mode is Mode.ORBIT:
@@ -138,18 +138,18 @@ class Navigator:
 
     def disarmed(self) -> None:
         """Nothing is flown any more."""
-        self._target = Target(Kind.IDLE, self.view.position_ned_m)
+        self._target = NavigatorTarget(Kind.IDLE, self.view.position_ned_m)
         self.mission.disarmed()
 
-    def _begin_hold(self, kept: Target | None) -> None:
+    def _begin_hold(self, kept: NavigatorTarget | None) -> None:
         if self._reposition is not None:
             self._take_reposition()
         elif kept is not None:
-            self._target = Target(Kind.HOLD, kept.position_ned_m, kept.yaw_rad)
+            self._target = NavigatorTarget(Kind.HOLD, kept.position_ned_m, kept.yaw_rad)
         elif self.view.landed:
-            self._target = Target(Kind.IDLE, self.view.position_ned_m)
+            self._target = NavigatorTarget(Kind.IDLE, self.view.position_ned_m)
         else:
-            self._target = Target(Kind.HOLD, self.stop_place_ned_m())
+            self._target = NavigatorTarget(Kind.HOLD, self.stop_place_ned_m())
 
     def _take_reposition(self) -> None:
         if self._reposition is not None and self.view.armed:
@@ -171,7 +171,7 @@ class Navigator:
             down_m = here_down_m
             self._say(Severity.CRITICAL, "Already higher than takeoff altitude")
         self._arrival.begin()
-        self._target = Target(Kind.TAKEOFF, (north, east, down_m))
+        self._target = NavigatorTarget(Kind.TAKEOFF, (north, east, down_m))
 
     # --- time ----------------------------------------------------------------------------------------------------
 
@@ -203,7 +203,7 @@ class Navigator:
         """GF_ACTION 2 holds where the fence was found breached."""
         if self._parameters["GF_ACTION"] == _FENCE_HOLDS:
             self._holds_after_breach = True
-            self._reposition = Target(Kind.HOLD, self.view.position_ned_m)
+            self._reposition = NavigatorTarget(Kind.HOLD, self.view.position_ned_m)
             if self._mode is Mode.LOITER:
                 self._target, self._reposition = self._reposition, None
 
@@ -250,9 +250,9 @@ class Navigator:
     def sink_here(self) -> None:
         """Begin to sink where the vehicle can stop: a stick mode without sticks."""
         self._flight.start(self.view)
-        self._target = Target(Kind.LAND, self.stop_place_ned_m())
+        self._target = NavigatorTarget(Kind.LAND, self.stop_place_ned_m())
 
-    def _target_of(self, mode: Mode) -> Target:
+    def _target_of(self, mode: Mode) -> NavigatorTarget:
         if mode is Mode.MISSION:
             return self.mission.target
         return self._return.target if mode is Mode.RETURN else self._target

@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, IntEnum, auto
 
-from sim_vehicle.autopilot.flight_tasks.target import Acceptance, Arrival, Kind, Target, Vector3, View
+from sim_vehicle.autopilot.flight_tasks.target import Acceptance, Arrival, Kind, NavigatorTarget, Vector3, View
 from sim_vehicle.autopilot.messages import Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_items import place_of
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.geography import Origin
 from sim_vehicle.parameters.store import Parameters
@@ -22,14 +22,14 @@ from sim_vehicle.parameters.store import Parameters
 _LANDINGS = (kinds.LAND, kinds.VTOL_LAND)
 _TAKEOFFS = (kinds.TAKEOFF, kinds.VTOL_TAKEOFF)
 
-Items = tuple[MissionItem, ...]
+Items = tuple[StoredItem, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
     """One place on the way."""
 
-    target: Target
+    target: NavigatorTarget
     acceptance: Acceptance
     item: int | None = None
     """The mission item that is the current one meanwhile."""
@@ -71,7 +71,7 @@ class PathPlanner:
         north, east, down = self._view.position_ned_m
         if down > return_down_m:
             # No heading is asked for in the climb
-            stops.append(Stop(Target(Kind.HOLD, (north, east, return_down_m)), self._acceptance(None)))
+            stops.append(Stop(NavigatorTarget(Kind.HOLD, (north, east, return_down_m)), self._acceptance(None)))
         numbers = [number for number in self._places if landing.start <= number <= landing.land]
         return stops + self._stops(numbers, stops[-1].target.position_ned_m[2] if stops else down)
 
@@ -102,24 +102,26 @@ class PathPlanner:
         for number in numbers:
             item, place = self._items[number], self._places[number]
             if item.command in _LANDINGS:
-                above = Target(Kind.POSITION, (place[0], place[1], down_m))
+                above = NavigatorTarget(Kind.POSITION, (place[0], place[1], down_m))
                 stops.append(Stop(above, self._acceptance(None), number))
-                stops.append(Stop(Target(Kind.LAND, place), self._acceptance(None), number))
+                stops.append(Stop(NavigatorTarget(Kind.LAND, place), self._acceptance(None), number))
             else:
                 kind = Kind.HOLD if item.command == kinds.LOITER_TO_ALTITUDE else Kind.POSITION
-                stops.append(Stop(Target(kind, place, item.yaw_rad), self._acceptance(item), number))
+                stops.append(Stop(NavigatorTarget(kind, place, item.yaw_rad), self._acceptance(item), number))
             down_m = place[2]
         return stops
 
     def _down_at_home(self, down_m: float | None) -> list[Stop]:
         north, east, home_down = self._view.home_ned_m
-        above = Target(Kind.POSITION, (north, east, self._view.position_ned_m[2] if down_m is None else down_m))
-        end = Target(Kind.LAND, self._view.home_ned_m)
+        above = NavigatorTarget(
+            Kind.POSITION, (north, east, self._view.position_ned_m[2] if down_m is None else down_m)
+        )
+        end = NavigatorTarget(Kind.LAND, self._view.home_ned_m)
         if self._parameters["RTL_LAND_DELAY"] < 0.0:
-            end = Target(Kind.HOLD, (north, east, home_down - self._parameters["RTL_DESCEND_ALT"]))
+            end = NavigatorTarget(Kind.HOLD, (north, east, home_down - self._parameters["RTL_DESCEND_ALT"]))
         return [Stop(above, self._acceptance(None)), Stop(end, self._acceptance(None))]
 
-    def _acceptance(self, item: MissionItem | None) -> Acceptance:
+    def _acceptance(self, item: StoredItem | None) -> Acceptance:
         horizontal_m, vertical_m = self._parameters["NAV_ACC_RAD"], self._parameters["NAV_MC_ALT_RAD"]
         if item is None:
             return Acceptance(horizontal_m, vertical_m)
@@ -153,7 +155,7 @@ class Type(IntEnum):
 _ALONG_THE_MISSION = (Type.MISSION, Type.SHORTER_MISSION)
 
 
-class Leg(Enum):
+class ReturnLeg(Enum):
     """RtlDirect's states."""
 
     CLIMB = auto()
@@ -172,7 +174,7 @@ class Return:
         self._parameters = parameters
         self._origin = origin
         self._arrival = Arrival()
-        self._leg = Leg.DONE
+        self._leg = ReturnLeg.DONE
         self._place_ned_m: Vector3 = (0.0, 0.0, 0.0)
         self._place_yaw_rad: float | None = None
         self._down_m = 0.0
@@ -180,7 +182,7 @@ class Return:
         self._stop: Stop | None = None
         self._stops: list[Stop] = []
         """What is left of a way along the mission."""
-        self.target = Target(Kind.IDLE, self._place_ned_m)
+        self.target = NavigatorTarget(Kind.IDLE, self._place_ned_m)
         self.texts: list[StatusText] = []
 
     def begin(self, view: View, missions: MissionStore, from_mission: bool) -> None:
@@ -214,9 +216,9 @@ class Return:
         self._down_m = self._return_down_m(view)
         return_height_m = place_down_m - self._down_m
         if view.landed:
-            self._leg = Leg.DONE
+            self._leg = ReturnLeg.DONE
         else:
-            self._leg = Leg.CLIMB if place_down_m - view.position_ned_m[2] < return_height_m else Leg.GO
+            self._leg = ReturnLeg.CLIMB if place_down_m - view.position_ned_m[2] < return_height_m else ReturnLeg.GO
         altitude_m = self._origin.place.altitude_m - self._down_m
         self._say(f"RTL: start return at {_metres(altitude_m)} m ({_metres(return_height_m)} m above destination)")
         self._enter(view)
@@ -232,7 +234,7 @@ class Return:
             if self._stops and self._arrival.is_reached(self.target, self._stop.acceptance, view, self._parameters):
                 self._enter_stop(self._stops.pop(0))
             return
-        if self._leg in (Leg.DONE, Leg.LAND):
+        if self._leg in (ReturnLeg.DONE, ReturnLeg.LAND):
             return
         if self._arrival.is_reached(self.target, self._acceptance(), view, self._parameters):
             self._leg = self._next()
@@ -251,44 +253,44 @@ class Return:
         current = self._missions.current
         return self._parameters["RTL_TYPE"] == Type.MISSION or landing.start - current < current
 
-    def _next(self) -> Leg:
-        if self._leg is Leg.CLIMB:
-            return Leg.GO
-        if self._leg is Leg.GO:
-            return Leg.LAND if self._parameters["RTL_LAND_DELAY"] == 0.0 else Leg.SINK
-        return {Leg.SINK: Leg.WAIT, Leg.WAIT: Leg.GO_OVER}.get(self._leg, Leg.LAND)
+    def _next(self) -> ReturnLeg:
+        if self._leg is ReturnLeg.CLIMB:
+            return ReturnLeg.GO
+        if self._leg is ReturnLeg.GO:
+            return ReturnLeg.LAND if self._parameters["RTL_LAND_DELAY"] == 0.0 else ReturnLeg.SINK
+        return {ReturnLeg.SINK: ReturnLeg.WAIT, ReturnLeg.WAIT: ReturnLeg.GO_OVER}.get(self._leg, ReturnLeg.LAND)
 
     def _enter(self, view: View) -> None:
         self._arrival.begin()
         north, east, down = self._place_ned_m
         over = (north, east, max(down - self._parameters["RTL_DESCEND_ALT"], self._down_m))
-        if self._leg is Leg.CLIMB:
+        if self._leg is ReturnLeg.CLIMB:
             here = (view.position_ned_m[0], view.position_ned_m[1], self._down_m)
-            self.target = Target(Kind.HOLD, here, view.yaw_rad)
-        elif self._leg is Leg.GO:
+            self.target = NavigatorTarget(Kind.HOLD, here, view.yaw_rad)
+        elif self._leg is ReturnLeg.GO:
             is_near = view.distance_m(self._place_ned_m) < self._parameters["RTL_MIN_DIST"]
             yaw_rad = self._place_yaw_rad if is_near else None
-            self.target = Target(Kind.POSITION, (north, east, self._down_m), yaw_rad)
-        elif self._leg in (Leg.SINK, Leg.WAIT):
-            self.target = Target(Kind.HOLD, over, self._place_yaw_rad)
-            if self._leg is Leg.WAIT and self._parameters["RTL_LAND_DELAY"] < 0.0:
+            self.target = NavigatorTarget(Kind.POSITION, (north, east, self._down_m), yaw_rad)
+        elif self._leg in (ReturnLeg.SINK, ReturnLeg.WAIT):
+            self.target = NavigatorTarget(Kind.HOLD, over, self._place_yaw_rad)
+            if self._leg is ReturnLeg.WAIT and self._parameters["RTL_LAND_DELAY"] < 0.0:
                 self._say("RTL: completed, loitering")
-        elif self._leg is Leg.GO_OVER:
-            self.target = Target(Kind.POSITION, over, self._place_yaw_rad)
-        elif self._leg is Leg.LAND:
-            self.target = Target(Kind.LAND, self._place_ned_m, self._place_yaw_rad)
+        elif self._leg is ReturnLeg.GO_OVER:
+            self.target = NavigatorTarget(Kind.POSITION, over, self._place_yaw_rad)
+        elif self._leg is ReturnLeg.LAND:
+            self.target = NavigatorTarget(Kind.LAND, self._place_ned_m, self._place_yaw_rad)
             self._say("RTL: land at destination")
         else:
-            self.target = Target(Kind.IDLE, view.position_ned_m)
+            self.target = NavigatorTarget(Kind.IDLE, view.position_ned_m)
 
     def _acceptance(self) -> Acceptance:
         parameters = self._parameters
         horizontal_m, vertical_m = parameters["NAV_ACC_RAD"], parameters["NAV_MC_ALT_RAD"]
-        if self._leg is Leg.WAIT:
+        if self._leg is ReturnLeg.WAIT:
             wait_s = parameters["RTL_LAND_DELAY"]
             return Acceptance(math.inf, math.inf, inside_s=wait_s if wait_s >= 0.0 else math.inf)
-        vertical_m = math.inf if self._leg is Leg.GO_OVER else vertical_m
-        yaw_rad = None if self._leg is Leg.CLIMB else self.target.yaw_rad
+        vertical_m = math.inf if self._leg is ReturnLeg.GO_OVER else vertical_m
+        yaw_rad = None if self._leg is ReturnLeg.CLIMB else self.target.yaw_rad
         return Acceptance(horizontal_m, vertical_m, yaw_rad=yaw_rad)
 
     def _chooses_landing(self, view: View, landing: Landing | None, items: Items) -> bool:

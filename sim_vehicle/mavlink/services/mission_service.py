@@ -6,16 +6,16 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionAnswer, MissionMessage, Peer, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionAnswer, MissionMessage, MissionPeer, WireItem
 from sim_vehicle.autopilot.mission_protocol.mission_progress import ProgressReport
-from sim_vehicle.autopilot.mission_protocol.mission_transfer import MissionTransfer, State
+from sim_vehicle.autopilot.mission_protocol.mission_transfer import MissionTransfer, TransferState
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.services.service import Channel, Handler
 
 
-def _peer(packet: dialect.MAVLink_message) -> Peer:
-    return Peer(packet.get_srcSystem(), packet.get_srcComponent())
+def _peer(packet: dialect.MAVLink_message) -> MissionPeer:
+    return MissionPeer(packet.get_srcSystem(), packet.get_srcComponent())
 
 
 def _request_list(packet: dialect.MAVLink_mission_request_list_message) -> wire.RequestList:
@@ -34,12 +34,12 @@ def _count(packet: dialect.MAVLink_mission_count_message) -> wire.Count:
     return wire.Count(_peer(packet), packet.count, packet.mission_type)
 
 
-def _read_item(packet: dialect.MAVLink_mission_item_message) -> wire.Item:
-    return wire.Item(_peer(packet), _wire_item(packet, is_int=False), packet.mission_type)
+def _read_item(packet: dialect.MAVLink_mission_item_message) -> wire.SentItem:
+    return wire.SentItem(_peer(packet), _wire_item(packet, is_int=False), packet.mission_type)
 
 
-def _read_item_int(packet: dialect.MAVLink_mission_item_int_message) -> wire.Item:
-    return wire.Item(_peer(packet), _wire_item(packet, is_int=True), packet.mission_type)
+def _read_item_int(packet: dialect.MAVLink_mission_item_int_message) -> wire.SentItem:
+    return wire.SentItem(_peer(packet), _wire_item(packet, is_int=True), packet.mission_type)
 
 
 def _wire_item(
@@ -87,7 +87,7 @@ READERS: dict[int, Callable[[dialect.MAVLink_message], object | None]] = {
 
 _INT_FRAME = {kinds.FRAME_GLOBAL: kinds.FRAME_GLOBAL_INT, kinds.FRAME_GLOBAL_RELATIVE: kinds.FRAME_GLOBAL_RELATIVE_INT}
 _FLOAT_FRAME = {number: frame for frame, number in _INT_FRAME.items()}
-_KINDS = (wire.RequestList, wire.RequestItem, wire.Count, wire.Item, wire.Ack, wire.ClearAll, wire.SetCurrent)
+_KINDS = (wire.RequestList, wire.RequestItem, wire.Count, wire.SentItem, wire.Ack, wire.ClearAll, wire.SetCurrent)
 
 
 class MissionService:
@@ -108,7 +108,7 @@ class MissionService:
         """Repeats, time-outs, and what the mission has come to."""
         for answer in self._report.update(now_us):
             self._link.send(message_of(answer))
-        if self._transfer.state is not State.IDLE:
+        if self._transfer.state is not TransferState.IDLE:
             for answer in self._transfer.update(now_us):
                 self._link.send(message_of(answer))
             self._say()

@@ -109,14 +109,14 @@ def interval_from_request(interval_us: float) -> int:
     return max(int(np.float32(1_000_000) / rate_hz), 1)
 
 
-class Pace(NamedTuple):
+class StreamPace(NamedTuple):
     """How a link slows its streams: see `line.py`."""
 
     early_us: int
     share: float = 1.0
 
 
-FAST_PACE = Pace(Line().early_us)
+FAST_PACE = StreamPace(Line().early_us)
 
 
 class Stream:
@@ -135,7 +135,7 @@ class Stream:
     )
 
     def __init__(
-        self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US, pace: Pace = FAST_PACE
+        self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US, pace: StreamPace = FAST_PACE
     ) -> None:
         self.kind = kind
         self.pace = pace
@@ -154,7 +154,7 @@ class Stream:
         self.interval_us = interval_us
         self._plan()
 
-    def set_pace(self, pace: Pace) -> None:
+    def set_pace(self, pace: StreamPace) -> None:
         """Go on with what the link can carry."""
         self.pace = pace
         self._plan()
@@ -223,7 +223,7 @@ class Streams:
         constant = [(size, interval_us) for stream, size, interval_us in planned if stream.kind.is_constant]
         share, early_us = self._line.share(varying, constant), self._line.early_us
         for stream in self._streams:
-            stream.set_pace(Pace(early_us, 1.0 if stream.kind.is_constant else share))
+            stream.set_pace(StreamPace(early_us, 1.0 if stream.kind.is_constant else share))
 
     def _exists(self, stream: Stream) -> bool:
         return stream.kind.topic not in OPTIONAL or self._versions[stream.kind.topic] != NEVER_SENT

@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.estimate import Estimate
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.mavlink.streams.vibration import Vibration
+from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
 from sim_vehicle.world import Vector3
 
 
@@ -22,7 +22,7 @@ class Telemetry:
     sample: Estimate
     published: Estimate
     autopilot: Autopilot
-    vibration: Vibration
+    vibration: VibrationMetrics
     position_variance_m2: float
     velocity_variance_m2_s2: float
     attitude_variance_rad2: float

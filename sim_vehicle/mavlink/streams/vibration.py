@@ -13,7 +13,7 @@ _KEPT = 0.99
 _ADDED = 1.0 - _KEPT
 
 
-class Vibration:
+class VibrationMetrics:
     """Means over all samples; update with every one of them."""
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE, NAV_TAKEOFF
 from sim_vehicle.autopilot.messages import Result, StickInput
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem, MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from sim_vehicle.geography import Origin
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
@@ -46,18 +46,18 @@ def item(
     up_m: float = 5.0,
     params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, math.nan),
     autocontinue: int = 1,
-) -> MissionItem:
+) -> StoredItem:
     """An item with a place, its height above home."""
-    return MissionItem(kinds.FRAME_GLOBAL_RELATIVE_INT, command, autocontinue, (*params, *place(north_m, east_m), up_m))
+    return StoredItem(kinds.FRAME_GLOBAL_RELATIVE_INT, command, autocontinue, (*params, *place(north_m, east_m), up_m))
 
 
-def action(command: int, *params: float) -> MissionItem:
+def action(command: int, *params: float) -> StoredItem:
     """An item without a place."""
     a, b, c, d, e, f, g = (*params, *[0.0] * (7 - len(params)))
-    return MissionItem(kinds.FRAME_MISSION, command, 1, (a, b, c, d, e, f, g))
+    return StoredItem(kinds.FRAME_MISSION, command, 1, (a, b, c, d, e, f, g))
 
 
-def upload(flight: Flight, *items: MissionItem, kind: MissionType = MissionType.MISSION) -> None:
+def upload(flight: Flight, *items: StoredItem, kind: MissionType = MissionType.MISSION) -> None:
     """Store a list as a link would."""
     flight.autopilot.missions.replace(kind, Plan(tuple(items), hash(items) & 0xFFFFFFFF))
     flight.fly(0.06)

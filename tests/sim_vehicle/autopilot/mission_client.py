@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 from sim_vehicle.autopilot.mission_protocol import mission_items as commands
 from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, Peer, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionPeer, MissionResult, MissionType, WireItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.autopilot.mission_protocol.mission_transfer import MissionTransfer
 
-CLIENT = Peer(245, 190)
+CLIENT = MissionPeer(245, 190)
 STEP_US = 4_000
 # MAVSDK asks again after half a second.
 CLIENT_RETRY_US = 500_000
@@ -99,7 +99,7 @@ class Exchange:
                 if isinstance(answer, wire.SendAck) and answer.peer == CLIENT:
                     return answer.result
                 if isinstance(answer, wire.SendRequest) and answer.number < len(items):
-                    said, said_us = wire.Item(CLIENT, items[answer.number], kind), self.now_us
+                    said, said_us = wire.SentItem(CLIENT, items[answer.number], kind), self.now_us
                     self.there.put(said, self.now_us)
             if self.now_us - said_us > CLIENT_RETRY_US:
                 said_us = self.now_us

@@ -8,8 +8,8 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     OFFBOARD_LOSS,
     ROWS,
     Action,
-    Situation,
-    Trigger,
+    FailsafeSituation,
+    FailsafeTrigger,
     markdown_table,
     responses_now,
 )
@@ -28,8 +28,8 @@ UP = target(position=(0.0, 0.0, -5.0))
 FLYING = {"armed": True, "armed_for_us": 60 * SECOND, "sticks_lost_at_arming": False}
 
 
-def situation(**fields: object) -> Situation:
-    return Situation(**{"intended": Mode.LOITER, **FLYING, **fields})  # type: ignore[arg-type]
+def situation(**fields: object) -> FailsafeSituation:
+    return FailsafeSituation(**{"intended": Mode.LOITER, **FLYING, **fields})  # type: ignore[arg-type]
 
 
 def in_offboard(**parameters: float) -> Flight:
@@ -72,21 +72,21 @@ def flown(flight: Flight) -> Mode:
 # --- the table ---------------------------------------------------------------------------------------------------
 
 CONDITIONS = {
-    Trigger.STICKS_LOST: {"sticks_lost": True},
-    Trigger.GROUND_STATION_LOST: {"ground_station_lost": True},
-    Trigger.MISSION_OUT_OF_REACH: {"mission_finished": True, "intended": Mode.MISSION},
-    Trigger.FLIGHT_TIME: {"flight_time_over": True},
-    Trigger.FENCE: {"fence_breached": True},
-    Trigger.BATTERY_LOW: {"battery": BatteryWarning.LOW},
-    Trigger.BATTERY_CRITICAL: {"battery": BatteryWarning.CRITICAL},
-    Trigger.BATTERY_EMERGENCY: {"battery": BatteryWarning.EMERGENCY},
-    Trigger.ATTITUDE_AT_TAKEOFF: {"tipped_over": True, "armed_for_us": 2 * SECOND},
-    Trigger.ATTITUDE: {"tipped_over": True},
+    FailsafeTrigger.STICKS_LOST: {"sticks_lost": True},
+    FailsafeTrigger.GROUND_STATION_LOST: {"ground_station_lost": True},
+    FailsafeTrigger.MISSION_OUT_OF_REACH: {"mission_finished": True, "intended": Mode.MISSION},
+    FailsafeTrigger.FLIGHT_TIME: {"flight_time_over": True},
+    FailsafeTrigger.FENCE: {"fence_breached": True},
+    FailsafeTrigger.BATTERY_LOW: {"battery": BatteryWarning.LOW},
+    FailsafeTrigger.BATTERY_CRITICAL: {"battery": BatteryWarning.CRITICAL},
+    FailsafeTrigger.BATTERY_EMERGENCY: {"battery": BatteryWarning.EMERGENCY},
+    FailsafeTrigger.ATTITUDE_AT_TAKEOFF: {"tipped_over": True, "armed_for_us": 2 * SECOND},
+    FailsafeTrigger.ATTITUDE: {"tipped_over": True},
 }
 # What PX4's parameters mean, written down once more: failsafe.cpp and commander_params.yaml.
 EXPECTED = {
-    (Trigger.STICKS_LOST, "NAV_RCL_ACT"): {1: "HOLD", 2: "RETURN", 3: "LAND", 5: "TERMINATE", 6: "DISARM"},
-    (Trigger.GROUND_STATION_LOST, "NAV_DLL_ACT"): {
+    (FailsafeTrigger.STICKS_LOST, "NAV_RCL_ACT"): {1: "HOLD", 2: "RETURN", 3: "LAND", 5: "TERMINATE", 6: "DISARM"},
+    (FailsafeTrigger.GROUND_STATION_LOST, "NAV_DLL_ACT"): {
         0: None,
         1: "HOLD",
         2: "RETURN",
@@ -94,24 +94,24 @@ EXPECTED = {
         5: "TERMINATE",
         6: "DISARM",
     },
-    (Trigger.FENCE, "GF_ACTION"): {0: None, 1: "WARN", 2: "HOLD", 3: "RETURN", 4: "TERMINATE", 5: "LAND"},
-    (Trigger.BATTERY_LOW, "COM_LOW_BAT_ACT"): {0: "WARN", 2: "WARN", 3: "WARN"},
-    (Trigger.BATTERY_CRITICAL, "COM_LOW_BAT_ACT"): {0: "WARN", 1: "RETURN", 2: "LAND", 3: "RETURN"},
-    (Trigger.BATTERY_EMERGENCY, "COM_LOW_BAT_ACT"): {0: "WARN", 1: "RETURN", 2: "LAND", 3: "LAND"},
-    (Trigger.ATTITUDE, "CBRK_FLIGHTTERM"): {121212: "WARN", 0: "TERMINATE"},
-    (Trigger.ATTITUDE_AT_TAKEOFF, "CBRK_FLIGHTTERM"): {121212: "DISARM", 0: "DISARM"},
-    (Trigger.MISSION_OUT_OF_REACH, "NAV_DLL_ACT"): {0: "RETURN", 2: None},
-    (Trigger.FLIGHT_TIME, "NAV_DLL_ACT"): {0: "RETURN"},
+    (FailsafeTrigger.FENCE, "GF_ACTION"): {0: None, 1: "WARN", 2: "HOLD", 3: "RETURN", 4: "TERMINATE", 5: "LAND"},
+    (FailsafeTrigger.BATTERY_LOW, "COM_LOW_BAT_ACT"): {0: "WARN", 2: "WARN", 3: "WARN"},
+    (FailsafeTrigger.BATTERY_CRITICAL, "COM_LOW_BAT_ACT"): {0: "WARN", 1: "RETURN", 2: "LAND", 3: "RETURN"},
+    (FailsafeTrigger.BATTERY_EMERGENCY, "COM_LOW_BAT_ACT"): {0: "WARN", 1: "RETURN", 2: "LAND", 3: "LAND"},
+    (FailsafeTrigger.ATTITUDE, "CBRK_FLIGHTTERM"): {121212: "WARN", 0: "TERMINATE"},
+    (FailsafeTrigger.ATTITUDE_AT_TAKEOFF, "CBRK_FLIGHTTERM"): {121212: "DISARM", 0: "DISARM"},
+    (FailsafeTrigger.MISSION_OUT_OF_REACH, "NAV_DLL_ACT"): {0: "RETURN", 2: None},
+    (FailsafeTrigger.FLIGHT_TIME, "NAV_DLL_ACT"): {0: "RETURN"},
 }
 CELLS = [(*key, value, action) for key, row in EXPECTED.items() for value, action in row.items()]
 
 
 @pytest.mark.parametrize(("trigger", "parameter", "value", "action"), CELLS)
 def test_every_value_of_every_parameter(trigger, parameter, value, action):
-    in_mode = 4 if trigger is Trigger.MISSION_OUT_OF_REACH else 1
+    in_mode = 4 if trigger is FailsafeTrigger.MISSION_OUT_OF_REACH else 1
     parameters = Parameters({"COM_RC_IN_MODE": in_mode, parameter: value})
     now = {"sticks_lost": False, "ground_station_lost": False, **CONDITIONS[trigger]}
-    if trigger is Trigger.MISSION_OUT_OF_REACH:
+    if trigger is FailsafeTrigger.MISSION_OUT_OF_REACH:
         now["ground_station_lost"] = True
     found = dict(responses_now(situation(**now), parameters))
     assert (found[trigger].action if trigger in found else None) == (Action[action] if action else None)
@@ -129,7 +129,11 @@ def test_a_lost_link_can_be_excepted_in_a_mode(mode, mask):
     for excepted in (0, mask, 7 - mask):
         parameters = Parameters({"COM_RCL_EXCEPT": excepted, "COM_DLL_EXCEPT": excepted, "NAV_DLL_ACT": 2})
         found = {trigger for trigger, _ in responses_now(lost, parameters)}
-        assert (Trigger.STICKS_LOST in found) == (Trigger.GROUND_STATION_LOST in found) == (excepted != mask)
+        assert (
+            (FailsafeTrigger.STICKS_LOST in found)
+            == (FailsafeTrigger.GROUND_STATION_LOST in found)
+            == (excepted != mask)
+        )
 
 
 def test_of_two_failsafes_the_later_in_the_order_wins():

@@ -11,7 +11,7 @@ from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionItem, MissionType
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
 from tests.sim_vehicle.autopilot.flying import action, hovering, item, set_mode, upload
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
@@ -20,7 +20,7 @@ TAKEOFF, NORTH, EAST = item(kinds.TAKEOFF), item(kinds.WAYPOINT, 20.0), item(kin
 LAND_AT_HOME = item(kinds.LAND, 0.0, 0.0, 0.0)
 
 
-def begun(*items: MissionItem) -> Flight:
+def begun(*items: StoredItem) -> Flight:
     """On the ground with that mission, started."""
     flight = Flight()
     upload(flight, *items)
@@ -182,8 +182,8 @@ def test_an_item_without_autocontinue_is_stayed_at():
 
 
 def test_a_gate_is_flown_through_and_a_region_of_interest_looked_at():
-    gate = MissionItem(6, kinds.CONDITION_GATE, 1, item(kinds.WAYPOINT, 10.0).params)
-    looks = MissionItem(6, kinds.DO_SET_ROI_LOCATION, 1, item(kinds.WAYPOINT, 0.0, 40.0).params)
+    gate = StoredItem(6, kinds.CONDITION_GATE, 1, item(kinds.WAYPOINT, 10.0).params)
+    looks = StoredItem(6, kinds.DO_SET_ROI_LOCATION, 1, item(kinds.WAYPOINT, 0.0, 40.0).params)
     flight = begun(TAKEOFF, gate, looks, item(kinds.WAYPOINT, 30.0))
     reached(flight, 1)
     assert north_east(flight)[0] >= 10.0

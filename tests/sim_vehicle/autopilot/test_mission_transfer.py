@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from sim_vehicle.autopilot.mission_protocol import mission_items as commands
 from sim_vehicle.autopilot.mission_protocol import mission_messages as wire
-from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionResult, MissionType, Peer, WireItem
+from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionPeer, MissionResult, MissionType, WireItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import MOST_ITEMS, MissionStore
-from sim_vehicle.autopilot.mission_protocol.mission_transfer import RETRY_US, TIMEOUT_US, State
+from sim_vehicle.autopilot.mission_protocol.mission_transfer import RETRY_US, TIMEOUT_US, TransferState
 from tests.sim_vehicle.autopilot.mission_client import CLIENT, STEP_US, Exchange, wire_item
 
-STRANGER = Peer(246, 190)
+STRANGER = MissionPeer(246, 190)
 MISSION = MissionType.MISSION
 SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(3, commands.LAND)]
 
@@ -21,7 +21,7 @@ SQUARE = [wire_item(0, commands.TAKEOFF), wire_item(1), wire_item(2), wire_item(
 def receiving(count: int = 3) -> Exchange:
     exchange = Exchange()
     exchange.ask(wire.Count(CLIENT, count, MISSION))
-    assert exchange.transfer.state is State.RECEIVING
+    assert exchange.transfer.state is TransferState.RECEIVING
     return exchange
 
 
@@ -29,7 +29,7 @@ def sending() -> Exchange:
     exchange = Exchange()
     assert exchange.upload(SQUARE) == MissionResult.ACCEPTED
     exchange.ask(wire.RequestList(CLIENT, MISSION))
-    assert exchange.transfer.state is State.SENDING
+    assert exchange.transfer.state is TransferState.SENDING
     return exchange
 
 
@@ -95,7 +95,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
                     wire.RequestList(peer, kind),
                     wire.RequestItem(peer, number, kind, True),
                     wire.Count(peer, number + 1, kind),
-                    wire.Item(peer, wire_item(number), kind),
+                    wire.SentItem(peer, wire_item(number), kind),
                     wire.Ack(peer, number, kind),
                     wire.SetCurrent(peer, number),
                 ]
@@ -108,7 +108,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
     exchange.now_us += TIMEOUT_US + RETRY_US
     exchange.step()
     exchange.step()
-    assert exchange.transfer.state is State.IDLE and not exchange.store.uploading
+    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_no_message_in_any_order_breaks_it_or_leaves_half_a_list(data):
 def test_items_that_px4_refuses(item: WireItem, result: MissionResult):
     exchange = Exchange()
     assert exchange.upload([item]) == result
-    assert exchange.store.mission.items == () and exchange.transfer.state is State.IDLE
+    assert exchange.store.mission.items == () and exchange.transfer.state is TransferState.IDLE
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_silence_ends_a_transfer_after_five_seconds(begin):
     if begin is sending:
         exchange.ask(wire.RequestItem(CLIENT, 0, MISSION, True))
     start_us = exchange.now_us
-    while exchange.transfer.state is not State.IDLE:
+    while exchange.transfer.state is not TransferState.IDLE:
         exchange.step()
     assert exchange.now_us - start_us == pytest.approx(TIMEOUT_US, abs=2 * STEP_US)
     assert said(exchange) == "Mission sync timeout"
@@ -213,9 +213,9 @@ def test_silence_ends_a_transfer_after_five_seconds(begin):
 def test_the_last_acknowledgement_is_given_again():
     exchange = Exchange()
     exchange.upload(SQUARE)
-    acks = exchange.ask(wire.Item(CLIENT, SQUARE[3], MISSION))
+    acks = exchange.ask(wire.SentItem(CLIENT, SQUARE[3], MISSION))
     assert MissionResult.ACCEPTED in [ack.result for ack in acks if isinstance(ack, wire.SendAck)]
-    exchange.ask(wire.Item(CLIENT, SQUARE[1], MISSION))
+    exchange.ask(wire.SentItem(CLIENT, SQUARE[1], MISSION))
     assert said(exchange) == "IGN MISSION_ITEM: No transfer"
 
 
@@ -225,7 +225,7 @@ def test_a_peer_that_wants_the_old_kind_of_item_gets_it():
     asked = exchange.ask(wire.Ack(CLIENT, MissionResult.UNSUPPORTED, MISSION))
     assert [answer.is_int for answer in asked if isinstance(answer, wire.SendRequest)] == [False]
     old = wire_item(0, frame=commands.FRAME_GLOBAL_RELATIVE, x=47.397742, y=8.545594, is_int=False)
-    exchange.ask(wire.Item(CLIENT, old, MISSION))
+    exchange.ask(wire.SentItem(CLIENT, old, MISSION))
     assert exchange.store.mission.items[0].latitude_deg == pytest.approx(47.397742)
 
 
@@ -234,7 +234,7 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
     exchange.upload(SQUARE)
     exchange.ask(wire.Count(CLIENT, 2, MISSION))
     exchange.ask(wire.Ack(CLIENT, MissionResult.CANCELLED, MISSION))
-    assert exchange.transfer.state is State.IDLE and not exchange.store.uploading
+    assert exchange.transfer.state is TransferState.IDLE and not exchange.store.uploading
     assert len(exchange.store.mission.items) == 4
 
 
@@ -244,12 +244,12 @@ def test_cancelling_an_upload_frees_the_vehicle_and_keeps_the_old_list():
         (receiving, wire.RequestList(CLIENT, MISSION), "Mission download request ignored, already active"),
         (receiving, wire.RequestItem(CLIENT, 0, MISSION, True), "WPM: REJ. CMD: Busy"),
         (receiving, wire.RequestItem(STRANGER, 0, MISSION, True), "WPM: REJ. CMD: partner id mismatch"),
-        (receiving, wire.Item(STRANGER, SQUARE[0], MISSION), "REJ. MIS ITEM: partner id mismatch"),
+        (receiving, wire.SentItem(STRANGER, SQUARE[0], MISSION), "REJ. MIS ITEM: partner id mismatch"),
         (receiving, wire.ClearAll(CLIENT, MISSION), "WPM: IGN CLEAR CMD: Busy"),
         (receiving, wire.SetCurrent(CLIENT, 0), "WPM: IGN WP CURR CMD: Busy"),
         (receiving, wire.Ack(STRANGER, 0, MISSION), "REJ. WP CMD: partner id mismatch"),
         (sending, wire.Count(CLIENT, 2, MISSION), "WPM: IGN MISSION_COUNT: Busy"),
-        (sending, wire.Item(CLIENT, SQUARE[0], MISSION), "IGN MISSION_ITEM: Busy"),
+        (sending, wire.SentItem(CLIENT, SQUARE[0], MISSION), "IGN MISSION_ITEM: Busy"),
         (sending, wire.RequestList(STRANGER, MISSION), "Mission download request ignored, already active"),
         (sending, wire.RequestItem(CLIENT, 3, MISSION, True), "WPM: REJ. CMD: Req. WP was unexpected"),
         (sending, wire.ClearAll(CLIENT, MISSION), "WPM: IGN CLEAR CMD: Busy"),

@@ -7,9 +7,9 @@ from sim_vehicle.autopilot.commander.modes import (
     NEEDS,
     TRANSITIONS,
     Conditions,
-    Event,
-    Guard,
     Mode,
+    ModeCondition,
+    ModeEvent,
     ModeState,
     Need,
     Transition,
@@ -19,7 +19,7 @@ from sim_vehicle.autopilot.commander.modes import (
 
 EVERYTHING = frozenset(Need)
 DISARMED = Conditions(False)
-ASKED_FOR = [row.target for row in TRANSITIONS if row.event is Event.REQUEST]
+ASKED_FOR = [row.target for row in TRANSITIONS if row.event is ModeEvent.REQUEST]
 
 
 def armed(*missing: Need) -> Conditions:
@@ -59,22 +59,22 @@ def test_the_numbers_on_the_wire_are_those_measured():
 @pytest.mark.parametrize("mode", ASKED_FOR)
 @pytest.mark.parametrize("before", [Mode.LOITER, Mode.OFFBOARD, Mode.MANUAL, Mode.LAND])
 def test_disarmed_every_mode_is_accepted(before, mode):
-    row = find_transition(before, Event.REQUEST, DISARMED, mode)
+    row = find_transition(before, ModeEvent.REQUEST, DISARMED, mode)
     assert row is not None and row.target is mode
 
 
 @pytest.mark.parametrize("mode", ASKED_FOR)
 def test_armed_a_mode_is_accepted_that_has_what_it_needs(mode):
-    assert find_transition(Mode.LOITER, Event.REQUEST, armed(), mode) is not None
+    assert find_transition(Mode.LOITER, ModeEvent.REQUEST, armed(), mode) is not None
     for need in NEEDS[mode]:
-        without = find_transition(Mode.LOITER, Event.REQUEST, armed(need), mode)
+        without = find_transition(Mode.LOITER, ModeEvent.REQUEST, armed(need), mode)
         # LAND must always be there, be it without a position
         assert (without is not None) == (mode is Mode.LAND), need
 
 
 def test_armed_without_sticks_setpoints_and_mission_only_these_can_fly():
     bare = armed(Need.STICKS, Need.SETPOINTS, Need.MISSION)
-    flown = {mode for mode in ASKED_FOR if find_transition(Mode.LOITER, Event.REQUEST, bare, mode)}
+    flown = {mode for mode in ASKED_FOR if find_transition(Mode.LOITER, ModeEvent.REQUEST, bare, mode)}
     assert flown == {
         *(Mode.LOITER, Mode.RETURN, Mode.TAKEOFF, Mode.LAND, Mode.PRECISION_LAND, Mode.FOLLOW_TARGET, Mode.ORBIT),
         Mode.TERMINATION,
@@ -82,32 +82,32 @@ def test_armed_without_sticks_setpoints_and_mission_only_these_can_fly():
 
 
 def test_takeoff_ends_in_hold():
-    assert find_transition(Mode.TAKEOFF, Event.TAKEOFF_REACHED, armed()).target is Mode.LOITER
-    assert find_transition(Mode.OFFBOARD, Event.TAKEOFF_REACHED, armed()) is None
+    assert find_transition(Mode.TAKEOFF, ModeEvent.TAKEOFF_REACHED, armed()).target is Mode.LOITER
+    assert find_transition(Mode.OFFBOARD, ModeEvent.TAKEOFF_REACHED, armed()) is None
 
 
 def test_sticks_take_over_from_every_mode_that_flies_without_them():
     for mode in (Mode.OFFBOARD, Mode.MISSION, Mode.LOITER, Mode.LAND, Mode.RETURN):
-        assert find_transition(mode, Event.STICKS, armed()).target is Mode.POSCTL
-    assert find_transition(Mode.ALTCTL, Event.STICKS, armed()) is None
-    assert find_transition(Mode.TERMINATION, Event.STICKS, armed()) is None
+        assert find_transition(mode, ModeEvent.STICKS, armed()).target is Mode.POSCTL
+    assert find_transition(Mode.ALTCTL, ModeEvent.STICKS, armed()) is None
+    assert find_transition(Mode.TERMINATION, ModeEvent.STICKS, armed()) is None
 
 
 @pytest.mark.parametrize("ends_in", [Mode.LAND, Mode.RETURN, Mode.TAKEOFF, Mode.ORBIT, Mode.FOLLOW_TARGET])
 def test_after_disarming_the_mode_before_is_meant(ends_in):
     # Given a flight in OFFBOARD that went on in a mode in which nobody can arm
     state = ModeState()
-    assert state.apply(Event.REQUEST, armed(), Mode.OFFBOARD)
-    assert state.apply(Event.REQUEST, armed(), ends_in)
+    assert state.apply(ModeEvent.REQUEST, armed(), Mode.OFFBOARD)
+    assert state.apply(ModeEvent.REQUEST, armed(), ends_in)
     # When the vehicle disarms
-    assert state.apply(Event.DISARMED, DISARMED)
+    assert state.apply(ModeEvent.DISARMED, DISARMED)
     # Then OFFBOARD is meant again
     assert state.intended is Mode.OFFBOARD
 
 
 def test_disarming_in_hold_changes_nothing():
     state = ModeState()
-    assert not state.apply(Event.DISARMED, DISARMED)
+    assert not state.apply(ModeEvent.DISARMED, DISARMED)
     assert state.intended is Mode.LOITER
 
 
@@ -115,8 +115,8 @@ def test_nothing_leads_out_of_termination():
     state = ModeState()
     state.flown = Mode.TERMINATION
     for mode in ASKED_FOR:
-        assert not state.apply(Event.REQUEST, DISARMED, mode)
-    assert not state.apply(Event.DISARMED, DISARMED)
+        assert not state.apply(ModeEvent.REQUEST, DISARMED, mode)
+    assert not state.apply(ModeEvent.DISARMED, DISARMED)
 
 
 @pytest.mark.parametrize("row", TRANSITIONS, ids=lambda row: f"{row.event}-{row.target}")
@@ -132,7 +132,7 @@ def test_the_diagram_shows_every_row():
     assert diagram.count("-->") == 1 + arrows
     assert "    ANY_MODE --> OFFBOARD: requested [disarmed, or setpoints arrive]\n" in diagram
     assert "    LAND --> MODE_BEFORE: disarmed\n" in diagram
-    assert Guard.CAN_RUN not in diagram
+    assert ModeCondition.CAN_RUN not in diagram
 
 
 @pytest.mark.parametrize(

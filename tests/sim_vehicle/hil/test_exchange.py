@@ -9,9 +9,9 @@ from sim_vehicle.hil.exchange import (
     MOVES,
     STARTING_PERIOD_US,
     STARTING_TIMEOUT_US,
-    Event,
     Exchange,
-    Phase,
+    ExchangeEvent,
+    ExchangePhase,
 )
 from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls
 
@@ -46,7 +46,7 @@ def test_while_px4_boots_samples_go_out_at_a_pace_of_their_own():
     exchange.sent(4_000, 60)
     assert exchange.next_sample_at_us() == 60 + STARTING_PERIOD_US
     exchange.sent(8_000, 5_000)
-    assert exchange.phase is Phase.STARTING
+    assert exchange.phase is ExchangePhase.STARTING
 
 
 def test_the_first_answer_begins_lockstep_even_to_an_older_sample():
@@ -54,7 +54,7 @@ def test_the_first_answer_begins_lockstep_even_to_an_older_sample():
     for number in range(1, 12):
         exchange.sent(4_000 * number, 4_000 * number)
     exchange.received(answer(4_000 * 10))
-    assert exchange.phase is Phase.READY
+    assert exchange.phase is ExchangePhase.READY
     assert exchange.motor_fractions == HALF_THRUST
     assert exchange.notices[0].startswith(FIRST_ANSWER_WORDS)
 
@@ -83,10 +83,10 @@ def test_an_answer_to_an_older_sample_gives_its_commands_but_not_the_turn():
     exchange.received(answer(4_000))
     exchange.sent(12_000, 8_000)
     exchange.received(answer(8_000, armed=False))
-    assert exchange.phase is Phase.AWAITING
+    assert exchange.phase is ExchangePhase.AWAITING
     assert exchange.late_answers == 1
     exchange.received(answer(12_000))
-    assert exchange.phase is Phase.READY
+    assert exchange.phase is ExchangePhase.READY
 
 
 def test_a_disarmed_px4_stops_the_motors_whatever_it_says_of_them():
@@ -116,9 +116,9 @@ def test_a_px4_that_comes_back_late_is_in_lockstep_again():
     exchange.look_at_clock(ANSWER_TIMEOUT_US)
     exchange.sent(12_000, ANSWER_TIMEOUT_US)
     exchange.received(answer(8_000))
-    assert exchange.phase is Phase.AWAITING
+    assert exchange.phase is ExchangePhase.AWAITING
     exchange.received(answer(12_000))
-    assert exchange.phase is Phase.READY
+    assert exchange.phase is ExchangePhase.READY
 
 
 def test_a_px4_that_never_answers_is_told_of_once():
@@ -143,24 +143,24 @@ def test_the_next_px4_begins_with_stopped_motors_and_from_the_start():
     assert exchange.next_sample_at_us() is None
     assert exchange.motor_fractions == MOTORS_STOPPED
     exchange.connected(70)
-    assert exchange.phase is Phase.STARTING
+    assert exchange.phase is ExchangePhase.STARTING
     exchange.sent(4_000, 80)
     exchange.received(answer(4_000))
-    assert exchange.phase is Phase.READY
+    assert exchange.phase is ExchangePhase.READY
 
 
 REACHED = {
-    Phase.WAITING: Exchange,
-    Phase.STARTING: starting,
-    Phase.READY: in_lockstep,
-    Phase.AWAITING: lambda: with_a_sample_out(in_lockstep()),
+    ExchangePhase.WAITING: Exchange,
+    ExchangePhase.STARTING: starting,
+    ExchangePhase.READY: in_lockstep,
+    ExchangePhase.AWAITING: lambda: with_a_sample_out(in_lockstep()),
 }
 DOES = {
-    Event.CONNECTED: lambda exchange: exchange.connected(0),
-    Event.SENT: lambda exchange: exchange.sent(8_000, 1_000),
-    Event.ANSWERED: lambda exchange: answered(exchange),
-    Event.OVERDUE: lambda exchange: exchange.look_at_clock(1_000 + ANSWER_TIMEOUT_US),
-    Event.CLOSED: lambda exchange: exchange.closed(),
+    ExchangeEvent.CONNECTED: lambda exchange: exchange.connected(0),
+    ExchangeEvent.SENT: lambda exchange: exchange.sent(8_000, 1_000),
+    ExchangeEvent.ANSWERED: lambda exchange: answered(exchange),
+    ExchangeEvent.OVERDUE: lambda exchange: exchange.look_at_clock(1_000 + ANSWER_TIMEOUT_US),
+    ExchangeEvent.CLOSED: lambda exchange: exchange.closed(),
 }
 
 
@@ -170,7 +170,7 @@ def with_a_sample_out(exchange: Exchange) -> Exchange:
 
 
 def answered(exchange: Exchange) -> None:
-    if exchange.phase is Phase.STARTING:
+    if exchange.phase is ExchangePhase.STARTING:
         exchange.sent(8_000, 1_000)
     exchange.received(answer(8_000))
 

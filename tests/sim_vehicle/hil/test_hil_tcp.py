@@ -13,7 +13,7 @@ from sim_vehicle.errors import NotInLockstep, PortInUse
 from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
-from sim_vehicle.shell.hil_tcp import Pace, serve_px4
+from sim_vehicle.shell.hil_tcp import HilPace, serve_px4
 from sim_vehicle.shell.truth_file import load_truth
 from tests.sim_vehicle.hil.px4_client import HOVER, TIMEOUT_S, Px4Client
 
@@ -148,19 +148,19 @@ def test_disarmed_it_stays_on_the_ground_whatever_the_controls_say():
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 4.0])
 def test_the_vehicles_clock_runs_at_the_asked_speed(speed):
-    pace = Pace(speed)
+    pace = HilPace(speed)
     booted_us = pace.due_us(0, 7_000_000)
     assert booted_us == 7_000_000
     assert pace.due_us(2_000_000, booted_us) == booted_us + round(2_000_000 / speed)
 
 
 def test_as_fast_as_px4_answers_is_always_due():
-    pace = Pace(0)
+    pace = HilPace(0)
     assert [pace.due_us(time_us, 7_000_000) for time_us in (0, 4_000, 9_000_000)] == [7_000_000] * 3
 
 
 def test_a_machine_that_was_away_does_not_hurry_after_the_lost_time():
-    pace = Pace(1.0)
+    pace = HilPace(1.0)
     booted_us = pace.due_us(0, 7_000_000)
     assert pace.due_us(1_000_000, booted_us + 1_100_000) == booted_us + 1_000_000, "a little late is caught up"
     away_us = booted_us + 60_000_000

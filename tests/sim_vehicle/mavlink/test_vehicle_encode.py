@@ -22,7 +22,7 @@ from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.streams import condition
 from sim_vehicle.mavlink.streams.telemetry import Telemetry
-from sim_vehicle.mavlink.streams.vibration import Vibration
+from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
 from sim_vehicle.mavlink.texts import TextLink
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
@@ -42,7 +42,7 @@ SAMPLE = Estimate(
 
 
 def telemetry() -> Telemetry:
-    return Telemetry(SAMPLE, SAMPLE, Autopilot(HOVER, SAMPLE, Parameters()), Vibration(), 1e-4, 4e-4, 9e-4)
+    return Telemetry(SAMPLE, SAMPLE, Autopilot(HOVER, SAMPLE, Parameters()), VibrationMetrics(), 1e-4, 4e-4, 9e-4)
 
 
 def read_back(message):
@@ -221,7 +221,7 @@ def test_timesync_is_answered_with_boot_time_in_nanoseconds():
 
 
 def test_vibration_is_the_slow_mean_of_the_jumps():
-    metric = Vibration()
+    metric = VibrationMetrics()
     for number in range(2_000):
         sign = 1.0 if number % 2 else -1.0
         metric.update((0.0, sign, -9.81), (0.0, 0.0, 0.25 * sign))
@@ -287,9 +287,9 @@ def test_frequent_messages_are_framed_as_pymavlink_frames_them():
     cases = [
         (dialect.MAVLink_local_position_ned_message(5, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0), framing.LocalPositionNed),
         (dialect.MAVLink_local_position_ned_message(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), framing.LocalPositionNed),
-        (dialect.MAVLink_attitude_message(5, 0.1, 0.2, 0.3, 0.0, 0.0, 1.0), framing.Attitude),
+        (dialect.MAVLink_attitude_message(5, 0.1, 0.2, 0.3, 0.0, 0.0, 1.0), framing.PackedAttitude),
         (dialect.MAVLink_highres_imu_message(9, *[0.5] * 13, 0x3F), framing.HighresImu),
-        (dialect.MAVLink_attitude_target_message(5, 0, (1, 0, 0, 0), 0, 0, 0, 0.5), framing.AttitudeTarget),
+        (dialect.MAVLink_attitude_target_message(5, 0, (1, 0, 0, 0), 0, 0, 0, 0.5), framing.PackedAttitudeTarget),
     ]
     for sequence in (0, 255):
         plain.seq = framed.seq = sequence
@@ -305,7 +305,7 @@ def test_frequent_messages_are_signed_as_pymavlink_signs_them():
     plain, framed = dialect.MAVLink(None, 7, 1), dialect.MAVLink(None, 7, 1)
     for link in (plain, framed):
         link.signing.secret_key, link.signing.sign_outgoing, link.signing.timestamp = b"k" * 32, True, 77
-    assert framing.Attitude(*in_wire_order(theirs)).pack(framed) == theirs.pack(plain)
+    assert framing.PackedAttitude(*in_wire_order(theirs)).pack(framed) == theirs.pack(plain)
 
 
 def in_wire_order(message):

@@ -17,7 +17,7 @@ from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import Streams, interval_from_request
 from sim_vehicle.mavlink.streams.telemetry import Telemetry
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.streams.vibration import Vibration
+from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate
 
@@ -32,7 +32,7 @@ class Link:
     def __init__(self, seed: int = 1) -> None:
         self.sample = Estimate(time_boot_us=4_000)
         self.autopilot = Autopilot(HOVER, self.sample, Parameters())
-        telemetry = Telemetry(self.sample, self.sample, self.autopilot, Vibration(), 1e-4, 1e-3, 1e-5)
+        telemetry = Telemetry(self.sample, self.sample, self.autopilot, VibrationMetrics(), 1e-4, 1e-3, 1e-5)
         self.telemetry = telemetry
         self.topics = Topics(telemetry)
         self.outbox = Outbox(Encoder(Identity()), Buffer(Line(), 0))

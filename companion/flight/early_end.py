@@ -18,7 +18,7 @@ FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
 DISARM_NEWS_US = 1_500_000
 
 
-def guard(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
+def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
     """The first reason to end, the pilot's before all others."""
     return (
         _control_lost(flight, state, now_us)
@@ -36,7 +36,7 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | No
         return Move(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
-    holder = who_decided(vehicle.mode, flight.expected_mode, flight.commander.requested_mode)
+    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
     if holder is Holder.COMPANION:
         flight.foreign_mode_since_us = None
         return None

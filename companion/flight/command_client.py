@@ -80,7 +80,7 @@ def is_final(command: VehicleCommand, result: CommandResult) -> bool:
     return result is CommandResult.TEMPORARILY_REJECTED and command == SetArmed(False)
 
 
-class Commander:
+class CommandClient:
     """Holds at most one command. `begin`, then `step` with what has arrived until it returns an outcome."""
 
     def __init__(self) -> None:
