@@ -66,7 +66,7 @@ class Signing:
         self._framer = Decoder({})
         self._streams: dict[tuple[int, int, int], int] = {}  # newest stamp by link, system and component
         self._refusals = Refusals()
-        self._news: str | None = None
+        self._news: dict[str, str] = {}  # by reason
         self.stamp = stamp
 
     @property
@@ -76,8 +76,7 @@ class Signing:
 
     def news(self) -> str | None:
         """That packets have been refused for a while, once a run of them."""
-        news, self._news = self._news, None
-        return news
+        return self._news.pop(next(iter(self._news))) if self._news else None
 
     def opened(self, received: bytes, now_us: int) -> bytes:
         """The genuine packets that are complete by now, without their signatures, and no other byte."""
@@ -129,7 +128,7 @@ class Signing:
         message = dialect.mavlink_map.get(message_id)
         last = f"{message.msgname if message else message_id} of system {system}, component {component}"
         if self._refusals.add(Refused(reason, last), now_us) is not None:
-            self._news = f"{_TEXTS[reason]}: {self._refusals.counts[reason]} so far, the last {last}"
+            self._news[reason] = f"{_TEXTS[reason]}: {self._refusals.counts[reason]} so far, the last {last}"
 
 
 def _stamp(packet: bytes) -> int:

@@ -61,10 +61,10 @@ class StampFile:
         self._path = key_file.with_name(key_file.name + ".stamp")
 
     def first(self, now_us: int) -> int:
-        """The time stamp to begin with: by the clock, or a minute after the one kept, if that is later.
+        """The time stamp to begin with: by the clock, or two minutes after the one kept, if that is later.
 
-        What was sent and heard since it was kept is earlier still, and with that minute nothing from before it passes
-        as the first packet of a stream, which may be a minute behind. So a clock that was set back does no harm.
+        In the first, more may have been sent and heard before the program ended. The second is how far behind the first
+        packet of a stream may be. So nothing recorded before passes now, even where the clock was set back.
         Raises SigningFileError.
         """
         try:
@@ -77,7 +77,7 @@ class StampFile:
         if kept is None or int(kept[1]) > LAST_STAMP:
             text = f"{self._path} holds no time stamp; once the clock is right, delete it"
             raise SigningFileError(f"{text}: it keeps packets that were recorded before from being played again.")
-        return min(max(stamp_at(now_us), int(kept[1]) + MINUTE), LAST_STAMP)
+        return min(max(stamp_at(now_us), int(kept[1]) + 2 * MINUTE), LAST_STAMP)
 
     def keep(self, stamp: int) -> None:
         """Whenever the program ends, the file holds the old stamp or the new one. Raises OSError."""
