@@ -122,6 +122,15 @@ def add_peer(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_signing_key(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--signing-key",
+        type=Path,
+        metavar="FILE",
+        help="with --connect: sign what is sent, hear only what is signed with this key; `rebound key new` makes one",
+    )
+
+
 def add_companion(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--companion", type=Path, metavar="FILE", help="settings from this file's companion: part, as tune writes it"

@@ -10,7 +10,6 @@ from pathlib import Path
 from companion.companion import Companion
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
-from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, UdpInConnection
 from rebound_cli import run_folder
@@ -22,6 +21,7 @@ from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
 from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.truth_match import FlightTruth
 from rebound_cli.vehicle_process import VehicleProcess
@@ -47,6 +47,8 @@ def run_fly(options: Namespace) -> int:
     is_simulated = options.connect is None
     if not is_simulated and (options.airframe is not None or options.seed is not None):
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
+    if is_simulated and options.signing_key is not None:
+        raise ConfigurationError("--signing-key belongs to --connect: leave it out where the vehicle is simulated.")
     document = load_mission_document(options.mission, options.set, options.airframe, options.seed, options.companion)
     if options.obstacles is not None:
         apply_override(
@@ -88,7 +90,7 @@ def run_fly(options: Namespace) -> int:
 def _connection_for(options: Namespace) -> Connection | None:
     """To a vehicle that is not ours to start; None for one that is."""
     if options.connect is not None:
-        return open_connection(options.connect, options.peer)
+        return open_signed(options)
     return UdpInConnection("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
 
 
@@ -110,7 +112,7 @@ def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirm
         )
     finally:
         connection.close()
-    return Flown(companion.report(), time.monotonic() - started_s, None, timing)
+    return Flown(companion.report(), time.monotonic() - started_s, None, timing, refused_packets(connection))
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:

@@ -9,6 +9,7 @@ from rebound_cli.arguments import (
     add_connect,
     add_json,
     add_peer,
+    add_signing_key,
     add_world_options,
     instance,
     mission_file,
@@ -54,5 +55,6 @@ def add_fly(commands: Commands) -> None:
     )
     add_json(fly, "summary")
     add_peer(fly)
+    add_signing_key(fly)
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
     fly.set_defaults(run=runs("rebound_cli.fly:run_fly"))

@@ -14,6 +14,7 @@ from rebound_cli.check.arguments import add_check
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
+from rebound_cli.key_arguments import add_key
 from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
@@ -111,6 +112,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_tune(commands)
     add_airframe(commands)
     add_identify(commands)
+    add_key(commands)
     return parser
 
 

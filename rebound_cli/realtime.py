@@ -187,12 +187,12 @@ class Loop:
         if self.interrupts.reason is not None and not self.is_interrupted:
             self.is_interrupted = True
             self._stop(self.interrupts.reason)
-        if self.stepped.armed is None:
-            # Nobody has been heard yet who could be told.
-            return
         stranger = self.connection.news()
         if stranger is not None:
             self._note("stranger", stranger, now_us)
+        if self.stepped.armed is None:
+            # Nobody has been heard yet who could be told.
+            return
         for writer in (self.recorder.writer, self.console.writer):
             loss = None if writer is None else writer.news()
             if loss is not None:

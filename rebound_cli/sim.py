@@ -9,8 +9,10 @@ from functools import partial
 from pathlib import Path
 
 from companion.errors import ConfigurationError
+from companion.shell.signing_files import read_key
 from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
+from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import COMPANION_PORT, open_port, px4_ports
 from sim_vehicle.shell.realtime import serve
@@ -43,12 +45,14 @@ def _check_place(truth: Path) -> None:
 
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
+    signing, sign_cfg = _signing(options)
     vehicle = SimulatedVehicle(
         world.airframe,
         world.scene,
         world.seed,
         epoch_at_boot_us=time.time_ns() // 1000,
-        parameters={"MAV_SYS_ID": options.instance + 1, **time_outs_at(options.speed)},
+        parameters={"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)},
+        signing=signing,
     )
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
@@ -59,6 +63,14 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
         flush=True,
     )
     serve(vehicle, ports, options.truth, stopped.is_set, options.speed)
+
+
+def _signing(options: Namespace) -> tuple[Signing, dict[str, float]]:
+    """Of the vehicle, and MAV_SIGN_CFG where it is not the vehicle's default."""
+    is_px4_1_17 = options.signing == "px4-1.17"
+    if options.signing_key is not None:
+        return Signing(read_key(options.signing_key), is_px4_1_17), {"MAV_SIGN_CFG": 1}
+    return Signing(None, is_px4_1_17), {"MAV_SIGN_CFG": 0} if is_px4_1_17 else {}
 
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:

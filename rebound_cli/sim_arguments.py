@@ -74,5 +74,12 @@ def add_sim(commands: Commands) -> None:
     sim.add_argument(
         "--truth", type=Path, metavar="FILE", help="write what really happened to this .npz file at the end"
     )
+    sim.add_argument(
+        "--signing",
+        choices=("any-link", "px4-1.17"),
+        default="any-link",
+        help="how it is given a key of message signing: by SETUP_SIGNING on any link, or as PX4 1.17 (docs/vehicle.md)",
+    )
+    sim.add_argument("--signing-key", type=Path, metavar="FILE", help="it has this key, and MAV_SIGN_CFG is 1")
     sim.add_argument("--stop-with-stdin", action="store_true", help="end when standard input ends")
     sim.set_defaults(run=runs("rebound_cli.sim:run_sim"))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from companion.memory.stored import as_data
@@ -34,6 +34,7 @@ class Flown:
     wall_clock_s: float
     truth: FlightTruth | None
     timing: Timing | None = None  # None in lockstep, which knows no real time
+    refused_packets: Mapping[str, int] = field(default_factory=dict)  # by reason; see mavlink/signing.py
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         **(flown.timing or Timing()).summary(),
         "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
         "refused_messages": dict(report.refused_messages),
+        "refused_packets": dict(flown.refused_packets),
         "unconfirmed": report.unconfirmed,
         "false_detections": matches.false_detections if matches else None,
         "missed_contacts": matches.missed_contacts if matches else None,

@@ -39,11 +39,13 @@ class SimulatedVehicle:
         keeps_path: bool = True,
         epoch_at_boot_us: int = 0,
         parameters: Mapping[str, float] | None = None,
+        signing: Signing | None = None,
     ) -> None:
         """``keeps_path`` off: the truth holds the hits but no path, for a simulation without an end.
 
         ``epoch_at_boot_us``: Unix time when the vehicle's clock was at zero, which it tells who asks for the time.
         ``parameters``: values in place of PX4's defaults and the airframe's.
+        ``signing``: the key that it has from the start, and how it is given another.
 
         Raises SceneError where a wall passes through the start position.
         """
@@ -55,7 +57,7 @@ class SimulatedVehicle:
         self._links_so_far = 0
         self._companion_link: Link | None = None
         self.parameters = Parameters({**defaults_from(airframe), **(parameters or {})})
-        self._signing, self._missions = Signing(), MissionStore()
+        self._signing, self._missions = signing or Signing(), MissionStore()
         self._plant = Plant(with_parameters(airframe, self.parameters), scene, seed, keeps_path)
         self._boot()
 
@@ -90,6 +92,7 @@ class SimulatedVehicle:
         self.time_boot_us = int(self._plant.state.time_us)
         """Since the vehicle was first switched on; its own clock begins anew with every reboot."""
         self._topics = Topics(self._telemetry)
+        self._signing.boot()
         self._board = Board(
             identity,
             self._autopilot,

@@ -95,6 +95,10 @@ def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[Outg
     outgoing: list[Outgoing] = []
     for sample in samples:
         _hear(survey, sample, now_us, outgoing)
+    if now_us >= survey._heartbeat_due_us:
+        # From the start: a vehicle may wait for somebody before it speaks, or learn from it what time it is.
+        survey._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
+        outgoing.append(OnboardHeartbeat(active=False))
     if survey.identity is None:
         if survey.refusal is None and now_us - survey.started_us > survey.config.link.heartbeat_wait_s * 1e6:
             wait_s = survey.config.link.heartbeat_wait_s
@@ -150,9 +154,6 @@ def _meet(survey: Survey, heartbeat: Heartbeat, now_us: int) -> None:
 
 
 def _ask(survey: Survey, now_us: int, outgoing: list[Outgoing]) -> None:
-    if now_us >= survey._heartbeat_due_us:
-        survey._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
-        outgoing.append(OnboardHeartbeat(active=False))
     if now_us >= survey._timesync_due_us:
         survey._timesync_due_us = now_us + TIMESYNC_INTERVAL_US
         outgoing.append(TimeSyncAsk(now_us * 1000))

@@ -10,6 +10,7 @@ udp://:14540                     the older form of udpin (or of udpout when a re
 
 import re
 import socket
+from collections.abc import Callable
 
 from companion.errors import ConnectionSetupError
 from companion.shell.connection import (
@@ -20,13 +21,16 @@ from companion.shell.connection import (
     UdpInConnection,
     UdpOutConnection,
 )
+from companion.shell.peer import Peer
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
-def open_connection(url: str, peer: str | None = None) -> Connection:
-    """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin.
+def open_connection(
+    url: str, peer: str | None = None, is_genuine: Callable[[bytes], bool] = lambda packet: True
+) -> Connection:
+    """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
 
     Raises ConnectionSetupError with one clear sentence.
     """
@@ -45,7 +49,7 @@ def open_connection(url: str, peer: str | None = None) -> Connection:
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise ConnectionSetupError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme == "udpin":
-        return UdpInConnection(host, port, None if peer is None else _peer(peer))
+        return UdpInConnection(host, port, Peer(None if peer is None else _peer(peer), is_genuine))
     if scheme == "udpout":
         return UdpOutConnection(host, port)
     if scheme == "tcpout":

@@ -38,10 +38,10 @@ class Connection(Protocol):
 class UdpInConnection:
     """Listens on a local port to one peer (see `peer`) and answers it."""
 
-    def __init__(self, host: str, port: int, only: tuple[str, int | None] | None = None) -> None:
+    def __init__(self, host: str, port: int, peer: Peer | None = None) -> None:
         self._socket = _bound_socket(socket.SOCK_DGRAM, host, port)
         self._socket.setblocking(False)
-        self._peer = Peer(only)
+        self._peer = peer or Peer()
 
     @property
     def local_port(self) -> int:

@@ -5,10 +5,12 @@
     released  the pinned address has sent no packet for RELEASED_US, as when a router was restarted: a heartbeat of the
               same system and component pins its new address, and nobody else is heard
 
-An address can be forged where the network lets it be; what keeps such packets out is MAVLink's signing.
+An address can be forged where the network lets it be; what keeps such packets out is MAVLink's signing. With it only
+genuine packets pin, hold and move an address. Whoever is answered before has not to be genuine: the vehicle learns the
+time stamp of its signatures from what it is sent.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
 from companion.link.identity import AUTOPILOT_COMPONENT_ID
@@ -28,8 +30,11 @@ class Peer:
     `only` is the host, or the host and port, that the person named: nobody else is heard, pinned or not.
     """
 
-    def __init__(self, only: tuple[str, int | None] | None = None) -> None:
+    def __init__(
+        self, only: tuple[str, int | None] | None = None, is_genuine: Callable[[bytes], bool] = lambda packet: True
+    ) -> None:
         self._only = only
+        self._is_genuine = is_genuine
         self._pinned: Address | None = None
         self._vehicle: tuple[int, int] | None = None  # system and component
         self._last_us = 0
@@ -55,7 +60,7 @@ class Peer:
         if self._only is not None and (sender[0] != self._only[0] or self._only[1] not in (None, sender[1])):
             return False
         if sender == self._pinned:
-            if any(True for _ in _packets(datagram)):
+            if any(map(self._is_genuine, _packets(datagram))):
                 self._last_us = now_us
             return True
         if self._vehicle is not None and now_us - self._last_us <= RELEASED_US:
@@ -65,7 +70,8 @@ class Peer:
             if self._vehicle is None:
                 self.answered = sender
             is_autopilot = source[1] == AUTOPILOT_COMPONENT_ID
-            if message_id_of(packet) == HEARTBEAT and is_autopilot and self._vehicle in (None, source):
+            is_vehicle = is_autopilot and self._vehicle in (None, source)
+            if message_id_of(packet) == HEARTBEAT and is_vehicle and self._is_genuine(packet):
                 self._vehicle, self._pinned, self._last_us, self.answered = source, sender, now_us, sender
         return self._vehicle is None or sender == self._pinned
 

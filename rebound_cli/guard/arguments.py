@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, add_connect, add_peer, add_set, runs
+from rebound_cli.arguments import Commands, add_connect, add_peer, add_set, add_signing_key, runs
 
 
 def add_guard(commands: Commands) -> None:
@@ -13,6 +13,7 @@ def add_guard(commands: Commands) -> None:
     )
     add_connect(guard, required=True)
     add_peer(guard)
+    add_signing_key(guard)
     guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/guard.md")
     add_set(guard, "change a setting, e.g. max_hits=5")
     guard.add_argument("--modes", metavar="A,B", help="the modes that may be taken over, e.g. POSCTL,AUTO.MISSION")

@@ -7,7 +7,6 @@ from companion.companion import StepResult
 from companion.errors import ConfigurationError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
-from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli import run_folder
@@ -17,13 +16,14 @@ from rebound_cli.documents import Override, apply_override, apply_overrides, emp
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop
 from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.signed_connection import open_signed, refused_packets
 
 
 def run_guard(options: Namespace) -> int:
     """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
     config = guard_config(options)
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-    connection = open_connection(options.connect, options.peer)
+    connection = open_signed(options)
     folder = run_folder.create_run_folder(options.out, "guard")
     run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
@@ -36,7 +36,12 @@ def run_guard(options: Namespace) -> int:
         connection.close()
         recorder.close()
         hits = [asdict(collision) for collision in guard.collisions()]
-        summary = {"outcome": guard.outcome, "collisions": hits, "left_alone": guard.left_alone()}
+        summary = {
+            "outcome": guard.outcome,
+            "collisions": hits,
+            "left_alone": guard.left_alone(),
+            "refused_packets": refused_packets(connection),
+        }
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
     left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
     console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")

@@ -1,6 +1,6 @@
 """The arguments of `rebound preflight`."""
 
-from rebound_cli.arguments import Commands, add_companion, add_connect, add_json, add_peer, runs
+from rebound_cli.arguments import Commands, add_companion, add_connect, add_json, add_peer, add_signing_key, runs
 
 
 def add_preflight(commands: Commands) -> None:
@@ -11,6 +11,7 @@ def add_preflight(commands: Commands) -> None:
     )
     add_connect(preflight, required=True)
     add_peer(preflight)
+    add_signing_key(preflight)
     add_companion(preflight)
     preflight.add_argument("--fix", action="store_true", help="offer to set the parameters that would mend it")
     preflight.add_argument("--yes", action="store_true", help="with --fix: set them without asking")

@@ -8,11 +8,11 @@ from dataclasses import asdict
 from companion.errors import ConfigurationError
 from companion.preflight.checks import Finding, Verdict
 from companion.preflight.preflight import Preflight
-from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli.console import Console, console_for
 from rebound_cli.replay.settings import companion_settings
+from rebound_cli.signed_connection import open_signed
 
 EXIT_NOT_READY = 1
 LONGEST_WAIT_S = 0.05
@@ -26,12 +26,15 @@ def run_preflight(options: Namespace) -> int:
     if options.yes and not options.fix:
         raise ConfigurationError("--yes answers the question of --fix: give both.")
     config = companion_settings(options.companion, (), None)
-    connection = open_connection(options.connect, options.peer)
+    connection = open_signed(options)
     try:
         preflight = Preflight(config, clock.now_us())
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
         while not preflight.finished:
             _exchange(preflight, connection, clock)
+            news = connection.news()
+            if news is not None:
+                console.print(news)
         if preflight.survey.refusal is not None:
             raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
         found = preflight.findings()

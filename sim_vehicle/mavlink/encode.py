@@ -45,10 +45,10 @@ class Encoder:
         return packet
 
     def sign(self, key: bytes | None, link_number: int, time_stamp: int) -> None:
-        """From now on sign with this key and from this time stamp on; None for no more signing."""
+        """From now on sign with this key and no earlier time stamp; None for no more signing."""
         signing = self._link.signing
         signing.secret_key, signing.sign_outgoing = key, key is not None
-        signing.link_id, signing.timestamp = link_number, time_stamp
+        signing.link_id, signing.timestamp = link_number, max(signing.timestamp, time_stamp)
 
 
 def payload_bytes(message_id: int) -> int:

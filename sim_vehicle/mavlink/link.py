@@ -16,7 +16,7 @@ from sim_vehicle.mavlink.services.parameter_service import ParameterService
 from sim_vehicle.mavlink.services.service import BusyService, Channel, Handler, Service
 from sim_vehicle.mavlink.services.setpoint_service import SetpointService
 from sim_vehicle.mavlink.services.timesync_service import TimeSyncService
-from sim_vehicle.mavlink.signing import SIGNING_OPTIONAL
+from sim_vehicle.mavlink.signing import is_optional
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import HEARTBEAT_ID, Streams
 from sim_vehicle.mavlink.texts import GROUND_STATION_TYPE, TextLink
@@ -41,11 +41,15 @@ SERVICES: tuple[Callable[[Channel, Board], Service], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class LinkOptions:
-    """What a link is for, what lies under it, and whether it passes on what is meant for others (MAV_n_FORWARD)."""
+    """What a link is for, what lies under it, and whether it passes on what is meant for others (MAV_n_FORWARD).
+
+    ``is_usb``: it stands for the autopilot's USB port, which needs hands at the vehicle; see `signing`.
+    """
 
     kind: LinkKind
     line: Line = FAST_LINE
     forwards: bool = True
+    is_usb: bool = False
 
 
 class Link:
@@ -63,7 +67,8 @@ class Link:
         options, seed, line = self.options, self._seed, self._planned_line(board.parameters)
         self.now_us = board.telemetry.sample.time_boot_us
         self._board = board
-        self._decoder = Decoder(board.identity, board.signing)
+        self._signing = board.signing.of_link()
+        self._decoder = Decoder(board.identity, self._signing)
         self._encoder = Encoder(board.identity)
         self._signed_with: bytes | None = None
         self._buffer = Buffer(line, self.now_us)
@@ -136,7 +141,7 @@ class Link:
         data, self._waiting = self._waiting, b""
         decoder, parameters = self._decoder, self._board.parameters
         decoder.foreign = [] if collects_foreign and self.options.forwards else None
-        decoder.signing_is_optional = parameters["MAV_SIGN_CFG"] == SIGNING_OPTIONAL
+        decoder.signing_is_optional = is_optional(parameters["MAV_SIGN_CFG"], self.options.is_usb)
         for message in decoder.push(data):
             handler = self._handlers.get(type(message))
             if handler is not None:
@@ -157,7 +162,7 @@ class Link:
         self.now_us = now_us
         if self.options.line.baud is not None:
             self._buffer.advance(now_us)
-        if self._board.signing.key is not self._signed_with or self._signed_with is not None:
+        if self._signing.key is not self._signed_with or self._signed_with is not None:
             self._sign()
         for text in texts:
             self._texts.add(text, now_us)
@@ -178,9 +183,9 @@ class Link:
         self._encoder.speaks_mavlink_1 = begins_with_1 and not self._decoder.heard_mavlink_2
 
     def _sign(self) -> None:
-        board = self._board
-        key = self._signed_with = board.signing.key
-        stamp = board.signing.next_stamps(board.telemetry.epoch_at_boot_us + self.now_us)
+        signing = self._signing
+        key = self._signed_with = signing.key
+        stamp = signing.next_stamp(self._board.telemetry.epoch_at_boot_us + self.now_us)
         self._encoder.sign(key, self._number, stamp)
 
     def _hear_heartbeat(self, heartbeat: PeerHeartbeat) -> None:
@@ -192,4 +197,4 @@ class Link:
         self.send(encode.ping_answer(request))
 
     def _set_up_signing(self, setup: SigningSetup) -> None:
-        self._board.signing.set_up(setup.key, setup.time_stamp)
+        self._signing.hear_setup(setup.key, setup.time_stamp, self.options.is_usb)

@@ -90,3 +90,22 @@ def test_a_hundred_thousand_random_datagrams_divert_nothing_and_take_no_memory()
         sender = (f"10.0.{chance.randrange(256)}.{chance.randrange(256)}", chance.randrange(65_536))
         assert not peer.accepts(chance.randbytes(chance.randrange(40)), sender, number % RELEASED_US)
     assert peer.answered == VEHICLE and peer.dropped == 100_000 and len(peer._told) <= 3
+
+
+def test_where_packets_are_signed_only_genuine_ones_pin_hold_and_move_an_address():
+    # Given packets of which those with an even sequence number are genuine
+    end = mav.MAVLink(None, 1, 1)
+    genuine = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(end))
+    end.seq = 1
+    forged = bytes(mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3).pack(end))
+    peer = Peer(is_genuine=lambda packet: packet[4] % 2 == 0)
+    # Then a forged heartbeat pins nothing; who sent it may be the vehicle, and is answered until the genuine one comes
+    peer.accepts(forged, STRANGER, 0)
+    assert peer.answered == STRANGER
+    assert peer.accepts(genuine, VEHICLE, 1) and peer.answered == VEHICLE
+    assert not peer.accepts(genuine, STRANGER, 2)
+    # And with the vehicle's address alone nobody holds its place once it has moved, nor takes it
+    moved = ("192.168.4.1", 50_001)
+    assert peer.accepts(forged, VEHICLE, 2 * RELEASED_US)
+    assert not peer.accepts(forged, moved, 2 * RELEASED_US) and peer.answered == VEHICLE
+    assert peer.accepts(genuine, moved, 2 * RELEASED_US) and peer.answered == moved

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.mavlink.line import Line
 from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -49,8 +50,10 @@ class End:
 
 
 class Vehicle:
-    def __init__(self, *options: LinkOptions) -> None:
-        self.vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1, epoch_at_boot_us=1_700_000_000_000_000)
+    def __init__(self, *options: LinkOptions, signing: Signing | None = None) -> None:
+        self.vehicle = SimulatedVehicle(
+            load_built_in("foldable"), Scene(), 1, epoch_at_boot_us=1_700_000_000_000_000, signing=signing
+        )
         self.ends = [End(self.vehicle.add_link(each)) for each in options]
 
     def run(self, seconds: float) -> None:
@@ -307,6 +310,73 @@ def test_a_key_is_taken_away_only_by_somebody_who_has_it(guarded):
     end.packets.clear()
     guarded.run(0.2)
     assert all(not raw[2] & 1 for raw in end.packets)
+
+
+USB = LinkOptions(LinkKind.GROUND, is_usb=True)
+SETUP = dialect.MAVLink_setup_signing_message(1, 1, KEY, 10**14)
+
+
+def restarted(vehicle: Vehicle) -> None:
+    vehicle.ends[0].command(246, 1)
+    vehicle.run(3.0)
+    for end in vehicle.ends:
+        end.packets.clear()
+
+
+def are_signed(end: End) -> set[bool]:
+    return {bool(raw[2] & 1) for raw in end.packets}
+
+
+def stamps(end: End) -> list[int]:
+    return [int.from_bytes(raw[-12:-6], "little") for raw in end.packets]
+
+
+def test_px4_1_17_takes_a_key_over_usb_alone_and_other_links_read_it_at_the_next_start():
+    # Given a vehicle whose links are a companion's and USB
+    vehicle = Vehicle(ONBOARD, USB, signing=Signing(is_px4_1_17=True))
+    companion, usb = vehicle.ends
+    # When a key comes over the companion's, nothing follows
+    companion.send(SETUP)
+    vehicle.run(0.2)
+    assert are_signed(companion) == are_signed(usb) == {False}
+    # When it comes over USB, that link signs, and the other after a restart
+    usb.send(SETUP)
+    vehicle.run(0.02)
+    for end in vehicle.ends:
+        end.packets.clear()
+    vehicle.run(0.2)
+    assert (are_signed(companion), are_signed(usb)) == ({False}, {True})
+    restarted(vehicle)
+    vehicle.run(0.2)
+    assert are_signed(companion) == are_signed(usb) == {True}
+
+
+@pytest.mark.parametrize(("sign_cfg", "heard"), [(0, [True, True]), (1, [False, True]), (2, [False, False])])
+def test_px4_1_17_takes_unsigned_packets_where_its_parameter_says(sign_cfg, heard):
+    vehicle = Vehicle(ONBOARD, USB, signing=Signing(KEY, is_px4_1_17=True))
+    vehicle.vehicle.parameters.set("MAV_SIGN_CFG", sign_cfg)
+    for end in vehicle.ends:
+        end.command(400, 0)
+        vehicle.run(0.05)
+    assert [bool(end.all("COMMAND_ACK")) for end in vehicle.ends] == heard
+
+
+def test_px4_1_17_has_the_time_stamp_of_its_card_until_it_hears_a_later_one_on_that_link():
+    vehicle = Vehicle(ONBOARD, USB, signing=Signing(KEY, is_px4_1_17=True))
+    companion, usb = vehicle.ends
+    vehicle.run(0.5)
+    assert stamps(companion)[:3] == [1, 2, 3]
+    # When the companion is heard with the clock's
+    companion.packets.clear()
+    signed(companion, time_stamp=10**14)
+    companion.heartbeat()
+    vehicle.run(0.5)
+    later = [stamp for stamp in stamps(companion) if stamp > 10**14]
+    assert later[:2] == [10**14 + 1, 10**14 + 2] and max(stamps(usb)) < 10**6
+    # And after a restart it begins again
+    restarted(vehicle)
+    vehicle.run(0.5)
+    assert stamps(companion)[0] < 10**6
 
 
 # As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)

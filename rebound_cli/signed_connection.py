@@ -1,0 +1,77 @@
+"""The connection to a vehicle that signs, with the key of --signing-key; a plain one without."""
+
+from argparse import Namespace
+
+from companion.mavlink.signing import MINUTE, Signing
+from companion.shell.addresses import open_connection
+from companion.shell.clock import Clock
+from companion.shell.connection import MOST_STRANGERS, Connection
+from companion.shell.signing_files import StampFile, read_key
+from rebound_cli.background import Background
+
+# The stamp kept must be less than a minute behind: half of that leaves room for a slow card.
+KEEP_EVERY = MINUTE // 2
+
+
+class SignedConnection:
+    """What comes is heard only if it is signed, what goes is signed; the rest of the program sees neither.
+
+    The time stamp is kept in the background: no flight waits for a disk.
+    """
+
+    def __init__(self, connection: Connection, signing: Signing, stamps: StampFile, clock: Clock) -> None:
+        stamps.keep_first(signing.stamp)
+        self._connection, self._signing, self._stamps, self._clock = connection, signing, stamps, clock
+        self._kept = signing.stamp
+        self._writer = Background("the signatures' time stamp")
+
+    def receive(self, timeout_s: float) -> bytes:
+        opened = b""
+        for _ in range(MOST_STRANGERS):
+            received = self._connection.receive(timeout_s)
+            opened = self._signing.opened(received, self._clock.now_us())
+            if opened or not received:
+                break
+            timeout_s = 0.0
+        if self._signing.stamp - self._kept >= KEEP_EVERY:
+            self._keep()
+        return opened
+
+    def _keep(self) -> None:
+        self._kept = self._signing.stamp
+        self._writer.give(self._stamps.keep, self._kept)
+
+    def send(self, frame: bytes) -> None:
+        self._connection.send(self._signing.signed(frame, self._clock.now_us()))
+
+    def news(self) -> str | None:
+        return self._connection.news() or self._signing.news() or self._writer.news()
+
+    def close(self) -> None:
+        self._connection.close()
+        self._keep()
+        self._writer.close()
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """How many packets were refused, by reason."""
+        return self._signing.refused
+
+
+def open_signed(options: Namespace) -> Connection:
+    """To the vehicle at --connect. Raises ConnectionSetupError, SigningFileError."""
+    if options.signing_key is None:
+        return open_connection(options.connect, options.peer)
+    clock, stamps = Clock(), StampFile(options.signing_key)
+    signing = Signing(read_key(options.signing_key), stamps.first(clock.now_us()))
+    connection = open_connection(options.connect, options.peer, signing.is_genuine)
+    try:
+        return SignedConnection(connection, signing, stamps, clock)
+    except Exception:
+        connection.close()
+        raise
+
+
+def refused_packets(connection: Connection | None) -> dict[str, int]:
+    """Of a connection without a key, none."""
+    return connection.refused if isinstance(connection, SignedConnection) else {}

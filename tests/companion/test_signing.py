@@ -1,0 +1,205 @@
+"""Message signing against pymavlink's as the other end, with the rules of MAVLink's specification; virtual time."""
+
+import hashlib
+import struct
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import development as mav
+
+from companion.link.refusals import LASTING_US
+from companion.mavlink.decode import Decoder
+from companion.mavlink.signing import FORGED, MINUTE, OLD, REPLAYED, UNIX_AT_2015_US, UNSIGNED, Signing, stamp_at
+
+KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
+# The stamp of this moment is 10^13.
+NOW_US = UNIX_AT_2015_US + 10**14
+NOW = stamp_at(NOW_US)
+BEAT = mav.MAVLink_heartbeat_message(2, 12, 0x1D, 0, 3, 3)
+IMU = mav.MAVLink_highres_imu_message(1, 0.0, 0.0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
+
+
+def vehicle(stamp: int = NOW, key: bytes | None = KEY, link: int = 3, component: int = 1) -> mav.MAVLink:
+    """pymavlink as the vehicle."""
+    end = mav.MAVLink(None, 1, component)
+    end.signing.secret_key, end.signing.sign_outgoing = key, key is not None
+    end.signing.timestamp, end.signing.link_id = stamp, link
+    return end
+
+
+def packed(message=BEAT, end: mav.MAVLink | None = None, v1: bool = False) -> bytes:
+    return bytes(message.pack(end or vehicle(), force_mavlink1=v1))
+
+
+def plain(message=BEAT, component: int = 1) -> bytes:
+    return packed(message, vehicle(key=None, component=component))
+
+
+@pytest.fixture
+def signing() -> Signing:
+    return Signing(KEY, NOW)
+
+
+def test_the_signature_is_the_specifications(signing):
+    # Given the specification's formula written out: SHA-256 of key, header to checksum, link and six bytes of stamp
+    content = signing.signed(plain(), NOW_US)[:-6]
+    stamp = content[-6:]
+    assert content[2] == 1 and content[-7] == 0 and struct.unpack("<Q", stamp + b"\0\0")[0] == NOW + 1
+    assert signing.signed(plain(), NOW_US)[-6:] != hashlib.sha256(KEY + content).digest()[:6], "each has its own stamp"
+    assert Signing(KEY, NOW).signed(plain(), NOW_US) == content + hashlib.sha256(KEY + content).digest()[:6]
+
+
+@pytest.mark.parametrize(
+    "message", [BEAT, IMU, mav.MAVLink_statustext_message(6, b"a" * 50), mav.MAVLink_ping_message(0, 0, 0, 0)]
+)
+def test_what_pymavlink_signs_is_heard_and_the_other_way_round(signing, message):
+    # Heard: the same packet as if it had never been signed
+    assert signing.opened(packed(message), NOW_US) == plain(message)
+    # Sent: pymavlink takes it, and refuses it once a byte is another
+    end = vehicle(stamp=NOW - 1)
+    end.signing.allow_unsigned_callback = None
+    sent = signing.signed(plain(message, component=191), NOW_US)
+    (found,) = end.parse_buffer(sent)
+    assert found.get_type() == message.get_type() and end.signing.badsig_count == 0
+    with pytest.raises(mav.MAVError, match="Invalid signature"):
+        vehicle(stamp=NOW - 1).decode(bytearray(sent[:-1] + bytes((sent[-1] ^ 1,))))
+
+
+@pytest.mark.parametrize(
+    ("reason", "packets"),
+    [
+        (UNSIGNED, [plain()]),
+        (UNSIGNED, [packed(v1=True, end=vehicle(key=None))]),
+        (FORGED, [packed(end=vehicle(key=OTHER_KEY))]),
+        (FORGED, [packed()[:-13] + bytes(13)]),
+        (FORGED, [packed()[:-1] + bytes((packed()[-1] ^ 1,))]),
+        (OLD, [packed(end=vehicle(stamp=NOW - MINUTE - 1))]),
+    ],
+)
+def test_what_is_not_genuine_is_refused_and_counted_by_reason(signing, reason, packets):
+    for packet in packets:
+        assert not signing.is_genuine(packet)
+        assert signing.opened(packet, NOW_US) == b""
+    assert signing.refused == {reason: 1}
+
+
+def test_a_packet_is_heard_once_and_nothing_before_it_any_more(signing):
+    end = vehicle()
+    first, second, third = (packed(end=end) for _ in range(3))
+    assert signing.opened(second, NOW_US)
+    for packet in (second, first):
+        assert not signing.is_genuine(packet) and not signing.opened(packet, NOW_US)
+    assert signing.opened(third, NOW_US)
+    assert signing.refused == {REPLAYED: 2}
+
+
+def test_each_link_and_component_has_a_stamp_of_its_own(signing):
+    assert signing.opened(packed(end=vehicle(stamp=NOW + 50)), NOW_US)
+    for other in (vehicle(link=4), vehicle(component=2)):
+        assert signing.opened(packed(end=other), NOW_US)
+    assert signing.refused == {}
+
+
+def test_a_new_stream_may_be_a_minute_behind_and_no_more(signing):
+    assert signing.opened(packed(end=vehicle(stamp=NOW - MINUTE)), NOW_US)
+    assert not signing.opened(packed(end=vehicle(stamp=NOW - MINUTE - 1, link=4)), NOW_US)
+    # An hour later by the clock alone
+    hour_us = 3_600_000_000
+    assert not signing.opened(packed(end=vehicle(link=5)), NOW_US + hour_us)
+    assert signing.refused == {OLD: 2}
+
+
+def test_a_forged_packet_from_the_future_locks_nobody_out(signing):
+    # Given a packet of the last possible stamp, signed with no key, and one with another
+    for key in (bytes(32), OTHER_KEY):
+        assert not signing.opened(packed(end=vehicle(stamp=2**48 - 2, key=key)), NOW_US)
+    # Then the vehicle's next is heard, and what is sent is not of the future
+    assert signing.opened(packed(end=vehicle(stamp=NOW + 1)), NOW_US)
+    assert signing.stamp == NOW + 1
+
+
+def test_a_vehicle_whose_stamp_is_old_learns_it_from_what_it_is_sent(signing):
+    # Given a vehicle that was switched off for an hour, and keeps its stamp as PX4 does
+    end = vehicle(stamp=NOW - 60 * MINUTE)
+    assert not signing.opened(packed(end=end), NOW_US)
+    # When it hears the companion, and goes on after that stamp
+    sent = signing.signed(plain(component=191), NOW_US)
+    end.signing.timestamp = int.from_bytes(sent[-12:-6], "little") + 1
+    # Then it is heard
+    assert signing.opened(packed(end=end), NOW_US) == plain()
+
+
+def test_what_is_sent_is_later_than_all_sent_and_heard_whatever_the_clock_says(signing):
+    stamps = []
+    for now_us in (NOW_US, NOW_US, NOW_US + 500, 0, NOW_US + 100):
+        stamps.append(int.from_bytes(signing.signed(plain(), now_us)[-12:-6], "little"))
+    signing.opened(packed(end=vehicle(stamp=NOW + 10_000)), NOW_US)
+    stamps.append(int.from_bytes(signing.signed(plain(), 0)[-12:-6], "little"))
+    assert stamps == sorted(set(stamps)) and stamps[-1] == NOW + 10_001
+
+
+def test_the_last_stamp_there_is_ends_nothing(signing):
+    signing.opened(packed(end=vehicle(stamp=2**48 - 1)), NOW_US)
+    for _ in range(2):
+        assert signing.signed(plain(), NOW_US)[-12:-6] == b"\xff" * 6
+
+
+def test_what_radios_cannot_sign_is_dropped_without_being_news(signing):
+    radio = mav.MAVLink_radio_status_message(100, 100, 100, 10, 10, 0, 0)
+    assert signing.opened(plain(radio, component=68), NOW_US) == b""
+    assert signing.refused == {}
+    # Nor is it a way in for what hides in it: bytes that are no packet pass nowhere
+    hidden = plain(mav.MAVLink_statustext_message(6, plain()))
+    for damaged in (hidden, hidden[:-1] + bytes((hidden[-1] ^ 1,)), plain(radio)[:-1] + b"\0" + plain()):
+        assert signing.opened(damaged + packed(), NOW_US).count(plain()) <= 1
+    signing = Signing(KEY, NOW)
+    assert signing.opened(b"\xfd\x09\0" + plain() + plain()[:5], NOW_US) == b""
+
+
+def test_what_lasts_is_told_once_a_run_with_the_last_of_it(signing):
+    def hear(packet: bytes, now_us: int) -> str | None:
+        signing.opened(packet, now_us)
+        return signing.news()
+
+    told = [hear(plain(), NOW_US + step * LASTING_US // 4) for step in range(12)]
+    assert [text for text in told if text] == [
+        "packets without a signature are refused: 5 so far, the last HEARTBEAT of system 1, component 1"
+    ]
+    wrong = packed(end=vehicle(key=OTHER_KEY))
+    assert [hear(wrong, NOW_US + step * LASTING_US) for step in range(2)] == [None, None], "two of them are no run"
+
+
+def test_the_key_is_in_no_text(signing):
+    text = repr(signing) + repr(signing.refused)
+    assert KEY.hex() not in text and repr(KEY) not in text
+
+
+def test_a_message_that_is_not_in_the_dialect_keeps_its_signature(signing):
+    content = b"\xfd\x01\x01\0\0\x01\x01\xff\xff\xff" + b"\x07" + b"\0\0" + b"\x03" + (NOW + 1).to_bytes(6, "little")
+    unknown = content + hashlib.sha256(KEY + content).digest()[:6]
+    assert signing.opened(unknown + packed(end=vehicle(stamp=NOW + 2)), NOW_US) == unknown + plain()
+    assert signing.refused == {}
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.binary(max_size=60),
+            st.sampled_from(
+                [plain(), packed(v1=True, end=vehicle(key=None)), packed(end=vehicle(key=OTHER_KEY)), packed()[:20]]
+            ),
+        ),
+        max_size=12,
+    )
+)
+def test_whatever_arrives_only_genuine_packets_are_heard(pieces):
+    # Given anything in pieces, and genuine packets between them
+    signing, end, reader = Signing(KEY, NOW), vehicle(), Decoder()
+    heard = []
+    for piece in [*pieces, b"\0" * 300]:
+        heard += reader.feed(signing.opened(piece + packed(end=end), NOW_US))
+    heard += reader.feed(signing.opened(b"\0" * 300, NOW_US))
+    # Then each of those arrives, and nothing else
+    assert [packet for packet, _ in heard] == [plain()] * (len(pieces) + 1)

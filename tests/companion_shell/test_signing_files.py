@@ -1,0 +1,76 @@
+"""The key's file and the time stamp beside it."""
+
+import stat
+
+import pytest
+
+from companion.mavlink.signing import MINUTE, UNIX_AT_2015_US, stamp_at
+from companion.shell.signing_files import SigningFileError, StampFile, read_key, write_new
+
+KEY = bytes(range(32))
+NOW_US = UNIX_AT_2015_US + 10**14
+NOW = stamp_at(NOW_US)
+
+
+@pytest.fixture
+def file(tmp_path):
+    write_new(tmp_path / "key", KEY.hex().encode() + b"\n")
+    return tmp_path / "key"
+
+
+def test_a_new_file_is_its_owners_alone_and_replaces_none(file):
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600 and read_key(file) == KEY
+    with pytest.raises(SigningFileError, match="exists already"):
+        write_new(file, b"other")
+    assert read_key(file) == KEY
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o610, 0o644])
+def test_a_key_that_others_may_use_is_refused_with_the_remedy(file, mode):
+    file.chmod(mode)
+    with pytest.raises(SigningFileError, match=f"mode {mode:o}.*chmod 600 {file}"):
+        read_key(file)
+
+
+@pytest.mark.parametrize("content", ["", "secret\n", KEY.hex()[:-1], KEY.hex() + "0", "0" * 64, KEY.hex() + " # mine"])
+def test_what_is_no_key_is_refused_without_showing_it(file, content):
+    file.write_text(content)
+    with pytest.raises(SigningFileError) as refusal:
+        read_key(file)
+    assert "not a key" in str(refusal.value) and KEY.hex()[:-1] not in str(refusal.value)
+    assert "secret" not in str(refusal.value) and refusal.value.__context__ is None
+
+
+def test_a_missing_key_is_one_sentence(tmp_path):
+    with pytest.raises(SigningFileError, match=r"No such file.*rebound key new"):
+        read_key(tmp_path / "none")
+
+
+def test_the_first_stamp_is_the_clocks_where_there_is_none_yet(file):
+    assert StampFile(file).first(NOW_US) == NOW
+    assert StampFile(file).first(0) == 0, "a clock before 2015"
+
+
+@pytest.mark.parametrize("passed_us", [-86_400_000_000, -NOW_US, 0, 10_000_000])
+def test_after_a_restart_stamps_go_on_two_minutes_later_whatever_the_clock_says(file, passed_us):
+    # Given a companion that kept a stamp, and a clock that was set back, or that a short time has passed on
+    StampFile(file).keep(NOW)
+    assert StampFile(file).first(NOW_US + passed_us) == NOW + 2 * MINUTE
+
+
+def test_after_a_long_pause_the_clock_counts(file):
+    StampFile(file).keep(NOW)
+    assert StampFile(file).first(NOW_US + 121_000_000) == NOW + 121 * 100_000
+
+
+@pytest.mark.parametrize("content", ["", "yesterday", "-5", str(2**48)])
+def test_a_damaged_stamp_is_one_sentence_with_the_remedy(file, content):
+    file.with_name("key.stamp").write_text(content)
+    with pytest.raises(SigningFileError, match="delete it"):
+        StampFile(file).first(NOW_US)
+
+
+def test_a_stamp_that_cannot_be_kept_is_told_before_the_flight(file):
+    file.with_name("key.stamp.part").mkdir()
+    with pytest.raises(SigningFileError, match="a folder that you may write to"):
+        StampFile(file).keep_first(NOW)

@@ -1,0 +1,221 @@
+"""A flight with --signing-key against a vehicle that signs as PX4 1.17 does, with and without somebody who forges."""
+
+import hashlib
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.companion import Companion
+from companion.mavlink.signing import Signing as CompanionsSigning
+from companion.mavlink.signing import stamp_at
+from companion.shell.signing_files import StampFile, write_new
+from companion.shell.tlog import read_tlog
+from rebound_cli import run_folder
+from rebound_cli.background import Background
+from rebound_cli.console import Console
+from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.realtime import ConfirmAtOnce, fly_realtime
+from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.signed_connection import SignedConnection
+from sim_vehicle.mavlink.signing import Signing
+from sim_vehicle.vehicle import SimulatedVehicle
+from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of
+from tests.rebound_cli.test_control_path import EPOCH_US, World
+
+KEY = hashlib.sha256(b"test").digest()
+DISARM = mav.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0)
+# Disarmed, and in a mode that a pilot has chosen
+STOLEN = mav.MAVLink_heartbeat_message(2, 12, 0x51, 0x30000, 3, 3)
+HIT = mav.MAVLink_highres_imu_message(1, -40.0, 0.0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
+
+
+class SignedWorld(World):
+    """Anybody hears both directions, and with `forges` adds packets to both."""
+
+    def __init__(self, scene, forges: bool):
+        super().__init__(scene)
+        self.vehicle = SimulatedVehicle(
+            scene.airframe,
+            scene.scene,
+            scene.seed,
+            parameters={"MAV_SIGN_CFG": 1},
+            signing=Signing(KEY, is_px4_1_17=True),
+        )
+        self._forges, self._heard, self._count = forges, b"", 0
+
+    def now_us(self):
+        return EPOCH_US + self.vehicle.time_boot_us
+
+    def close(self):
+        pass
+
+    def _pass(self):
+        genuine = super()._pass()
+        if not self._forges:
+            return genuine
+        replayed, self._heard = self._heard, genuine
+        self._count += 1
+        signs_wrongly = mav.MAVLink(None, 1, 1)
+        signs_wrongly.signing.secret_key, signs_wrongly.signing.sign_outgoing = bytes(range(32)), True
+        signs_wrongly.signing.timestamp = 2**47 + self._count
+        forged = [message.pack(end) for message in (STOLEN, HIT) for end in (mav.MAVLink(None, 1, 1), signs_wrongly)]
+        # What the vehicle is sent: of nobody's key, and the companion's last packet once more
+        self._pending += DISARM.pack(mav.MAVLink(None, 1, 191)) + b"".join(self.sent[-1:])
+        return b"".join(map(bytes, forged)) + replayed + genuine
+
+
+def fly(folder: Path, forges: bool) -> Any:
+    document = load_mission_document(SQUARE, [word for word in HOP if word != "--set"])
+    mission, scene = mission_from(document), world_from(document)
+    world: Any = SignedWorld(scene, forges)
+    folder.mkdir()
+    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))
+    for name in (run_folder.VERSIONS_NAME, run_folder.SUMMARY_NAME):
+        run_folder.write_json(folder / name, {})
+    stamps = StampFile(folder / "key")
+    connection = SignedConnection(world, CompanionsSigning(KEY, stamps.first(world.now_us())), stamps, world)
+    recorder, console = FlightRecorder(folder, Background("log")), Console(sys.stderr, Background("console"))
+    fly_realtime(Companion(mission), connection, world, recorder, console, ConfirmAtOnce(), Interrupts())
+    recorder.close()
+    world.refused = connection.refused
+    connection.close()
+    return world
+
+
+def log_of(folder: Path) -> list[bytes]:
+    return [packet for _, packet in read_tlog(folder / run_folder.TLOG_NAME)]
+
+
+def heard(folder: Path) -> list[bytes]:
+    return [packet for packet in log_of(folder) if packet[6] == 1]
+
+
+def setpoints(folder: Path) -> list[bytes]:
+    """What they say: sequence numbers go to texts, too."""
+    return [packet[10:-2] for packet in log_of(folder) if packet[6:10] == b"\xbf\x54\0\0"]
+
+
+def decisions(folder: Path) -> list[str]:
+    return [event["text"] for event in events_of(folder) if event["kind"] not in ("stranger", "late")]
+
+
+def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flight(tmp_path: Path):
+    # Given the flight that nobody disturbs
+    quiet = fly(tmp_path / "quiet", forges=False)
+    assert decisions(tmp_path / "quiet")[-1] == "done: landed and disarmed, no hit"
+    # When every packet comes with forged ones, in both directions
+    loud = fly(tmp_path / "loud", forges=True)
+    # Then what was heard, decided and sent is the same to the bit
+    assert decisions(tmp_path / "loud") == decisions(tmp_path / "quiet")
+    for part in (heard, setpoints):
+        assert len(part(tmp_path / "loud")) > 200 and part(tmp_path / "loud") == part(tmp_path / "quiet")
+    # And it was counted by both, and told
+    assert set(quiet.refused) <= {"old"}
+    assert min(loud.refused[reason] for reason in ("unsigned", "forged", "replayed")) > 500
+    refused = loud.vehicle._signing.refused
+    assert refused.unsigned > 500 and refused.replayed > 500
+    told = [event["text"] for event in events_of(tmp_path / "loud") if event["kind"] == "stranger"]
+    assert any("without a signature are refused" in text for text in told)
+
+
+def test_a_signed_flights_log_has_no_signature_and_comes_again_without_the_key(tmp_path: Path):
+    fly(tmp_path / "run", forges=True)
+    packets = log_of(tmp_path / "run")
+    assert len(packets) > 2000 and not any(packet[2] for packet in packets)
+    assert_comes_again(tmp_path / "run")
+    for file in (tmp_path / "run").iterdir():
+        content = file.read_bytes()
+        assert KEY not in content and KEY.hex().encode() not in content
+
+
+def test_what_was_recorded_before_a_restart_is_not_heard_after_it(tmp_path: Path):
+    # Given a session whose packets somebody recorded, and a clock that is a day behind after the restart
+    key_file, now_us = tmp_path / "key", 1_700_000_000_000_000
+    write_new(key_file, KEY.hex().encode())
+    vehicle = mav.MAVLink(None, 1, 1)
+    vehicle.signing.secret_key, vehicle.signing.sign_outgoing = KEY, True
+    vehicle.signing.timestamp = stamp_at(now_us)
+    recorded = [bytes(STOLEN.pack(vehicle)) for _ in range(20)]
+    first = Line(recorded, now_us)
+    before = session(key_file, first)
+    assert before.receive(1.0) and before.refused == {}
+    before.close()
+    # When they are played again
+    again = Line(recorded, now_us - 86_400_000_000)
+    after = session(key_file, again)
+    # Then none is heard, and what is sent is later than all before
+    assert after.receive(1.0) == b"" and after.refused == {"old": 20}
+    for connection in (before, after):
+        connection.send(bytes(STOLEN.pack(mav.MAVLink(None, 1, 191))))
+    assert first.stamps() < again.stamps()
+    after.close()
+
+
+def test_the_time_stamp_is_kept_while_it_flies(tmp_path: Path):
+    line = Line([], 1_700_000_000_000_000)
+    connection = session(tmp_path / "key", line)
+    kept = []
+    for _ in range(4):
+        line.time_us += 20_000_000
+        connection.send(bytes(STOLEN.pack(mav.MAVLink(None, 1, 191))))
+        connection.receive(0.0)
+        kept.append(connection._kept)
+    assert kept[0] < kept[1] == kept[2] < kept[3]
+    connection.close()
+    assert int((tmp_path / "key.stamp").read_text()) >= line.stamps()[-1]
+
+
+class Line:
+    """A link that has brought some bytes, and the clock."""
+
+    def __init__(self, received: list[bytes], time_us: int):
+        self._received, self.time_us, self._sent = b"".join(received), time_us, []
+
+    def now_us(self) -> int:
+        return self.time_us
+
+    def receive(self, timeout_s: float) -> bytes:
+        received, self._received = self._received, b""
+        return received
+
+    def send(self, frame: bytes) -> None:
+        self._sent.append(frame)
+
+    def news(self) -> None:
+        return None
+
+    def close(self) -> None:
+        return None
+
+    def stamps(self) -> list[int]:
+        return [int.from_bytes(packet[-12:-6], "little") for packet in self._sent]
+
+
+def session(key_file: Path, line: Any) -> SignedConnection:
+    stamps = StampFile(key_file)
+    return SignedConnection(line, CompanionsSigning(KEY, stamps.first(line.now_us())), stamps, line)
+
+
+@pytest.mark.parametrize("reason", ["unsigned", "forged"])
+def test_a_flood_that_is_refused_does_not_wake_the_loop_for_each_packet(tmp_path: Path, reason):
+    # Given a datagram a packet, three hundred of them, before one that is genuine
+    class Datagrams(Line):
+        def receive(self, timeout_s):
+            return self.waiting.pop(0) if self.waiting else b""
+
+    line = Datagrams([], 1_700_000_000_000_000)
+    end = mav.MAVLink(None, 1, 1)
+    end.signing.timestamp = stamp_at(line.time_us)
+    if reason == "forged":
+        end.signing.secret_key, end.signing.sign_outgoing = bytes(range(32)), True
+    line.waiting = [bytes(STOLEN.pack(end)) for _ in range(299)]
+    end.signing.secret_key, end.signing.sign_outgoing = KEY, True
+    line.waiting.append(bytes(STOLEN.pack(end)))
+    connection = session(tmp_path / "key", line)
+    assert connection.receive(0.0) == bytes(STOLEN.pack(mav.MAVLink(None, 1, 1)))
+    assert connection.refused == {reason: 299}
+    connection.close()
