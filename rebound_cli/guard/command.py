@@ -37,6 +37,7 @@ def run_guard(options: Namespace) -> int:
         recorder.close()
         hits = [asdict(collision) for collision in guard.collisions()]
         summary = {"outcome": guard.outcome, "collisions": hits, "left_alone": guard.left_alone()}
+        summary["round_trip_ms"] = guard.round_trip().summary()
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
     left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
     console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
