@@ -129,7 +129,7 @@ class Companion:
     def status(self) -> Status:
         """For the live line."""
         if self._core is None:
-            return Status(State.CONNECT.value, "", False, None, None, "off (connect)")
+            return Status(State.CONNECT.value, "", False, None, None, "off (connect)", None)
         vehicle = self._core.flight.vehicle
         latest = vehicle.history.latest()
         return Status(
@@ -139,6 +139,7 @@ class Companion:
             position_ned_m=None if latest is None else latest.position_ned_m,
             speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
             detector=self._core.watch.describe(),
+            round_trip_us=self._core.flight.round_trip.present_us,
         )
 
     def obstacles(self) -> tuple[Patch, ...]:
@@ -167,4 +168,5 @@ class Companion:
             unreachable=tuple(flight.unreachable),
             refused_messages=dict(flight.refusals.counts),
             unconfirmed=flight.unconfirmed,
+            round_trip=flight.round_trip.report(),
         )

@@ -24,7 +24,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The live line. Position is the vehicle's local NED estimate."""
+    """The live line. Position is the vehicle's local NED estimate, the round trip TIMESYNC's; None before an answer."""
 
     state: str
     vehicle_mode: str
@@ -32,6 +32,7 @@ class Status:
     position_ned_m: Vector3 | None
     speed_m_s: float | None
     detector: str
+    round_trip_us: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,20 @@ class CollisionReport:
     settled_after_s: float | None
     overshoot_m: float
     rebound_speed_m_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class RoundTripReport:
+    """To the vehicle and back by TIMESYNC; None without an answer. `ignored` counts answers to no question of ours."""
+
+    median_us: int | None = None
+    worst_us: int | None = None
+    ignored: int = 0
+
+    def summary(self) -> dict[str, float | int | None]:
+        """As summary.json has it, in milliseconds."""
+        median_ms, worst_ms = (None if us is None else us / 1e3 for us in (self.median_us, self.worst_us))
+        return {"median": median_ms, "worst": worst_ms, "ignored": self.ignored}
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,3 +115,4 @@ class FlightReport:
     unreachable: tuple[str, ...] = ()
     refused_messages: Mapping[str, int] = field(default_factory=dict)
     unconfirmed: int = 0
+    round_trip: RoundTripReport = RoundTripReport()

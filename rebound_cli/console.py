@@ -78,7 +78,7 @@ def console_for(json_on_stdout: bool, writer: Background | None = None) -> Conso
 
 
 def live_text(status: "Status", flight_time_s: float) -> str:
-    """One line of 80 columns: companion's state, vehicle's mode, local NED position, speed, detector."""
+    """One line of 80 columns: companion's state, vehicle's mode, local NED position, speed, round trip, detector."""
     lead = f"{flight_time_s:6.1f} s  {status.state:<10} "
     if not status.vehicle_mode:
         return lead + "no vehicle heard yet"
@@ -86,7 +86,8 @@ def live_text(status: "Status", flight_time_s: float) -> str:
     position, speed_m_s = status.position_ned_m, status.speed_m_s
     where = "no position" if position is None else "{:+.2f} {:+.2f} {:+.2f} m".format(*position)
     speed = "" if speed_m_s is None else f"  {speed_m_s:.2f} m/s"
-    return f"{lead} {mode}  {where}{speed}  detector {status.detector}"
+    trip = "" if status.round_trip_us is None else f"  RTT {status.round_trip_us / 1e3:.0f} ms"
+    return f"{lead} {mode}  {where}{speed}{trip}  detector {status.detector}"
 
 
 def timeline(events: "Sequence[Event]", started_at_us: int) -> str:

@@ -99,7 +99,7 @@ def ground_check(flight: FlightContext) -> str | None:
         return "the vehicle says it is not on the ground"
     if flight.mission.abort_when.battery_below_percent is not None and vehicle.battery_percent is None:
         return "the mission ends below a battery level, and the vehicle says none (SYS_STATUS.battery_remaining)"
-    return battery_complaint(flight)
+    return battery_complaint(flight) or flight.round_trip.complaint()
 
 
 def _connected_text(flight: FlightContext) -> str:

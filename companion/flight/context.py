@@ -12,6 +12,7 @@ from companion.flight.leaning import Leaning
 from companion.flight.pressing import Pressing
 from companion.flight.states import State, Trigger
 from companion.link.refusals import Refusals
+from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
@@ -162,6 +163,7 @@ class FlightContext:
     before_hit: BeforeHit | None = None
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
+    round_trip: RoundTrip = field(default_factory=RoundTrip)
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)

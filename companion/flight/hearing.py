@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from companion.flight.context import FlightContext
 from companion.link.identity import identify, is_autopilot
 from companion.link.refusals import LASTING_US
-from companion.messages import Heartbeat, Refused, Sample, TimeSyncReply, TimeSyncRequest
+from companion.messages import Heartbeat, Refused, Sample, TimeSyncAnswer, TimeSyncReply, TimeSyncRequest
 from companion.px4_mode import mode_name
 
 
 def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
-    """Bring the vehicle view up to date, answer time requests; why the vehicle is refused, or None."""
+    """Bring the vehicle view up to date, ask and answer for the time; why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
     mode, armed, conflicts = vehicle.custom_mode, vehicle.armed, vehicle.conflicts
     vehicle.note_silence(now_us)
@@ -37,6 +37,8 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
             continue
         elif isinstance(sample, TimeSyncRequest):
             flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
+        elif isinstance(sample, TimeSyncAnswer):
+            flight.round_trip.hear(sample, now_us)
         vehicle.hear(sample, now_us, own_modes)
         streams.count(type(sample), now_us)
     if vehicle.conflicts > conflicts:
@@ -45,7 +47,20 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
         flight.tell(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
         flight.tell(now_us, "disarmed", "disarmed")
+    if vehicle.identity is not None:
+        _measure_round_trip(flight, now_us)
     return None
+
+
+def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
+    """On the ground too long a one is a reason not to begin; in the air it is told."""
+    asked = flight.round_trip.ask(now_us)
+    if asked is None:
+        return
+    flight.outbox.append(asked)
+    text = flight.round_trip.alarm() if flight.vehicle.armed else None
+    if text is not None:
+        flight.tell(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)
 
 
 def _tell_conflict(flight: FlightContext, now_us: int) -> None:

@@ -85,6 +85,7 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "lost": _as_it_stands,
     "stranger": _as_it_stands,
     "late": _as_it_stands,
+    "round_trip": _as_it_stands,
     "fault": _fault,
     "done": _ended,
     "aborted": _ended,

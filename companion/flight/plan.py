@@ -180,11 +180,13 @@ def plan_text(flight: FlightContext) -> str:
     mission = flight.mission
     identity = flight.vehicle.identity
     rates = ", ".join(f"{name} {rate_hz:.1f} Hz" for name, rate_hz in flight.streams.rates_hz().items())
+    trip_us = flight.round_trip.present_us
+    trip = "unknown: TIMESYNC is not answered" if trip_us is None else f"{trip_us / 1e3:.1f} ms"
     lines = [
         f"Mission    {mission.name}" + (f": {mission.description}" if mission.description else ""),
         f"Vehicle    {flight.vehicle.autopilot_text()}, "
         + (f"{identity.vehicle_type}, system {identity.system_id}" if identity else "not connected"),
-        f"Checks     disarmed, on the ground, streams: {rates}",
+        f"Checks     disarmed, on the ground, round trip {trip}, streams: {rates}",
         *_resume_lines(flight),
         *mission_lines(mission),
         "Pilot      any mode change or disarm by the pilot ends the flight; the companion does not come back",

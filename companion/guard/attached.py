@@ -12,7 +12,7 @@ from companion.guard.states import State
 from companion.link.identity import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
 from companion.mavlink.fields import fields_from, sample_from
-from companion.messages import OnboardHeartbeat, Sample, TimeSyncReply
+from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk, TimeSyncReply
 from companion.report import Event
 
 
@@ -27,7 +27,8 @@ class AttachedStep:
 class AttachedGuard:
     """Joins fields with the pure core; holds no clock and no thread. Times are microseconds, any epoch.
 
-    The program's own heartbeats and its answers to time requests are already there; none are added. `seek` takes the
+    The program's own heartbeats and its share of TIMESYNC are already there; none are added. A program would take an
+    answer to a question of the guard's for one to its own, so the round trip is not measured here. `seek` takes the
     search for a hit's normal on, with each message.
     """
 
@@ -53,7 +54,7 @@ class AttachedGuard:
         outputs = advance(self.core, samples, now_us)
         sent: list[tuple[str, Mapping[str, Any]]] = []
         for message in outputs.messages:
-            if not isinstance(message, OnboardHeartbeat | TimeSyncReply):
+            if not isinstance(message, OnboardHeartbeat | TimeSyncAsk | TimeSyncReply):
                 sent += fields_from(self._encoder, message)
         for name, fields in sent:
             if name in SETPOINTS:

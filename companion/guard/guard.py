@@ -9,7 +9,7 @@ from companion.guard.states import State
 from companion.mavlink.decode import LONE_GUARD_CONVERTERS, Decoder
 from companion.mavlink.encode import Encoder
 from companion.px4_mode import mode_name
-from companion.report import CollisionReport, Status
+from companion.report import CollisionReport, RoundTripReport, Status
 
 
 class Guard:
@@ -91,7 +91,9 @@ class Guard:
     def status(self) -> Status:
         """For the live line."""
         return (
-            Status(State.CONNECTING.value, "", False, None, None, "off") if self._core is None else status(self._core)
+            Status(State.CONNECTING.value, "", False, None, None, "off", None)
+            if self._core is None
+            else status(self._core)
         )
 
     def collisions(self) -> tuple[CollisionReport, ...]:
@@ -100,6 +102,9 @@ class Guard:
     def left_alone(self) -> int:
         """Hits that were told and left to the program that flies."""
         return 0 if self._core is None else self._core.guard.left_alone
+
+    def round_trip(self) -> RoundTripReport:
+        return RoundTripReport() if self._core is None else self._core.flight.round_trip.report()
 
     @property
     def stop_reason(self) -> str | None:
@@ -117,6 +122,7 @@ def status(core: GuardCore) -> Status:
         position_ned_m=None if latest is None else latest.position_ned_m,
         speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
         detector=core.watch.describe(),
+        round_trip_us=core.flight.round_trip.present_us,
     )
 
 

@@ -87,7 +87,7 @@ class Connect:
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         flight.tell(now_us, "streams", f"streams in Hz: {text}", **rates)
-        complaint = flight.streams.too_slow()
+        complaint = flight.streams.too_slow() or flight.round_trip.complaint()
         return Move(Trigger.CONNECTED) if complaint is None else Move(Trigger.REFUSED, complaint)
 
 
@@ -105,6 +105,8 @@ class StandBy:
         if vehicle.last_position_us is not None and vehicle.last_heard_us - vehicle.last_position_us > STREAMS_GONE_US:
             return Move(Trigger.STREAMS_GONE, "streams ended, asking for them again")
         reason = why_not(guard)
+        if reason is None and guard.flight.round_trip.complaint() is not None:
+            reason = "the round trip to the vehicle takes too long"
         if reason is None:
             assert guard.flight.vehicle.custom_mode is not None
             return Move(Trigger.WORTH_GUARDING, f"watching {mode_name(guard.flight.vehicle.custom_mode)}")

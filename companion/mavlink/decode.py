@@ -63,6 +63,8 @@ Frame = tuple[bytes, Sample | None]
 
 # time_boot_ms has 32 bits: it begins again after 49.7 days.
 WRAP_US = (1 << 32) * 1000
+# Stamps of one boot differ by as much as their messages are apart, which is far less than an hour.
+SAME_BOOT_US = 3_600_000_000
 # POSITION_TARGET_TYPEMASK: x, y or z.
 POSITION_IGNORED = 0x7
 
@@ -262,7 +264,9 @@ class Decoder:
             self._boot_us = sample.time_boot_us
         elif self._boot_us > WRAP_US // 2 and isinstance(sample, LocalPosition | Attitude | AttitudeTarget):
             wraps = round((self._boot_us - sample.time_boot_us) / WRAP_US)
-            return replace(sample, time_boot_us=sample.time_boot_us + wraps * WRAP_US) if wraps else sample
+            stamp_us = sample.time_boot_us + wraps * WRAP_US
+            # Far from the newest one it has not wrapped: the vehicle has rebooted.
+            return replace(sample, time_boot_us=stamp_us) if abs(stamp_us - self._boot_us) < SAME_BOOT_US else sample
         return sample
 
     def _converted(self, converter: Callable[[Any], Sample | None], packet: bytes) -> Sample | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.link import round_trip
 from companion.preflight.survey import LISTENING_US, Survey, spread
 
 
@@ -47,8 +48,8 @@ FOLDING_DAMPING_PER_S = 30.0
 MOST_WANDER_M, DOUBTFUL_WANDER_M = 0.5, 0.1
 # Innovation test ratios: at 1 the estimator turns its sensors down, and PX4 warns from 0.5 on.
 DOUBTFUL_RATIO, BAD_RATIO = 0.5, 1.0
-# A round trip of 20 ms is five IMU samples; of 100 ms, 0.2 m at 2 m/s.
-DOUBTFUL_TRIP_MS, BAD_TRIP_MS = 20.0, 100.0
+# A round trip of so long is five IMU samples; beyond round_trip.MOST_US no flight begins.
+DOUBTFUL_TRIP_US = 20_000
 # PX4's BAT_LOW_THR is 15 %; a flight needs something above it.
 DOUBTFUL_BATTERY, BAD_BATTERY = 50, 20
 # A vehicle that stands still does not clip; a sensor that does shakes in its mount.
@@ -235,14 +236,14 @@ def _vibration(survey: Survey) -> Iterator[Finding]:
 
 
 def _time(survey: Survey) -> Iterator[Finding]:
-    if not survey.round_trips_us:
+    median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
+    if median_us is None or worst_us is None:
         yield Finding("time", Verdict.DOUBTFUL, "TIMESYNC is not answered", "MAVLink 2 on the link (MAV_PROTO_VER 2)")
         return
-    trip_ms = sorted(survey.round_trips_us)[len(survey.round_trips_us) // 2] / 1e3
-    found = f"{trip_ms:.1f} ms there and back (median)"
-    if trip_ms > BAD_TRIP_MS:
+    found = f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst"
+    if median_us > round_trip.MOST_US:
         yield Finding("time", Verdict.BAD, found, "a wire or a direct link instead of this one")
-    elif trip_ms > DOUBTFUL_TRIP_MS:
+    elif median_us > DOUBTFUL_TRIP_US:
         yield Finding("time", Verdict.DOUBTFUL, found, "a wire instead of a radio; serial: baud rate 921600")
     else:
         yield Finding("time", Verdict.GOOD, found)

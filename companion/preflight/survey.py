@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.link.identity import Identity, identify, is_autopilot
+from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.messages import (
     AutopilotVersion,
@@ -23,7 +24,6 @@ from companion.messages import (
     SendCommand,
     SetMessageInterval,
     TimeSyncAnswer,
-    TimeSyncAsk,
     TimeSyncReply,
     TimeSyncRequest,
     Vector3,
@@ -48,8 +48,6 @@ LISTENING_US = 10_000_000
 HEARTBEAT_INTERVAL_US = 1_000_000
 # A lost question is asked again; PX4 answers a parameter within 50 ms.
 ASK_AGAIN_US = 500_000
-# Ten exchanges in the ten seconds tell a round trip from its scatter.
-TIMESYNC_INTERVAL_US = 1_000_000
 
 
 @dataclass(slots=True)
@@ -72,11 +70,10 @@ class Survey:
     vibration: list[Vibration] = field(default_factory=list)
     estimator: list[EstimatorStatus] = field(default_factory=list)
     battery: Battery | None = None
-    round_trips_us: list[int] = field(default_factory=list)
+    round_trip: RoundTrip = field(default_factory=RoundTrip)
     _now_us: int = 0
     _heartbeat_due_us: int = 0
     _ask_due_us: int = 0
-    _timesync_due_us: int = 0
 
     @property
     def finished(self) -> bool:
@@ -132,8 +129,8 @@ def _hear(survey: Survey, sample: Sample, now_us: int, outgoing: list[Outgoing])
             survey.estimator.append(sample)
         case TimeSyncRequest(vehicle_time_ns):
             outgoing.append(TimeSyncReply(vehicle_time_ns, now_us * 1000))
-        case TimeSyncAnswer(companion_time_ns, _):
-            survey.round_trips_us.append(now_us - companion_time_ns // 1000)
+        case TimeSyncAnswer():
+            survey.round_trip.hear(sample, now_us)
         case ImuSample() if listens:
             survey.imu.append(sample)
         case LocalPosition() if listens:
@@ -154,9 +151,9 @@ def _meet(survey: Survey, heartbeat: Heartbeat, now_us: int) -> None:
 
 
 def _ask(survey: Survey, now_us: int, outgoing: list[Outgoing]) -> None:
-    if now_us >= survey._timesync_due_us:
-        survey._timesync_due_us = now_us + TIMESYNC_INTERVAL_US
-        outgoing.append(TimeSyncAsk(now_us * 1000))
+    asked = survey.round_trip.ask(now_us)
+    if asked is not None:
+        outgoing.append(asked)
     if now_us < survey._ask_due_us:
         return
     survey._ask_due_us = now_us + ASK_AGAIN_US

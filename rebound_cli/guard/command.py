@@ -40,6 +40,7 @@ def run_guard(options: Namespace) -> int:
             "outcome": guard.outcome,
             "collisions": hits,
             "left_alone": guard.left_alone(),
+            "round_trip_ms": guard.round_trip().summary(),
             "refused_packets": refused_packets(connection),
         }
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)

@@ -64,6 +64,9 @@ class FakeVehicle:
     commands: list = field(default_factory=list)
     heartbeats: list = field(default_factory=list)
     timesyncs: list = field(default_factory=list)
+    asked: list = field(default_factory=list)
+    round_trip_us: int = 0  # after which it answers TIMESYNC; one interval at least
+    does_answer_time: bool = True
     contact_times_us: list = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -111,7 +114,10 @@ class FakeVehicle:
         elif kind == "HEARTBEAT":
             self.heartbeats.append((self.time_us, message))
         elif kind == "TIMESYNC":
-            self.timesyncs.append(message)
+            if message.tc1 == 0:
+                self.asked.append((self.time_us + self.round_trip_us, message.ts1))
+            else:
+                self.timesyncs.append(message)
         elif kind == "COMMAND_LONG":
             self.obey_command(message)
 
@@ -158,6 +164,8 @@ class FakeVehicle:
             self.send(mav.MAVLink_heartbeat_message(self.vehicle_type, self.autopilot, base, self.mode, status, 3))
         if n % 50 == 6 and self.battery_percent is not None:
             self.send(mav.MAVLink_sys_status_message(0, 0, 0, 300, 15_000, 900, self.battery_percent, 0, 0, 0, 0, 0, 0))
+        while self.does_answer_time and self.asked and self.asked[0][0] <= self.time_us:
+            self.send(mav.MAVLink_timesync_message(self.time_us * 1000, self.asked.pop(0)[1]))
         if n % 25 == 5:
             self.send(mav.MAVLink_timesync_message(0, self.time_us * 1000))
 

@@ -139,6 +139,16 @@ def test_millisecond_stamps_go_on_where_their_32_bits_wrap():
     assert [sample.time_boot_us // 1000 - wrap_ms for _, sample in frames] == [5, -3, 2, 4]
 
 
+def test_after_a_reboot_of_a_vehicle_that_was_up_for_a_month_stamps_are_as_they_come():
+    """The first position comes before the first HIGHRES_IMU; it lies in no later wrap of the boot before."""
+    imu = mav.MAVLink_highres_imu_message(30 * 86_400_000_000, 0, 0, -9.8, *[0] * 10, 0x3F)
+    rebooted = mav.MAVLink_local_position_ned_message(2_500, 1, 2, 3, 0, 0, 0)
+
+    frames = listening_decoder().feed(packed(imu) + packed(rebooted))
+
+    assert frames[1][1].time_boot_us == 2_500_000
+
+
 @pytest.mark.parametrize("chunk", [1, 7, 100_000])
 def test_every_sample_is_decoded_in_any_chunking(chunk):
     stream = b"".join(packed(message) for message, _ in CASES)

@@ -12,6 +12,7 @@ from companion.messages import (
     Parameter,
     ReadParameter,
     TimeSyncAnswer,
+    TimeSyncAsk,
     Vibration,
 )
 from companion.mission.config import CompanionConfig
@@ -36,7 +37,7 @@ def surveyed(
     """A vehicle that was listened to for the whole time."""
     survey = start_survey(CompanionConfig(), 0)
     advance(survey, [PX4], 0)
-    step_us = 4_000
+    step_us, asked = 4_000, []
     for number in range(11_200_000 // step_us):
         now_us = (number + 1) * step_us
         samples = []
@@ -47,12 +48,12 @@ def surveyed(
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
         if number % 250 == 0:
             samples += [EstimatorStatus(ratio, ratio, ratio, velocity, False), Battery(battery)]
-            samples += [
-                Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0)),
-                TimeSyncAnswer(1000 * (now_us - trip_us), 1),
-            ]
+            samples += [Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0))]
             samples += [Parameter(name, value) for name, value in parameters.items()]
-        advance(survey, samples, now_us)
+        if asked and now_us - asked[0] // 1000 >= trip_us:
+            samples.append(TimeSyncAnswer(asked.pop(0), 1))
+        sent = advance(survey, samples, now_us)
+        asked += [message.companion_time_ns for message in sent if isinstance(message, TimeSyncAsk)]
     assert survey.finished
     return survey
 
@@ -109,6 +110,17 @@ def test_a_radio_that_may_be_lost_is_excepted_and_the_other_exceptions_stay():
 )
 def test_what_is_measured_is_judged(wrong, item, verdict):
     assert verdicts(surveyed(**wrong))[item] is verdict
+
+
+def test_answers_that_nobody_asked_for_make_no_round_trip():
+    # Given a vehicle that answers in 200 ms, and a program beside whose answers come by
+    survey = start_survey(CompanionConfig(), 0)
+    advance(survey, [PX4], 0)
+    for now_us in range(50_000, 3_000_000, 50_000):
+        advance(survey, [TimeSyncAnswer(1000 * (now_us - 1_777), 1)], now_us)
+    # Then nothing is known of ours
+    found = {finding.item: finding for finding in findings(survey)}["time"]
+    assert (found.verdict, found.found) == (Verdict.DOUBTFUL, "TIMESYNC is not answered")
 
 
 def test_arms_that_are_no_quad_x_are_worth_a_look_where_the_normal_is_fitted_to_them():

@@ -1,0 +1,92 @@
+"""How long a message takes to the vehicle and back, by TIMESYNC. Times are on the companion's clock.
+
+A hit is answered a round trip late: the sample that shows it comes late, and so does the setpoint that answers it.
+"""
+
+from collections import Counter, deque
+from dataclasses import dataclass, field
+from statistics import median_low
+
+from companion.messages import TimeSyncAnswer, TimeSyncAsk
+from companion.report import RoundTripReport
+
+# Until a first answer as often as PX4 asks by itself (its TIMESYNC stream has 10 Hz), so that a flight that is about to
+# begin is judged by several answers. Then as often as a HEARTBEAT.
+FIRST_INTERVAL_US, INTERVAL_US = 100_000, 1_000_000
+# The median of five stands when two of them were held up by a busy computer, and follows a change within three seconds.
+RECENT = 5
+# A vehicle at 2 m/s goes 0.2 m in it: as old as a position may be (StreamsConfig.min_local_position_hz).
+MOST_US = 100_000
+# Questions that are remembered: more than six seconds of them, which is longer than any link that flies a vehicle.
+_MOST_ON_THE_WAY = 64
+# Of the flight's median. PX4 answers within 0.14 to 0.5 ms; finer digits are noise.
+_RESOLUTION_US = 100
+
+
+@dataclass(slots=True)
+class RoundTrip:
+    """Asks, matches answers with what was asked, and judges. An answer to nobody's question is counted, and no more."""
+
+    worst_us: int | None = None
+    ignored: int = 0
+    _recent_us: deque[int] = field(default_factory=lambda: deque(maxlen=RECENT))
+    _all_us: Counter[int] = field(default_factory=Counter)
+    _asked_us: dict[int, int] = field(default_factory=dict)  # by the time stamp sent, ns
+    _due_us: int | None = None
+    _is_told: bool = False
+
+    def ask(self, now_us: int) -> TimeSyncAsk | None:
+        """The question, where one is due."""
+        if self._due_us is not None and now_us < self._due_us:
+            return None
+        self._due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
+        asked = TimeSyncAsk(now_us * 1000)
+        self._asked_us[asked.companion_time_ns] = now_us
+        if len(self._asked_us) > _MOST_ON_THE_WAY:
+            del self._asked_us[next(iter(self._asked_us))]
+        return asked
+
+    def hear(self, answer: TimeSyncAnswer, now_us: int) -> None:
+        """An answer; the first to each question counts."""
+        asked_us = self._asked_us.pop(answer.companion_time_ns, None)
+        if asked_us is None:
+            self.ignored += 1
+            return
+        trip_us = now_us - asked_us
+        self._recent_us.append(trip_us)
+        self._all_us[round(trip_us / _RESOLUTION_US) * _RESOLUTION_US] += 1
+        self.worst_us = trip_us if self.worst_us is None else max(self.worst_us, trip_us)
+
+    @property
+    def present_us(self) -> int | None:
+        """Median of the last few; None before an answer."""
+        return median_low(self._recent_us) if self._recent_us else None
+
+    @property
+    def median_us(self) -> int | None:
+        """Of all answers."""
+        return median_low(self._all_us.elements()) if self._all_us else None
+
+    def report(self) -> RoundTripReport:
+        return RoundTripReport(self.median_us, self.worst_us, self.ignored)
+
+    def complaint(self) -> str | None:
+        """One sentence where it takes too long to begin; None before an answer, as nothing is known then."""
+        present_us = self.present_us
+        if present_us is None or present_us <= MOST_US:
+            return None
+        return (
+            f"the round trip to the vehicle takes {present_us / 1e3:.0f} ms and at most {MOST_US / 1e3:.0f} ms are "
+            "allowed; use a wire or a direct link"
+        )
+
+    def alarm(self) -> str | None:
+        """What is to be told of one that has become too long, once while it lasts: until the last few are all short."""
+        present_us = self.present_us
+        if present_us is None or present_us <= MOST_US:
+            self._is_told = self._is_told and any(trip_us > MOST_US for trip_us in self._recent_us)
+            return None
+        if self._is_told:
+            return None
+        self._is_told = True
+        return f"round trip {present_us / 1e3:.0f} ms: hits are answered late"

@@ -1,0 +1,163 @@
+"""The round trip to the vehicle by TIMESYNC: asked, matched with what was asked, judged before a flight and in it."""
+
+import itertools
+import random
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.link.round_trip import MOST_US, RoundTrip
+from companion.messages import TimeSyncAnswer, TimeSyncAsk
+from companion.report import RoundTripReport
+from rebound_cli.console import live_text
+from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
+
+TICK_US = 4_000
+
+
+def asked_over(trip: RoundTrip, seconds: float, start_us: int = EPOCH_US) -> list[TimeSyncAsk]:
+    times = range(start_us, start_us + round(seconds * 1e6), TICK_US)
+    return [question for now_us in times if (question := trip.ask(now_us)) is not None]
+
+
+def answered(trip: RoundTrip, *trips_us: int, start_us: int = EPOCH_US) -> None:
+    """Questions two seconds apart, each answered after so long."""
+    for number, trip_us in enumerate(trips_us):
+        now_us = start_us + 2_000_000 * number
+        question = trip.ask(now_us)
+        assert question is not None
+        trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), now_us + trip_us)
+
+
+def test_it_asks_ten_times_a_second_until_a_first_answer_and_then_once():
+    trip = RoundTrip()
+    first = asked_over(trip, 2.0)
+    assert [b.companion_time_ns - a.companion_time_ns for a, b in itertools.pairwise(first)] == [100_000_000] * 19
+    trip.hear(TimeSyncAnswer(first[-1].companion_time_ns, 7), EPOCH_US + 2_000_000)
+    assert len(asked_over(trip, 5.0, EPOCH_US + 2_000_000)) == 5
+
+
+def test_an_answer_to_nobodys_question_and_a_second_answer_are_counted_and_no_more():
+    # Given a question
+    trip = RoundTrip()
+    question = trip.ask(EPOCH_US)
+    assert question is not None
+    # When another's answer comes, then its own twice
+    trip.hear(TimeSyncAnswer(question.companion_time_ns - 5_000_000_000, 7), EPOCH_US + 1_000)
+    assert trip.present_us is None
+    trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 3_000)
+    trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 900_000)
+    # Then one counts
+    assert (trip.present_us, trip.report()) == (3_000, RoundTripReport(3_000, 3_000, 2))
+
+
+def test_two_late_answers_of_five_leave_the_present_value_and_three_change_it():
+    trip = RoundTrip()
+    answered(trip, 2_000, 900_000, 2_000, 900_000, 2_000)
+    assert (trip.present_us, trip.complaint(), trip.worst_us) == (2_000, None, 900_000)
+    answered(trip, 900_000, start_us=EPOCH_US + 10_000_000)
+    assert (trip.present_us, trip.median_us) == (900_000, 2_000)
+
+
+def test_answers_in_any_order_are_matched_with_their_own_questions():
+    trip, order = RoundTrip(), random.Random(1)
+    questions = asked_over(trip, 1.0)
+    order.shuffle(questions)
+    now_us = EPOCH_US + 2_000_000
+    for question in questions:
+        trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), now_us)
+    assert trip.report() == RoundTripReport(1_500_000, 2_000_000, 0)
+
+
+def test_questions_that_nobody_answers_are_forgotten_in_the_end():
+    trip = RoundTrip()
+    questions = asked_over(trip, 60.0)
+    for question in questions:
+        trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 60_000_000)
+    assert trip.ignored == len(questions) - 64
+
+
+@pytest.mark.parametrize(("trip_us", "is_too_long"), [(MOST_US, False), (MOST_US + 1_000, True)])
+def test_a_flight_begins_up_to_the_bound_and_not_beyond(trip_us, is_too_long):
+    trip = RoundTrip()
+    answered(trip, trip_us)
+    assert (trip.complaint() is not None) is is_too_long
+
+
+def test_the_alarm_is_given_once_while_it_lasts_and_again_after_five_short_ones():
+    trip, told = RoundTrip(), []
+    trips_us = [2_000] * 5 + [400_000] * 6 + [2_000, 400_000] * 4 + [2_000] * 5 + [400_000] * 5
+    for number, trip_us in enumerate(trips_us):
+        answered(trip, trip_us, start_us=EPOCH_US + 2_000_000 * number)
+        if trip.alarm() is not None:
+            told.append(number)
+    assert told == [7, 26]
+
+
+# --- in a flight
+
+
+def texts(f: Flight) -> list[str]:
+    parser = mav.MAVLink(None)
+    messages = parser.parse_buffer(b"".join(frame for _, frame in f.sent)) or []
+    return [message.text for message in messages if message.get_type() == "STATUSTEXT"]
+
+
+def test_a_flight_tells_its_round_trip_in_the_plan_the_live_line_and_the_report():
+    f = flight(FakeVehicle(round_trip_us=20_000), confirmed=False)
+    f.run_to("ready")
+    assert "round trip 20.0 ms" in f.companion.plan_text()
+    f.companion.confirm_plan()
+    f.run_to("mission")
+    assert "  RTT 20 ms  " in live_text(f.companion.status(), 1.0)
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    assert f.companion.report().round_trip == RoundTripReport(20_000, 20_000, 0)
+    assert "round_trip" not in f.kinds()
+
+
+def test_a_vehicle_that_is_too_far_away_is_not_armed():
+    # Given 200 ms each way
+    f = flight(FakeVehicle(round_trip_us=400_000))
+    # When it is to be flown
+    f.run_to_end()
+    # Then it is refused with the figure, before anything was asked of it
+    report = f.companion.report()
+    assert report.outcome == "failed"
+    assert report.reason.startswith("the round trip to the vehicle takes 400 ms and at most 100 ms are allowed")
+    assert set(f.vehicle.counts) <= {511, 512} and f.vehicle.setpoints == []
+
+
+def test_a_round_trip_that_grows_while_the_plan_is_read_is_a_reason_not_to_begin():
+    f = flight(confirmed=False)
+    f.run_to("ready")
+    f.vehicle.round_trip_us = 400_000
+    f.run_for(6.0)
+    f.companion.confirm_plan()
+    f.run_to_end()
+    assert f.companion.report().reason.startswith("the round trip to the vehicle takes 400 ms")
+    assert f.vehicle.setpoints == []
+
+
+def test_a_round_trip_that_grows_in_flight_is_told_once_and_the_flight_goes_on():
+    f = flight()
+    f.run_to("mission")
+    f.vehicle.round_trip_us = 400_000
+    f.run_to_end()
+    report = f.companion.report()
+    assert report.outcome == "completed"
+    assert f.kinds().count("round_trip") == 1
+    assert f.event("round_trip").data["round_trip_us"] == 400_000
+    assert texts(f).count("Round trip 400 ms: hits are answered late") == 1
+    assert report.round_trip.worst_us == 400_000
+
+
+def test_a_vehicle_that_answers_no_timesync_is_told_of_in_the_plan_and_may_be_flown():
+    f = flight(FakeVehicle(does_answer_time=False), confirmed=False)
+    f.run_to("ready")
+    assert "round trip unknown: TIMESYNC is not answered" in f.companion.plan_text()
+    f.companion.confirm_plan()
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+    assert f.companion.report().round_trip == RoundTripReport()
+    assert "RTT" not in live_text(f.companion.status(), 1.0)
