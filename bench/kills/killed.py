@@ -1,8 +1,10 @@
-"""One flight into a wall, flown again for each kill: up to it with the companion, and then without. By the truth."""
+"""One flight into a wall with many ends: at each kill a copy of it goes on without the companion. By the truth."""
 
+import json
 import math
+import os
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,34 +121,53 @@ class Flight:
 
 def work_out(case: Case) -> Json:
     """Every kill of a flight, and what the same flight does when nobody is killed."""
-    whole = Flight(case)
-    limit_us = virtual_time_limit_s(whole.mission) * 1e6
-    while not whole.vehicle.truth.hits and whole.vehicle.time_boot_us < limit_us and not whole.companion.finished:
-        whole.fly()
-    if not whole.vehicle.truth.hits:
+    first = Flight(case)
+    limit_us = virtual_time_limit_s(first.mission) * 1e6
+    while not first.vehicle.truth.hits and first.vehicle.time_boot_us < limit_us and not first.companion.finished:
+        first.fly()
+    if not first.vehicle.truth.hits:
         raise AssertionError("the vehicle never reached the wall")
-    touch = whole.vehicle.truth.hits[0]
-    whole.fly_until(touch.contact_at_boot_us + 1e6 * (KILLED_S[1] + WITH_IT_S))
-    again_m_s = _hardest(whole.vehicle.truth.hits[1:])
-    killed = [_killed(case, touch, kill_s) for kill_s in case.kills_s]
+    touch = first.vehicle.truth.hits[0]
+    flight, killed = Flight(case), []
+    for kill_s in sorted(case.kills_s):
+        flight.fly_until(touch.contact_at_boot_us + kill_s * 1e6)
+        killed.append(_in_a_copy(lambda: _killed(flight, touch)))
+    flight.fly_until(touch.contact_at_boot_us + 1e6 * (KILLED_S[1] + WITH_IT_S))
+    again_m_s = _hardest(flight.vehicle.truth.hits[1:])
     return {"touch_m_s": closing_m_s(touch), "again_m_s": again_m_s, "kills": killed}
 
 
-def _killed(case: Case, touch: Hit, kill_s: float) -> Json:
-    flight = Flight(case)
-    flight.fly_until(touch.contact_at_boot_us + kill_s * 1e6)
+def _in_a_copy(work: Callable[[], Json]) -> Json:
+    """What a copy of this process makes of it: the flight goes on here as if nothing had been done."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.write(writing, json.dumps(work()).encode())
+        finally:
+            os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        text = pipe.read()
+    os.waitpid(child, 0)
+    found: Json = json.loads(text)
+    return found
+
+
+def _killed(flight: Flight, touch: Hit) -> Json:
     killed_at_us = flight.vehicle.time_boot_us
+    since_s = 1e-6 * (killed_at_us - touch.contact_at_boot_us)
     core = flight.companion.core
     target = None if core is None else core.flight.target
     flight.fall()
     truth = flight.vehicle.truth
     # The touch itself is no second one, whenever it came.
-    later = [hit for hit in truth.hits if hit.contact_at_boot_us >= killed_at_us][1 if kill_s < 0.0 else 0 :]
+    later = [hit for hit in truth.hits if hit.contact_at_boot_us >= killed_at_us][1 if since_s < 0.0 else 0 :]
     series = truth.series()
     after = series["time_boot_us"] >= killed_at_us
     off_m = (series["position_ned_m"][after] - np.array(touch.contact_position_ned_m)) @ np.array(touch.normal_ned)
     return {
-        "kill_s": 1e-6 * (killed_at_us - touch.contact_at_boot_us),
+        "kill_s": since_s,
         "again_m_s": _hardest(later),
         "ground_m_s": float(np.linalg.norm(series["velocity_ned_m_s"][-1])) if flight.is_down else None,
         "furthest_m": float(off_m.max()),

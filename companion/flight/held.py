@@ -17,7 +17,7 @@ from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.recovery.direction import plus
 from companion.recovery.interface import Moving
-from companion.recovery.room import Surface
+from companion.recovery.room import BEHIND_M, Surface
 
 # PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
 HELD_S = 1.0
@@ -45,10 +45,11 @@ class Known:
     def free_m(self, way: Sequence[Vector3], place_ned_m: Vector3) -> float:
         """How much further off the way stays than it must; below 0 it leads too near.
 
-        It must stay off by the clearance, or by what the vehicle now and the place it is to be at leave of it.
+        It must stay off by the clearance, or by what the vehicle now and the place it is to be at leave of it. Behind
+        it nothing is in the way.
         """
         offs_m = [self.surface.off_m(place) for place in way]
-        if min(offs_m) >= self.surface.distance_m:
+        if min(offs_m) >= self.surface.distance_m or offs_m[0] < -BEHIND_M:
             return 0.0
         must_m = min(self.surface.distance_m, offs_m[0], self.surface.off_m(place_ned_m))
         beside = [o - must_m for o, place in zip(offs_m, way, strict=True) if self._is_there(o, must_m, place)]

@@ -75,8 +75,10 @@ def known_surfaces(flight: FlightContext) -> list[Known]:
     for record in reversed(flight.collisions):
         if record.is_over:
             break
-        if record.contact.normal_ned != (0.0, 0.0, 0.0):
-            known.append(Known(touched(record.contact.position_ned_m, record.contact.normal_ned)))
+        surface = touched(record.contact.position_ned_m, record.contact.normal_ned)
+        # One past which the vehicle has slid, and where it is to come to rest behind, is in nobody's way.
+        if surface.off_m(record.setpoint_ned_m) > 0.0:
+            known.append(Known(surface))
     if flight.patches and flight.origin_ned_m is not None:
         reach_m = flight.mission.companion.estimate.reach_m
         for patch in surroundings(flight).patches:

@@ -113,6 +113,13 @@ def test_a_velocity_that_leads_out_of_the_fence_is_held_back():
     assert bounded(asked, around(velocity), FENCE, LIMITS) == (asked, "")
 
 
+def test_a_surface_that_the_vehicle_is_behind_is_in_nobodys_way():
+    """It is not where it was thought to be: a pole that was slid past, or an estimate that has jumped."""
+    vehicle, velocity = (0.8, 0.0, -1.5), (1.0, 0.0, 0.0)
+    asked = Target((0.9, 0.0, -1.5), 0.0, velocity, REST)
+    assert bounded(asked, around(velocity, [Known(WALL)], vehicle), FENCE, LIMITS) == (asked, "")
+
+
 @pytest.mark.parametrize(("east_m", "is_held_back"), [(0.0, True), (4.0, False)])
 def test_a_patch_counts_as_far_as_it_is_believed_to_go(east_m, is_held_back):
     # Given one touch of a wall, 0.7 m north of the origin, by a vehicle with a reach of 0.2 m
