@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from bench.campaign_report.arguments import add_campaign
 from bench.detectors_report.arguments import add_detectors
+from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
 from rebound_cli.main import run
 
@@ -23,4 +24,5 @@ def build_parser() -> argparse.ArgumentParser:
     add_paper(commands)
     add_detectors(commands)
     add_campaign(commands)
+    add_kills(commands)
     return parser

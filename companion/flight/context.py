@@ -22,6 +22,7 @@ from companion.mission.items import ReturnItem
 from companion.mission.itinerary import steps_to_fly
 from companion.mission.model import Mission
 from companion.mission.program import Step
+from companion.recovery.interface import Moving
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -30,7 +31,7 @@ class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
     `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; and of the
-    height only velocity and acceleration, where `is_height_free`.
+    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known.
     """
 
     position_ned_m: Vector3
@@ -39,6 +40,7 @@ class Target:
     acceleration_ned_m_s2: Vector3 | None = None
     leans_only: bool = False
     is_height_free: bool = False
+    expected: Moving | None = None
 
     def at_rest(self) -> "Target":
         """Its place alone, which is safe to hold for as long as nobody says more."""

@@ -1,28 +1,32 @@
 """The safety envelope: every setpoint passes through it on its way out, whoever asked for it.
 
-It bounds all that a setpoint holds: place, step, velocity, acceleration, tilt, yaw, and where the setpoint leads up and
-down when nothing follows it. A companion that dies sends nothing more, and PX4 flies its last setpoint on until
-COM_OF_LOSS_T. An acceleration a beside a velocity v ends, by PX4's velocity loop, at v + a / MPC_Z_VEL_P_ACC. That
-velocity beside a height ends, by PX4's height loop, at v / MPC_Z_P from it.
+It bounds all that a setpoint holds: place, step, velocity, acceleration, tilt, yaw, and where the setpoint leads when
+nothing follows it (see held): off what is known and inside the fence, and neither below the floor nor out of the top.
+There an acceleration a beside a velocity v ends, by PX4's velocity loop, at v + a / MPC_Z_VEL_P_ACC. That velocity
+beside a height ends, by PX4's height loop, at v / MPC_Z_P from it.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
+from companion.flight.held import HELD_S, PLACE_PER_S, VELOCITY_PER_S, Known, held_way
 from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
+from companion.recovery.direction import plus, split
+from companion.recovery.interface import Moving
+from companion.recovery.room import Surface
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
-# PX4's defaults: COM_OF_LOSS_T, MPC_Z_VEL_P_ACC and MPC_Z_P.
-HELD_S = 1.0
-VELOCITY_GAIN_PER_S = 4.0
-HEIGHT_GAIN_PER_S = 1.0
+HEIGHT_GAIN_PER_S, VELOCITY_GAIN_PER_S = PLACE_PER_S[2], VELOCITY_PER_S[2]
 # How far from a height a velocity beside it leads within HELD_S, over that velocity.
 _LEADS_S = (1.0 - math.exp(-HEIGHT_GAIN_PER_S * HELD_S)) / HEIGHT_GAIN_PER_S
+# What is taken from a setpoint is found by halving: to 3 %.
+_HALVINGS = 5
 
 
 class SetpointError(Exception):
@@ -43,6 +47,8 @@ class Surroundings:
     has_floor: bool
     last_ned_m: Vector3 | None = None
     since_last_s: float = 0.0
+    velocity_ned_m_s: Vector3 | None = None
+    known: Sequence[Known] = ()
 
 
 def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) -> tuple[Target, str]:
@@ -57,6 +63,7 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) 
     target = _with_place(target, around, fence, limits, reasons)
     target = _with_velocity(target, limits, reasons)
     target = _with_acceleration(target, limits, reasons)
+    target = _with_way(target, around, fence, reasons)
     target = _with_height(target, around, fence, reasons)
     if target.yaw_rad is not None and abs(target.yaw_rad) > math.pi:
         target = replace(target, yaw_rad=math.remainder(target.yaw_rad, math.tau))
@@ -124,6 +131,78 @@ def _with_acceleration(target: Target, limits: Limits, reasons: list[str]) -> Ta
         reasons.append("acceleration up or down above gravity's")
         d = math.copysign(GRAVITY_M_S2, d)
     return replace(target, acceleration_ned_m_s2=(n, e, d))
+
+
+def _with_way(target: Target, around: Surroundings, fence: Fence, reasons: list[str]) -> Target:
+    """What of velocity and acceleration leads, held, out of the fence or too near to what is known, taken away.
+
+    Where that is not enough the place alone is left, or the vehicle's level attitude, if that leads less far.
+    """
+    if around.vehicle_ned_m is None or around.velocity_ned_m_s is None:
+        return target
+    if target.velocity_ned_m_s is None and target.acceleration_ned_m_s2 is None:
+        return target
+    motions = [Moving(around.vehicle_ned_m, around.velocity_ned_m_s)]
+    if target.expected is not None:
+        # The vehicle is wrong about its motion, and what is expected is no more than that: both count.
+        place = target.expected.position_ned_m
+        motions = [target.expected, Moving(place, around.velocity_ned_m_s)]
+    known = list(around.known)
+    for motion in motions:
+        known += _sides(held_way(target, motion), around.origin_ned_m, fence)
+
+    def free_m(candidate: Target, surfaces: Sequence[Known] = known) -> float:
+        ways = [held_way(candidate, motion) for motion in motions]
+        return min((one.free_m(way, candidate.position_ned_m) for one in surfaces for way in ways), default=0.0)
+
+    asked = target
+    for surface in known:
+        if free_m(target, [surface]) < 0.0:
+            target = _off(target, surface, free_m)
+    if target is asked:
+        return asked
+    if not target.leans_only:
+        # Of a lean, which every brake is after a clipped hit, it would be told in every flight.
+        reasons.append("leads too near to what is known, or out of the fence")
+    still = _less(target, None, 1.0) if target.leans_only else target.at_rest()
+    return max(target, still, asked, key=free_m)
+
+
+def _off(target: Target, known: Known, free_m: Callable[[Target, Sequence[Known]], float]) -> Target:
+    """With as little as possible taken from what leads towards one surface; all of it where that is not enough."""
+    least, most = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        share = 0.5 * (least + most)
+        is_free = free_m(_less(target, known.surface.normal_ned, share), [known]) >= 0.0
+        least, most = (least, share) if is_free else (share, most)
+    return _less(target, known.surface.normal_ned, most)
+
+
+def _less(target: Target, normal: Vector3 | None, share: float) -> Target:
+    """With a share taken from what of velocity and acceleration leads towards a surface; None for all but down."""
+
+    def less(vector: Vector3 | None) -> Vector3 | None:
+        if vector is None or normal is None:
+            return None if vector is None else (0.0, 0.0, vector[2])
+        return plus(vector, -share * min(0.0, split(vector, normal)[0]), normal)
+
+    velocity, acceleration = less(target.velocity_ned_m_s), less(target.acceleration_ned_m_s2)
+    return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
+
+
+def _sides(way: Sequence[Vector3], origin: Vector3 | None, fence: Fence) -> list[Known]:
+    """The fence as a surface, where a way that begins inside leaves it the furthest."""
+    if origin is None:
+        return []
+    places = [(n - origin[0], e - origin[1]) for n, e, _ in way]
+    furthest_m, sides = 0.0, list[Known]()
+    for place in places[1:] if fence.contains(*places[0]) else []:
+        inside = fence.nearest_inside(*place)
+        beyond_m = math.dist(inside, place)
+        if beyond_m > furthest_m + _ROUNDING_M:
+            furthest_m, normal = beyond_m, ((inside[0] - place[0]) / beyond_m, (inside[1] - place[1]) / beyond_m, 0.0)
+            sides = [Known(Surface((origin[0] + inside[0], origin[1] + inside[1], 0.0), normal, 0.0))]
+    return sides
 
 
 def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: list[str]) -> Target:

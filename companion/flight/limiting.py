@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from companion.flight.context import FlightContext, Target
 from companion.flight.envelope import Surroundings, bounded
+from companion.flight.remembering import known_surfaces
 from companion.messages import Vector3
 
 # A setpoint at the edge of the envelope may cross it fifty times a second.
@@ -32,6 +33,8 @@ class Limiter:
             has_floor=has_floor,
             last_ned_m=None if moved else self.last_ned_m,
             since_last_s=(now_us - self.last_us) * 1e-6,
+            velocity_ned_m_s=None if latest is None else latest.velocity_ned_m_s,
+            known=known_surfaces(flight),
         )
         target, reason = bounded(wanted, around, flight.mission.fence, flight.mission.limits)
         if reason != self.limited_by and now_us - self.told_us >= LEAST_BETWEEN_LIMITS_US:

@@ -1,7 +1,10 @@
 """The plan a person confirms, and the words for mission items."""
 
+import math
+
 from companion.flight.context import FlightContext, as_text
 from companion.flight.expecting import describe
+from companion.flight.held import unattended_text
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.stored import describe as describe_patch
 from companion.mission.expectations import ExpectItem
@@ -22,7 +25,7 @@ from companion.mission.items import (
 )
 from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision
-from companion.mission.program import MissionItem
+from companion.mission.program import MissionItem, program
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05
@@ -145,10 +148,23 @@ def mission_lines(mission: Mission) -> list[str]:
         *_obstacle_lines(mission.obstacles),
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
+        f"Unattended {unattended_text(_fastest_m_s(mission))}",
     ]
     if has_gamma and max(gamma_1, gamma_2) > LARGE_GAMMA_S:
         lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
     return lines
+
+
+def _fastest_m_s(mission: Mission) -> float:
+    """The highest speed that an item asks for."""
+    speeds = []
+    for step in program(mission.items):
+        match step.action:
+            case VelocityItem(velocity_ned_m_s=velocity):
+                speeds.append(math.hypot(*velocity))
+            case GoToItem() | PathItem() | OrbitItem() | ReturnItem() | SetSpeedItem():
+                speeds.append(step.action.speed_m_s or mission.companion.flight.cruise_speed_m_s)
+    return max(speeds, default=mission.companion.flight.takeoff_speed_m_s)
 
 
 def _obstacle_lines(obstacles: ObstaclesConfig) -> list[str]:

@@ -81,10 +81,11 @@ class Recover:
             is_new = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
             motion = level(motion, self._record.setpoint_ned_m[2], braking)
             a, b, _ = motion.acceleration_ned_m_s2 or REST
+            expected = Moving(motion.position_ned_m, motion.velocity_ned_m_s or REST)
             leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
             is_free = is_new or climb.is_reckoned
             velocity = as_it_moves(self._record.estimated_down_m_s) if is_free else REST
-            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_free)
+            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_free, expected)
         if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
             motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
         return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, damped(motion))

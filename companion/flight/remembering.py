@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext
+from companion.flight.held import Known, touched
 from companion.flight.states import Trigger
 from companion.memory.merging import is_same, remembered
 from companion.memory.patch import Patch, Touch
@@ -66,6 +67,24 @@ def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface
         for patch in flight.patches
         if patch.faces(place, clearance_m) and not (touch is not None and is_same(patch, touch, clearance_m))
     ]
+
+
+def known_surfaces(flight: FlightContext) -> list[Known]:
+    """What a setpoint must not lead into: what has been hit in this recovery, and what ways are planned around."""
+    known = []
+    for record in reversed(flight.collisions):
+        if record.is_over:
+            break
+        surface = touched(record.contact.position_ned_m, record.contact.normal_ned)
+        # One past which the vehicle has slid, and where it is to come to rest behind, is in nobody's way.
+        if surface.off_m(record.setpoint_ned_m) > 0.0:
+            known.append(Known(surface))
+    if flight.patches and flight.origin_ned_m is not None:
+        reach_m = flight.mission.companion.estimate.reach_m
+        for patch in surroundings(flight).patches:
+            centre = flight.local_ned_m(plus(patch.centre_ned_m, reach_m, patch.normal_ned))
+            known.append(Known(touched(centre, patch.normal_ned), patch, flight.origin_ned_m, reach_m))
+    return known
 
 
 def _with_hits(flight: FlightContext, hits: int) -> tuple[Patch, ...]:

@@ -2,6 +2,7 @@
 
 from companion.flight.connecting import request_streams
 from companion.flight.context import Inputs, Target
+from companion.flight.held import unattended_text
 from companion.guard.context import GuardContext, GuardInputs, Move
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, SetMessageInterval, VehicleCommand
@@ -88,6 +89,7 @@ class Connect:
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         flight.tell(now_us, "streams", f"streams in Hz: {text}", **rates)
         complaint = flight.streams.too_slow() or flight.round_trip.complaint()
+        flight.tell(now_us, "unattended", unattended_text(guard.config.limits.max_speed_m_s))
         return Move(Trigger.CONNECTED) if complaint is None else Move(Trigger.REFUSED, complaint)
 
 

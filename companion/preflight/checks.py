@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.flight.held import HELD_S
 from companion.link import round_trip
 from companion.preflight.survey import LISTENING_US, Survey, spread
 
@@ -34,8 +35,6 @@ FLIGHTTERM_OFF = 121212
 # COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
 LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
 LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
-# A vehicle whose companion died in front of a wall must not go on for longer.
-LONGEST_LOSS_S = 1.0
 # The least that PX4 documents: a lean of 11 degrees; beyond 10 a hit at 3 m/s tips a vehicle onto what it hits.
 LEAST_ACC_HOR_M_S2 = 2.0
 # Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
@@ -121,10 +120,12 @@ def _offboard_loss(survey: Survey) -> Iterator[Finding]:
     loss_s, action = survey.parameters.get("COM_OF_LOSS_T"), survey.parameters.get("COM_OBL_RC_ACT")
     if loss_s is None:
         yield _unread("COM_OF_LOSS_T")
-    elif loss_s > LONGEST_LOSS_S:
-        remedy = f"COM_OF_LOSS_T = {LONGEST_LOSS_S:g}"
-        found = f"{loss_s:g} s until PX4 acts when the companion has died"
-        yield Finding("COM_OF_LOSS_T", Verdict.DOUBTFUL, found, remedy, ("COM_OF_LOSS_T", LONGEST_LOSS_S))
+    elif loss_s > HELD_S:
+        found = f"{loss_s:g} s until PX4 acts when the companion has died; setpoints are made safe to hold {HELD_S:g} s"
+        remedy = (
+            f"COM_OF_LOSS_T = {HELD_S:g}; at 2 m/s the vehicle flies {2.0 * (loss_s - HELD_S):g} m further unattended"
+        )
+        yield Finding("COM_OF_LOSS_T", Verdict.DOUBTFUL, found, remedy, ("COM_OF_LOSS_T", HELD_S))
     else:
         yield Finding("COM_OF_LOSS_T", Verdict.GOOD, f"{loss_s:g} s until PX4 acts when the companion has died")
     if action is None:

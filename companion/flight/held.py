@@ -1,0 +1,134 @@
+"""Where a setpoint leads that nothing follows: PX4's loops until it notices, and then its own stop.
+
+A companion that dies sends nothing more. PX4 flies its last setpoint on for COM_OF_LOSS_T, on each axis by
+
+    x'' = k_v (v_s + k_x (x_s - x) - x') + a_s,    k_x: MPC_XY_P, MPC_Z_P,    k_v: MPC_XY_VEL_P_ACC, MPC_Z_VEL_P_ACC
+
+of which what is not asked for falls away: of a lean all but a_s.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from companion.flight.context import Target
+from companion.memory.patch import Patch
+from companion.memory.surroundings import LEAST_FREE_M
+from companion.messages import Vector3
+from companion.recovery.direction import plus
+from companion.recovery.interface import Moving
+from companion.recovery.room import BEHIND_M, Surface
+
+# PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
+HELD_S = 1.0
+PLACE_PER_S = (0.95, 0.95, 1.0)
+VELOCITY_PER_S = (1.8, 1.8, 4.0)
+# PX4's commander looks now and then: of 1 s it made 1.03 to 1.11 s.
+NOTICED_S = 0.11
+# What PX4's own modes brake with: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
+BRAKES_M_S2 = 3.0
+# What it brings to rest after a lean is its estimate, which is wrong about it; a second later that is right again.
+REPAIRED_S = 1.0
+# At a rebound of 1 m/s a look every 0.2 m.
+_TIMES_S = tuple((HELD_S + NOTICED_S) * look / 6 for look in range(1, 7))
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A surface that is known, local NED. Of a patch: in its own coordinates, how far it goes, and for whom."""
+
+    surface: Surface
+    patch: Patch | None = None
+    origin_ned_m: Vector3 = (0.0, 0.0, 0.0)
+    reach_m: float = 0.0
+
+    def free_m(self, way: Sequence[Vector3], place_ned_m: Vector3) -> float:
+        """How much further off the way stays than it must; below 0 it leads too near.
+
+        It must stay off by the clearance, or by what the vehicle now and the place it is to be at leave of it. Behind
+        it nothing is in the way.
+        """
+        offs_m = [self.surface.off_m(place) for place in way]
+        if min(offs_m) >= self.surface.distance_m or offs_m[0] < -BEHIND_M:
+            return 0.0
+        must_m = min(self.surface.distance_m, offs_m[0], self.surface.off_m(place_ned_m))
+        beside = [o - must_m for o, place in zip(offs_m, way, strict=True) if self._is_there(o, must_m, place)]
+        return min([0.0, *beside])
+
+    def _is_there(self, off_m: float, must_m: float, place_ned_m: Vector3) -> bool:
+        """Whether a place that is too near is so beside what is known of the surface, and not past its end."""
+        if self.patch is None:
+            return True
+        before = plus(place_ned_m, max(0.0, must_m - off_m), self.surface.normal_ned)
+        n, e, d = (p - o for p, o in zip(before, self.origin_ned_m, strict=True))
+        return self.patch.faces((n, e, d), self.reach_m)
+
+
+def unattended_text(speed_m_s: float) -> str:
+    """What a companion that dies leaves behind, for people."""
+    return (
+        f"if the companion dies, PX4 flies its last setpoint on for COM_OF_LOSS_T, made safe for {HELD_S:g} s; "
+        f"every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
+    )
+
+
+def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:
+    """What a vehicle touched whose centre was there, and how far off a held setpoint is to lead it."""
+    return Surface(place_ned_m, normal_ned, LEAST_FREE_M)
+
+
+def held_way(target: Target, motion: Moving) -> list[Vector3]:
+    """Places that a vehicle which moves so passes, the present one first, the last where it stops."""
+    axes = []
+    for axis in range(3):
+        place_m, speed_m_s = motion.position_ned_m[axis], motion.velocity_ned_m_s[axis]
+        axes.append([place_m, *_led(axis, place_m, speed_m_s, *_asked(target, axis))])
+    return [(n, e, d) for n, e, d in zip(*axes, strict=True)]
+
+
+def _asked(target: Target, axis: int) -> tuple[float | None, float | None, float]:
+    """Place, velocity and acceleration on one axis; None where it is not asked for."""
+    velocity, acceleration = target.velocity_ned_m_s, target.acceleration_ned_m_s2
+    a_s = 0.0 if acceleration is None else acceleration[axis]
+    v_s = None if velocity is None else velocity[axis]
+    if not target.leans_only:
+        return target.position_ned_m[axis], v_s, a_s
+    if axis < 2:
+        return None, None, a_s
+    return None if target.is_height_free else target.position_ned_m[2], v_s, a_s
+
+
+def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_s: float) -> Iterator[float]:
+    """Of one axis: at each time, and stopped."""
+    k_x, k_v = PLACE_PER_S[axis], VELOCITY_PER_S[axis]
+    way, after_m_s = x, v
+    for number, time_s in enumerate(_TIMES_S):
+        if x_s is not None:
+            rest_m = x_s + ((v_s or 0.0) + a_s / k_v) / k_x
+            a, b, c, d = _WEIGHTS[axis][number]
+            way, after_m_s = rest_m + a * (x - rest_m) + b * v, c * (x - rest_m) + d * v
+        elif v_s is not None:
+            ends_m_s, left = v_s + a_s / k_v, _LEFT[axis][number]
+            way = x + ends_m_s * time_s + (v - ends_m_s) * (1.0 - left) / k_v
+            after_m_s = ends_m_s + left * (v - ends_m_s)
+        else:
+            way, after_m_s = x + v * time_s + 0.5 * a_s * time_s**2, v + a_s * time_s
+        yield way
+    if x_s is None and v_s is None:
+        yield way + after_m_s * REPAIRED_S
+    else:
+        yield way + 0.5 * after_m_s * abs(after_m_s) / BRAKES_M_S2
+
+
+def _weights(k_x: float, k_v: float, time_s: float) -> tuple[float, float, float, float]:
+    """What a place off its rest and a velocity make, in so long, of the place and of the velocity."""
+    half = 0.5 * k_v
+    turn = math.sqrt(max(0.0, k_v * k_x - half * half))
+    left, cosine = math.exp(-half * time_s), math.cos(turn * time_s)
+    sine = math.sin(turn * time_s) / turn if turn else time_s
+    return left * (cosine + half * sine), left * sine, -left * k_v * k_x * sine, left * (cosine - half * sine)
+
+
+_GAINS = tuple(zip(PLACE_PER_S, VELOCITY_PER_S, strict=True))
+_WEIGHTS = tuple(tuple(_weights(k_x, k_v, time_s) for time_s in _TIMES_S) for k_x, k_v in _GAINS)
+_LEFT = tuple(tuple(math.exp(-k_v * time_s) for time_s in _TIMES_S) for k_v in VELOCITY_PER_S)

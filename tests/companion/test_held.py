@@ -1,0 +1,138 @@
+"""Where a setpoint leads that nothing follows, and what the envelope makes of one that leads into something."""
+
+import math
+
+import pytest
+
+from companion.flight.context import Target
+from companion.flight.envelope import Surroundings, bounded
+from companion.flight.held import HELD_S, NOTICED_S, Known, held_way, touched, unattended_text
+from companion.memory.patch import Patch
+from companion.mission.fence import Fence
+from companion.mission.policy import Limits
+from companion.recovery.interface import Moving
+
+ORIGIN = (0.0, 0.0, 0.0)
+REST = (0.0, 0.0, 0.0)
+FENCE, LIMITS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), Limits()
+HERE = (0.0, 0.0, -1.5)
+# A wall that is touched with the centre 0.5 m north of here.
+WALL = touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0))
+
+
+def around(velocity, known=(), vehicle=HERE) -> Surroundings:
+    return Surroundings(vehicle, ORIGIN, True, velocity_ned_m_s=velocity, known=known)
+
+
+def lean(acceleration, velocity=REST, place=HERE) -> Target:
+    return Target(place, 0.0, REST, acceleration, leans_only=True, expected=Moving(place, velocity))
+
+
+def flown(target: Target, motion: Moving, seconds: float) -> tuple[tuple, tuple]:
+    """PX4's loops in steps of a millisecond, by their gains' defaults."""
+    place, velocity = list(motion.position_ned_m), list(motion.velocity_ned_m_s)
+    wanted, ahead = target.velocity_ned_m_s or REST, target.acceleration_ned_m_s2 or REST
+    for _ in range(round(seconds * 1e3)):
+        for axis, (k_x, k_v) in enumerate(((0.95, 1.8), (0.95, 1.8), (1.0, 4.0))):
+            pulled = k_v * (wanted[axis] + k_x * (target.position_ned_m[axis] - place[axis]) - velocity[axis])
+            velocity[axis] += 1e-3 * (ahead[axis] if target.leans_only and axis < 2 else pulled + ahead[axis])
+            place[axis] += 1e-3 * velocity[axis]
+    return tuple(place), tuple(velocity)
+
+
+@pytest.mark.parametrize(
+    "target",
+    [
+        Target((1.0, -0.5, -2.0), 0.0),
+        Target((1.0, -0.5, -2.0), 0.0, (1.5, 0.5, -0.4), (-2.0, 1.0, 0.5)),
+        lean((2.0, -1.0, 0.8)),
+    ],
+)
+def test_the_way_is_that_of_px4s_loops(target):
+    motion = Moving(HERE, (0.8, -0.3, 0.2))
+    way = held_way(target, motion)
+    place, velocity = flown(target, motion, HELD_S + NOTICED_S)
+    assert way[0] == HERE
+    assert way[-2] == pytest.approx(place, abs=0.01)
+    # and then it stops: from 3 m/s^2 on a place, and of a lean a second later
+    n = 0.5 * abs(velocity[0]) * velocity[0] / 3.0 if not target.leans_only else velocity[0]
+    assert way[-1][0] - way[-2][0] == pytest.approx(n, abs=0.02)
+
+
+def test_a_brake_after_a_rebound_leads_back_to_the_wall_and_is_weakened_by_as_little_as_that_takes():
+    """0.8 m/s off the wall and 3 m/s^2 towards it: after 1.1 s it would come back at 2.5 m/s."""
+    off = (-0.8, 0.0, 0.0)
+    known = [Known(WALL)]
+    asked = lean((3.0, 1.0, 0.0), off)
+    sent, _ = bounded(asked, around(off, known), FENCE, LIMITS)
+    north, east, _ = sent.acceleration_ned_m_s2
+    assert 0.0 < north < 1.5 and east == 1.0
+    assert min(WALL.off_m(place) for place in held_way(sent, Moving(HERE, off))) == pytest.approx(0.15, abs=0.15)
+    # a hair more and it were too near
+    more = lean((north + 0.2, 1.0, 0.0), off)
+    assert min(WALL.off_m(place) for place in held_way(more, Moving(HERE, off))) < 0.15
+
+
+def test_a_vehicle_that_is_slower_off_the_wall_than_expected_may_brake_no_harder_than_that_allows():
+    """The estimate says 0.2 m/s off the wall, the hit's law 1 m/s: which of them is right nobody knows."""
+    expected, told = (-1.0, 0.0, 0.0), (-0.2, 0.0, 0.0)
+    alone, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(expected, [Known(WALL)]), FENCE, LIMITS)
+    both, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(told, [Known(WALL)]), FENCE, LIMITS)
+    assert both.acceleration_ned_m_s2[0] < 0.6 * alone.acceleration_ned_m_s2[0]
+
+
+def test_what_leads_away_from_the_wall_or_along_it_passes():
+    asked = lean((-3.0, 2.0, 0.0))
+    assert bounded(asked, around(REST, [Known(WALL)]), FENCE, LIMITS) == (asked, "")
+
+
+def test_a_place_with_a_velocity_into_the_wall_loses_that_and_says_so():
+    asked = Target((0.2, 0.0, -1.5), 0.0, (1.5, 0.5, 0.0), (1.0, 0.0, 0.0))
+    sent, said = bounded(asked, around((0.5, 0.5, 0.0), [Known(WALL)]), FENCE, LIMITS)
+    assert said == "leads too near to what is known, or out of the fence"
+    way = held_way(sent, Moving(HERE, (0.5, 0.5, 0.0)))
+    assert min(WALL.off_m(place) for place in way) > 0.1
+    assert sent.position_ned_m == asked.position_ned_m
+
+
+def test_a_place_that_is_asked_for_beside_the_wall_may_be_flown_to():
+    """Whoever plans a goal nearer than the clearance has decided on it."""
+    asked = Target((0.42, 0.0, -1.5), 0.0)
+    assert bounded(asked, around(REST, [Known(WALL)]), FENCE, LIMITS) == (asked, "")
+
+
+def test_a_velocity_that_leads_out_of_the_fence_is_held_back():
+    vehicle, velocity = (11.0, 0.0, -1.5), (2.0, 0.0, 0.0)
+    asked = Target((11.2, 0.0, -1.5), 0.0, velocity, REST)
+    sent, said = bounded(asked, around(velocity, vehicle=vehicle), FENCE, LIMITS)
+    assert "out of the fence" in said
+    held, at_first = (held_way(target, Moving(vehicle, velocity))[-1][0] for target in (sent, asked))
+    assert held < at_first and held < 12.2
+    # in its middle it passes
+    asked = Target((0.2, 0.0, -1.5), 0.0, velocity, REST)
+    assert bounded(asked, around(velocity), FENCE, LIMITS) == (asked, "")
+
+
+def test_a_surface_that_the_vehicle_is_behind_is_in_nobodys_way():
+    """It is not where it was thought to be: a pole that was slid past, or an estimate that has jumped."""
+    vehicle, velocity = (0.8, 0.0, -1.5), (1.0, 0.0, 0.0)
+    asked = Target((0.9, 0.0, -1.5), 0.0, velocity, REST)
+    assert bounded(asked, around(velocity, [Known(WALL)], vehicle), FENCE, LIMITS) == (asked, "")
+
+
+@pytest.mark.parametrize(("east_m", "is_held_back"), [(0.0, True), (4.0, False)])
+def test_a_patch_counts_as_far_as_it_is_believed_to_go(east_m, is_held_back):
+    # Given one touch of a wall, 0.7 m north of the origin, by a vehicle with a reach of 0.2 m
+    patch = Patch(((0.7, 0.0, -1.5),), (-1.0, 0.0, 0.0), 0.2, 0.5, 0)
+    known = Known(touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0)), patch, ORIGIN, 0.2)
+    vehicle, velocity = (0.0, east_m, -1.5), (1.5, 0.0, 0.0)
+    # When a velocity leads through its plane
+    _, said = bounded(Target(vehicle, 0.0, velocity, REST), around(velocity, [known], vehicle), FENCE, LIMITS)
+    # Then it is held back where the wall is, and not beside it
+    assert bool(said) is is_held_back
+
+
+def test_what_a_longer_loss_costs_is_told_in_metres():
+    text = unattended_text(2.5)
+    assert "COM_OF_LOSS_T" in text and "1 s" in text and "2.5 m" in text
+    assert math.isclose(HELD_S, 1.0)
