@@ -15,8 +15,9 @@ from companion.shell.clock import Clock
 from companion.shell.connection import Connection, UdpInConnection
 from rebound_cli import run_folder
 from rebound_cli.background import Background
-from rebound_cli.console import Console, console_for, summary_text, timeline
+from rebound_cli.console import Console, console_for, timeline
 from rebound_cli.documents import Override, apply_override
+from rebound_cli.ending import ending_text
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
@@ -176,7 +177,7 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     if flown.timing is None:
         # In real time each was printed as it happened.
         console.print(timeline(flight.recorder.events, flown.report.started_at_us))
-    console.print("\n" + summary_text(summary))
+    console.print("\n" + ending_text(summary))
     if writer is not None and writer.loss is not None:
         console.print(f"\n  {writer.loss} ({writer.lost} steps)")
     try:
