@@ -80,9 +80,7 @@ def _surroundings(summary: Mapping[str, Any]) -> list[str]:
     from companion.memory.stored import KnownPatch, describe
 
     lines = [f"Remembered: {describe(KnownPatch.model_validate(data).patch())}." for data in summary["obstacles"]]
-    return lines + [
-        f"Out of reach: {name if name == 'home' else f'item {name}'}." for name in summary["unreachable"]
-    ]
+    return lines + [f"Out of reach: {name if name == 'home' else f'item {name}'}." for name in summary["unreachable"]]
 
 
 def _length(length_m: float) -> str:

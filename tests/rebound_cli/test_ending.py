@@ -66,9 +66,7 @@ def test_what_a_pilot_asks_is_one_line():
 
 def test_a_real_vehicle_is_told_of_by_its_telemetry_alone():
     real = dict.fromkeys(("false_detections", "missed_contacts", "recontacts", "airframe", "seed"))
-    assert told(hit(truth=None), **real) == [
-        "Hit something at 1.98 m/s. Stopped 0.5 m off it in 1.7 s, landed safely."
-    ]
+    assert told(hit(truth=None), **real) == ["Hit something at 1.98 m/s. Stopped 0.5 m off it in 1.7 s, landed safely."]
 
 
 def test_a_frame_of_which_nobody_says_what_it_bears_has_no_such_figure():
@@ -85,7 +83,12 @@ def test_the_hardest_hit_decides_whether_the_frame_would_have_broken(peak_n, wor
 def test_what_went_wrong_is_told_and_no_landing_is_claimed():
     # Given a flight that was aborted in its second recovery, with a false alarm and a contact that nobody saw
     lines = told(
-        hit(truth=None), hit(settled_after_s=None), outcome="aborted", false_detections=1, missed_contacts=2, recontacts=1
+        hit(truth=None),
+        hit(settled_after_s=None),
+        outcome="aborted",
+        false_detections=1,
+        missed_contacts=2,
+        recontacts=1,
     )
     # Then each is a sentence
     assert lines[0] == "1. False alarm: nothing was touched."
