@@ -78,10 +78,8 @@ class _Shown:
 
 
 def _kernels_beside(dispatcher: Any) -> list[Any]:
-    """Of the same room, as far as it is loaded."""
+    """With all of the same room, as far as it is loaded."""
     room = dispatcher.py_func.__module__.partition(".")[0] + "."
     modules = [module for name, module in sys.modules.items() if name.startswith(room)]
-    found = {
-        id(value): value for module in modules for value in vars(module).values() if type(value) is type(dispatcher)
-    }
-    return list(found.values())
+    values = [dispatcher, *(value for module in modules for value in vars(module).values())]
+    return list({id(value): value for value in values if type(value) is type(dispatcher)}.values())
