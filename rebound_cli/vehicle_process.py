@@ -27,7 +27,7 @@ _PROGRESS = re.compile(r"(Compiling .+): (\d+) of (\d+)")
 
 
 class VehicleProcessError(ReboundError):
-    """The simulated vehicle ended before the flight did."""
+    """The simulated vehicle ended before the flight did, or the flight before it began."""
 
 
 class VehicleProcess:
@@ -50,7 +50,7 @@ class VehicleProcess:
             )
 
     def wait_until_ready(self, interrupts: Interrupts, console: Console) -> None:
-        """Return when the vehicle is on the air. Raises KeyboardInterrupt when the person has had enough before.
+        """Return when the vehicle is on the air. Raises VehicleProcessError when the person has had enough.
 
         The companion waits ten seconds for a vehicle; compiling the physics may take longer.
         """
@@ -58,7 +58,9 @@ class VehicleProcess:
         while not is_ready:
             self.check_running()
             if interrupts.reason is not None:
-                raise KeyboardInterrupt
+                # It has nothing to hand over, and may be compiling: it is not waited for.
+                self._process.kill()
+                raise VehicleProcessError(f"The flight was {interrupts.reason} before the vehicle was ready.")
             for line in self._said()[told:]:
                 told += 1
                 is_ready |= line.startswith(self._ready_words)

@@ -13,7 +13,7 @@ from rebound_cli.compiling import compiling_shown
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.timing import Heard
-from rebound_cli.vehicle_process import VehicleProcess
+from rebound_cli.vehicle_process import VehicleProcess, VehicleProcessError
 
 ROOT = Path(__file__).parents[2]
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
@@ -153,7 +153,7 @@ def test_the_vehicles_progress_is_shown_by_who_waits_for_it_and_ctrl_c_ends_that
     # And Ctrl-C before it is ready ends the wait
     interrupts = Interrupts()
     interrupts.reason = "stopped with Ctrl-C"
-    with pytest.raises(KeyboardInterrupt), VehicleProcess(tmp_path, []) as vehicle:
+    with pytest.raises(VehicleProcessError, match="Ctrl-C"), VehicleProcess(tmp_path, []) as vehicle:
         vehicle.wait_until_ready(interrupts, Console(stream))
 
 
