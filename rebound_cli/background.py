@@ -54,10 +54,10 @@ class Background:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or type(error).__name__
         return f"{self._what} has gaps: {why}"
 
-    def close(self) -> None:
-        """Return when all that was given has been tried."""
+    def close(self, timeout_s: float | None = None) -> None:
+        """Return when all that was given has been tried, or after so long."""
         self._waiting.put(None)
-        self._thread.join()
+        self._thread.join(timeout_s)
 
     @property
     def lost(self) -> int:

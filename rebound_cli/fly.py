@@ -14,8 +14,10 @@ from companion.shell.clock import Clock
 from companion.shell.connection import Connection, UdpInConnection
 from rebound_cli import run_folder
 from rebound_cli.background import Background
-from rebound_cli.console import Console, console_for, summary_text, timeline
+from rebound_cli.compiling import prepare_companion, prepare_vehicle
+from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override
+from rebound_cli.ending import ending_text
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
@@ -63,28 +65,35 @@ def run_fly(options: Namespace) -> int:
             remember_from(options.resume, document)
         mission = mission_from(document)
     world = world_from(document) if is_simulated else None
-    console = console_for(options.json, Background("console"))
-    # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-    connection = _connection_for(options)
-    folder = run_folder.create_run_folder(options.out, mission.name)
-    _write_inputs(folder, options.mission, mission, world)
-    # In lockstep the vehicle waits for the disk as for everything else.
-    recorder = FlightRecorder(folder, None if options.lockstep else Background("log"))
-    with Interrupts() as interrupts:
-        flight = Flight(mission, world, folder, recorder, console, interrupts)
-        try:
-            if connection is not None and not is_simulated:
-                confirmation = ConfirmAtOnce(console) if options.yes else AskPerson(console)
-                flown = _fly_connected(flight, connection, confirmation)
-            elif options.lockstep:
-                flown = _fly_lockstep(flight)
-            elif connection is not None:
-                flown = _fly_beside_px4(flight, connection, options.instance)
-            else:
-                flown = _fly_beside_vehicle(flight)
-        finally:
-            recorder.close()
-    return _finish(flight, flown, options.json)
+    with console_for(options.json, Background("console")) as console:
+        prepare_companion(console)
+        if world is not None and options.lockstep:
+            prepare_vehicle(console, world)
+        # The address is tried before anything is written: a wrong one leaves no empty folder behind.
+        connection = _connection_for(options)
+        folder = run_folder.create_run_folder(options.out, mission.name)
+        _write_inputs(folder, options.mission, mission, world)
+        # In lockstep the vehicle waits for the disk as for everything else.
+        recorder = FlightRecorder(folder, None if options.lockstep else Background("log"))
+        with Interrupts() as interrupts:
+            flight = Flight(mission, world, folder, recorder, console, interrupts)
+            try:
+                flown = _fly(flight, connection, options)
+            finally:
+                recorder.close()
+        return _finish(flight, flown, options.json)
+
+
+def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
+    if options.lockstep:
+        return _fly_lockstep(flight)
+    if connection is None:
+        return _fly_beside_vehicle(flight)
+    if options.connect is None:
+        return _fly_beside_px4(flight, connection, options.instance)
+    return _fly_connected(
+        flight, connection, ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
+    )
 
 
 def _connection_for(options: Namespace) -> Connection | None:
@@ -133,8 +142,8 @@ def _fly_beside_px4(flight: Flight, connection: Connection, instance: int) -> Fl
 
     port = PX4_SIMULATOR_PORT + instance
     with VehicleProcess(flight.folder, ["--autopilot", "px4", "--port", str(port)], FIRST_ANSWER_WORDS) as vehicle:
-        explanation = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ..."
-        vehicle.wait_until_ready(flight.interrupts, flight.console, explanation, explain_after_s=0)
+        flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
+        vehicle.wait_until_ready(flight.interrupts, flight.console)
         # What PX4 said while it booted is old.
         while connection.receive(0):
             pass
@@ -177,20 +186,35 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     console, writer = flight.console, flight.recorder.writer
     if flown.timing is None:
         # In real time each was printed as it happened.
-        console.print(timeline(flight.recorder.events, flown.report.started_at_us))
-    console.print("\n" + summary_text(summary))
+        console.events(flight.recorder.events, flown.report.started_at_us)
+    console.still()
+    console.print("\n" + ending_text(summary))
     if writer is not None and writer.loss is not None:
-        console.print(f"\n  {writer.loss} ({writer.lost} steps)")
+        console.print(f"\n{writer.loss} ({writer.lost} steps)")
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
         if world is not None:
             # A drone draws nothing: `rebound replay` does, wherever the folder is taken.
-            from rebound_cli.figure.flight import draw_flight
-
-            draw_flight(flight.folder, flight.mission, world.scene, flown.report, flown.truth)
-        console.print(f"\n  everything is in {flight.folder}/")
+            _draw(flight, flown, world)
+        console.print(f"\nEverything is in {flight.folder}/")
     finally:
         if json_on_stdout:
             print(json.dumps(summary, indent=2))
-    console.close()
     return 0 if summary["outcome"] == "completed" else 1
+
+
+def _draw(flight: Flight, flown: Flown, world: SimulatedWorld) -> None:
+    """The picture of the flight, beside and later where the person wants the prompt back."""
+    from rebound_cli.figure.later import draw_later
+
+    drawn = (flight.folder, flight.mission, world.scene, flown.report, flown.truth)
+    try:
+        if flight.interrupts.reason is None:
+            from rebound_cli.figure.flight import draw_flight
+
+            draw_flight(*drawn)
+            return
+    except KeyboardInterrupt:
+        pass
+    draw_later(*drawn)
+    flight.console.print(f"\n{run_folder.FIGURE_NAME} follows.")

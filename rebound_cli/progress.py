@@ -1,22 +1,15 @@
 """A bar on the terminal while many flights are flown."""
 
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeVar
 
 Item = TypeVar("Item")
 
-WIDTH = 40
 
-
-def with_progress(items: Iterable[Item], total: int, what: str = "flights") -> Iterator[Item]:
+def with_progress(items: Iterable[Item], total: int, what: str = "flights") -> Iterable[Item]:
     """Hand the items on; in a file or a pipe nothing is drawn."""
-    is_terminal = sys.stderr.isatty()
-    for done, item in enumerate(items, start=1):
-        if is_terminal:
-            filled = WIDTH * done // total
-            sys.stderr.write(f"\r[{'#' * filled}{'.' * (WIDTH - filled)}] {done}/{total} {what}")
-            sys.stderr.flush()
-        yield item
-    if is_terminal:
-        sys.stderr.write("\n")
+    from rich.console import Console
+    from rich.progress import track
+
+    console = Console(stderr=True)
+    return track(items, what, total, console=console, disable=not console.is_terminal)

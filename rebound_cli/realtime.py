@@ -13,10 +13,10 @@ from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
-from rebound_cli.console import Console, timeline
+from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.timing import Timing, undisturbed
+from rebound_cli.timing import Heard, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
@@ -139,6 +139,7 @@ class Loop:
     console: Console
     interrupts: Interrupts
     timing: Timing = field(default_factory=Timing)
+    heard: Heard = field(default_factory=Heard)
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False
 
@@ -166,6 +167,7 @@ class Loop:
         deadline_us = self.stepped.next_deadline_us()
         received = waiting(self.connection, min((deadline_us - self.clock.now_us()) / 1e6, LONGEST_WAIT_S))
         now_us = self.clock.now_us()
+        self.heard.take(len(received), now_us)
         result = self._step(received, now_us)
         late = self.timing.stepped(deadline_us, now_us, self.clock.now_us())
         if late is not None:
@@ -240,11 +242,11 @@ def fly_realtime(
         if result.events:
             recorder.record_obstacles(companion.obstacles())
             began_us = started_us if companion.core is None else companion.core.started_at_us
-            console.print(timeline(result.events, began_us))
+            console.events(result.events, began_us)
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
         recorder.record_person(now_us, companion.plan_is_confirmed, companion.stop_reason)
-        console.live(companion.status, (now_us - started_us) / 1e6)
+        console.live(companion.status, (now_us - started_us) / 1e6, loop.heard.text(now_us))
 
     loop = Loop(companion, connection, clock, recorder, console, interrupts)
     loop.run(beside)

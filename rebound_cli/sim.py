@@ -1,5 +1,6 @@
 """`rebound sim`: the simulated vehicle alone, in real time, for any MAVLink client."""
 
+import math
 import os
 import signal
 import threading
@@ -10,12 +11,16 @@ from pathlib import Path
 
 from companion.errors import ConfigurationError
 from companion.shell.signing_files import read_key
+from rebound_cli.background import Background
+from rebound_cli.compiling import prepare_vehicle
+from rebound_cli.console import Console, console_for
 from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.parameters.pace import time_outs_at
-from sim_vehicle.shell.addresses import COMPANION_PORT, open_port, px4_ports
+from sim_vehicle.shell.addresses import COMPANION_PORT, GROUND_PORT, open_port, px4_ports
 from sim_vehicle.shell.realtime import serve
+from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
 
 
@@ -24,16 +29,31 @@ def run_sim(options: Namespace) -> int:
     if options.truth is not None:
         _check_place(options.truth)
     world = load_world(options.mission, options.set, options.airframe, options.seed)
+    # On a thread of its own: a vehicle does not stand still in the air because nobody reads what is printed.
+    with console_for(False, Background("console")) as console:
+        # Before Ctrl-C means an end in good order: until then there is nothing to end.
+        prepare_vehicle(console, world)
+        console.still()
+        _serve(options, world, console)
+    return 0
+
+
+def _serve(options: Namespace, world: SimulatedWorld, console: Console) -> None:
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: stopped.set())
     if options.stop_with_stdin:
         threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
     if options.autopilot == "px4":
-        _serve_px4(options, world, stopped)
+        _serve_px4(options, world, stopped, console)
     else:
-        _serve_builtin(options, world, stopped)
-    return 0
+        _serve_builtin(options, world, stopped, console)
+
+
+def _tell_of(hit: Hit, console: Console) -> None:
+    article = "an" if hit.kind == "edge" else "a"
+    text = f"{article} {hit.kind} at {math.hypot(*hit.impact_velocity_ned_m_s):.2f} m/s, {hit.peak_force_n:.0f} N"
+    console.event(hit.contact_at_boot_us / 1e6, "hit", text)
 
 
 def _check_place(truth: Path) -> None:
@@ -44,7 +64,7 @@ def _check_place(truth: Path) -> None:
         raise ConfigurationError(f"--truth {truth}: this cannot be written to; give another file.")
 
 
-def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
+def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
     signing, sign_cfg = _signing(options)
     vehicle = SimulatedVehicle(
         world.airframe,
@@ -54,13 +74,17 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
         parameters={"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)},
         signing=signing,
     )
+    vehicle.truth.on_hit = partial(_tell_of, console=console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
     ports += [open_port(vehicle, address) for address in options.link]
     host, port = remote
-    print(
-        f"{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.",
-        flush=True,
+    console.print(f"{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.")
+    console.print(
+        f"  QGroundControl  finds it by itself, at UDP port {GROUND_PORT}\n"
+        f"  MAVSDK          udpin://0.0.0.0:{port}\n"
+        f"  mavutil         udpin:0.0.0.0:{port}\n"
+        f"  Rebound         --connect udpin://0.0.0.0:{port}"
     )
     serve(vehicle, ports, options.truth, stopped.is_set, options.speed)
 
@@ -73,21 +97,22 @@ def _signing(options: Namespace) -> tuple[Signing, dict[str, float]]:
     return Signing(None, is_px4_1_17), {"MAV_SIGN_CFG": 0} if is_px4_1_17 else {}
 
 
-def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event) -> None:
+def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
     # Here, because most vehicles have an autopilot of their own and are to start at once.
     from sim_vehicle.hil.messages import MOTORS_STOPPED
     from sim_vehicle.hil.vehicle import HilVehicle
     from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT, serve_px4
 
     def new_vehicle() -> HilVehicle:
-        return HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
+        vehicle = HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
+        vehicle.truth.on_hit = partial(_tell_of, console=console)
+        return vehicle
 
     # Compiled, or loaded from numba's cache, before PX4 waits for it.
     new_vehicle().step(MOTORS_STOPPED)
-    print(f"Body of '{world.airframe.name}' for PX4. Ctrl-C stops it.", flush=True)
+    console.print(f"Body of '{world.airframe.name}' for PX4. Ctrl-C stops it.")
     port = PX4_SIMULATOR_PORT if options.port is None else options.port
-    tell = partial(print, flush=True)
-    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, tell, options.host)
+    serve_px4(new_vehicle, port, options.speed, options.truth, stopped.is_set, console.print, options.host)
 
 
 def _wait_for_end_of_stdin(stopped: threading.Event) -> None:

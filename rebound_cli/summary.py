@@ -1,7 +1,7 @@
 """`summary.json`: what the companion says of a flight beside what the simulator knows; docs/summary.md."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 
-# The paper's stress analysis (section II): a factor of safety of 1.85 at 100 N.
+# The paper's stress analysis (section II) of its frame: a factor of safety of 1.85 at 100 N.
 BREAKING_FORCE_N = 185.0
+_PAPERS_FRAME = "foldable"
 
 # Sizes are written to a tenth of a millimetre, times to a microsecond: finer digits are noise.
 _DIGITS = 4
@@ -103,6 +104,7 @@ def _collision(report: FlightReport, number: int) -> dict[str, Any]:
         "settled_after_s": None if settled_s is None else round(settled_s, _TIME_DIGITS),
         "overshoot_m": round(collision.overshoot_m, _DIGITS),
         "rebound_speed_m_s": None if rebound_m_s is None else round(rebound_m_s, _DIGITS),
+        "stopped_off_m": _between(collision.position_ned_m, collision.recovery_setpoint_ned_m, collision.normal_ned),
     }
 
 
@@ -111,7 +113,9 @@ def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", tr
     contact_at_us = truth.at_us(hit.contact_at_boot_us)
     end_boot_us = hit.contact_at_boot_us + _recovery_end_us(report, number, facts) - contact_at_us
     overshoot_m, height_lost_m = truth.past_setpoint_and_below(hit, collision.recovery_setpoint_ned_m, end_boot_us)
+    believed_ned_m = tuple(map(sum, zip(hit.contact_position_ned_m, hit.frame_offset_ned_m, strict=True)))
     return {
+        "kind": hit.kind,
         "contact_at_s": _seconds(contact_at_us - report.started_at_us),
         "detection_latency_ms": round((collision.detected_at_us - contact_at_us) / 1e3, 3),
         "impact_velocity_ned_m_s": _rounded(hit.impact_velocity_ned_m_s),
@@ -120,12 +124,13 @@ def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", tr
         "max_fold_m": round(hit.max_fold_m, _TIME_DIGITS),
         "rebound_speed_m_s": round(hit.rebound_speed_m_s, _DIGITS),
         "peak_force_n": round(hit.peak_force_n, 2),
-        "factor_of_safety": round(BREAKING_FORCE_N / hit.peak_force_n, 3),
+        "factor_of_safety": round(BREAKING_FORCE_N / hit.peak_force_n, 3) if facts.airframe == _PAPERS_FRAME else None,
         "impulse_n_s": round(math.hypot(*hit.impulse_ned_n_s), _DIGITS),
         "energy_before_j": round(hit.energy_before_j, _DIGITS),
         "energy_after_j": round(hit.energy_after_j, _DIGITS),
         "overshoot_m": round(overshoot_m, _DIGITS),
         "height_lost_m": round(height_lost_m, _DIGITS),
+        "stopped_off_m": _between(believed_ned_m, collision.recovery_setpoint_ned_m, hit.normal_ned),
     }
 
 
@@ -139,6 +144,12 @@ def _recovery_end_us(report: FlightReport, number: int, facts: FlightFacts) -> f
     if number + 1 < len(report.collisions):
         end_us = min(end_us, report.collisions[number + 1].detected_at_us)
     return end_us
+
+
+def _between(from_ned_m: Sequence[float], to_ned_m: Sequence[float], normal_ned: Sequence[float]) -> float:
+    """How far one place is from another along a surface's normal, out of it positive."""
+    steps = zip(from_ned_m, to_ned_m, normal_ned, strict=True)
+    return round(sum((to_m - from_m) * axis for from_m, to_m, axis in steps), _DIGITS)
 
 
 def _seconds(time_us: float) -> float:

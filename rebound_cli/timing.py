@@ -12,6 +12,8 @@ TOO_LATE_US = 500_000
 _BIN_US = 100
 # How long another thread of ours may keep the loop's from running: Python's own 5 ms is more than a sample's interval.
 _SWITCH_INTERVAL_S = 0.0001
+# A figure that a person can read; PX4's slowest stream, the heartbeat, comes once a second.
+_RATE_OVER_US, _SILENT_US = 1_000_000, 1_000_000
 
 
 class Timing:
@@ -37,6 +39,31 @@ class Timing:
     def summary(self) -> Mapping[str, Mapping[str, float]]:
         """In milliseconds, for summary.json."""
         return {"tick_lateness_ms": _quantiles_ms(self._late), "step_ms": _quantiles_ms(self._took)}
+
+
+class Heard:
+    """What of the link is worth a glance: how much comes in, or for how long nothing has."""
+
+    def __init__(self) -> None:
+        self._bytes = 0
+        self._since_us = self._last_us = 0
+        self._text = ""
+
+    def take(self, count: int, now_us: int) -> None:
+        if count:
+            self._since_us = self._since_us or now_us
+            self._bytes, self._last_us = self._bytes + count, now_us
+
+    def text(self, now_us: int) -> str:
+        """The rate of about the last second; empty before anything has been heard."""
+        if self._last_us == 0:
+            return ""
+        if now_us - self._last_us >= _SILENT_US:
+            return f"silent for {(now_us - self._last_us) / 1e6:.1f} s"
+        if now_us - self._since_us >= _RATE_OVER_US:
+            self._text = f"{self._bytes / 1e3 / ((now_us - self._since_us) / 1e6):.1f} kB/s"
+            self._bytes, self._since_us = 0, now_us
+        return self._text
 
 
 def _quantiles_ms(counts: Counter[int]) -> Mapping[str, float]:

@@ -1,5 +1,6 @@
 """The simulated vehicle as a process of its own, which never outlives the flight."""
 
+import re
 import subprocess
 import sys
 import time
@@ -9,6 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from companion.errors import ReboundError
+from rebound_cli.compiling import COMPILED
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import RESOLVED_NAME, TRUTH_NAME, VEHICLE_LOG_NAME
@@ -20,11 +22,12 @@ STOP_TIMEOUT_S = 5.0
 READY_WORDS = "Simulated vehicle"
 
 _READY_POLL_S = 0.02
-COMPILING = "Compiling the simulated vehicle's physics, which is done once for this machine ..."
+# What it prints before, of its compiling: how far it is, and that it cannot be kept.
+_PROGRESS = re.compile(r"(Compiling .+): (\d+) of (\d+)")
 
 
 class VehicleProcessError(ReboundError):
-    """The simulated vehicle ended before the flight did."""
+    """The simulated vehicle ended before the flight did, or the flight before it began."""
 
 
 class VehicleProcess:
@@ -46,31 +49,33 @@ class VehicleProcess:
                 start_new_session=True,
             )
 
-    def wait_until_ready(
-        self, interrupts: Interrupts, console: Console, explanation: str = COMPILING, explain_after_s: float = 3.0
-    ) -> None:
-        """Return when the vehicle is on the air, or when the person has had enough.
+    def wait_until_ready(self, interrupts: Interrupts, console: Console) -> None:
+        """Return when the vehicle is on the air. Raises VehicleProcessError when the person has had enough.
 
-        The companion waits ten seconds for a vehicle; compiling the physics may take longer. A start with
-        everything compiled takes about a second.
+        The companion waits ten seconds for a vehicle; compiling the physics may take longer.
         """
-        started_s = time.monotonic()
-        is_explained = False
-        while not self._is_ready() and interrupts.reason is None:
+        told, is_ready = 0, False
+        while not is_ready:
             self.check_running()
-            time.sleep(_READY_POLL_S)
-            if not is_explained and time.monotonic() - started_s >= explain_after_s:
-                is_explained = True
-                console.print(explanation)
+            if interrupts.reason is not None:
+                # It has nothing to hand over, and may be compiling: it is not waited for.
+                self._process.kill()
+                raise VehicleProcessError(f"The flight was {interrupts.reason} before the vehicle was ready.")
+            for line in self._said()[told:]:
+                told += 1
+                is_ready |= line.startswith(self._ready_words)
+                if (progress := _PROGRESS.fullmatch(line)) is not None:
+                    console.progress(progress[1], int(progress[2]), int(progress[3]))
+                elif line.startswith(COMPILED):
+                    console.print(line)
+            if not is_ready:
+                time.sleep(_READY_POLL_S)
 
     def check_running(self) -> None:
         """Raise VehicleProcessError with the process's last words if it has ended."""
         if self._process.poll() is not None:
             last = self._said() or [f"exit code {self._process.returncode}"]
             raise VehicleProcessError(f"The simulated vehicle ended by itself: {last[-1].removeprefix('rebound: ')}")
-
-    def _is_ready(self) -> bool:
-        return any(line.startswith(self._ready_words) for line in self._said())
 
     def _said(self) -> list[str]:
         return (self._folder / VEHICLE_LOG_NAME).read_text(errors="replace").strip().splitlines()

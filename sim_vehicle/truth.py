@@ -1,5 +1,6 @@
 """What really happened: every hit and the path, recorded beside the simulation and never sent by it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -93,6 +94,8 @@ class TruthRecorder:
     keeps_path: bool = True
     hits: list[Hit] = field(default_factory=list)
     faults: list[FaultSpan] = field(default_factory=list)
+    on_hit: Callable[[Hit], None] | None = None
+    """Told of each as soon as it is over."""
     _rows: Floats = field(default_factory=lambda: np.empty((_FIRST_ROWS, _ROW)))
     _used: int = 0
 
@@ -107,7 +110,7 @@ class TruthRecorder:
 
     def add_hit(self, row: Floats, world: World) -> None:
         """Add a finished row of `State.finished_hits`."""
-        self.hits.append(
+        self._add(
             Hit(
                 obstacle=world.names[int(row[HIT_FACE])],
                 contact_at_boot_us=float(row[HIT_START_US]),
@@ -127,6 +130,11 @@ class TruthRecorder:
                 frame_offset_ned_m=_vector(row[HIT_FRAME_OFFSET]),
             )
         )
+
+    def _add(self, hit: Hit) -> None:
+        self.hits.append(hit)
+        if self.on_hit is not None:
+            self.on_hit(hit)
 
     def series(self) -> dict[str, Floats]:
         """The path, one row an IMU interval: arrays by name, each with frame and unit in it."""

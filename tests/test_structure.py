@@ -17,7 +17,7 @@ OUTSIDE = {
     *("socket", "select", "serial", "asyncio", "threading", "subprocess", "signal"),
     *("time", "datetime", "os", "sys", "shutil", "tempfile", "pathlib", "io"),
 }
-# Built-in airframes and the table of parameters are read where they lie; compiled kernels are kept beside their source.
+# Built-in airframes and the table of parameters are read where they lie; compiled kernels in the user's cache.
 MAY_READ_FILES = {
     "sim_vehicle/airframe.py",
     "sim_vehicle/parameters/definitions.py",

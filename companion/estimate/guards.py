@@ -62,16 +62,21 @@ STOP_PER_S2, STOP_DAMPING_PER_S = 60_000.0, 30.0
 MOTORS_S, MOTORS_RAD_S2, YAW_SHARE = 0.025, 100.0, 0.3
 
 
-def _compiled(function: Kernel) -> Kernel:
+def _compiled(function: Kernel, inlined: bool = False) -> Kernel:
     """To machine code, kept for the next start. No fast-math: the same inputs have to give the same bits."""
-    return function if numba is None else cast(Kernel, numba.njit(cache=True, fastmath=False, nogil=True)(function))
+    if numba is None:
+        return function
+    options = {"fastmath": False, "forceinline": True} if inlined else {"fastmath": False, "nogil": True}
+    try:
+        return cast(Kernel, numba.njit(cache=True, **options)(function))
+    except RuntimeError:
+        # Numba finds no folder to keep it in: neither beside this file nor in the user's own.
+        return cast(Kernel, numba.njit(**options)(function))
 
 
 def _inlined(function: Kernel) -> Kernel:
     """The same, put into whatever calls it."""
-    if numba is None:
-        return function
-    return cast(Kernel, numba.njit(cache=True, fastmath=False, forceinline=True)(function))
+    return _compiled(function, inlined=True)
 
 
 @_inlined

@@ -147,9 +147,9 @@ class CollisionRecord:
         settled_after_s = self.settled_after_s()
         assert settled_after_s is not None
         speed_m_s = self.rebound_speed_m_s()
-        rebound = "rebound not known" if speed_m_s is None else f"rebound {speed_m_s:.2f} m/s"
+        rebound = "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
         past_cm = self.overshoot_m * 100
-        return f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {past_cm:.1f} cm, {rebound}"
+        return f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {past_cm:.1f} cm{rebound}"
 
     def report(self) -> CollisionReport:
         velocity = self.contact.velocity_ned_m_s

@@ -11,7 +11,8 @@ from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli import run_folder
 from rebound_cli.background import Background
-from rebound_cli.console import Console, console_for, timeline
+from rebound_cli.compiling import prepare_companion
+from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop
@@ -22,13 +23,19 @@ from rebound_cli.signed_connection import open_signed, refused_packets
 def run_guard(options: Namespace) -> int:
     """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
     config = guard_config(options)
+    with console_for(False, Background("console")) as console:
+        return _guard(options, config, console)
+
+
+def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
+    prepare_companion(console)
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
     connection = open_signed(options)
     folder = run_folder.create_run_folder(options.out, "guard")
     run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     recorder = FlightRecorder(folder, Background("log"))
-    console, guard = console_for(False, Background("console")), Guard(config)
+    guard = Guard(config)
     try:
         with Interrupts() as interrupts:
             _run(guard, connection, recorder, console, interrupts)
@@ -46,7 +53,6 @@ def run_guard(options: Namespace) -> int:
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
     left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
     console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
-    console.close()
     if interrupts.reason is None:
         raise ConfigurationError(guard.outcome[:1].upper() + guard.outcome[1:] + ".")
     return 0
@@ -72,7 +78,8 @@ def _run(
 
     def beside(now_us: int, result: StepResult) -> None:
         if result.events:
-            console.print(timeline(result.events, started_us))
-        console.live(guard.status, (now_us - started_us) / 1e6)
+            console.events(result.events, started_us)
+        console.live(guard.status, (now_us - started_us) / 1e6, loop.heard.text(now_us))
 
-    Loop(guard, connection, clock, recorder, console, interrupts).run(beside)
+    loop = Loop(guard, connection, clock, recorder, console, interrupts)
+    loop.run(beside)

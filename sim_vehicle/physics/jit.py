@@ -2,11 +2,13 @@
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import platformdirs
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
@@ -23,12 +25,12 @@ def njit(function: Kernel) -> Kernel:
     No fast-math: reordering sums would make the answers depend on the compiler's mood, and the
     same seed has to give the same bytes.
     """
-    return cast(Kernel, numba.njit(cache=True, fastmath=False)(function))
+    return cast(Kernel, numba.njit(cache=NOT_KEPT is None, fastmath=False)(function))
 
 
 def inlined(function: Kernel) -> Kernel:
     """The same, put into whatever calls it: for small functions that are called with whole arrays again and again."""
-    return cast(Kernel, numba.njit(cache=True, fastmath=False, forceinline=True)(function))
+    return cast(Kernel, numba.njit(cache=NOT_KEPT is None, fastmath=False, forceinline=True)(function))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -46,18 +48,33 @@ def borrowed(_typing: Any, array: Any) -> Any:
     return array(array), codegen
 
 
-def _keep_code_by_content() -> None:
-    """Keep compiled code in a folder named after the kernels' text.
+def _kernels_folder(parent: str) -> str:
+    """A folder named after the kernels' text.
 
     Numba looks only at the file of the outermost function, so that a changed callee in another file
-    would go on running as it was. Where the folder cannot be written numba's own place serves.
+    would go on running as it was.
     """
     digest = hashlib.sha256()
     for path in sorted([*(path for room in _ROOMS for path in _PACKAGE.glob(f"{room}/*.py")), _PACKAGE / "world.py"]):
         digest.update(path.read_bytes())
-    parent = _PACKAGE / "__pycache__"
-    if os.access(parent if parent.exists() else _PACKAGE, os.W_OK):
-        numba.config.CACHE_DIR = str(parent / f"kernels-{digest.hexdigest()[:12]}")
+    return os.path.join(parent, f"kernels-{digest.hexdigest()[:12]}")
 
 
-_keep_code_by_content()
+def _keep_code() -> str | None:
+    """Below NUMBA_CACHE_DIR, else the user's own cache folder; why nothing can be kept, where that is so."""
+    folder = _kernels_folder(numba.config.CACHE_DIR or platformdirs.user_cache_dir("px4-rebound"))
+    if folder.startswith("~"):
+        return "this user has no home folder"
+    try:
+        os.makedirs(folder, exist_ok=True)
+        # As numba does it: a folder's permissions say nothing of a disk that is read-only.
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        return f"{folder}: {error.strerror}"
+    numba.config.CACHE_DIR = folder
+    return None
+
+
+NOT_KEPT = _keep_code()
+"""Why compiled kernels are compiled again at every start, if they are."""

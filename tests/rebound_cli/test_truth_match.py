@@ -158,6 +158,25 @@ def test_a_recovery_that_a_next_hit_cuts_short_is_measured_up_to_it():
     assert (second["overshoot_m"], second["height_lost_m"]) == pytest.approx((0.3, 0.3))
 
 
+def test_where_it_stopped_is_measured_from_where_it_touched_in_the_frame_that_it_believed_in():
+    # Given a contact at 3.8 m of a vehicle that believed itself 0.3 m further north, and a setpoint at 2.8 m
+    drifted = dataclasses.replace(hit(10_000), frame_offset_ned_m=(0.3, 0.1, 0.0))
+    truth = FlightTruth([drifted], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
+    summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then it stopped 1.3 m off the wall, which faces south
+    assert summary["collisions"][0]["truth"]["stopped_off_m"] == pytest.approx(1.3)
+
+
+def test_the_papers_stress_analysis_is_of_the_papers_frame():
+    truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
+    flown = Flown(report_of(collision(10_004)), 0.5, truth)
+    foldable, rigid = (
+        build_summary(flown, dataclasses.replace(FACTS, airframe=name))["collisions"][0]["truth"]["factor_of_safety"]
+        for name in ("foldable", "rigid")
+    )
+    assert foldable == pytest.approx(185.0 / hit(10_000).peak_force_n, abs=1e-3) and rigid is None
+
+
 def test_the_summary_has_exactly_the_documented_keys():
     truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
     summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
@@ -168,12 +187,12 @@ def test_the_summary_has_exactly_the_documented_keys():
     )
     assert " ".join(summary["collisions"][0]) == (
         "detected_at_s detector impact_velocity_ned_m_s impact_speed_m_s normal_ned peak_specific_force_m_s2 "
-        "recovery_setpoint_ned_m settled_after_s overshoot_m rebound_speed_m_s truth"
+        "recovery_setpoint_ned_m settled_after_s overshoot_m rebound_speed_m_s stopped_off_m truth"
     )
     assert " ".join(summary["collisions"][0]["truth"]) == (
-        "contact_at_s detection_latency_ms impact_velocity_ned_m_s normal_ned contact_duration_s max_fold_m "
+        "kind contact_at_s detection_latency_ms impact_velocity_ned_m_s normal_ned contact_duration_s max_fold_m "
         "rebound_speed_m_s peak_force_n factor_of_safety impulse_n_s energy_before_j energy_after_j "
-        "overshoot_m height_lost_m"
+        "overshoot_m height_lost_m stopped_off_m"
     )
 
 

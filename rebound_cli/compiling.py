@@ -1,0 +1,85 @@
+"""Kernels are compiled before a flight waits for them, and somebody who waits sees how far it is."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rebound_cli.console import Console
+
+if TYPE_CHECKING:
+    from rebound_cli.inputs import SimulatedWorld
+
+_ROOMS = ("companion", "sim_vehicle")
+ONCE = "once for this machine"
+COMPILED = "Compiled code"
+
+
+def prepare_companion(console: Console) -> None:
+    """What the companion calls in the first hundredths of a second of a hit; nothing without the extra [fit]."""
+    from companion.estimate.normal import prepare
+
+    with compiling_shown(console, f"Compiling the fit of a touch, {ONCE}"):
+        prepare()
+
+
+def prepare_vehicle(console: Console, world: "SimulatedWorld") -> None:
+    """All that a vehicle calls, it calls in its first interval."""
+    from sim_vehicle.physics.jit import NOT_KEPT
+    from sim_vehicle.vehicle import SimulatedVehicle
+
+    what = "Compiling the simulated vehicle's physics"
+    with compiling_shown(console, f"{what}, {ONCE}" if NOT_KEPT is None else what):
+        SimulatedVehicle(world.airframe, world.scene, world.seed, keeps_path=False)
+    if NOT_KEPT is not None:
+        console.print(f"{COMPILED} is not kept ({NOT_KEPT}): give NUMBA_CACHE_DIR a folder that can be written to.")
+
+
+@contextmanager
+def compiling_shown(console: Console, what: str) -> Iterator[None]:
+    """Show how much is compiled meanwhile, from the first kernel on that has to be."""
+    try:
+        from numba.core import event
+    except ImportError:
+        # Without numba nothing is compiled.
+        yield
+        return
+    shown = _Shown(lambda done, total: console.progress(what, done, total))
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: Any) -> None:
+            shown.looked(event.data["dispatcher"])
+
+        on_end = on_start
+
+    with event.install_listener("numba:compile", Listener()):
+        yield
+    shown.finish()
+
+
+class _Shown:
+    """Counts the kernels of the rooms that are loaded and that are compiled, or were kept by an earlier start."""
+
+    def __init__(self, tell: Callable[[int, int], None]) -> None:
+        self._tell = tell
+        self._kernels: list[Any] = []
+
+    def looked(self, dispatcher: Any) -> None:
+        """At one that is being compiled; numba compiles functions of its own beside ours."""
+        if dispatcher.py_func.__module__.partition(".")[0] not in _ROOMS:
+            return
+        if not self._kernels:
+            self._kernels = _kernels_beside(dispatcher)
+        self._tell(sum(bool(kernel.overloads) for kernel in self._kernels), len(self._kernels))
+
+    def finish(self) -> None:
+        if self._kernels:
+            self._tell(len(self._kernels), len(self._kernels))
+
+
+def _kernels_beside(dispatcher: Any) -> list[Any]:
+    """With all of the same room, as far as it is loaded."""
+    room = dispatcher.py_func.__module__.partition(".")[0] + "."
+    modules = [module for name, module in sys.modules.items() if name.startswith(room)]
+    values = [dispatcher, *(value for module in modules for value in vars(module).values())]
+    return list({id(value): value for value in values if type(value) is type(dispatcher)}.values())
