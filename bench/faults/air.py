@@ -29,7 +29,7 @@ from rebound_cli.realtime import MOST_DATAGRAMS
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.mavlink.link import Link, LinkOptions
-from sim_vehicle.mavlink.stream_rates import LinkKind
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
 if TYPE_CHECKING:
     from bench.faults.fault import Injector

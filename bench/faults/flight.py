@@ -39,7 +39,7 @@ from sim_vehicle.truth import Hit
 
 AIRFRAMES = ("foldable", "rigid")
 SPEEDS_M_S, MOST_SLANT_DEG = (1.0, 2.0), 30.0
-HEIGHT_M, WALL_M = 1.0, 2.6
+HEIGHT_M, WALL_M = 1.0, 2.0
 # The mission takes 20 s; links that are cut are given up after some seconds.
 LIMIT_S = 60.0
 # What an aborted flight leaves hovers, or comes down by itself from this height within 12 s.

@@ -1,12 +1,11 @@
 """A pilot who takes position mode, whatever happens meanwhile: nothing of the companion's comes between."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from bench.faults.air import Air
 from bench.faults.fault import HANDED_OVER, Expected, Fault, Injector, When
-from sim_vehicle.bench.faults import link_cut
 
 _TAKEN = Expected((HANDED_OVER,), finds=False)
 
@@ -19,6 +18,7 @@ class Taken(Injector):
     stall_s: float = 0.0
     cut_s: float = 0.0
     is_begun: bool = False
+    cut_until_s: float = 0.0
 
     def begin(self, air: Air) -> None:
         air.add_pilot()
@@ -27,10 +27,16 @@ class Taken(Injector):
         if self.is_begun or not self.when.is_on(air):
             return
         self.is_begun = True
-        if self.cut_s:
-            air.inject(link_cut(), self.cut_s)
+        self.cut_until_s = air.now_s + self.cut_s
         air.stall_s = self.stall_s
         air.take_over()
+
+    # The companion's link alone is cut: the pilot has a radio of its own.
+    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return [] if air.now_s < self.cut_until_s else frames
+
+    def to_vehicle(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return [] if air.now_s < self.cut_until_s else frames
 
 
 def _taken(
