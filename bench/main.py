@@ -1,4 +1,4 @@
-"""The command `python -m bench`: the paper's studies, every detector on its bench, random missions by the thousand."""
+"""The command `python -m bench`: the paper's studies, detectors on their bench, random missions, faults."""
 
 import argparse
 import sys
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from bench.campaign_report.arguments import add_campaign
 from bench.detectors_report.arguments import add_detectors
+from bench.faults.arguments import add_faults
 from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
 from rebound_cli.main import run
@@ -25,4 +26,5 @@ def build_parser() -> argparse.ArgumentParser:
     add_detectors(commands)
     add_campaign(commands)
     add_kills(commands)
+    add_faults(commands)
     return parser

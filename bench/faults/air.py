@@ -1,0 +1,228 @@
+"""Between the companion and the simulated vehicle: the connection and the clock of a real loop, in virtual time.
+
+Whatever an injector does, it does here: to the bytes of either direction, to the clock, to the loop, to the vehicle.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from bench.faults.envelope import outside
+from bench.faults.packets import (
+    ARM,
+    COMMAND,
+    GROUND_STATION,
+    SET_MODE,
+    SETPOINT,
+    custom_mode,
+    decoded,
+    made,
+)
+from companion.companion import Companion
+from companion.mavlink.packet import message_id_of
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import EPOCH_US
+from rebound_cli.realtime import MOST_DATAGRAMS
+from sim_vehicle.bench.changeable import ChangeableVehicle
+from sim_vehicle.bench.faults import FaultRequest
+from sim_vehicle.mavlink.link import Link, LinkOptions
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
+
+if TYPE_CHECKING:
+    from bench.faults.fault import Injector
+
+# A clock that is read goes on.
+_READING_US = 4
+# A ground station's own rates; sticks come at 10 Hz or more.
+_STICKS_EVERY, _BEAT_EVERY = 20, 250
+# PX4's modes as DO_SET_MODE takes them: main and sub mode.
+POSCTL = 3 << 16
+
+
+class Killed(BaseException):
+    """SIGKILL: nothing of the program goes on."""
+
+
+class Hung(BaseException):
+    """The flight has taken longer than any should."""
+
+
+class Landing(BaseException):
+    """The vehicle has been landing by itself for a second; the rest is its own affair."""
+
+
+class Branched(BaseException):
+    """Every fault has flown on from here."""
+
+
+@dataclass
+class Air:
+    """One flight's wire, clock and vehicle."""
+
+    vehicle: ChangeableVehicle
+    companion: Companion
+    interrupts: Interrupts
+    injector: Injector
+    chance: random.Random
+    limit_s: float
+    to_the_ground: bool = True
+    """Whether the vehicle's own landing is waited for."""
+    branch: Callable[[], None] | None = None
+    """Called once, when the first item begins."""
+    since: dict[str, float] = field(default_factory=dict)
+    """When the companion was first in a state; seconds of the vehicle's clock."""
+    stall_s: float = 0.0
+    """The process gets no time for so long, from now on."""
+    outside: list[str] = field(default_factory=list)
+    """Setpoints outside the envelope."""
+    pilot_mode: int | None = None
+    """What a pilot has taken."""
+    pilot_at_s: float | None = None
+    is_told: bool = False
+    """Whether the companion has been handed a packet that says so."""
+    after_told: int = 0
+    """Setpoints and commands for mode or arming that it sent afterwards."""
+    is_overruled: bool = False
+    """Whether the vehicle has left the pilot's mode."""
+    sent: int = 0
+    received: int = 0
+    _to_vehicle: list[bytes] = field(default_factory=list)
+    _waiting: list[bytes] = field(default_factory=list)
+    _pilot: Link | None = None
+    _readings: int = 0
+    _intervals: int = 0
+
+    @property
+    def now_s(self) -> float:
+        """Of the vehicle, since it was switched on."""
+        return self.vehicle.time_boot_us * 1e-6
+
+    @property
+    def state(self) -> str:
+        """The companion's."""
+        core = self.companion.core
+        return "" if core is None else core.machine.state.value
+
+    # --- the clock and the connection of the loop
+
+    def now_us(self) -> int:
+        self._readings += 1
+        return self.injector.clock_us(self, EPOCH_US + self.vehicle.time_boot_us + _READING_US * self._readings)
+
+    def sleep(self, duration_s: float) -> None:
+        until_s = self.now_s + duration_s
+        while self.now_s < until_s:
+            self._waiting += self.passed()
+
+    def receive(self, timeout_s: float) -> bytes:
+        """A wait lets one interval pass, or a stall's many; what has arrived then waits packet by packet."""
+        if self._waiting:
+            return self._hand_over([self._waiting.pop(0)])
+        if timeout_s <= 0.0:
+            return b""
+        frames = self.passed()
+        until_s, self.stall_s = self.now_s + self.stall_s, 0.0
+        if self.now_s >= until_s:
+            return self._hand_over(frames)
+        self._waiting = list(frames)
+        while self.now_s < until_s:
+            self._waiting += self.passed()
+        # A socket that is full drops what is new.
+        del self._waiting[MOST_DATAGRAMS:]
+        return self.receive(timeout_s)
+
+    def news(self) -> str | None:
+        return None
+
+    def close(self) -> None:
+        """There is nothing to close."""
+
+    def send(self, frame: bytes) -> None:
+        self.sent += 1
+        core = self.companion.core
+        wrong = None if core is None else outside(core, frame)
+        if wrong is not None:
+            self.outside.append(f"{wrong} at {self.now_s:.2f} s")
+        if self.is_told and _takes_control(frame):
+            self.after_told += 1
+        self._to_vehicle.append(frame)
+
+    def _hand_over(self, frames: Sequence[bytes]) -> bytes:
+        self.received += len(frames)
+        if self.pilot_mode is not None and not self.is_told:
+            self.is_told = any(custom_mode(frame) == self.pilot_mode for frame in frames if len(frame) > 12)
+        return b"".join(frames)
+
+    # --- the vehicle's side
+
+    def passed(self) -> list[bytes]:
+        """One interval of the vehicle; what reaches the companion of it."""
+        if self.now_s > self.limit_s:
+            raise Hung
+        state = self.state
+        if state == "mission" and self.branch is not None:
+            branch, self.branch = self.branch, None
+            branch()
+        began_s = self.since.setdefault(state, self.now_s)
+        if state == "landing" and not self.to_the_ground and self.now_s - began_s > 1.0 and self.vehicle.mode == "Land":
+            raise Landing
+        self.injector.each(self)
+        self._fly_sticks()
+        frames, self._to_vehicle = self._to_vehicle, []
+        said = self.vehicle.step(b"".join(self.injector.to_vehicle(self, frames)))
+        if self._pilot is not None:
+            self._pilot.take()
+        if self.pilot_mode is not None and self.pilot_at_s is not None and self.now_s > self.pilot_at_s + 0.1:
+            self.is_overruled |= self.vehicle.mode != "Position"
+        return list(self.injector.to_companion(self, list(said)))
+
+    def alone(self, seconds: float) -> None:
+        """The vehicle goes on until it is disarmed, or so long; nobody reads what it says."""
+        until_s = self.now_s + seconds
+        while self.now_s < until_s and self.vehicle.is_armed:
+            self.vehicle.step(b"")
+            self._fly_sticks()
+
+    # --- what injectors do
+
+    def inject(self, request: FaultRequest, for_s: float | None = None) -> None:
+        """A fault of the simulated vehicle's, from now on."""
+        for fault in request.timed(self.now_s, for_s):
+            self.vehicle.add_fault(fault)
+
+    def kill(self) -> None:
+        raise Killed
+
+    def add_pilot(self) -> None:
+        """A ground station with centred sticks, on a link of its own."""
+        self._pilot = self.vehicle.add_link(LinkOptions(LinkKind.GROUND))
+
+    def take_over(self) -> None:
+        """The pilot takes position mode."""
+        assert self._pilot is not None, "there is a pilot from the beginning"
+        self._push("COMMAND_LONG", command=SET_MODE, param1=1.0, param2=3.0, target_system=1, target_component=1)
+        self.pilot_mode, self.pilot_at_s = POSCTL, self.now_s
+
+    def _fly_sticks(self) -> None:
+        self._intervals += 1
+        if self._pilot is None:
+            return
+        if self._intervals % _STICKS_EVERY == 0:
+            self._push("MANUAL_CONTROL", target=1, z=500)
+        if self._intervals % _BEAT_EVERY == 0:
+            self._push("HEARTBEAT", type=6, autopilot=8)
+
+    def _push(self, name: str, **fields: Any) -> None:
+        assert self._pilot is not None, "only with a pilot"
+        self._pilot.push(made(name, fields, GROUND_STATION, self._intervals % 256))
+
+
+def _takes_control(frame: bytes) -> bool:
+    number = message_id_of(frame)
+    if number == SETPOINT:
+        return True
+    message = decoded(frame) if number == COMMAND else None
+    return message is not None and message.command in (SET_MODE, ARM)

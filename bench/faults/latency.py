@@ -1,0 +1,194 @@
+"""From a hit to the recovery setpoint on the wire, under load: the real loop, a real socket and the real clock.
+
+A flight is flown in virtual time to just before its hit. From there on a forked process of its own goes on with it in
+real time, as often as wanted: what the vehicle says until the hit no longer depends on the companion.
+"""
+
+import contextlib
+import io
+import math
+import os
+import signal
+import socket
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.campaign.plan import Json
+from bench.faults.flight import mission_of
+from bench.faults.packets import SETPOINT, decoded
+from companion.companion import Companion
+from companion.mavlink.packet import message_id_of
+from companion.shell.clock import Clock
+from companion.shell.connection import UdpOutConnection
+from rebound_cli.background import Background
+from rebound_cli.console import Console
+from rebound_cli.interrupts import Interrupts
+from rebound_cli.lockstep import EPOCH_US
+from rebound_cli.realtime import Loop
+from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.timing import undisturbed
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.scene import Scene
+from sim_vehicle.vehicle import SimulatedVehicle
+
+FLIGHTS = 10
+BUSY_LOOPS = 2
+# A forked process first has to make its memory its own; by the hit it runs as any other.
+LEAD = 30
+AFTER = 25
+# The cruise's setpoint moves by 6 cm from one to the next at 3 m/s; a recovery's jumps, or is a lean.
+JUMP_M = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What the vehicle said in each interval, and the interval whose packets show the hit."""
+
+    number: int
+    said: Sequence[bytes]
+    hit: int
+
+
+class Going(Clock):
+    """The real clock, from a moment of the recording on."""
+
+    def __init__(self, from_us: int) -> None:
+        super().__init__()
+        self._ahead_us = from_us - super().now_us()
+
+    def now_us(self) -> int:
+        return super().now_us() + self._ahead_us
+
+
+def measured(hits: int) -> Json:
+    """With two busy loops, and without."""
+    # Measured at the priority at which the product runs; a higher one than this process has takes root.
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, 0)
+    flights = [_recorded(number) for number in range(FLIGHTS)]
+    times = math.ceil(hits / FLIGHTS)
+    quiet = [taken for flight in flights for taken in _timed(flight, times)]
+    with _busy(BUSY_LOOPS):
+        busy = [taken for flight in flights for taken in _timed(flight, times)]
+    return {"hits": len(busy), "load": os.getloadavg()[0], "busy": _spread(busy), "quiet": _spread(quiet)}
+
+
+def _recorded(number: int) -> Recorded:
+    mission = mission_of(number)
+    scene = Scene.model_validate(mission.sim or {})
+    companion, vehicle = Companion(mission), SimulatedVehicle(load_built_in(scene.airframe), scene, scene.seed)
+    companion.confirm_plan()
+    said: list[bytes] = []
+    pending = b""
+    while not companion.finished:
+        said.append(b"".join(vehicle.step(pending)))
+        result = companion.step(said[-1], _now_us(len(said) - 1))
+        pending = b"".join(result.sent_frames)
+        if any(event.kind == "detection" for event in result.events):
+            hit = len(said) - 1
+            said += [b"".join(vehicle.step(b"")) for _ in range(AFTER)]
+            return Recorded(number, said, hit)
+    raise AssertionError("the vehicle never met the wall")
+
+
+def _now_us(interval: int) -> int:
+    return EPOCH_US + 4000 * (interval + 2)
+
+
+def _timed(flight: Recorded, times: int) -> Iterator[float | None]:
+    """Seconds from the hit's datagram to the recovery setpoint; None where there was none in time."""
+    companion = Companion(mission_of(flight.number))
+    companion.confirm_plan()
+    start = flight.hit - LEAD
+    for interval in range(start):
+        companion.step(flight.said[interval], _now_us(interval))
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ours:
+        ours.bind(("127.0.0.1", 0))
+        for trial in range(times):
+            (place := Path(folder) / str(trial)).mkdir()
+            child = os.fork()
+            if child == 0:
+                with contextlib.suppress(BaseException):
+                    _fly_on(companion, _now_us(start), ours.getsockname()[1], place)
+                os._exit(0)
+            yield _exchanged(flight, start, ours)
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
+def _fly_on(companion: Companion, now_us: int, port: int, folder: Path) -> None:
+    """The child: the loop of real flights, log and all."""
+    connection = UdpOutConnection("127.0.0.1", port)
+    recorder = FlightRecorder(folder, Background("log"))
+    clock = Going(now_us)
+    loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
+    connection.send(b"\0")
+    with undisturbed():
+        while True:
+            loop.exchange()
+
+
+def _exchanged(flight: Recorded, start: int, ours: socket.socket) -> float | None:
+    ours.settimeout(10.0)
+    _, theirs = _from(ours)
+    began_s, hit_s, last = time.monotonic(), math.inf, None
+    for interval in range(start, len(flight.said)):
+        due_s = began_s + 0.004 * (interval - start)
+        while (left_s := due_s - time.monotonic()) > 0.0:
+            ours.settimeout(left_s)
+            try:
+                frame = ours.recv(65_536)
+            except TimeoutError:
+                break
+            at_s = time.monotonic()
+            if len(frame) > 12 and message_id_of(frame) == SETPOINT:
+                message = decoded(frame)
+                assert message is not None, "the companion's own"
+                place = (message.type_mask, message.x, message.y)
+                if hit_s < math.inf and last is not None and _jumps(last, place):
+                    return at_s - hit_s
+                last = place
+        if interval == flight.hit:
+            hit_s = time.monotonic()
+        ours.sendto(flight.said[interval], theirs)
+    return None
+
+
+def _from(ours: socket.socket) -> tuple[bytes, tuple[str, int]]:
+    """The child's first word; what an earlier child said last is passed over."""
+    while True:
+        data, sender = ours.recvfrom(65_536)
+        if data == b"\0":
+            return data, sender
+
+
+def _jumps(last: tuple[int, float, float], place: tuple[int, float, float]) -> bool:
+    return last[0] != place[0] or math.dist(last[1:], place[1:]) > JUMP_M
+
+
+@contextlib.contextmanager
+def _busy(loops: int) -> Iterator[None]:
+    children = []
+    for _ in range(loops):
+        child = os.fork()
+        if child == 0:
+            while True:
+                math.fsum(range(1000))
+        children.append(child)
+    try:
+        yield
+    finally:
+        for child in children:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
+def _spread(taken: Sequence[float | None]) -> Json:
+    known = sorted(1e3 * seconds for seconds in taken if seconds is not None)
+    if not known:
+        return {"found": 0, "p50": math.nan, "p99": math.nan, "p999": math.nan, "most": math.nan}
+    at = [known[min(len(known) - 1, math.ceil(share * len(known)) - 1)] for share in (0.5, 0.99, 0.999)]
+    return {"found": len(known), "p50": at[0], "p99": at[1], "p999": at[2], "most": known[-1]}
