@@ -46,7 +46,7 @@ def surveyed(
             north_m = wander_m if number % 2 else -wander_m
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
         if number % 250 == 0:
-            samples += [EstimatorStatus(ratio, ratio, ratio, velocity, False), Battery(battery)]
+            samples += [EstimatorStatus((ratio, ratio, ratio), velocity, False), Battery(battery)]
             samples += [
                 Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0)),
                 TimeSyncAnswer(1000 * (now_us - trip_us), 1),
