@@ -133,12 +133,11 @@ def _parameter(m: Any) -> Parameter | None:
 
 def _estimator_status(m: Any) -> EstimatorStatus | Refused:
     ratios = (m.vel_ratio, m.pos_horiz_ratio, m.pos_vert_ratio)
-    if not all(map(math.isfinite, ratios)):
+    if any(map(math.isinf, ratios)):
         return Refused("ESTIMATOR_STATUS", "ratios {:g} {:g} {:g}".format(*ratios))
     return EstimatorStatus(
-        m.vel_ratio,
-        m.pos_horiz_ratio,
-        m.pos_vert_ratio,
+        # NaN is PX4's word for what no sensor measures: the velocity, by motion capture.
+        tuple(ratio for ratio in ratios if not math.isnan(ratio)),
         bool(m.flags & dialect.ESTIMATOR_VELOCITY_HORIZ),
         bool(m.flags & dialect.ESTIMATOR_ACCEL_ERROR),
     )

@@ -208,11 +208,9 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class EstimatorStatus:
-    """ESTIMATOR_STATUS: squared innovations against their gates (1 is turned down), and what is estimated."""
+    """ESTIMATOR_STATUS: innovations against their gates (1 is turned down), and what is estimated."""
 
-    velocity_ratio: float
-    horizontal_position_ratio: float
-    vertical_position_ratio: float
+    ratios: tuple[float, ...]  # of velocity and place, as far as a sensor measures them
     horizontal_velocity_is_good: bool
     accelerometer_is_doubted: bool
 

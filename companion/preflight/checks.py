@@ -201,7 +201,7 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
         if wander_m <= DOUBTFUL_WANDER_M
         else Finding("position", verdict, found, remedy)
     )
-    ratios = [max(e.velocity_ratio, e.horizontal_position_ratio, e.vertical_position_ratio) for e in survey.estimator]
+    ratios = [ratio for status in survey.estimator for ratio in status.ratios]
     if not ratios:
         yield Finding("estimator", Verdict.DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
         return

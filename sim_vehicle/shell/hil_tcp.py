@@ -90,7 +90,7 @@ class _Session:
         else:
             self._tell("PX4 went away before it answered.")
         if truth_path is not None:
-            save_truth(truth_path, self._vehicle.truth, self._pace.epoch_at_boot_us(time_us))
+            save_truth(truth_path, self._vehicle.truth, self._pace.epoch_at_boot_us(time_us), self._pace.stalls)
 
     def _send_if_due(self, now_us: int) -> int:
         """Send the next sample if it may go; how long, in microseconds, to wait for PX4 then."""
@@ -133,14 +133,20 @@ class HilPace:
     def __init__(self, speed: float) -> None:
         self._speed = speed
         self._boot_us: int | None = None
+        self.stalls: list[tuple[int, int]] = []
+        """Boot times at which the vehicle's clock stood while the machine's went on, and for how long, microseconds."""
 
     def due_us(self, time_us: int, now_us: int) -> int:
         """The machine's time at which the vehicle's clock should show ``time_us``."""
         if self._speed == 0:
             return now_us
         since_boot_us = round(time_us / self._speed)
-        if self._boot_us is None or now_us - self._boot_us - since_boot_us > MOST_CAUGHT_UP_US:
+        if self._boot_us is None:
             self._boot_us = now_us - since_boot_us
+        late_us = now_us - self._boot_us - since_boot_us
+        if late_us > MOST_CAUGHT_UP_US:
+            self._boot_us += late_us
+            self.stalls.append((time_us, late_us))
         return self._boot_us + since_boot_us
 
     def epoch_at_boot_us(self, time_us: int) -> int:

@@ -93,7 +93,12 @@ CASES = [
     ),
     (
         mav.MAVLink_estimator_status_message(0, 2, 0.25, 0.5, 0.75, 0, 0, 0, 0, 0),
-        EstimatorStatus(0.25, 0.5, 0.75, True, False),
+        EstimatorStatus((0.25, 0.5, 0.75), True, False),
+    ),
+    # By motion capture no sensor measures the velocity, and PX4 says NaN
+    (
+        mav.MAVLink_estimator_status_message(0, 2, math.nan, 0.5, 0.75, 0, 0, 0, 0, 0),
+        EstimatorStatus((0.5, 0.75), True, False),
     ),
     (
         mav.MAVLink_autopilot_version_message(0, 0x010F02FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0),

@@ -47,7 +47,7 @@ def surveyed(
             north_m = wander_m if number % 2 else -wander_m
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
         if number % 250 == 0:
-            samples += [EstimatorStatus(ratio, ratio, ratio, velocity, False), Battery(battery)]
+            samples += [EstimatorStatus((ratio, ratio, ratio), velocity, False), Battery(battery)]
             samples += [Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0))]
             samples += [Parameter(name, value) for name, value in parameters.items()]
         if asked and now_us - asked[0] // 1000 >= trip_us:

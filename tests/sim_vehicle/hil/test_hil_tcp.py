@@ -14,7 +14,7 @@ from sim_vehicle.hil.messages import MOTORS_STOPPED
 from sim_vehicle.hil.vehicle import HilVehicle
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.hil_tcp import HilPace, serve_px4
-from sim_vehicle.shell.truth_file import load_truth
+from sim_vehicle.shell.truth_file import load_stalls, load_truth
 from tests.sim_vehicle.hil.px4_client import HOVER, TIMEOUT_S, Px4Client
 
 
@@ -116,8 +116,9 @@ def test_time_stands_still_until_the_answer_comes():
         assert px4.times_us[-1] - px4.times_us[-2] == 4_000
 
 
-def test_a_lost_answer_costs_a_second_and_not_the_flight():
-    with served() as server, connected(server) as px4:
+def test_a_lost_answer_costs_a_second_and_not_the_flight(tmp_path):
+    path = tmp_path / "truth.npz"
+    with served(1.0, path) as server, connected(server) as px4:
         boot(px4)
         list(px4.fly(20, HOVER))
         px4.next_step()
@@ -126,6 +127,9 @@ def test_a_lost_answer_costs_a_second_and_not_the_flight():
         px4.answer(HOVER)
         list(px4.fly(20, HOVER))
         assert px4.times_us == [4_000 * i for i in range(1, len(px4.times_us) + 1)]
+    # What stood still is told with the truth: times of before count from another start of the clock.
+    (at_us, stood_us), *others = load_stalls(path)
+    assert not others and at_us == 4_000 * 34 and stood_us >= 900_000
 
 
 def test_motor_commands_move_the_vehicle():
@@ -165,6 +169,7 @@ def test_a_machine_that_was_away_does_not_hurry_after_the_lost_time():
     assert pace.due_us(1_000_000, booted_us + 1_100_000) == booted_us + 1_000_000, "a little late is caught up"
     away_us = booted_us + 60_000_000
     assert pace.due_us(2_000_000, away_us) == away_us
+    assert pace.stalls == [(2_000_000, 58_000_000)]
     assert pace.due_us(3_000_000, away_us) == away_us + 1_000_000
 
 
