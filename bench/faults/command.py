@@ -23,7 +23,7 @@ def run_faults(options: Namespace) -> int:
     if options.only is not None:
         return _only(options.only, options.seeds)
     checked_text(options.out, PART, TITLE)
-    campaign = Campaign("faults", {}, (), tried, ("bench.faults",))
+    campaign = Campaign("faults", {}, (), _tried, ("bench.faults",))
     record = Record(campaign, RECORDS_FOLDER)
     try:
         for number in with_progress(iter(range(options.seeds)), options.seeds, "faults"):
@@ -76,10 +76,15 @@ def _under_load(record: Record, hits: int) -> Json | None:
 def _only(name: str, seeds: int) -> int:
     if name not in NAMES:
         raise ConfigurationError(f"--only {name}: there is no such fault; there are {', '.join(NAMES)}.")
-    results = [tried(FILES[name], n) if name in FILES else _flown(n, name) for n in range(seeds)]
+    results = [_tried((name, n)) for n in range(seeds)]
     for number, result in enumerate(results):
         print(f"{number}: {result}")
     return 1 if any(result["complaints"] for result in results) else 0
+
+
+def _tried(case: tuple[str, int]) -> Json:
+    name, number = case
+    return tried(FILES[name], number) if name in FILES else _flown(number, name)
 
 
 def _flown(number: int, name: str) -> Json:

@@ -11,6 +11,7 @@ from companion.messages import (
     LocalPosition,
     Parameter,
     ReadParameter,
+    Sample,
     TimeSyncAnswer,
     TimeSyncAsk,
     Vibration,
@@ -40,7 +41,7 @@ def surveyed(
     step_us, asked = 4_000, []
     for number in range(11_200_000 // step_us):
         now_us = (number + 1) * step_us
-        samples = []
+        samples: list[Sample] = []
         if number * imu_hz // 250 != (number + 1) * imu_hz // 250:
             samples.append(ImuSample(now_us, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)))
         if number % 5 == 0:

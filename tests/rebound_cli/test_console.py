@@ -17,7 +17,7 @@ from rebound_cli.vehicle_process import VehicleProcess, VehicleProcessError
 
 ROOT = Path(__file__).parents[2]
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))
-FLYING = Status("mission", "OFFBOARD", True, (1.0, 2.0, -1.5), 2.0, "armed at 1.8 m/s^2")
+FLYING = Status("mission", "OFFBOARD", True, (1.0, 2.0, -1.5), 2.0, "armed at 1.8 m/s^2", 4_000)
 RED = "\x1b[1;31m"
 
 
@@ -54,7 +54,7 @@ def test_in_a_pipe_each_event_and_now_and_then_the_state_is_one_plain_line():
         "    1.000 s  mode        mode OFFBOARD",
         "    2.500 s  detection   hit 1 at [3.76, 0.00]",
         "      3.0 s  state mission  mode OFFBOARD  position +1.00 +2.00 -1.50 m, 2.00 m/s  "
-        "detector armed at 1.8 m/s^2  link 40.1 kB/s",
+        "detector armed at 1.8 m/s^2  round trip 4 ms  link 40.1 kB/s",
     ]
 
 
