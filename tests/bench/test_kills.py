@@ -1,0 +1,49 @@
+"""Kills around a hit: what is drawn, what a flight shows, and the table."""
+
+from dataclasses import replace
+
+from bench.campaign.run import Results
+from bench.kills.command import table
+from bench.kills.killed import KILLED_S, SPEEDS_M_S, cases, kills_campaign, work_out
+
+
+def test_so_many_kills_are_drawn_within_the_bounds_and_the_same_each_time():
+    drawn = cases(45, first_seed=3)
+    instants = [kill_s for case in drawn for kill_s in case.kills_s]
+    assert len(instants) == 45 and len(drawn) == 5
+    assert all(KILLED_S[0] <= kill_s <= KILLED_S[1] for kill_s in instants)
+    assert all(SPEEDS_M_S[0] <= case.speed_m_s <= SPEEDS_M_S[1] for case in drawn)
+    assert drawn == cases(45, first_seed=3)
+    assert {(case.airframe, case.imu_hz) for case in drawn[:4]} == {
+        ("foldable", 250),
+        ("rigid", 250),
+        ("foldable", 50),
+        ("rigid", 50),
+    }
+
+
+def test_a_brake_that_nobody_ends_does_not_lead_back_to_the_wall():
+    """Held, the brake of 0.6 s after the hit led the vehicle back at 1 m/s."""
+    case = cases(50, first_seed=1)[4]
+    flight = work_out(replace(case, kills_s=(0.6, 0.87)))
+    assert flight["touch_m_s"] > 2.5 and flight["again_m_s"] == 0.0
+    for kill, at_s in zip(flight["kills"], (0.6, 0.87), strict=True):
+        assert abs(kill["kill_s"] - at_s) < 0.01
+        assert kill["again_m_s"] == 0.0
+        assert kill["ground_m_s"] < 1.5
+
+
+def test_the_table_has_a_line_for_every_100_ms_and_counts_the_hard_contacts():
+    # Given two kills in one bin, one of which ended in a second contact, and one before the touch
+    kills = [
+        {"kill_s": 0.61, "again_m_s": 0.9, "ground_m_s": 0.7},
+        {"kill_s": 0.69, "again_m_s": 0.2, "ground_m_s": 1.1},
+        {"kill_s": -0.05, "again_m_s": 1.5, "ground_m_s": None},
+    ]
+    flight = {"touch_m_s": 2.0, "again_m_s": 0.0, "kills": kills}
+    text = table(kills_campaign(3, 1), Results({0: flight}, {}))
+    assert "| 600 to 700 ms | 2 | 1 (50.0 %) | 0.90 m/s | 0.90 m/s | 1.10 m/s |" in text
+    assert "| -100 to 0 ms | 1 | 1 (100.0 %) | 1.50 m/s | – | – |" in text
+    assert "| **after it** | 2 | 1 (50.0 %)" in text
+    assert text.count("ms |") == 18
+    assert "0 of 1 of these flights" in text
