@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from bench.campaign.plan import Json
-from bench.faults.air import Air, Branched, Hung, Killed, Landing
-from bench.faults.fault import COMPLETED, KILLED, Fault, Injector
+from bench.faults.air import Air, Branched, Hung, Injector, Killed, Landing
+from bench.faults.fault import COMPLETED, KILLED, Fault
 from bench.random_missions.crashes import crashes, heights_m, tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from companion.companion import Companion, StepResult
@@ -208,7 +208,7 @@ class _Flight:
             self.ended = {Killed: KILLED, Hung: "hung", Landing: COMPLETED}[type(end)]
         self.injector.end()
         self.killed_at_s = air.now_s
-        air.alone(KILLED_FOR_S if self.ended == KILLED else LEFT_ALONE_S)
+        air.alone({KILLED: KILLED_FOR_S, COMPLETED: 0.0}.get(self.ended, LEFT_ALONE_S))
         if self.ended == KILLED:
             # What a killed process had in memory is gone; what it had given to the system is not.
             self.recorder._tlog._pending.clear()
@@ -252,7 +252,7 @@ class _Flight:
 
     def _counts(self, cause: str) -> bool:
         """A landing that PX4 or a pilot flies may come at any time."""
-        return cause != "touched the ground" or self.air.vehicle.mode == "Offboard"
+        return cause != "touched the ground" or not self.air.has_left_offboard
 
     def _flown(self) -> JudgedFlight:
         truth = self.air.vehicle.truth

@@ -4,8 +4,8 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from bench.faults.air import Air
-from bench.faults.fault import HANDED_OVER, Expected, Fault, Injector, When
+from bench.faults.air import Air, Injector, When
+from bench.faults.fault import HANDED_OVER, Expected, Fault
 
 _TAKEN = Expected((HANDED_OVER,), finds=False)
 
