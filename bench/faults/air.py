@@ -5,10 +5,11 @@ Whatever an injector does, it does here: to the bytes of either direction, to th
 
 from __future__ import annotations
 
+import io
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bench.faults.envelope import outside
 from bench.faults.packets import (
@@ -23,6 +24,8 @@ from bench.faults.packets import (
 )
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
+from rebound_cli.background import Background
+from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import EPOCH_US
 from rebound_cli.realtime import MOST_DATAGRAMS
@@ -31,15 +34,66 @@ from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 
-if TYPE_CHECKING:
-    from bench.faults.fault import Injector
-
 # A clock that is read goes on.
 _READING_US = 4
 # A ground station's own rates; sticks come at 10 Hz or more.
 _STICKS_EVERY, _BEAT_EVERY = 20, 250
 # PX4's modes as DO_SET_MODE takes them: main and sub mode.
 POSCTL = 3 << 16
+
+
+class Injector:
+    """Does nothing; each fault overrides where it acts."""
+
+    def begin(self, air: Air) -> None:
+        """Before the first interval."""
+
+    def end(self) -> None:
+        """After the last one."""
+
+    def each(self, air: Air) -> None:
+        """Before every interval of the vehicle."""
+
+    def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return frames
+
+    def to_vehicle(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
+        return frames
+
+    def clock_us(self, air: Air, now_us: int) -> int:
+        """What the companion's clock shows."""
+        return now_us
+
+    def console(self) -> Console:
+        """Where the timeline is printed."""
+        return Console(io.StringIO())
+
+    def writer(self) -> Background | None:
+        """Who writes the log; None: it is written at once."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """So long after the companion was first in a state, and for how long."""
+
+    state: str
+    after_s: float = 0.0
+    for_s: float = 1e9
+
+    def is_on(self, air: Air) -> bool:
+        since_s = air.since.get(self.state)
+        return since_s is not None and 0.0 <= air.now_s - since_s - self.after_s < self.for_s
+
+    @classmethod
+    def flying(cls, chance: random.Random, for_s: float = 1e9) -> When:
+        """In the cruise towards the wall, or at the hit: at a random instant of the first 1.5 s of the item."""
+        return cls("mission", chance.uniform(0.0, 1.5), for_s)
+
+    @classmethod
+    def recovering(cls, chance: random.Random, for_s: float = 1e9) -> When:
+        """At a random instant of the first 0.6 s after the hit."""
+        return cls("recovering", chance.uniform(0.0, 0.6), for_s)
 
 
 class Killed(BaseException):
@@ -85,6 +139,8 @@ class Air:
     """Whether the companion has been handed a packet that says so."""
     after_told: int = 0
     """Setpoints and commands for mode or arming that it sent afterwards."""
+    has_left_offboard: bool = False
+    """Whether somebody else has flown since the first item: PX4's failsafe, its landing, a pilot."""
     is_overruled: bool = False
     """Whether the vehicle has left the pilot's mode."""
     sent: int = 0
@@ -166,6 +222,7 @@ class Air:
         if state == "mission" and self.branch is not None:
             branch, self.branch = self.branch, None
             branch()
+        self.has_left_offboard |= "mission" in self.since and self.vehicle.mode != "Offboard"
         began_s = self.since.setdefault(state, self.now_s)
         if state == "landing" and not self.to_the_ground and self.now_s - began_s > 1.0 and self.vehicle.mode == "Land":
             raise Landing
@@ -185,6 +242,7 @@ class Air:
         while self.now_s < until_s and self.vehicle.is_armed:
             self.vehicle.step(b"")
             self._fly_sticks()
+            self.has_left_offboard |= self.vehicle.mode != "Offboard"
 
     # --- what injectors do
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, count, runs
+from rebound_cli.arguments import Commands, add_jobs, count, runs
 
 
 def add_faults(commands: Commands) -> None:
@@ -14,6 +14,7 @@ def add_faults(commands: Commands) -> None:
     )
     faults.add_argument("--seeds", type=count, default=50, metavar="N", help="flights of each fault (default 50)")
     faults.add_argument("--only", metavar="NAME", help="print the flights of this fault and write nothing")
+    add_jobs(faults)
     faults.add_argument("--hits", type=count, default=1000, metavar="N", help="hits under load (default 1000)")
     faults.add_argument(
         "--out", type=Path, default=Path("docs/faults.md"), metavar="FILE", help="default: docs/faults.md"

@@ -4,8 +4,8 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bench.faults.air import Air
-from bench.faults.fault import COMPLETED, FAILED, HANDED_OVER, Expected, Fault, Injector, When
+from bench.faults.air import Air, Injector, When
+from bench.faults.fault import COMPLETED, FAILED, HANDED_OVER, Expected, Fault
 from bench.faults.injectors import Simulated
 from sim_vehicle.bench.faults import clock_jump
 
@@ -56,9 +56,6 @@ FAULTS = (
         "the same by a day (the product's own clock is monotonic)",
         _jumped(86_400.0),
         _MAY_END,
-    ),
-    Fault(
-        "clock 5 s back", "clock", "the same back by 5 s; the loop then waits for its old time", _jumped(-5.0), _MAY_END
     ),
     Fault(
         "vehicle's clock anew",

@@ -1,6 +1,8 @@
 """`bench faults`: every fault by the dozen, and the table of what became of them."""
 
+import multiprocessing
 from argparse import Namespace
+from collections.abc import Iterator, Sequence
 
 from bench.campaign.plan import Campaign, Json, Outcome
 from bench.campaign.record import Record
@@ -12,6 +14,7 @@ from bench.faults.flight import fly, fly_from_one_take_off
 from bench.faults.table import PART, TITLE, Row, text_of
 from bench.marked import checked_text, write_part
 from companion.errors import ConfigurationError
+from rebound_cli.interrupts import ctrl_c_waiting
 from rebound_cli.progress import with_progress
 
 # A flight's number in the record is its row's plus so many for each seed.
@@ -23,11 +26,12 @@ def run_faults(options: Namespace) -> int:
     if options.only is not None:
         return _only(options.only, options.seeds)
     checked_text(options.out, PART, TITLE)
-    campaign = Campaign("faults", {}, (), _tried, ("bench.faults",))
+    campaign = Campaign("faults", {}, (), fly_seed)
     record = Record(campaign, RECORDS_FOLDER)
     try:
-        for number in with_progress(iter(range(options.seeds)), options.seeds, "faults"):
-            _fly_missing(record, number)
+        for number, results in with_progress(_flown_seeds(record, options), options.seeds, "faults"):
+            for name, result in results.items():
+                record.add(Outcome(_case(number, name), result))
         under_load = _under_load(record, options.hits)
     finally:
         record.close()
@@ -43,21 +47,43 @@ def _case(number: int, name: str) -> int:
     return number * len(NAMES) + NAMES.index(name)
 
 
-def _fly_missing(record: Record, number: int) -> None:
-    """The flights and files of one seed that the record does not have."""
+def _flown_seeds(record: Record, options: Namespace) -> Iterator[tuple[int, Json]]:
+    """Seeds as they come, each with what became of all that the record did not have of it."""
+    wanted = [(number, _missing(record, number)) for number in range(options.seeds)]
+    yield from ((number, {}) for number, names in wanted if not names)
+    with ctrl_c_waiting() as pressed:
+        pool = multiprocessing.get_context("spawn").Pool(options.jobs)
+    with pool:
+        if pressed:
+            raise KeyboardInterrupt
+        results = pool.imap_unordered(fly_numbered, [(number, names) for number, names in wanted if names])
+        yield from results
 
-    def take(name: str, result: Json) -> None:
-        record.add(Outcome(_case(number, name), result))
 
-    names = [name for name in NAMES if _case(number, name) not in record.outcomes]
+def _missing(record: Record, number: int) -> list[str]:
+    names = [name for name in FLOWN if _case(number, name) not in record.outcomes]
+    files = [name for name in FILES if _case(number, name) not in record.outcomes]
+    return names + [name for name in files if number < FILES[name].most_tries]
+
+
+def fly_numbered(case: tuple[int, Sequence[str]]) -> tuple[int, Json]:
+    """The seed's number with its results."""
+    return case[0], fly_seed(case)
+
+
+def fly_seed(case: tuple[int, Sequence[str]]) -> Json:
+    """What became of each of these faults with one seed, by name."""
+    number, names = case
+    results: Json = {}
     branching = [FLOWN[name] for name in names if name in FLOWN and not FLOWN[name].from_the_start]
     if branching:
-        fly_from_one_take_off(number, branching, take)
+        fly_from_one_take_off(number, branching, results.__setitem__)
     for name in names:
-        if name in FILES and number < FILES[name].most_tries:
-            take(name, tried(FILES[name], number))
-        elif name in FLOWN and FLOWN[name].from_the_start:
-            take(name, fly(number, FLOWN[name]))
+        if name in FILES:
+            results[name] = tried(FILES[name], number)
+        elif name not in results:
+            results[name] = fly(number, FLOWN[name])
+    return results
 
 
 def _row(record: Record, name: str, seeds: int) -> Row:
@@ -76,21 +102,7 @@ def _under_load(record: Record, hits: int) -> Json | None:
 def _only(name: str, seeds: int) -> int:
     if name not in NAMES:
         raise ConfigurationError(f"--only {name}: there is no such fault; there are {', '.join(NAMES)}.")
-    results = [_tried((name, n)) for n in range(seeds)]
+    results = [fly_seed((number, [name]))[name] for number in range(seeds)]
     for number, result in enumerate(results):
         print(f"{number}: {result}")
     return 1 if any(result["complaints"] for result in results) else 0
-
-
-def _tried(case: tuple[str, int]) -> Json:
-    name, number = case
-    return tried(FILES[name], number) if name in FILES else _flown(number, name)
-
-
-def _flown(number: int, name: str) -> Json:
-    fault = FLOWN[name]
-    if fault.from_the_start:
-        return fly(number, fault)
-    results: list[Json] = []
-    fly_from_one_take_off(number, [fault], lambda _, result: results.append(result))
-    return results[0]

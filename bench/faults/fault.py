@@ -1,16 +1,11 @@
-"""A fault: what is injected and what is expected; and when in a flight something begins."""
+"""A fault: what is injected and what is expected."""
 
-import io
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from rebound_cli.console import Console
-
-if TYPE_CHECKING:
-    from bench.faults.air import Air
-    from rebound_cli.background import Background
+from bench.faults.air import Injector
 
 Group = Literal[
     "link", "sensors", "clock", "process", "disk and console", "estimator", "wind and body", "hostile packets",
@@ -23,60 +18,6 @@ _WORDS = {
     FAILED: "fault told, vehicle handed over",
     KILLED: "PX4's own failsafe lands it",
 }
-
-
-class Injector:
-    """Does nothing; each fault overrides where it acts."""
-
-    def begin(self, air: "Air") -> None:
-        """Before the first interval."""
-
-    def end(self) -> None:
-        """After the last one."""
-
-    def each(self, air: "Air") -> None:
-        """Before every interval of the vehicle."""
-
-    def to_companion(self, air: "Air", frames: list[bytes]) -> Sequence[bytes]:
-        return frames
-
-    def to_vehicle(self, air: "Air", frames: list[bytes]) -> Sequence[bytes]:
-        return frames
-
-    def clock_us(self, air: "Air", now_us: int) -> int:
-        """What the companion's clock shows."""
-        return now_us
-
-    def console(self) -> Console:
-        """Where the timeline is printed."""
-        return Console(io.StringIO())
-
-    def writer(self) -> "Background | None":
-        """Who writes the log; None: it is written at once."""
-        return None
-
-
-@dataclass(frozen=True, slots=True)
-class When:
-    """So long after the companion was first in a state, and for how long."""
-
-    state: str
-    after_s: float = 0.0
-    for_s: float = 1e9
-
-    def is_on(self, air: "Air") -> bool:
-        since_s = air.since.get(self.state)
-        return since_s is not None and 0.0 <= air.now_s - since_s - self.after_s < self.for_s
-
-    @classmethod
-    def flying(cls, chance: random.Random, for_s: float = 1e9) -> "When":
-        """In the cruise towards the wall, or at the hit: at a random instant of the first 1.5 s of the item."""
-        return cls("mission", chance.uniform(0.0, 1.5), for_s)
-
-    @classmethod
-    def recovering(cls, chance: random.Random, for_s: float = 1e9) -> "When":
-        """At a random instant of the first 0.6 s after the hit."""
-        return cls("recovering", chance.uniform(0.0, 0.6), for_s)
 
 
 @dataclass(frozen=True, slots=True)

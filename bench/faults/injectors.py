@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from bench.faults.air import Air
-from bench.faults.fault import Injector, When
+from bench.faults.air import Air, Injector, When
 from bench.faults.packets import changed
 from companion.mavlink.packet import message_id_of
 from sim_vehicle.bench.faults import FaultRequest

@@ -125,8 +125,8 @@ def _fly_on(companion: Companion, now_us: int, port: int, folder: Path) -> None:
     recorder = FlightRecorder(folder, Background("log"))
     clock = Going(now_us)
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
-    connection.send(b"\0")
     with undisturbed():
+        connection.send(b"\0")
         while True:
             loop.exchange()
 

@@ -1,6 +1,7 @@
 """The link between vehicle and companion."""
 
-from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault, When
+from bench.faults.air import When
+from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
 from bench.faults.injectors import Simulated
 from sim_vehicle.bench.faults import corruption, delay, duplication, link_cut, packet_loss, reordering
 

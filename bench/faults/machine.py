@@ -8,8 +8,8 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bench.faults.air import Air
-from bench.faults.fault import Fault, Injector, When
+from bench.faults.air import Air, Injector, When
+from bench.faults.fault import Fault
 from rebound_cli.background import Background
 from rebound_cli.console import Console
 

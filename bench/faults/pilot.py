@@ -4,8 +4,8 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from bench.faults.air import Air
-from bench.faults.fault import HANDED_OVER, Expected, Fault, Injector, When
+from bench.faults.air import Air, Injector, When
+from bench.faults.fault import HANDED_OVER, Expected, Fault
 
 _TAKEN = Expected((HANDED_OVER,), finds=False)
 
@@ -40,9 +40,9 @@ class Taken(Injector):
 
 
 def _taken(
-    state: str, within_s: float, stall_s: float = 0.0, cut_s: float = 0.0
+    state: str, within_s: float, from_s: float = 0.3, stall_s: float = 0.0, cut_s: float = 0.0
 ) -> Callable[[random.Random], Injector]:
-    return lambda chance: Taken(When(state, chance.uniform(0.3, within_s)), stall_s, cut_s)
+    return lambda chance: Taken(When(state, chance.uniform(from_s, from_s + within_s)), stall_s, cut_s)
 
 
 FAULTS = (
@@ -50,7 +50,7 @@ FAULTS = (
         "takes over in take-off",
         "pilot",
         "POSCTL at a random instant of the climb",
-        _taken("takeoff", 2.5),
+        _taken("takeoff", 2.3, from_s=1.7),
         _TAKEN,
         True,
     ),

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bench.faults.air import Air
-from bench.faults.fault import COMPLETED, FAILED, HANDED_OVER, KILLED, Expected, Fault, Injector, When
+from bench.faults.air import Air, Injector, When
+from bench.faults.fault import COMPLETED, FAILED, HANDED_OVER, KILLED, Expected, Fault
 
 _MAY_END = Expected((COMPLETED, HANDED_OVER), finds=False)
 _HANDED = Expected((HANDED_OVER,), finds=False)

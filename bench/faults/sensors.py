@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from bench.faults.air import Air
-from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault, Injector, When
+from bench.faults.air import Air, Injector, When
+from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
 from bench.faults.injectors import Rewritten, Simulated, adding, setting
 from bench.faults.packets import ATTITUDE, IMU, ODOMETRY, POSITION, changed
 from companion.mavlink.packet import message_id_of

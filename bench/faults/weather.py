@@ -3,7 +3,8 @@
 import math
 import random
 
-from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault, Injector, When
+from bench.faults.air import Injector, When
+from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
 from bench.faults.injectors import Simulated
 from sim_vehicle.bench.faults import other
 

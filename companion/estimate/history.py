@@ -33,6 +33,11 @@ class MotionHistory:
             samples.popleft()
         return True
 
+    def newest(self, count: int) -> list[LocalPosition]:
+        """The newest of all, the very newest first."""
+        samples = self._samples
+        return [samples[-number] for number in range(1, min(count, len(samples)) + 1)]
+
     def latest(self) -> LocalPosition | None:
         return self._samples[-1] if self._samples else None
 

@@ -106,15 +106,21 @@ def _abort_condition(flight: FlightContext, state: State, inputs: Inputs, now_us
     """The mission's own conditions; looked at with each new position, so that a silent link is not one of them."""
     if state not in ON_SETPOINTS or not inputs.positions or flight.armed_at_us is None:
         return None
-    reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+    reason = _outside_fence(flight) or _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
     return None if reason is None else Move(Trigger.INTERRUPTED, reason, hand_over=True)
 
 
+def _outside_fence(flight: FlightContext) -> str | None:
+    """Two positions in a row have to say so: one forged or broken packet ends no flight."""
+    most_m, newest = flight.mission.abort_when.outside_fence_by_m, flight.vehicle.history.newest(2)
+    if most_m is None or len(newest) < 2:
+        return None
+    outside_m = min(flight.mission.fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in newest)
+    return f"the vehicle is {outside_m:.2f} m outside the fence" if outside_m > most_m else None
+
+
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
-    when, fence = flight.mission.abort_when, flight.mission.fence
-    outside_m = fence.outside_by_m(flight.mission_ned_m(place_ned_m))
-    if when.outside_fence_by_m is not None and outside_m > when.outside_fence_by_m:
-        return f"the vehicle is {outside_m:.2f} m outside the fence"
+    when = flight.mission.abort_when
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
     if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
         return f"flight time above {when.flight_time_above_s:g} s"

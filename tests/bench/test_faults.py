@@ -5,9 +5,10 @@ import math
 import pytest
 
 from bench.campaign.plan import Json
+from bench.faults.air import Injector, When
 from bench.faults.catalogue import FILES, FLOWN
 from bench.faults.envelope import outside
-from bench.faults.fault import COMPLETED, Expected, Fault, Injector, When
+from bench.faults.fault import COMPLETED, Expected, Fault
 from bench.faults.files import tried
 from bench.faults.flight import fly, fly_from_one_take_off
 from bench.faults.injectors import Rewritten, setting

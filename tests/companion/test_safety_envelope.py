@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.faults.packets import made
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
 from companion.flight.envelope import SetpointError, Surroundings, bounded
@@ -16,6 +17,7 @@ from companion.flight.trajectory import LineProfile
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
+from tests.companion.hostile import attacked
 
 FENCE = Fence(radius_m=8, max_height_m=4, min_height_m=0.5)
 LIMITS = Limits(max_speed_m_s=3.0, max_step_m=4.0)
@@ -211,6 +213,24 @@ def test_a_condition_of_the_mission_ends_it(condition, happens, words):
     assert words in f.companion.report().reason
     f.run_to_end()
     assert f.vehicle.mode == mode
+
+
+def test_one_position_outside_the_fence_ends_no_flight_and_two_do():
+    f = in_mission()
+
+    def far(later_ms):
+        fields = {"time_boot_ms": f.vehicle.time_us // 1000 + later_ms, "x": 40.0, "z": -1.5}
+        return made("LOCAL_POSITION_NED", fields)
+
+    # Given one forged packet between two of the vehicle's own, which come with every fifth interval
+    f.run_until(lambda: f.vehicle.ticks % 5 == 1)
+    attacked(f, [far(1)])
+    f.run_for(0.5)
+    assert f.state != "aborted"
+    # When two come in a row
+    f.run_until(lambda: f.vehicle.ticks % 5 == 1)
+    attacked(f, [far(1), far(2)])
+    assert f.state == "aborted" and "outside the fence" in f.companion.report().reason
 
 
 def test_a_battery_that_is_low_or_unknown_is_no_battery_to_start_with():
