@@ -1,5 +1,6 @@
 """A terminal: what has happened scrolls by above one region that is drawn anew, with the state now."""
 
+from collections.abc import Sequence
 from typing import TextIO
 
 from rich.console import Console as RichConsole
@@ -8,8 +9,6 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
-
-from rebound_cli.console import Fields
 
 _BAR_WIDTH = 40
 
@@ -43,7 +42,7 @@ class Terminal:
         row.add_row(f"{time_s:.3f} s", kind, text, style="bold red" if stands_out else "")
         self._draw(row)
 
-    def state(self, fields: Fields) -> None:
+    def state(self, fields: Sequence[tuple[str, str]]) -> None:
         rows = Table.grid(padding=(0, 1))
         for name, text in fields:
             rows.add_row(Text(f"  {name}", "dim"), text)

@@ -26,9 +26,10 @@ def speeds_m_s(f: Flight) -> list[float]:
 
 
 def strike(f: Flight) -> None:
-    """Something hits the vehicle from the south."""
-    f.vehicle.push_m_s2 = (12.0, 0.0)
-    f.step()
+    """Something hits the vehicle from the south, for longer than one sample."""
+    for _ in range(3):
+        f.vehicle.push_m_s2 = (12.0, 0.0)
+        f.step()
 
 
 @pytest.mark.parametrize("then", ["hold", "continue"])

@@ -1,6 +1,7 @@
 """Identification: what the simulated vehicle is known to have is found again; bad data end in one sentence."""
 
 import csv
+import json
 import os
 from pathlib import Path
 
@@ -151,7 +152,7 @@ def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
     # And flies the same mission
     again = run("fly", WALL, "--lockstep", "--airframe", tmp_path / "found.yaml", "--out", tmp_path / "again")
     assert again.returncode == 0, again.stderr
-    assert "recontacts 0" in again.stdout
+    assert json.loads((tmp_path / "again" / "summary.json").read_text())["recontacts"] == 0
 
 
 def test_bad_data_end_in_one_clear_sentence(tmp_path):
