@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from sim_vehicle.truth import Hit
+from tests.sim_vehicle.bench.kept_kernels import keep_kernels
 
 pytest_plugins = "pytester"
 
@@ -19,6 +20,7 @@ def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.
     """Without whatever plugins are installed here, so that it does not matter whether this package is."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    keep_kernels(monkeypatch)
     return pytester
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sim_vehicle.bench.kept_kernels import keep_kernels
+
 pytestmark = pytest.mark.slow
 
 pytest_plugins = "pytester"
@@ -19,6 +21,7 @@ def examples() -> list[str]:
 def test_every_example_passes(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    keep_kernels(monkeypatch)
     tests, scripts = [], []
     for number, example in enumerate(examples()):
         (tests if "def test_" in example else scripts).append(example)
