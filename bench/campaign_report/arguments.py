@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from bench.recoveries.arguments import add_recoveries
+from bench.vehicles_argument import add_vehicles
 from rebound_cli.arguments import Commands, add_workers, count, runs
 
 
@@ -16,13 +17,7 @@ def add_campaign(commands: Commands) -> None:
     campaign.add_argument(
         "--first-seed", type=count, default=1, metavar="SEED", help="of the first; the others follow (default 1)"
     )
-    campaign.add_argument(
-        "--vehicles",
-        choices=("named", "drawn"),
-        default="named",
-        help="drawn: every mission has a vehicle of its own, drawn from its seed, of both airframes' kinds "
-        "(default named: the two airframes)",
-    )
+    add_vehicles(campaign, "every mission")
     campaign.add_argument(
         "--hits", type=count, default=5, metavar="SEEDS", help="of each hit with each recovery law (default 5)"
     )

@@ -20,13 +20,13 @@ from bench.random_missions.generator import MissionCase
 from bench.recoveries.command import PART as RECOVERY_PART
 from bench.recoveries.command import write_table
 from bench.recoveries.hits import recoveries_campaign
+from bench.vehicles_argument import DRAWN_NAME, DRAWN_TITLE
 from companion.errors import ConfigurationError
 from rebound_cli import __version__
 from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
 PART, TITLE = "campaign", "Campaign"
-DRAWN_NAME, DRAWN_TITLE = "drawn.md", "Vehicles nobody tuned for"
 # What is wanted of vehicles drawn at random; the two named ones have other bars.
 DRAWN_WANTED = {"foldable": 0.995, "rigid": 0.99}
 

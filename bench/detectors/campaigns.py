@@ -1,12 +1,15 @@
 """The campaigns of the bench: how many cases of which family."""
 
 import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from bench.campaign.plan import Campaign
+from bench.campaign.plan import Campaign, Json
 from bench.detectors.flights import AIRBORNE_S, FlightCase, work_out_flight
 from bench.detectors.hands import draw_hand, work_out_hand
-from bench.detectors.hits import AIRFRAMES, HitCase, draw_case, work_out_hit
+from bench.detectors.hits import HitCase, draw_case, work_out_hit
 from bench.detectors.links import JITTERY
 from bench.detectors.mishaps import FAMILIES
 from bench.detectors.recorded import (
@@ -18,6 +21,7 @@ from bench.detectors.recorded import (
     work_out_healthy,
     work_out_injected,
 )
+from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors.watching import detector_names
 
 # Tried on everything. The others are compared on at least so many hits and flights, and on one in eight at most sizes:
@@ -42,32 +46,55 @@ USES = ("rebound_cli.logs", "rebound_cli.replay")
 FLIGHT_S = AIRBORNE_S + 40.0
 
 
-def hits_campaign(hits: int) -> Campaign:
-    """So many hits as the airframes are, a sixteenth more of each variation, and some over a bad link and in hover."""
-    every = _every(hits, COMPARED_HITS)
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """The seed of the first case, and whether each case has a vehicle of its own."""
+
+    first_seed: int = 0
+    is_drawn: bool = False
+
+    def campaign(
+        self, name: str, size: Mapping[str, float], cases: Sequence[Any], work_out: Callable[[Any], Json]
+    ) -> Campaign:
+        parameters = {**size, "first_seed": self.first_seed, "vehicles": "drawn" if self.is_drawn else "named"}
+        drawn = [replace(case, is_drawn=self.is_drawn) for case in cases]
+        return Campaign(name, parameters, drawn, work_out, ("bench.random_missions",))
+
+
+NAMED = Drawing()
+
+
+def hits_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
+    """So many hits as the vehicles are, a sixteenth more of each variation, and some over a bad link and in hover."""
+    every, first = _every(hits, COMPARED_HITS), drawing.first_seed
     swept = every * max(1, round(hits / (every * SWEPT_HITS)))
     cases: list[HitCase] = [
-        draw_case("plain", seed, _compared(seed, every), sweeps=_is_turn(seed, swept)) for seed in range(hits)
+        draw_case("plain", seed, _compared(seed, every), sweeps=_is_turn(seed, swept))
+        for seed in range(first, first + hits)
     ]
-    for seed in range(hits, hits + hits // VARIED_SHARE):
+    first += hits
+    for seed in range(first, first + hits // VARIED_SHARE):
         level = VIBRATIONS_M_S2[seed // 2 % len(VIBRATIONS_M_S2)]
         cases.append(draw_case("vibration", seed, _compared(seed, every), vibration_m_s2=level))
-    for seed in range(2 * hits, 2 * hits + hits // VARIED_SHARE):
+    first += hits
+    for seed in range(first, first + hits // VARIED_SHARE):
         noise = VELOCITY_NOISES_M_S[seed // 2 % len(VELOCITY_NOISES_M_S)]
         cases.append(draw_case("velocity", seed, _thorough(), velocity_noise_m_s=noise))
+    first += hits
     side = _side(hits, SIDE_HITS_AT_MOST)
-    cases += [draw_case("link", 3 * hits + count, _thorough(), link=JITTERY) for count in range(side)]
-    cases += [draw_case("struck", 4 * hits + count, _thorough(), is_struck=True) for count in range(side)]
-    return Campaign("hits", {"hits": hits}, cases, work_out_hit)
+    cases += [draw_case("link", first + count, _thorough(), link=JITTERY) for count in range(side)]
+    cases += [draw_case("struck", first + hits + count, _thorough(), is_struck=True) for count in range(side)]
+    return drawing.campaign("hits", {"hits": hits}, cases, work_out_hit)
 
 
-def hands_campaign(hits: int) -> Campaign:
+def hands_campaign(hits: int, drawing: Drawing = NAMED) -> Campaign:
     """A hand's grips on a hovering vehicle, as many as belong to so many hits."""
-    cases = [draw_hand(seed, _thorough()) for seed in range(2 * _side(hits, HANDS_AT_MOST // 2))]
-    return Campaign("hands", {"hits": hits}, cases, work_out_hand)
+    first, count = drawing.first_seed, 2 * _side(hits, HANDS_AT_MOST // 2)
+    cases = [draw_hand(seed, _thorough()) for seed in range(first, first + count)]
+    return drawing.campaign("hands", {"hits": hits}, cases, work_out_hand)
 
 
-def flights_campaign(hours: float) -> Campaign:
+def flights_campaign(hours: float, drawing: Drawing = NAMED) -> Campaign:
     """At least so many hours of flight, airframes in turn."""
     count = max(2, math.ceil(3600.0 * hours / FLIGHT_S))
     families, every = list(FAMILIES), _every(count, COMPARED_FLIGHTS)
@@ -79,9 +106,9 @@ def flights_campaign(hours: float) -> Campaign:
             detectors=_compared(seed, every),
             sweeps=_is_turn(seed, 2 * every),
         )
-        for seed in range(count)
+        for seed in range(drawing.first_seed, drawing.first_seed + count)
     ]
-    return Campaign("flights", {"hours": hours}, cases, work_out_flight)
+    return drawing.campaign("flights", {"hours": hours}, cases, work_out_flight)
 
 
 def healthy_campaign(folder: Path) -> Campaign:

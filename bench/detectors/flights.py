@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from bench.detectors.hits import built_in
 from bench.detectors.mishaps import FAMILIES
 from bench.detectors.pilot import Pilot, PilotDemand, as_known
 from bench.detectors.recording import VehicleRecording
+from bench.detectors.vehicles import BenchVehicle, vehicle_of
 from bench.detectors.watching import (
     ASKED_HZ,
     SWEPT_FACTORS,
@@ -41,6 +41,7 @@ class FlightCase:
     airframe: str
     detectors: tuple[str, ...]
     sweeps: bool = False
+    is_drawn: bool = False
 
 
 @dataclass(slots=True)
@@ -53,8 +54,8 @@ class FlownHealthy:
 
 def work_out_flight(case: FlightCase) -> dict[str, Any]:
     """Fly it, let every detector hear it at every rate, list what they report."""
-    airframe = built_in(case.airframe)
-    flown = fly_healthy(case, airframe)
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    flown = fly_healthy(case, vehicle.airframe)
     samples = flown.recording.samples
     result: dict[str, Any] = {
         "seconds": 1e-6 * (samples[-1].time_boot_us - samples[0].time_boot_us),
@@ -63,26 +64,25 @@ def work_out_flight(case: FlightCase) -> dict[str, Any]:
     }
     wire = Wire(flown.recording)
     for rate in ASKED_HZ:
-        result["rates"][str(rate)] = _reports(case, flown, wire, rate)
+        result["rates"][str(rate)] = _reports(case, vehicle, flown, wire, rate)
     return result
 
 
-def _reports(case: FlightCase, flown: FlownHealthy, wire: Wire, rate: int) -> dict[str, Any]:
+def _reports(case: FlightCase, vehicle: BenchVehicle, flown: FlownHealthy, wire: Wire, rate: int) -> dict[str, Any]:
     arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
     situations = flown.recording.situations
     index_at = {step.time_boot_us: step.index for step in arrived}
     detectors: dict[str, Any] = {}
     for name in case.detectors:
-        found, touches, blind = watch_all(alarms_only(name), arrived, situations)
+        found, touches, blind = watch_all(alarms_only(name, vehicle.settings), arrived, situations)
         entry: dict[str, Any] = {
             "alarms": [_told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.final.kind) for f in found],
             "touches": len(touches),
             "blind": blind,
         }
         if case.sweeps and rate == SWEPT_RATE:
-            entry["swept"] = [
-                len(watch_all(configuration(name, factor), arrived, situations)[0]) for factor in SWEPT_FACTORS
-            ]
+            configs = [configuration(name, vehicle.settings, factor) for factor in SWEPT_FACTORS]
+            entry["swept"] = [len(watch_all(config, arrived, situations)[0]) for config in configs]
         detectors[name] = entry
     return detectors
 

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bench.detectors.hits import AIRFRAMES, HEIGHT_M, SWITCHED_ON_AFTER_S, built_in
+from bench.detectors.hits import HEIGHT_M, SWITCHED_ON_AFTER_S
 from bench.detectors.recording import VehicleRecording
+from bench.detectors.vehicles import AIRFRAMES, vehicle_of
 from bench.detectors.watching import ASKED_HZ, configuration, streams_asked_hz, watch_all
 from bench.detectors.wire import Wire
 from companion.detection.interface import Situation
@@ -34,6 +35,7 @@ class HandCase:
     seed: int
     airframe: str
     detectors: tuple[str, ...]
+    is_drawn: bool = False
 
 
 def draw_hand(seed: int, detectors: tuple[str, ...]) -> HandCase:
@@ -43,14 +45,15 @@ def draw_hand(seed: int, detectors: tuple[str, ...]) -> HandCase:
 
 def work_out_hand(case: HandCase) -> dict[str, Any]:
     """Hold it once, then let every detector hear it at every rate."""
-    recording, began_us = hover_in_hand(case, built_in(case.airframe))
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    recording, began_us = hover_in_hand(case, vehicle.airframe)
     wire = Wire(recording)
     result: dict[str, Any] = {"rates": {}}
     for rate in ASKED_HZ:
         arrived = wire.heard(streams_asked_hz(rate), case.seed + rate)
         entries: dict[str, Any] = {}
         for name in case.detectors:
-            found, touches, _ = watch_all(configuration(name), arrived, recording.situations)
+            found, touches, _ = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
             told_us = [t.impact.sample_time_boot_us for t in touches if t.impact.sample_time_boot_us >= began_us]
             entries[name] = {
                 "collisions": [f.final.kind.value for f in found],

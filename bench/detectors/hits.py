@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,11 @@ import numpy.typing as npt
 
 from bench.detectors.recording import VehicleRecording
 from bench.detectors.scoring import score_hit
+from bench.detectors.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.detectors.watching import detector_names
 from companion.detection.interface import Situation
 from companion.messages import LandedState
-from sim_vehicle.airframe import Airframe, load_built_in
+from sim_vehicle.airframe import Airframe
 from sim_vehicle.cruise import Cruise
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
@@ -22,7 +22,6 @@ from sim_vehicle.truth import Hit
 
 Floats = npt.NDArray[np.float64]
 
-AIRFRAMES = ("foldable", "rigid")
 # What is hit and how; each as often as the others.
 APPROACHES = ("wall", "slanted wall", "leaning wall", "ceiling", "pole")
 SPEEDS_M_S = (0.5, 5.0)
@@ -78,6 +77,8 @@ class HitCase:
     """The vehicle hovers, and the obstacle comes at it with the speed."""
     link: str | None = None
     """By name, of what the link to the companion does to packets; None: nothing."""
+    is_drawn: bool = False
+    """Whether the vehicle, too, is drawn from the seed: one of the airframe's kind, with other numbers."""
 
 
 def draw_case(family: str, seed: int, detectors: tuple[str, ...] | None = None, **settings: Any) -> HitCase:
@@ -99,26 +100,21 @@ def draw_case(family: str, seed: int, detectors: tuple[str, ...] | None = None, 
 
 def work_out_hit(case: HitCase) -> dict[str, Any]:
     """Fly it once, then let every detector hear it at every rate."""
-    airframe = airframe_of(case)
-    recording, hit = hit_of(case, airframe)
-    return score_hit(recording, hit, airframe, case.seed, case.detectors, case.sweeps, case.link)
+    vehicle = vehicle_of_hit(case)
+    recording, hit = hit_of(case, vehicle.airframe)
+    return score_hit(recording, hit, vehicle, case.seed, case.detectors, case.sweeps, case.link)
 
 
-def airframe_of(case: HitCase) -> Airframe:
-    airframe = built_in(case.airframe)
+def vehicle_of_hit(case: HitCase) -> BenchVehicle:
+    vehicle = vehicle_of(case.airframe, case.seed if case.is_drawn else None)
+    airframe = vehicle.airframe
     if case.vibration_m_s2 is not None:
         imu = airframe.imu.model_copy(update={"accelerometer_noise_m_s2": case.vibration_m_s2})
         airframe = airframe.model_copy(update={"imu": imu})
     if case.velocity_noise_m_s is not None:
         estimate = airframe.estimate.model_copy(update={"velocity_noise_m_s": case.velocity_noise_m_s})
         airframe = airframe.model_copy(update={"estimate": estimate})
-    return airframe
-
-
-@lru_cache
-def built_in(name: str) -> Airframe:
-    """Reading an airframe's file takes longer than flying a hit with it."""
-    return load_built_in(name)
+    return BenchVehicle(airframe, vehicle.settings)
 
 
 def hit_of(case: HitCase, airframe: Airframe) -> tuple[VehicleRecording, Hit]:

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from bench.baselines.config import BaselineConfig
 from bench.detectors.links import LINKS, over_link
 from bench.detectors.recording import VehicleRecording
+from bench.detectors.vehicles import BenchVehicle
 from bench.detectors.watching import (
     ASKED_HZ,
     SWEPT_FACTORS,
@@ -18,7 +20,6 @@ from bench.detectors.watching import (
 from bench.detectors.wire import HeardStep, Wire
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample
-from sim_vehicle.airframe import Airframe
 from sim_vehicle.truth import Hit
 
 Vector3 = tuple[float, float, float]
@@ -70,7 +71,7 @@ def first_possible(
 def score_hit(
     recording: VehicleRecording,
     hit: Hit,
-    airframe: Airframe,
+    vehicle: BenchVehicle,
     seed: int,
     detectors: Sequence[str],
     sweeps: bool,
@@ -78,7 +79,7 @@ def score_hit(
 ) -> dict[str, Any]:
     """What the tables need of one hit, for every rate and detector."""
     touch_us = hit.contact_at_boot_us
-    floor_m_s2 = NOISE_FLOOR_SIGMAS * airframe.imu.accelerometer_noise_m_s2
+    floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
     result: dict[str, Any] = {
         "speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
         "off_head_on_deg": _angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
@@ -94,20 +95,21 @@ def score_hit(
         possible = first_possible(recording, arrived, touch_us, floor_m_s2)
         entries, swept = {}, {}
         for name in detectors:
-            found, touches, blind = watch_all(configuration(name), arrived, recording.situations)
+            found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
             told_us = [touch.impact.sample_time_boot_us for touch in touches]
             entries[name] = _entry(found, hit, possible, blind) | {"touches": sum(t >= touch_us for t in told_us)}
             if sweeps and rate in SWEPT_RATES:
-                swept[name] = [_is_found(name, factor, arrived, recording, touch_us) for factor in SWEPT_FACTORS]
+                configs = [configuration(name, vehicle.settings, factor) for factor in SWEPT_FACTORS]
+                swept[name] = [_is_found(config, arrived, recording, touch_us) for config in configs]
         possible_ms = None if possible.time_boot_us is None else 1e-3 * (possible.time_boot_us - touch_us)
         result["rates"][str(rate)] = {"possible_ms": possible_ms, "detectors": entries, "swept": swept}
     return result
 
 
 def _is_found(
-    name: str, factor: float, arrived: Sequence[HeardStep], recording: VehicleRecording, touch_us: float
+    config: BaselineConfig, arrived: Sequence[HeardStep], recording: VehicleRecording, touch_us: float
 ) -> bool:
-    found, _, _ = watch_all(configuration(name, factor), arrived, recording.situations)
+    found, _, _ = watch_all(config, arrived, recording.situations)
     return _first_of(found, touch_us) is not None
 
 

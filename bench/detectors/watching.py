@@ -1,7 +1,9 @@
 """Detectors by name let loose on what was heard."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 from bench.baselines.config import BaselineConfig
 from bench.detectors.wire import BUILDERS, HeardStep
@@ -14,6 +16,8 @@ from companion.mission.config import CompanionConfig
 
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
+
+DEFAULTS: Mapping[str, Any] = MappingProxyType({})
 
 # What a detector's sensitivity hangs on is taken times these.
 SWEPT_FACTORS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)
@@ -47,20 +51,20 @@ class Found:
     final: ImpactEstimate
 
 
-def configuration(detector: str, factor: float = 1.0) -> BaselineConfig:
-    """Default settings but for the detector's name, and its thresholds times `factor`."""
+def configuration(detector: str, settings: Mapping[str, Any] = DEFAULTS, factor: float = 1.0) -> BaselineConfig:
+    """The vehicle's settings with the detector's name, and its thresholds times `factor`."""
     if factor == 1.0:
-        return BaselineConfig(detector=detector)
-    config = alarms_only(detector)
+        return BaselineConfig.model_validate({**settings, "detector": detector})
+    config = alarms_only(detector, settings)
     own = getattr(config, detector)
     changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
-    settings = type(own).model_validate({**own.model_dump(), **changes})
-    return config.model_copy(update={detector: settings})
+    swept = type(own).model_validate({**own.model_dump(), **changes})
+    return config.model_copy(update={detector: swept})
 
 
-def alarms_only(detector: str) -> BaselineConfig:
-    """Default settings where nobody asks which way a collision pushed: some detectors report thousands."""
-    config = BaselineConfig(detector=detector)
+def alarms_only(detector: str, settings: Mapping[str, Any] = DEFAULTS) -> BaselineConfig:
+    """Its settings where nobody asks which way a collision pushed: some detectors report thousands."""
+    config = configuration(detector, settings)
     return config.model_copy(update={"estimate": config.estimate.model_copy(update={"fits_normal": False})})
 
 

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from bench.vehicles_argument import add_vehicles
 from rebound_cli.arguments import Commands, add_documents_folder, add_workers, count, hours, runs
 
 
@@ -17,6 +18,10 @@ def add_detectors(commands: Commands) -> None:
         "--hours", type=hours, default=0.5, metavar="H", help="hours of simulated healthy flight (default 0.5)"
     )
     detectors.add_argument(
+        "--first-seed", type=count, default=0, metavar="SEED", help="of the first case; the others follow (default 0)"
+    )
+    add_vehicles(detectors, "every case")
+    detectors.add_argument(
         "--data",
         type=Path,
         metavar="DIR",
@@ -24,5 +29,5 @@ def add_detectors(commands: Commands) -> None:
         help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
     )
     add_workers(detectors)
-    add_documents_folder(detectors, "detection.md and images/detection")
+    add_documents_folder(detectors, "detection.md and images/detection, or of drawn.md")
     detectors.set_defaults(run=runs("bench.detectors_report.command:run_detectors"))

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from bench.campaign.plan import Campaign
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.detectors.campaigns import (
+    Drawing,
     flights_campaign,
     hands_campaign,
     healthy_campaign,
@@ -22,6 +23,7 @@ from bench.detectors_report.bars import Bar, bars_text, summary_text
 from bench.detectors_report.numbers import Hits
 from bench.detectors_report.reading import HOW_TO_READ
 from bench.marked import checked_text, write_part
+from bench.vehicles_argument import DRAWN_NAME, DRAWN_TITLE
 from rebound_cli import __version__
 from rebound_cli.run_folder import make_folder
 
@@ -34,23 +36,33 @@ HITS_PER_ROUND = 2500
 def run_detectors(options: Namespace) -> int:
     """0 when everything is written, whatever it says; 1 when a case failed."""
     make_folder(options.out)
-    checked_text(options.out / DOCUMENT_NAME, PART, TITLE)
+    drawing = Drawing(options.first_seed, options.vehicles == "drawn")
+    name, title = (DRAWN_NAME, DRAWN_TITLE) if drawing.is_drawn else (DOCUMENT_NAME, TITLE)
+    checked_text(options.out / name, PART, title)
     started_s = time.monotonic()
     workers = Workers(options.jobs, options.scheduler)
-    campaigns = [hits_campaign(options.hits), hands_campaign(options.hits), flights_campaign(options.hours)]
+    campaigns = [
+        hits_campaign(options.hits, drawing),
+        hands_campaign(options.hits, drawing),
+        flights_campaign(options.hours, drawing),
+    ]
     if options.data is not None:
         rounds = max(1, round(options.hits / HITS_PER_ROUND))
         campaigns += [healthy_campaign(options.data), injected_campaign(options.data, rounds)]
     worked_out = {campaign.name: (campaign, run_campaign(campaign, workers)) for campaign in campaigns}
     failures = [text for campaign, results in worked_out.values() if (text := failures_text(campaign, results))]
     bars = _bars(worked_out)
-    sections = _sections(worked_out, bars)
     lead = _lead(options, worked_out, failures)
-    _write(options.out, "\n".join([lead, *sections]), _figures(worked_out))
+    if drawing.is_drawn:
+        text = "\n".join([lead, *_headed([("What must be shown", bars_text(bars)), *_tables(worked_out)])])
+        write_part(options.out / name, PART, text, title)
+    else:
+        sections = _sections(worked_out, bars)
+        _write(options.out, "\n".join([lead, *sections]), _figures(worked_out))
     print(summary_text(bars))
     for text in failures:
         print(text)
-    print(f"Written to {options.out / DOCUMENT_NAME} in {time.monotonic() - started_s:.0f} s.")
+    print(f"Written to {options.out / name} in {time.monotonic() - started_s:.0f} s.")
     return 1 if failures else 0
 
 
@@ -75,17 +87,33 @@ def _bars(worked_out: Worked) -> list[Bar]:
     return bars + comparison.comparison_bars(_hits(worked_out), campaign.cases, results.results)
 
 
+Parts = list[tuple[str, str]]
+
+
 def _sections(worked_out: Worked, bars: list[Bar]) -> list[str]:
-    flown, results = worked_out["flights"]
-    held, in_hand = worked_out["hands"]
-    all_hits = _hits(worked_out)
-    parts: list[tuple[str, str]] = [
+    every, *others = _tables(worked_out)
+    parts: Parts = [
         ("What must be shown", bars_text(bars)),
         ("", HOW_TO_READ),
-        ("Every detector on simulated hits", hits.comparison_text(all_hits)),
+        every,
         ("", "![detection rate by speed](images/detection/speed.png)\n"),
         ("", "![false alarms against detection rate](images/detection/roc.png)\n"),
         ("", "![latency](images/detection/latency.png)\n"),
+        *others,
+    ]
+    return _headed(parts)
+
+
+def _headed(parts: Parts) -> list[str]:
+    return [f"### {title}\n\n{text}" if title else text for title, text in parts]
+
+
+def _tables(worked_out: Worked) -> Parts:
+    flown, results = worked_out["flights"]
+    held, in_hand = worked_out["hands"]
+    all_hits = _hits(worked_out)
+    parts: Parts = [
+        ("Every detector on simulated hits", hits.comparison_text(all_hits)),
         (f"Beside `{comparison.BASELINE}`", comparison.baseline_text(all_hits)),
         ("By obstacle", hits.approaches_text(all_hits)),
         ("By speed", hits.speeds_text(all_hits)),
@@ -103,13 +131,15 @@ def _sections(worked_out: Worked, bars: list[Bar]) -> list[str]:
         if name in worked_out:
             recorded, found = worked_out[name]
             parts.append((title, tell(recorded.cases, found.results)))
-    return [f"### {title}\n\n{text}" if title else text for title, text in parts]
+    return parts
 
 
 def _lead(options: Namespace, worked_out: Worked, failures: list[str]) -> str:
     """What was run and how to run it again."""
     data = "" if options.data is None else " --data DIR"
-    command = f"python -m bench detectors --hits {options.hits} --hours {options.hours:g}{data}"
+    first = f" --first-seed {options.first_seed}" if options.first_seed else ""
+    which = " --vehicles drawn" if options.vehicles == "drawn" else ""
+    command = f"python -m bench detectors --hits {options.hits} --hours {options.hours:g}{first}{which}{data}"
     counts = ", ".join(f"{len(results.results)} {name.replace('-', ' ')}" for name, (_, results) in worked_out.items())
     failed = f" {sum(len(r.failures) for _, r in worked_out.values())} cases failed." if failures else ""
     return f"\nWritten by `{command}` (version {__version__}): {counts}.{failed}\n"

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from bench.detectors.flights import FlightCase
-from bench.detectors.hits import AIRFRAMES
 from bench.detectors.scoring import FOUND_WITHIN_US
+from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors.watching import ASKED_HZ
 from bench.detectors_report.bars import Bar
 from bench.detectors_report.flights import alarms

@@ -4,8 +4,9 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from bench.detectors.hands import GRIPS, HandCase
-from bench.detectors.hits import AIRFRAMES, SPEEDS_M_S, HitCase
+from bench.detectors.hits import SPEEDS_M_S, HitCase
 from bench.detectors.links import JITTERY
+from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors.watching import ASKED_HZ
 from bench.detectors_report.bars import Bar
 from bench.detectors_report.hit_bars import FOUND_BARS

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from bench.detectors.hits import AIRFRAMES
+from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors.watching import ASKED_HZ
 from bench.detectors_report.bars import Bar
 from bench.detectors_report.hits import DEFAULT, FAST_M_S, plain

@@ -4,7 +4,8 @@ import itertools
 from collections.abc import Callable, Sequence
 
 from bench.detectors.campaigns import VELOCITY_NOISES_M_S, VIBRATIONS_M_S2
-from bench.detectors.hits import AIRFRAMES, APPROACHES, SPEEDS_M_S, HitCase
+from bench.detectors.hits import APPROACHES, SPEEDS_M_S, HitCase
+from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors.watching import ASKED_HZ
 from bench.detectors_report.numbers import (
     Hits,

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.detectors.flights import SWEPT_RATE, FlightCase
-from bench.detectors.hits import AIRFRAMES
 from bench.detectors.scoring import SWEPT_RATES
+from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors.watching import ASKED_HZ, SWEPT_FACTORS
 from bench.detectors_report.comparison import BASELINE
 from bench.detectors_report.hits import DEFAULT, SPEED_BINS_M_S, at_any_speed, plain

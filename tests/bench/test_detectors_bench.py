@@ -2,10 +2,11 @@
 
 import pytest
 
-from bench.detectors.hits import airframe_of, draw_case, fly_hit
+from bench.detectors.campaigns import Drawing, hits_campaign
+from bench.detectors.hits import draw_case, fly_hit, vehicle_of_hit
 from bench.detectors.recording import VehicleRecording
 from bench.detectors.scoring import first_possible
-from bench.detectors.watching import ASKED_HZ, streams_asked_hz
+from bench.detectors.watching import ASKED_HZ, configuration, streams_asked_hz
 from bench.detectors.wire import BUILDERS, Wire
 from companion.detection.interface import Situation
 from companion.mavlink.decode import Decoder
@@ -60,15 +61,29 @@ def test_a_hit_is_drawn_from_its_seed_alone():
     assert draw_case("plain", 7) == draw_case("plain", 7)
     drawn = [draw_case("plain", seed) for seed in range(40)]
     assert {case.airframe for case in drawn} == {"foldable", "rigid"}
-    first, again = (fly_hit(drawn[0], airframe_of(drawn[0])) for _ in range(2))
+    first, again = (fly_hit(drawn[0], vehicle_of_hit(drawn[0]).airframe) for _ in range(2))
     assert first[0].samples == again[0].samples and first[1] == again[1]
+
+
+def test_drawn_cases_have_a_vehicle_each_whose_detector_knows_its_sensor():
+    # Given a campaign of vehicles that nobody tuned for
+    cases = hits_campaign(8, Drawing(first_seed=500, is_drawn=True)).cases
+    vehicles = [vehicle_of_hit(case) for case in cases]
+    # Then each case has its own
+    assert len({vehicle.airframe.mass_kg for vehicle in vehicles}) == len(cases)
+    assert {vehicle.airframe.name.split("-")[0] for vehicle in vehicles} == {"foldable", "rigid"}
+    # And a detector is told what the data sheet says
+    for vehicle in vehicles:
+        told = configuration("fused", vehicle.settings).estimate
+        assert told.accelerometer_range_m_s2 == vehicle.airframe.imu.accelerometer_range_m_s2
+        assert told.imu_averaging_interval_s == 1e-6 * vehicle.airframe.imu.integration_interval_us
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_a_hit_is_the_one_that_was_asked_for(seed):
     # Given any approach
     case = draw_case("plain", seed)
-    airframe = airframe_of(case)
+    airframe = vehicle_of_hit(case).airframe
     # When it is flown
     recording, hit = fly_hit(case, airframe)
     # Then the vehicle touches at the speed asked for, moving towards the obstacle
@@ -88,7 +103,7 @@ def test_a_hit_is_the_one_that_was_asked_for(seed):
 def test_the_first_possible_sample_is_the_first_received_that_holds_the_force():
     # Given a hit, heard at every rate
     case = draw_case("plain", 0)
-    recording, hit = fly_hit(case, airframe_of(case))
+    recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     first_us = {}
     for rate in ASKED_HZ:
         arrived = Wire(recording).heard(streams_asked_hz(rate), case.seed)

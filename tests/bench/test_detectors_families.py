@@ -7,7 +7,7 @@ import pytest
 
 from bench.detectors.campaigns import HANDS_AT_MOST, SIDE_HITS_AT_MOST, hands_campaign, hits_campaign
 from bench.detectors.hands import draw_hand, hover_in_hand, work_out_hand
-from bench.detectors.hits import airframe_of, built_in, draw_case, fly_hit, work_out_hit
+from bench.detectors.hits import draw_case, fly_hit, vehicle_of_hit, work_out_hit
 from bench.detectors.links import JITTERY, LINKS, over_link
 from bench.detectors.scoring import first_possible
 from bench.detectors.watching import streams_asked_hz
@@ -16,13 +16,14 @@ from bench.detectors_report.bars import MET, MISSED
 from bench.detectors_report.families import families_text, family_bars, hand_bars, hands_text
 from bench.detectors_report.numbers import Hits
 from companion.messages import ImuSample
+from sim_vehicle.airframe import load_built_in
 
 # --- a bad link -------------------------------------------------------------------------------------------------------
 
 
 def sent_and_arrived(fault, seed=4):
     case = draw_case("link", 0)
-    recording, hit = fly_hit(case, airframe_of(case))
+    recording, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     sent = Wire(recording).heard(streams_asked_hz(246), seed)
     return recording, hit, sent, over_link(sent, recording, fault, seed)
 
@@ -66,7 +67,7 @@ def test_a_link_that_only_delays_shows_the_hit_by_so_much_later():
 def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
     # Given an obstacle of any kind that comes at a hovering vehicle
     case = draw_case("struck", seed, is_struck=True)
-    _, hit = fly_hit(case, airframe_of(case))
+    _, hit = fly_hit(case, vehicle_of_hit(case).airframe)
     # Then it is the obstacle that moves, at the speed asked for, and it meets the vehicle head-on or at a slant
     assert 0.5 <= case.speed_m_s <= 3.0
     assert math.hypot(*hit.impact_velocity_ned_m_s) < 0.15
@@ -81,7 +82,7 @@ def test_an_obstacle_strikes_a_vehicle_that_hovers(seed):
 def test_a_hand_holds_or_pushes_a_hovering_vehicle(seed):
     # Given a hand that holds (first) or pushes (second)
     case = draw_hand(seed, ())
-    recording, began_us = hover_in_hand(case, built_in(case.airframe))
+    recording, began_us = hover_in_hand(case, load_built_in(case.airframe))
     samples = recording.samples
     moved_m = [math.dist(s.position_ned_m, (0.0, 0.0, -30.0)) for s in samples if s.time_boot_us < began_us]
     # Then it hovered until then, and nothing of it is an obstacle
