@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from bench.campaign_report.arguments import add_campaign
+from bench.corpus.arguments import add_corpus
 from bench.detectors_report.arguments import add_detectors
 from bench.faults.arguments import add_faults
 from bench.kills.arguments import add_kills
@@ -25,6 +26,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_paper(commands)
     add_detectors(commands)
     add_campaign(commands)
+    add_corpus(commands)
     add_kills(commands)
     add_faults(commands)
     return parser

@@ -76,7 +76,7 @@ def match_contacts(collisions: Sequence[CollisionReport], hits: "Sequence[Hit]",
     collision_of_hit: dict[int, CollisionReport] = {}
     hit_of_collision: list[Hit | None] = []
     for collision in collisions:
-        index = _index_of_hit(collision.sample_time_boot_us, hits)
+        index = index_of_hit(collision.sample_time_boot_us, hits)
         if index is None or index in collision_of_hit:
             hit_of_collision.append(None)
             continue
@@ -94,7 +94,7 @@ def match_contacts(collisions: Sequence[CollisionReport], hits: "Sequence[Hit]",
     )
 
 
-def _index_of_hit(sample_time_boot_us: int, hits: "Sequence[Hit]") -> int | None:
+def index_of_hit(sample_time_boot_us: int, hits: "Sequence[Hit]") -> int | None:
     """The latest contact that had begun when the sample's window ended and was not long over."""
     for index in range(len(hits) - 1, -1, -1):
         hit = hits[index]

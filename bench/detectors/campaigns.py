@@ -111,24 +111,26 @@ def flights_campaign(hours: float, drawing: Drawing = NAMED) -> Campaign:
     return drawing.campaign("flights", {"hours": hours}, cases, work_out_flight)
 
 
-def healthy_campaign(folder: Path) -> Campaign:
-    """Every recorded flight, at half, whole and double magnitude. Raises DataError."""
+def healthy_campaign(folder: Path, detectors: tuple[str, ...] | None = None) -> Campaign:
+    """Every recorded flight, at half, whole and double magnitude; by all detectors, or these. Raises DataError."""
     logs, _ = data_files(folder)
-    cases = [HealthyCase(str(folder), log, scale, detector_names()) for scale in SCALES for log in logs]
-    return Campaign("recorded-flights", {"logs": logs}, cases, work_out_healthy, USES)
+    cases = [HealthyCase(str(folder), log, scale, detectors or detector_names()) for scale in SCALES for log in logs]
+    return Campaign("recorded-flights", {"logs": logs, "by": detectors}, cases, work_out_healthy, USES)
 
 
-def injected_campaign(folder: Path, rounds: int) -> Campaign:
-    """Every recorded impact so many times, each time in another flight. Raises DataError."""
+def injected_campaign(folder: Path, rounds: int, detectors: tuple[str, ...] | None = None) -> Campaign:
+    """Every recorded impact so many times, each time in another flight; the first time by all detectors, or always by
+    these. Raises DataError."""
     logs, drops = data_files(folder)
     healthy = [log for log in logs if log != STRIKE_LOG]
     cases = []
     for turn in range(rounds):
-        detectors = detector_names() if turn == 0 else _thorough()
+        by = detectors or (detector_names() if turn == 0 else _thorough())
         for number, drop in enumerate(drops):
             log, seed = healthy[(number + turn) % len(healthy)], turn * len(drops) + number
-            cases.append(InjectedCase(str(folder), log, drop, seed, detectors))
-    return Campaign("recorded-impacts", {"logs": healthy, "rounds": rounds}, cases, work_out_injected, USES)
+            cases.append(InjectedCase(str(folder), log, drop, seed, by))
+    parameters = {"logs": healthy, "rounds": rounds, "by": detectors}
+    return Campaign("recorded-impacts", parameters, cases, work_out_injected, USES)
 
 
 def _side(hits: int, at_most: int) -> int:

@@ -82,7 +82,7 @@ def score_hit(
     floor_m_s2 = NOISE_FLOOR_SIGMAS * vehicle.airframe.imu.accelerometer_noise_m_s2
     result: dict[str, Any] = {
         "speed_m_s": math.hypot(*hit.impact_velocity_ned_m_s),
-        "off_head_on_deg": _angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
+        "off_head_on_deg": angle_deg(_minus(hit.impact_velocity_ned_m_s), hit.normal_ned),
         "clipped": _clipped(recording, hit),
         "contact_s": hit.contact_duration_s,
         "rates": {},
@@ -131,8 +131,8 @@ def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> 
         "evidence": first.first.impact.evidence.value,
         "speed_error_m_s": math.hypot(*velocity) - math.hypot(*true_velocity),
         "velocity_error_m_s": math.dist(velocity, true_velocity),
-        "normal_error_deg": _angle_deg(first.final.normal_ned, hit.normal_ned),
-        "first_normal_error_deg": _angle_deg(first.first.normal_ned, hit.normal_ned),
+        "normal_error_deg": angle_deg(first.final.normal_ned, hit.normal_ned),
+        "first_normal_error_deg": angle_deg(first.first.normal_ned, hit.normal_ned),
         "time_error_ms": 1e-3 * (first.final.time_boot_us - touch_us),
         "kind": first.final.kind.value,
         "confidence": first.final.confidence,
@@ -163,7 +163,7 @@ def _minus(vector: Vector3) -> Vector3:
     return -vector[0], -vector[1], -vector[2]
 
 
-def _angle_deg(one: Vector3, other: Vector3) -> float:
+def angle_deg(one: Vector3, other: Vector3) -> float:
     lengths = math.hypot(*one) * math.hypot(*other)
     if lengths == 0.0:
         return 180.0

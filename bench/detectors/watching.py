@@ -18,6 +18,8 @@ from companion.mission.config import CompanionConfig
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
 
 DEFAULTS: Mapping[str, Any] = MappingProxyType({})
+FLOWN_WITH = (BaselineConfig().detector,)
+"""The detector of a drone."""
 
 # What a detector's sensitivity hangs on is taken times these.
 SWEPT_FACTORS = (0.25, 0.5, 0.7, 1.0, 1.4, 2.0, 4.0)

@@ -1,10 +1,21 @@
 """The arguments of `bench detectors`."""
 
 import os
+from argparse import ArgumentParser
 from pathlib import Path
 
 from bench.vehicles_argument import add_vehicles
 from rebound_cli.arguments import Commands, add_documents_folder, add_workers, count, hours, runs
+
+
+def add_data(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--data",
+        type=Path,
+        metavar="DIR",
+        default=os.environ.get("REBOUND_DATA") or None,
+        help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
+    )
 
 
 def add_detectors(commands: Commands) -> None:
@@ -21,13 +32,7 @@ def add_detectors(commands: Commands) -> None:
         "--first-seed", type=count, default=0, metavar="SEED", help="of the first case; the others follow (default 0)"
     )
     add_vehicles(detectors, "every case")
-    detectors.add_argument(
-        "--data",
-        type=Path,
-        metavar="DIR",
-        default=os.environ.get("REBOUND_DATA") or None,
-        help="folder with px4_logs/*.ulg and drops/ for recorded flights and impacts (default: $REBOUND_DATA)",
-    )
+    add_data(detectors)
     add_workers(detectors)
     add_documents_folder(detectors, "detection.md and images/detection, or of drawn.md")
     detectors.set_defaults(run=runs("bench.detectors_report.command:run_detectors"))

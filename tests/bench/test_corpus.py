@@ -1,0 +1,72 @@
+"""The corpus: a flight is kept as bytes and truth, judged from its bytes, and two versions' verdicts are told apart."""
+
+import copy
+import json
+
+import pytest
+
+from bench.corpus.comparison import comparison_text
+from bench.corpus.recording import record
+from bench.corpus.verdict import FlightCase, work_out
+from bench.main import main
+from bench.random_missions.generator import MissionCase
+from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME
+from sim_vehicle.shell.truth_file import load_truth
+
+# The first random mission, of a drawn vehicle, in which something is hit.
+CASE = MissionCase(70003, "foldable", is_drawn=True)
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("corpus") / "flight"
+    record((folder, CASE))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def verdicts(flight):
+    return {"flights": {"flight": work_out(FlightCase(str(flight)))}}
+
+
+def test_a_flight_is_judged_from_its_bytes_against_its_truth(flight, verdicts):
+    # Given a recorded flight with hits
+    hits, _, _ = load_truth(flight / TRUTH_NAME)
+    assert hits
+    # When it is heard again, as recorded and at 50 Hz
+    rates = verdicts["flights"]["flight"]["rates"]
+    # Then each true hit has its row, with what was told of it, and nothing else was told
+    for rate, most_late_ms in (("recorded", 10.0), ("50", 45.0)):
+        rows = rates[rate]["hits"]
+        assert [row["contact_boot_us"] for row in rows] == [round(hit.contact_at_boot_us) for hit in hits]
+        assert all(0.0 <= row["latency_ms"] <= most_late_ms for row in rows)
+        assert rates[rate]["false_boot_us"] == []
+
+
+def test_a_flight_that_is_there_is_not_flown_again(flight):
+    before = (flight / TLOG_NAME).stat().st_mtime_ns
+    record((flight, CASE))
+    assert (flight / TLOG_NAME).stat().st_mtime_ns == before
+
+
+def test_a_hit_that_is_lost_and_a_false_one_are_told(verdicts, tmp_path, capsys):
+    # Given a version that misses the first hit at 50 Hz and tells one that is none
+    worse = copy.deepcopy(verdicts)
+    verdict = worse["flights"]["flight"]["rates"]["50"]
+    for key in ("latency_ms", "velocity_error_m_s", "normal_error_deg"):
+        del verdict["hits"][0][key]
+    verdict["false_boot_us"].append(12_000_000)
+    for name, content in (("old.json", verdicts), ("new.json", worse)):
+        (tmp_path / name).write_text(json.dumps(content))
+    # When both are compared
+    assert main(["corpus", "compare", str(tmp_path / "old.json"), str(tmp_path / "new.json")]) == 0
+    # Then the flight is named with what changed, and of the same version nothing has
+    assert "flight, 50: 0 hits won, 1 lost, +1 told that are none" in capsys.readouterr().out
+    assert "flight," not in comparison_text(verdicts, verdicts)
+
+
+@pytest.mark.parametrize("words", [["judge", "FOLDER", "--out", "FOLDER/v.json"], ["compare", "FOLDER/a", "FOLDER/b"]])
+def test_a_folder_or_a_file_with_nothing_in_it_is_one_sentence(words, tmp_path, capsys):
+    assert main(["corpus", *(word.replace("FOLDER", str(tmp_path)) for word in words)]) == 1
+    told = capsys.readouterr().err
+    assert str(tmp_path) in told and len(told.strip().splitlines()) == 1
