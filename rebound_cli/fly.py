@@ -121,7 +121,8 @@ def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirm
         )
     finally:
         connection.close()
-    return Flown(companion.report(), time.monotonic() - started_s, None, timing, refused_packets(connection))
+    duration_s = time.monotonic() - started_s
+    return Flown(companion.report(), duration_s, None, timing, refused_packets(connection), connection.counts)
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:

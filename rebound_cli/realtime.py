@@ -189,9 +189,9 @@ class Loop:
         if self.interrupts.reason is not None and not self.is_interrupted:
             self.is_interrupted = True
             self._stop(self.interrupts.reason)
-        stranger = self.connection.news()
-        if stranger is not None:
-            self._note("stranger", stranger, now_us)
+        news = self.connection.news()
+        if news is not None:
+            self._note("link", news, now_us)
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return

@@ -48,6 +48,7 @@ def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
             "collisions": hits,
             "left_alone": guard.left_alone(),
             "round_trip_ms": guard.round_trip().summary(),
+            **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
         }
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
