@@ -136,14 +136,17 @@ class FlightRecorder:
         if result.sent_frames:
             self._tlog.write(now_us, result.sent_frames)
 
-    def record_person(self, now_us: int, is_confirmed: bool, stop_reason: str | None) -> None:
-        """What the companion has been told by now, after its step at `now_us`; only what is new is written."""
+    def record_confirmation(self, now_us: int, is_confirmed: bool) -> None:
+        """Whether the plan is agreed to by now, after the companion's step at `now_us`; written when it is newly so."""
         if is_confirmed and not self._is_confirmed:
-            self._is_confirmed = True
             self._record_input(now_us, "confirm")
-        if stop_reason is not None and stop_reason != self._stop_reason:
-            self._stop_reason = stop_reason
-            self._record_input(now_us, "stop", reason=stop_reason)
+        self._is_confirmed = is_confirmed
+
+    def record_stop(self, now_us: int, reason: str) -> None:
+        """The companion has been asked to stop, after its step at `now_us`; written once a reason."""
+        if reason != self._stop_reason:
+            self._stop_reason = reason
+            self._record_input(now_us, "stop", reason=reason)
 
     def record_file(self, now_us: int) -> None:
         """The companion was told, after its step at `now_us`, that the file it waits for exists."""

@@ -141,6 +141,8 @@ class FlightContext:
     command_client: CommandClient = field(default_factory=CommandClient)
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
+    is_silent: bool = False  # for longer than a silent link is put up with
+    was_silent: bool = False  # since the streams were asked for; if it was restarted meanwhile it has forgotten them
     target: Target | None = None  # as last streamed
     is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
@@ -207,6 +209,15 @@ class FlightContext:
     def own_modes(self) -> tuple[int | None, ...]:
         """The modes that mean that the companion has the vehicle; none while it does not hold it."""
         return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
+
+    def silent_s(self, now_us: int) -> float:
+        """How long nothing has been heard of the vehicle."""
+        return (now_us - self.vehicle.last_heard_us) * 1e-6
+
+    def note_silence(self, now_us: int) -> None:
+        known = self.vehicle.identity is not None
+        self.is_silent = known and self.silent_s(now_us) > self.mission.companion.link.silence_s
+        self.was_silent |= self.is_silent
 
     def may_ask(self, now_us: int) -> bool:
         """Whether a command that moves a held vehicle may leave: not on old news, which the pilot may have made untrue.
