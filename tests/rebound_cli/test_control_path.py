@@ -116,6 +116,23 @@ class Unplugged(ConfirmAtOnce):
             world.told.append("connected again: /dev/ttyACM1")
 
 
+class Restarted(ConfirmAtOnce):
+    """Restarts the vehicle while the plan is shown; the person says yes to that one, too."""
+
+    def __init__(self, world):
+        super().__init__()
+        self._world, self._since_us = world, None
+
+    def poll(self, companion):
+        world, now_us = self._world, self._world.vehicle.time_boot_us
+        if self._since_us is None and companion.plan_is_ready():
+            self._since_us, world.is_cut = now_us, True
+        silent_us = now_us - (self._since_us or now_us)
+        world.is_cut &= silent_us < 2_000_000
+        if silent_us > 1_800_000:
+            super().poll(companion)
+
+
 def fly(folder, stream=sys.stderr, confirm=None):
     """A hop in virtual time through the loop of real flights."""
     document = load_mission_document(SQUARE, HOP_SETS)
@@ -185,6 +202,14 @@ def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_
         "connected again: /dev/ttyACM1",
     ]
     assert any(b"Connected again: /dev/ttyACM1" in frame for frame in world.sent)
+    assert_comes_again(tmp_path)
+
+
+def test_a_plan_that_is_made_anew_after_a_silence_is_agreed_to_twice_and_the_log_says_so(tmp_path):
+    companion, _, recorder, _, _ = fly(tmp_path, confirm=Restarted)
+    assert companion.report().outcome == "completed"
+    assert [event.kind for event in recorder.events].count("plan") == 2
+    assert (tmp_path / run_folder.INPUTS_NAME).read_text().count('"confirm"') == 2
     assert_comes_again(tmp_path)
 
 
