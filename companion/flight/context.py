@@ -146,6 +146,9 @@ class FlightContext:
     target: Target | None = None  # as last streamed
     is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
+    stepped_us: int | None = None  # when the step before was
+    way_us: int = 0  # a clock that stands still while no position comes: nobody flies on who does not hear the vehicle
+    is_heard: bool = True
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other

@@ -41,6 +41,7 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
             flight.round_trip.hear(sample, now_us)
         vehicle.hear(sample, now_us, own_modes)
         streams.count(type(sample), now_us)
+    _let_ways_go_on(flight, now_us)
     if vehicle.conflicts > conflicts:
         _tell_conflict(flight, now_us)
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
@@ -50,6 +51,16 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
     if vehicle.identity is not None:
         _measure_round_trip(flight, now_us)
     return None
+
+
+def _let_ways_go_on(flight: FlightContext, now_us: int) -> None:
+    """After a silence, or a step that came as late, a way goes on where it was: nothing is caught up with."""
+    before_us, heard_us = flight.stepped_us, flight.vehicle.last_position_us
+    flight.stepped_us = now_us
+    longest_us = flight.mission.companion.sight.silence_s * 1e6
+    flight.is_heard = heard_us is not None and now_us - heard_us <= longest_us
+    if before_us is not None and flight.is_heard and now_us - before_us <= longest_us:
+        flight.way_us += now_us - before_us
 
 
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
