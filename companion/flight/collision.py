@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
+from companion.estimate.history import MotionHistory
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import DECIDED_US, Claim, Leap
@@ -45,6 +46,7 @@ class CollisionRecord:
     contact_ended_boot_us: int
     impulse_m_s: float
     climb: Climb
+    recovering_since_us: int = 0  # when the first came of the hits that the vehicle has not settled between
     doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
     inherits_doubt: bool = False  # from an earlier hit
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
@@ -97,12 +99,14 @@ class CollisionRecord:
         """Another sample of the contact's force has come."""
         return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > claim.time_boot_us
 
-    def is_contradicted(self, now_boot_us: int) -> bool:
+    def is_contradicted(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether, once that is decided, nothing but its first sample shows this hit."""
         if self.claim is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
-        found = self.claim.is_contradicted(self.fixes)
-        self.claim = None
+        claim, self.claim = self.claim, None
+        found = claim.is_contradicted(self.fixes)
+        if isinstance(claim, Leap) and not found:
+            found = claim.stays_in_place(places, position_noise_m)
         return found
 
     def follow_recovery(self, sample: LocalPosition) -> None:
