@@ -20,11 +20,12 @@ from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
+from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, FlightFaultError, fly_realtime
 from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.summary import FlightFacts, Flown, build_summary
+from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth
 from rebound_cli.vehicle_process import VehicleProcess
 
@@ -115,14 +116,18 @@ def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: Sim
 def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirmation) -> Flown:
     companion = Companion(flight.mission)
     started_s = time.monotonic()
+    timing, fault = Timing(), None
     try:
         timing = fly_realtime(
             companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts
         )
+    except FlightFaultError as error:
+        # What is known of the flight is written first.
+        fault = error
     finally:
         connection.close()
-    duration_s = time.monotonic() - started_s
-    return Flown(companion.report(), duration_s, None, timing, refused_packets(connection), connection.counts)
+    duration_s, refused = time.monotonic() - started_s, refused_packets(connection)
+    return Flown(companion.report(), duration_s, None, timing, refused, connection.counts, fault)
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:
@@ -201,6 +206,8 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     finally:
         if json_on_stdout:
             print(json.dumps(summary, indent=2))
+    if flown.fault is not None:
+        raise flown.fault
     return 0 if summary["outcome"] == "completed" else 1
 
 

@@ -129,10 +129,12 @@ class FlightRecorder:
         # What is small first: a log that may grow no more costs no event.
         for event in result.events:
             self._events_file.write(event_line(event))
-        if not result.sent_frames and not any(map(is_packet, result.received_frames)):
+        # Foreign bytes among the packets could hide one of them from whoever reads the log.
+        received = [frame for frame in result.received_frames if is_packet(frame)]
+        if not result.sent_frames and not received:
             self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
-        if result.received_frames:
-            self._tlog.write(now_us, result.received_frames)
+        if received:
+            self._tlog.write(now_us, received)
         if result.sent_frames:
             self._tlog.write(now_us, result.sent_frames)
 

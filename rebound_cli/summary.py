@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from companion.errors import ReboundError
 from companion.memory.stored import as_data
 from companion.report import FlightReport
 from companion.shell.connection import LinkCounts
@@ -38,6 +39,7 @@ class Flown:
     timing: Timing | None = None  # None in lockstep, which knows no real time
     refused_packets: Mapping[str, int] = field(default_factory=dict)  # by reason; see mavlink/signing.py
     link: LinkCounts = field(default_factory=LinkCounts)
+    fault: ReboundError | None = None  # of the program around the flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +61,8 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "mission": facts.mission,
-        "outcome": report.outcome,
-        "reason": report.reason,
+        "outcome": report.outcome if flown.fault is None else "failed",
+        "reason": report.reason if flown.fault is None else str(flown.fault),
         "autopilot": report.autopilot,
         "seed": facts.seed,
         "airframe": facts.airframe,

@@ -1,6 +1,8 @@
 """Disks, terminals, garbage and faults beside the control path: none of them ends a flight in the air."""
 
 import gc
+import io
+import json
 import resource
 import sys
 import threading
@@ -10,6 +12,8 @@ import pytest
 
 from companion.companion import Companion, StepResult
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
+from companion.shell.connection import LinkCounts
+from rebound_cli import fly as command
 from rebound_cli import run_folder
 from rebound_cli.background import MOST_WAITING, Background
 from rebound_cli.console import Console
@@ -336,3 +340,34 @@ def test_garbage_is_collected_while_disarmed_only():
         allow_collecting(False)
         assert not gc.isenabled() and sys.getswitchinterval() < switch_interval_s
     assert gc.isenabled() and gc.get_freeze_count() == 0 and sys.getswitchinterval() == switch_interval_s
+
+
+def test_a_fault_around_the_flight_leaves_a_summary_and_is_raised_then(tmp_path, monkeypatch):
+    # Given a flight that a fault of the program ended
+    document = load_mission_document(SQUARE, HOP_SETS)
+    problem = FlightFaultError("Fault around the flight; the vehicle was handed over.")
+
+    def breaks(*arguments):
+        raise problem
+
+    monkeypatch.setattr(command, "fly_realtime", breaks)
+    flight = command.Flight(
+        mission_from(document), None, tmp_path, FlightRecorder(tmp_path), Console(io.StringIO()), Interrupts()
+    )
+    connection: Any = Silent()
+    flown = command._fly_connected(flight, connection, ConfirmAtOnce())
+    with pytest.raises(FlightFaultError, match="handed over"):
+        command._finish(flight, flown, False)
+    # Then what is known of it is in its folder
+    summary = json.loads((tmp_path / run_folder.SUMMARY_NAME).read_text())
+    assert summary["outcome"] == "failed" and summary["reason"] == str(problem) and connection.is_closed
+
+
+class Silent:
+    """A connection that nobody uses."""
+
+    counts = LinkCounts()
+    is_closed = False
+
+    def close(self):
+        self.is_closed = True
