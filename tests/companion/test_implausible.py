@@ -165,3 +165,14 @@ def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
     assert f.now_us - began_us == pytest.approx(timeout_us, abs=1_000_000)
     f.run_for(0.1)
     assert f.vehicle.mode != LOITER
+
+
+@pytest.mark.parametrize("late_ms", [200, 1000])
+def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms):
+    """By as much as a mean's time or a second, for which what is learnt of drag and wind would be divided by zero."""
+    f = flight_in("returning")
+    for _ in range(200):
+        stamp_ms = f.vehicle.time_us // 1000
+        late = mav.MAVLink_local_position_ned_message(stamp_ms - late_ms, *f.vehicle.position, *f.vehicle.velocity)
+        attacked(f, [bytes(late.pack(mav.MAVLink(None, 1, 1)))])
+    assert "fault" not in f.kinds(), f.texts()
