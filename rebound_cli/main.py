@@ -13,6 +13,7 @@ from rebound_cli.arguments import SIMULATED_AUTOPILOTS
 from rebound_cli.check.arguments import add_check
 from rebound_cli.completion_arguments import add_completion
 from rebound_cli.extras import needed_text
+from rebound_cli.flights.arguments import add_doctor, add_logs
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
@@ -21,6 +22,7 @@ from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
 from rebound_cli.sim_arguments import add_sim
+from rebound_cli.status.arguments import add_status
 from rebound_cli.tune.arguments import add_tune
 
 EXIT_ERROR = 1
@@ -95,6 +97,9 @@ def build_parser() -> argparse.ArgumentParser:
     add_plan(commands)
     add_sim(commands)
     add_preflight(commands)
+    add_status(commands)
+    add_logs(commands)
+    add_doctor(commands)
     add_replay(commands)
     add_tune(commands)
     add_airframe(commands)

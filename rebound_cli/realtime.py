@@ -16,6 +16,7 @@ from companion.shell.connection import Connection
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.status.server import StatusServer
 from rebound_cli.timing import Heard, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
@@ -233,6 +234,7 @@ def fly_realtime(
     console: Console,
     confirmation: Confirmation,
     interrupts: Interrupts,
+    server: StatusServer | None = None,
 ) -> Timing:
     """Run until the companion has finished; after the first interrupt it finishes by itself. How steadily it went."""
     started_us = clock.now_us()
@@ -247,7 +249,10 @@ def fly_realtime(
         recorder.record_confirmation(now_us, companion.plan_is_confirmed)
         if companion.stop_reason is not None:
             recorder.record_stop(now_us, companion.stop_reason)
-        console.live(companion.status, (now_us - started_us) / 1e6, loop.heard.text(now_us))
+        running_s, link = (now_us - started_us) / 1e6, loop.heard.text(now_us)
+        console.live(companion.status, running_s, link)
+        if server is not None:
+            server.hand_over(companion.status, result.events, running_s, link)
 
     loop = Loop(companion, connection, clock, recorder, console, interrupts)
     loop.run(beside)

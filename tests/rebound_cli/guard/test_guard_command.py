@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from companion.guard.config import GuardConfig
+from rebound_cli.status.asking import ask
 from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
 pytestmark = pytest.mark.realtime
@@ -56,7 +57,8 @@ def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
     assert json.loads((tmp_path / "summary.json").read_text())["left_alone"] == 0
 
 
-def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path):
+def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(tmp_path / "run"))
     port = free_port()
     simulator = [sys.executable, "-m", "rebound_cli", "sim", "--port", "0", "--remote", f"127.0.0.1:{port}"]
     vehicle = subprocess.Popen(
@@ -65,6 +67,7 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path):
     guard = start("guard", "--connect", f"udpin://127.0.0.1:{port}", "--out", tmp_path, "--then", "previous", *QUICK)
     try:
         wait_for_event(tmp_path, "standing_by")
+        status = ask(tmp_path / "run" / "status.sock")
         guard.send_signal(signal.SIGTERM)
         stdout, stderr = guard.communicate(timeout=20)
     finally:
@@ -72,6 +75,9 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path):
         vehicle.stdin.close()
         vehicle.wait(20)
     assert guard.returncode == 0, stderr
+    assert status["command"] == "guard" and status["pid"] == guard.pid and status["folder"] == str(tmp_path)
+    assert status["age_s"] < 5.0 and status["hits"] == 0
+    assert not (tmp_path / "run" / "status.sock").exists()
     assert "stopped by a terminate signal; 0 hits" in stdout
     assert [event["kind"] for event in events_of(tmp_path)][-1] == "stopped"
     assert (tmp_path / "flight.tlog").stat().st_size > 10_000
