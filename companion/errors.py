@@ -11,3 +11,7 @@ class ConfigurationError(ReboundError):
 
 class ConnectionSetupError(ReboundError):
     """The connection could not be opened: port in use, serial device missing, URL not understood."""
+
+
+class AddressError(ConfigurationError, ConnectionSetupError):
+    """What was given as an address is none: trying again will not help."""

@@ -1,5 +1,6 @@
 """What a person sees of a flight: events as they happen, the state now, the end."""
 
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -40,7 +41,7 @@ class Display(Protocol):
 
 
 class Plain:
-    """Lines, for a pipe, a file or a service's journal."""
+    """Lines, for a pipe or a file."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -68,6 +69,13 @@ class Plain:
 
     def close(self) -> None:
         self._stream.flush()
+
+
+class Journal(Plain):
+    """Lines for a service's journal. The state is not among them: the service manager shows the present one."""
+
+    def state(self, fields: Fields) -> None:
+        pass
 
 
 class Console:
@@ -133,7 +141,7 @@ class Console:
 
 def _display(stream: TextIO) -> Display:
     if not stream.isatty():
-        return Plain(stream)
+        return Journal(stream) if "NOTIFY_SOCKET" in os.environ else Plain(stream)
     # A companion that runs as a service has no terminal, and never loads what draws on one.
     from rebound_cli.terminal import Terminal
 

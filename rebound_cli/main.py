@@ -6,8 +6,8 @@ import itertools
 import sys
 from collections.abc import Sequence
 
-from companion.errors import ReboundError
-from rebound_cli import __version__
+from companion.errors import ConfigurationError, ReboundError
+from rebound_cli import __version__, exit_codes
 from rebound_cli.airframe_arguments import add_airframe
 from rebound_cli.arguments import SIMULATED_AUTOPILOTS
 from rebound_cli.check.arguments import add_check
@@ -21,13 +21,11 @@ from rebound_cli.key_arguments import add_key
 from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
+from rebound_cli.service.arguments import add_service
 from rebound_cli.sim_arguments import add_sim
 from rebound_cli.status.arguments import add_status
 from rebound_cli.tune.arguments import add_tune
 
-EXIT_ERROR = 1
-# The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
-EXIT_INTERRUPTED = 130
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Whoever ends these at once leaves a vehicle to itself.
@@ -49,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if words and words[0] in MOVED:
         text = f"'rebound {words[0]}' is now 'python -m bench {MOVED[words[0]]}', run in a checkout of Rebound"
         print(f"rebound: {text}.", file=sys.stderr)
-        return EXIT_ERROR
+        return exit_codes.ERROR
     return run(build_parser().parse_args(words), "rebound")
 
 
@@ -61,27 +59,28 @@ def run(options: argparse.Namespace, program: str) -> int:
         return int(options.run(options))
     except (ReboundError, SimulationError) as error:
         print(f"{program}: {error}", file=sys.stderr)
-        return EXIT_ERROR
+        is_in_vain = isinstance(error, ConfigurationError) and options.command in COMMANDING
+        return exit_codes.CONFIGURATION if is_in_vain else exit_codes.ERROR
     except ModuleNotFoundError as error:
         print(f"{program}: {needed_text(error)}", file=sys.stderr)
-        return EXIT_ERROR
+        return exit_codes.ERROR
     except KeyboardInterrupt:
         text = "ended at once"
         if options.command in COMMANDING:
             text += "; a vehicle in the air does what its autopilot does when setpoints stop"
         print(f"{program}: {text}.", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        return exit_codes.INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone (`rebound ... | head`): nobody is left to tell.
         sys.stderr.close()
-        return EXIT_ERROR
+        return exit_codes.ERROR
     except OSError as error:
         # A file or folder that cannot be had, or a disk that takes no more; any other error is a fault of ours.
         if error.filename is None and error.errno not in _DISK_ERRORS:
             raise
         where = "" if error.filename is None else f"{error.filename}: "
         print(f"{program}: {where}{error.strerror}.", file=sys.stderr)
-        return EXIT_ERROR
+        return exit_codes.ERROR
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -106,6 +105,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_identify(commands)
     add_key(commands)
     add_completion(commands)
+    add_service(commands)
     return parser
 
 

@@ -11,9 +11,11 @@ from typing import Protocol
 
 from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
+from companion.report import Status
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
-from rebound_cli.console import Console
+from companion.shell.service_manager import ServiceManager, service_manager
+from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.status.server import StatusServer
@@ -109,6 +111,8 @@ class Stepped(Protocol):
 
     def note(self, kind: str, text: str) -> None: ...
 
+    def status(self) -> Status: ...
+
 
 def waiting(connection: Connection, timeout_s: float) -> bytes:
     """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
@@ -140,6 +144,7 @@ class Loop:
     interrupts: Interrupts
     timing: Timing = field(default_factory=Timing)
     heard: Heard = field(default_factory=Heard)
+    manager: ServiceManager | None = field(default_factory=service_manager)
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False
 
@@ -182,7 +187,14 @@ class Loop:
                 self.connection.send(frame)
         finally:
             self.recorder.record(now_us, result)
+        if self.manager is not None:
+            is_ending = self.is_interrupted or self.stepped.finished
+            self.manager.stepped(self.stepped.armed is not None, is_ending, self._status_text, now_us)
         return result
+
+    def _status_text(self) -> str:
+        _, *fields = state_fields(self.stepped.status(), 0.0, self.heard.text(self.now_us or 0))
+        return ", ".join(f"{name} {text}" for name, text in fields)
 
     def _look_up(self, now_us: int) -> None:
         """Whether somebody wants an end, and whether all that was to be written was."""
@@ -195,7 +207,7 @@ class Loop:
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return
-        for writer in (self.recorder.writer, self.console.writer):
+        for writer in (self.recorder.writer, self.console.writer, self.manager):
             loss = None if writer is None else writer.news()
             if loss is not None:
                 self._note("lost", loss, now_us)

@@ -12,12 +12,13 @@ import re
 import socket
 from collections.abc import Callable
 
-from companion.errors import ConnectionSetupError
+from companion.errors import AddressError, ConnectionSetupError
 from companion.shell.connection import Connection, UdpInConnection, UdpOutConnection
 from companion.shell.peer import Peer
 from companion.shell.streams import TcpInConnection, serial_port, tcp_out
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
+_SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
 
@@ -28,29 +29,43 @@ def open_connection(
 
     Raises ConnectionSetupError with one clear sentence.
     """
-    scheme, separator, rest = url.partition("://")
-    if not separator:
-        meant = _meant(url)
-        hint = f"use {_FORMS}." if meant is None else f"did you mean {meant}?"
-        raise ConnectionSetupError(f"{url!r} is not a connection address: {hint}")
+    scheme, rest = _scheme_and_rest(url)
     if peer is not None and scheme not in ("udpin", "udp"):
-        raise ConnectionSetupError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
+        raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
         return serial_port(*_device_and_baud(url, rest))
     host, port = _host_and_port(url, rest)
     if scheme == "udp":
         scheme = "udpin" if host in ("", "0.0.0.0", "::") else "udpout"
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
-        raise ConnectionSetupError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
+        raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme == "udpin":
         return UdpInConnection(host, port, Peer(None if peer is None else _peer(peer), is_genuine))
     if scheme == "udpout":
         return UdpOutConnection(host, port)
     if scheme == "tcpout":
         return tcp_out(host, port)
-    if scheme == "tcpin":
-        return TcpInConnection(host, port)
-    raise ConnectionSetupError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+    return TcpInConnection(host, port)
+
+
+def serial_device(url: str) -> str | None:
+    """The device of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
+    scheme, rest = _scheme_and_rest(url)
+    if scheme == "serial":
+        return _device_and_baud(url, rest)[0]
+    _host_and_port(url, rest)
+    return None
+
+
+def _scheme_and_rest(url: str) -> tuple[str, str]:
+    scheme, separator, rest = url.partition("://")
+    if not separator:
+        meant = _meant(url)
+        hint = f"use {_FORMS}." if meant is None else f"did you mean {meant}?"
+        raise AddressError(f"{url!r} is not a connection address: {hint}")
+    if scheme not in _SCHEMES:
+        raise AddressError(f"{url!r} begins with an unknown scheme {scheme!r}: use {_FORMS}.")
+    return scheme, rest
 
 
 def _meant(text: str) -> str | None:
@@ -83,12 +98,12 @@ def _peer(text: str) -> tuple[str, int | None]:
 def _device_and_baud(url: str, rest: str) -> tuple[str, int]:
     device, separator, baud = rest.rpartition(":")
     if not separator or not device or not baud.isdecimal() or int(baud) == 0:
-        raise ConnectionSetupError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
+        raise AddressError(f"{url!r} names no device and baud rate: use serial:///dev/ttyAMA0:921600.")
     return device, int(baud)
 
 
 def _host_and_port(url: str, rest: str) -> tuple[str, int]:
     match = _HOST_PORT.match(rest)
     if match is None or int(match["port"]) > 65_535:
-        raise ConnectionSetupError(f"{url!r} names no host and port: use {_FORMS}.")
+        raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")
     return match["host"], int(match["port"])

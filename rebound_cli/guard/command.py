@@ -4,7 +4,7 @@ from argparse import Namespace
 from dataclasses import asdict
 
 from companion.companion import StepResult
-from companion.errors import ConfigurationError
+from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.shell.clock import Clock
@@ -23,7 +23,7 @@ from rebound_cli.status.server import StatusServer, served
 
 
 def run_guard(options: Namespace) -> int:
-    """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
+    """Guard until told to stop; 0 then. Raises ReboundError where there is nothing that can be guarded."""
     config = guard_config(options)
     run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
@@ -58,7 +58,7 @@ def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
     left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
     console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
     if interrupts.reason is None:
-        raise ConfigurationError(guard.outcome[:1].upper() + guard.outcome[1:] + ".")
+        raise ReboundError(guard.outcome[:1].upper() + guard.outcome[1:] + ("" if guard.outcome.endswith("?") else "."))
     return 0
 
 

@@ -1,0 +1,12 @@
+"""The exit codes of every command but 0; docs/companion-computer.md has the table."""
+
+ERROR = 1
+# argparse's own, for a command line that cannot be read.
+USAGE = 2
+# EX_CONFIG of sysexits.h, which systemd knows as CONFIG.
+CONFIGURATION = 78
+# The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
+INTERRUPTED = 130
+
+# With the same command line and files it goes the same way again.
+IN_VAIN = (USAGE, CONFIGURATION)

@@ -1,0 +1,1 @@
+"""`rebound service`: the guard, or a mission, as a service of systemd."""

@@ -1,0 +1,93 @@
+"""The system that the service is installed on: its folder, its programs, its user."""
+
+import grp
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import rebound_cli
+from companion.errors import ReboundError
+
+# ProtectHome= hides these from the service.
+_HIDDEN = ("/home", "/root", "/run/user")
+# Who may open serial ports: Debian's and Ubuntu's group, and Arch's.
+_SERIAL_GROUPS = ("dialout", "uucp")
+
+
+class ServiceError(ReboundError):
+    """The system has no systemd, or it refused."""
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """The one of this computer; with another `root` that in a folder, as `systemctl --root` has it."""
+
+    root: Path = Path("/")
+
+    @property
+    def is_running(self) -> bool:
+        """Not where an image is made, in a chroot or a container: there all begins with the first boot."""
+        # As sd_booted(3) finds out.
+        return self.root == Path("/") and Path("/run/systemd/system").is_dir()
+
+    def root_option(self) -> list[str]:
+        return [] if self.root == Path("/") else [f"--root={self.root}"]
+
+    def refuse_if_unfit(self) -> None:
+        """Raises ServiceError where there is no systemd, or nothing may be changed."""
+        if shutil.which("systemctl") is None:
+            raise ServiceError("This system has no systemd, which runs Rebound's service.")
+        if not os.access(self.root / "etc", os.W_OK):
+            raise ServiceError(f"{self.root / 'etc'} cannot be written to: run it again with sudo.")
+
+    def call(self, *command: str) -> int:
+        """The exit code; what the program prints is for the person. Raises ServiceError where it is not there."""
+        if shutil.which(command[0]) is None:
+            raise ServiceError(f"{command[0]} is not on this machine: Rebound's service needs systemd.")
+        return subprocess.run(command, check=False).returncode
+
+    def told(self, *command: str) -> None:
+        """Raises ServiceError where it fails."""
+        code = self.call(*command)
+        if code != 0:
+            raise ServiceError(f"`{' '.join(command)}` failed with exit code {code}: what it says is above.")
+
+    def answer(self, *command: str) -> tuple[str, int]:
+        """What the program prints, and its exit code."""
+        done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        return done.stdout.strip(), done.returncode
+
+    def release(self) -> int | None:
+        """systemd's; None where there is none."""
+        if shutil.which("systemctl") is None:
+            return None
+        found = re.match(r"systemd (\d+)", self.answer("systemctl", "--version")[0])
+        return None if found is None else int(found[1])
+
+    def serial_group(self) -> str:
+        present = {group.gr_name for group in grp.getgrall()}
+        return next((name for name in _SERIAL_GROUPS if name in present), _SERIAL_GROUPS[0])
+
+    def write(self, path: str, text: str) -> None:
+        """Whenever this ends, the file is whole: the old one or the new one."""
+        file = self.root / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        half_written = file.with_name(file.name + ".part")
+        half_written.write_text(text, encoding="utf-8")
+        # The service's user reads it, whatever the umask of whoever installs.
+        half_written.chmod(0o644)
+        half_written.replace(file)
+
+
+def hidden_program() -> str | None:
+    """The folder with a part of this program that the service could not read."""
+    parts = (sys.prefix, sys.base_prefix, str(Path(rebound_cli.__file__).parent))
+    return next((part for part in parts if _is_hidden(Path(part).resolve())), None)
+
+
+def _is_hidden(folder: Path) -> bool:
+    return any(folder.is_relative_to(place) for place in _HIDDEN)

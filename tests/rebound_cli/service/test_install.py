@@ -1,0 +1,273 @@
+"""`rebound service` in a folder that stands for a system's root: what is written, kept, refused and taken away."""
+
+import shutil
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+
+from rebound_cli import exit_codes
+from rebound_cli.main import main
+from rebound_cli.service import check, command
+from rebound_cli.service.check import MOST_EXPOSED, analysed
+from rebound_cli.service.files import SYSUSERS, UDEV, UNIT, udev_text, unit_text
+from rebound_cli.service.settings import ServiceSettings
+from rebound_cli.service.system import ServiceError, System, hidden_program
+
+ROOT = Path(__file__).parents[3]
+GUARD = ROOT / "examples" / "guard.yaml"
+FTDI = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A10-if00-port0"
+PIXHAWK = "/dev/serial/by-id/usb-3D_Robotics_PX4_FMU_v5.x_0-if00"
+UART = "/dev/ttyAMA0"
+UDP = "udpin://0.0.0.0:14540"
+PYTHON = "/opt/rebound/bin/python"
+NEEDS_SYSTEMD = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="there is no systemd-analyze here")
+
+
+@pytest.fixture
+def system(tmp_path, monkeypatch):
+    """One with systemd, in a folder; the interpreter of the tests may lie where a service cannot read it."""
+    monkeypatch.setattr(command, "hidden_program", lambda: None)
+    monkeypatch.setattr(check, "hidden_program", lambda: None)
+    monkeypatch.setattr(shutil, "which", lambda program: f"/usr/bin/{program}")
+    called = []
+    monkeypatch.setattr(System, "call", lambda self, *words: called.append(words) or 0)
+    (tmp_path / "etc").mkdir()
+    made = System(tmp_path)
+    return Namespace(system=made, root=tmp_path, called=called)
+
+
+def service(system, what, **options):
+    given = {"guard": None, "mission": None, "connect": None, "dry_run": False, **options}
+    return command.run_on(system.system, Namespace(what=what, **given))
+
+
+def files(root):
+    return {path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file()}
+
+
+def unit(run="guard", connect=f"serial://{UART}:921600", systemd=252, **more):
+    return unit_text(ServiceSettings(run=run, connect=connect, **more), PYTHON, systemd, "dialout")
+
+
+def values(text, key):
+    return [line.partition("=")[2] for line in text.splitlines() if line.startswith(f"{key}=")]
+
+
+def test_a_dry_run_needs_nothing_and_prints_each_file_below_its_path_the_unit_last(capsys):
+    assert main(["service", "install", "--guard", str(GUARD), "--connect", f"serial://{FTDI}:921600", "--dry-run"]) == 0
+    parts = capsys.readouterr().out.split("\n# /")
+    paths = [part.partition("\n")[0].removeprefix("# /") for part in parts]
+    assert paths == ["etc/rebound/service.yaml", "etc/rebound/guard.yaml", SYSUSERS, UDEV, UNIT]
+    assert parts[1].partition("\n")[2].rstrip() == GUARD.read_text().rstrip()
+    assert values(parts[-1], "Type") == ["notify"]
+
+
+def test_a_guard_is_installed_enabled_and_taken_away_again(system, capsys):
+    assert service(system, "install", guard=GUARD, connect=f"serial://{UART}:921600") == 0
+    etc = {"etc/rebound/service.yaml", "etc/rebound/guard.yaml"}
+    assert files(system.root) == etc | {SYSUSERS, UDEV, UNIT}
+    assert (system.root / UNIT).stat().st_mode & 0o777 == 0o644
+    at = f"--root={system.root}"
+    assert system.called == [("systemd-sysusers", at, "rebound.conf"), ("systemctl", at, "enable", "rebound.service")]
+    # And what is taken away leaves what a person wrote
+    assert service(system, "uninstall", dry_run=True) == 0
+    assert f"/{UNIT}" in capsys.readouterr().out and UNIT in files(system.root)
+    assert service(system, "uninstall") == 0
+    assert files(system.root) == etc
+    assert system.called[-1] == ("systemctl", at, "disable", "rebound.service")
+    with pytest.raises(ServiceError, match="No service of Rebound is installed"):
+        service(system, "uninstall")
+
+
+def test_an_upgrade_keeps_every_value_that_a_person_wrote(system, capsys):
+    # Given an installation in which a person has changed both files
+    service(system, "install", guard=GUARD, connect=f"serial://{UART}:921600")
+    guard, settings = system.root / "etc/rebound/guard.yaml", system.root / "etc/rebound/service.yaml"
+    guard.write_text("max_hits: 7  # mine\n")
+    settings.write_text(f"# mine\nrun: guard\nconnect: serial://{PIXHAWK}:57600\n")
+    kept = guard.read_text(), settings.read_text()
+    # When it is installed again, with and without the words of the first time
+    capsys.readouterr()
+    service(system, "install", guard=GUARD, connect=f"serial://{UART}:921600")
+    assert (guard.read_text(), settings.read_text()) == kept
+    said = capsys.readouterr().out
+    assert "/etc/rebound/guard.yaml is kept. What you asked for is beside it, as guard.yaml.new." in said
+    assert guard.with_name("guard.yaml.new").read_text() == GUARD.read_text()
+    assert UART in settings.with_name("service.yaml.new").read_text()
+    service(system, "install")
+    assert (guard.read_text(), settings.read_text()) == kept
+    # Then the unit follows what the person wrote
+    assert (
+        PIXHAWK in (system.root / UNIT).read_text()
+        and PIXHAWK.removeprefix("/dev/") in (system.root / UDEV).read_text()
+    )
+
+
+def test_a_link_that_is_a_network_now_leaves_no_rule_for_a_port(system):
+    service(system, "install", connect=f"serial://{UART}:921600")
+    (system.root / "etc/rebound/service.yaml").write_text(f"connect: {UDP}\n")
+    service(system, "install")
+    assert UDEV not in files(system.root)
+
+
+def test_a_guard_without_a_file_has_all_defaults(system):
+    service(system, "install")
+    assert "then: hold" in (system.root / "etc/rebound/guard.yaml").read_text()
+    assert values((system.root / UNIT).read_text(), "WantedBy") == ["multi-user.target"]
+
+
+def test_a_mission_is_never_flown_at_boot_or_by_a_restart(system, capsys):
+    service(system, "install", mission=ROOT / "missions" / "square.yaml", connect=UDP)
+    text = (system.root / UNIT).read_text()
+    assert values(text, "Restart") == ["no"] and "[Install]" not in text
+    assert values(text, "ExecStart")[0].endswith(f"fly /etc/rebound/mission.yaml --yes --connect {UDP}")
+    assert system.called[-1][-2:] == ("disable", "rebound.service")
+    assert "never by itself" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"connect": "nowhere"}, "--connect nowhere: connect: 'nowhere' is not a connection address"),
+        ({"connect": "serial:///dev/tty A:9600"}, "is not the name of a device"),
+        ({"connect": "serial:///dev/../etc/passwd:9600"}, "is not the name of a device"),
+        ({"connect": 'serial:///dev/x"; RUN+="y:9600'}, "is not the name of a device"),
+        ({"guard": Path("none.yaml")}, "none.yaml: cannot be read: No such file"),
+        ({"guard": ROOT / "missions" / "square.yaml"}, "unknown key 'name'"),
+        ({"mission": GUARD}, "is missing"),
+    ],
+)
+def test_what_is_wrong_is_said_before_anything_is_written(system, options, words):
+    with pytest.raises(Exception, match=words):
+        service(system, "install", **options)
+    assert files(system.root) == set() and system.called == []
+
+
+def test_a_mission_that_names_a_file_beside_it_says_that_it_is_copied(system, tmp_path):
+    mission = tmp_path / "mine.yaml"
+    mission.write_text((ROOT / "missions" / "square.yaml").read_text() + "\nobstacles:\n  file: hall.json\n")
+    with pytest.raises(Exception, match=r"obstacles\.file: the mission is copied to /etc/rebound"):
+        service(system, "install", mission=mission)
+
+
+def test_settings_that_a_person_got_wrong_are_named_with_their_line(system):
+    service(system, "install")
+    (system.root / "etc/rebound/service.yaml").write_text("run: guard\nconect: udpin://:1\n")
+    with pytest.raises(Exception, match=r"service.yaml:2: conect: unknown key 'conect'; did you mean 'connect'"):
+        service(system, "install")
+    assert service(system, "check") == 1
+
+
+@pytest.mark.parametrize("what", ["status", "check", "uninstall"])
+def test_options_of_install_belong_to_install(what, capsys):
+    assert main(["service", what, "--connect", UDP]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_system_without_systemd_is_one_sentence(system, monkeypatch):
+    monkeypatch.setattr(shutil, "which", lambda program: None)
+    with pytest.raises(ServiceError, match="has no systemd"):
+        service(system, "install")
+    assert files(system.root) == set()
+
+
+def test_a_program_in_a_home_is_refused(system, monkeypatch):
+    monkeypatch.setattr("rebound_cli.service.system.sys.prefix", "/home/pi/rebound")
+    assert hidden_program() == "/home/pi/rebound"
+    monkeypatch.setattr(command, "hidden_program", hidden_program)
+    with pytest.raises(ServiceError, match="/home/pi/rebound is hidden from the service: install Rebound in /opt"):
+        service(system, "install")
+    assert files(system.root) == set()
+
+
+def test_a_step_that_systemd_refuses_is_named(system, monkeypatch):
+    monkeypatch.setattr(System, "call", lambda self, *words: 5)
+    with pytest.raises(ServiceError, match=r"`systemd-sysusers .*` failed with exit code 5"):
+        service(system, "install")
+
+
+def test_exit_codes_that_no_restart_mends_end_the_service(monkeypatch):
+    monkeypatch.setattr("rebound_cli.guard.command.prepare_companion", lambda console: None)
+    assert values(unit(), "RestartPreventExitStatus") == ["2 78"]
+    assert (exit_codes.USAGE, exit_codes.CONFIGURATION) == exit_codes.IN_VAIN
+    assert main(["guard", "--connect", "nowhere"]) == exit_codes.CONFIGURATION
+    assert main(["guard", "--connect", UDP, "--config", "none.yaml"]) == exit_codes.CONFIGURATION
+    # A cable that is not there yet is no fault of the configuration.
+    assert main(["guard", "--connect", "serial:///dev/ttyNONE:57600"]) == exit_codes.ERROR
+
+
+def test_the_documented_exit_codes_are_those_of_the_program():
+    text = (ROOT / "docs" / "companion-computer.md").read_text()
+    codes = [line.split("|")[1].strip() for line in text.partition("## Exit codes")[2].splitlines() if line[:3] > "| /"]
+    known = (exit_codes.ERROR, exit_codes.USAGE, exit_codes.CONFIGURATION, exit_codes.INTERRUPTED)
+    assert [code for code in codes if code.isdecimal()] == ["0", *map(str, known)]
+
+
+def test_the_back_off_is_there_where_systemd_knows_it():
+    assert values(unit(systemd=254), "RestartSteps") == ["5"] and values(unit(systemd=254), "RestartMaxDelaySec")
+    for older in (252, None):
+        assert not values(unit(systemd=older), "RestartSteps")
+
+
+@pytest.mark.parametrize(
+    ("device", "rule"),
+    [
+        (UART, UART),
+        ("/dev/ttyUSB3", "char-188"),
+        ("/dev/ttyACM0", "char-166"),
+        (FTDI, "char-188"),
+        (PIXHAWK, "char-166"),
+    ],
+)
+def test_one_device_is_open_to_it_under_whatever_name_it_comes_back(device, rule):
+    text = unit(connect=f"serial://{device}:921600")
+    assert values(text, "DeviceAllow") == [f"{rule} rw"] and values(text, "DevicePolicy") == ["closed"]
+    assert values(text, "PrivateNetwork") == ["yes"]
+    match = 'KERNEL=="' if device.startswith("/dev/tty") else 'SYMLINK=="'
+    rules = udev_text(device).splitlines()[1:]
+    assert all(f'{match}{device.removeprefix("/dev/")}"' in rule for rule in rules) and len(rules) == 2
+    assert 'DRIVERS=="ftdi_sio", ATTR{device/latency_timer}="1"' in rules[1]
+
+
+def test_a_link_over_a_network_has_no_device():
+    text = unit(connect=UDP)
+    assert values(text, "PrivateDevices") == ["yes"] and values(text, "DeviceAllow") == []
+
+
+def test_words_that_mean_something_to_systemd_are_taken_literally():
+    command_line = values(unit(signing_key='/var/lib/rebound/my $key 100%".key'), "ExecStart")[0]
+    assert command_line.endswith('--signing-key "/var/lib/rebound/my $$key 100%%\\".key"')
+
+
+@NEEDS_SYSTEMD
+@pytest.mark.parametrize("connect", [f"serial://{UART}:921600", f"serial://{FTDI}:57600", UDP])
+@pytest.mark.parametrize("run", ["guard", "mission"])
+def test_systemd_finds_nothing_to_complain_of_and_little_exposed(connect, run):
+    # With an interpreter that is there, for systemd looks.
+    systemd = System().release()
+    text = unit_text(ServiceSettings(run=run, connect=connect), shutil.which("python3"), systemd, "dialout")
+    verified, exposure = analysed(System(), text)
+    assert (verified.verdict.value, verified.found) == ("ok", "in order")
+    assert exposure.verdict.value == "ok" and float(exposure.found.split()[0]) <= MOST_EXPOSED
+
+
+@NEEDS_SYSTEMD
+def test_systemd_finds_what_is_wrong_in_a_unit():
+    verified, exposure = analysed(System(), "[Service]\nType=notify\nExecStart=/bin/true\nRestartStep=5\n")
+    assert verified.verdict.value == "no" and "RestartStep" in verified.found
+    assert exposure.verdict.value == "no" and float(exposure.found.split()[0]) > 9
+
+
+@NEEDS_SYSTEMD
+def test_what_is_installed_is_checked(system, capsys):
+    assert service(system, "check") == 1
+    assert "is not there" in capsys.readouterr().out
+    service(system, "install", guard=GUARD)
+    capsys.readouterr()
+    assert service(system, "check") == 0
+    assert " no " not in capsys.readouterr().out
+    with (system.root / UNIT).open("a") as file:
+        file.write("MemoryMax=infinity\n")
+    assert service(system, "check") == 1
+    assert f"not as this version writes them: /{UNIT}" in capsys.readouterr().out

@@ -1,0 +1,98 @@
+"""A flight in virtual time under a systemd that listens: ready, alive, how it goes, and the end."""
+
+import itertools
+import socket
+
+import pytest
+
+from rebound_cli.console import Console, Journal, Plain
+from tests.rebound_cli.test_control_path import fly
+
+
+@pytest.fixture
+def systemd(tmp_path, monkeypatch):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as bound:
+        bound.bind(str(tmp_path / "notify"))
+        bound.setblocking(False)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        monkeypatch.setenv("WATCHDOG_USEC", "5000000")
+        yield bound
+
+
+class Reader:
+    """Answers for a person, and meanwhile reads what systemd is told: its queue holds few datagrams."""
+
+    def __init__(self, systemd, world):
+        self._systemd, self._world, self.told = systemd, world, []
+
+    def read(self):
+        while True:
+            try:
+                lines = self._systemd.recv(4096).decode().split("\n")
+            except BlockingIOError:
+                return
+            self.told += [(self._world.now_us(), line) for line in lines]
+
+    def poll(self, companion):
+        self.read()
+        if companion.plan_is_ready():
+            companion.confirm_plan()
+
+
+def flown(systemd, tmp_path):
+    readers = []
+
+    def reader(world):
+        readers.append(Reader(systemd, world))
+        return readers[0]
+
+    companion, *_ = fly(tmp_path, confirm=reader)
+    readers[0].read()
+    return companion, readers[0].told
+
+
+def test_a_flight_tells_systemd_that_it_is_ready_alive_how_it_goes_and_when_it_ends(systemd, tmp_path):
+    companion, told = flown(systemd, tmp_path)
+    assert companion.report().outcome == "completed"
+    lines = [line for _, line in told]
+    # Ready once, at the vehicle's first heartbeat, long before it is armed; the end is told last, once
+    ready_us = next(at_us for at_us, line in told if line == "READY=1")
+    assert lines.count("READY=1") == 1 and ready_us < companion.report().armed_at_us
+    assert lines.count("STOPPING=1") == 1 and "STOPPING=1" in lines[-2:]
+    # Alive at least as often as systemd asks for, at half of its time
+    fed_at_us = [at_us for at_us, line in told if line == "WATCHDOG=1"]
+    assert len(fed_at_us) > 3
+    assert max(b - a for a, b in itertools.pairwise(fed_at_us)) < 2_600_000
+    # And the state and the rate of the link
+    states = [line for line in lines if line.startswith("STATUS=state takeoff, mode OFFBOARD, ")]
+    assert states and all(line.endswith(" kB/s") for line in states)
+
+
+def test_a_flight_is_the_same_whether_systemd_listens_or_not(systemd, tmp_path, monkeypatch):
+    # What it tells is beside the flight: the same bytes are sent at the same times.
+    for name in ("told", "alone"):
+        (tmp_path / name).mkdir()
+    flown(systemd, tmp_path / "told")
+    monkeypatch.delenv("NOTIFY_SOCKET")
+    fly(tmp_path / "alone")
+    logs = [(tmp_path / name / "flight.tlog").stat().st_size for name in ("told", "alone")]
+    assert logs[0] == logs[1]
+
+
+def test_the_present_state_is_no_line_of_a_journal(systemd, tmp_path, monkeypatch, capsys):
+    class Pipe:
+        def isatty(self):
+            return False
+
+        def write(self, text):
+            print(text, end="")
+
+        def flush(self):
+            pass
+
+    pipe = Pipe()
+    for display, is_shown in ((Journal(pipe), False), (Plain(pipe), True)):
+        display.state([("time", "1.0 s"), ("state", "watching")])
+        assert ("watching" in capsys.readouterr().out) is is_shown
+    Console(pipe).event(1.0, "detection", "hit")
+    assert "hit" in capsys.readouterr().out
