@@ -31,7 +31,8 @@ class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
     `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; and of the
-    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known.
+    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known, with
+    the acceleration that it has where it takes itself for level.
     """
 
     position_ned_m: Vector3
