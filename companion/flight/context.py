@@ -167,6 +167,7 @@ class FlightContext:
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
+    loss_s: float | None = None  # the vehicle's COM_OF_LOSS_T
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)

@@ -20,6 +20,7 @@ from companion.recovery.direction import plus
 from companion.recovery.interface import Moving
 from companion.recovery.room import BEHIND_M, Surface
 
+LOSS_PARAMETER = "COM_OF_LOSS_T"
 # PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
 HELD_S = 1.0
 PLACE_PER_S = (0.95, 0.95, 1.0)
@@ -70,6 +71,14 @@ def unattended_text(speed_m_s: float) -> str:
     return (
         f"if the companion dies, PX4 flies its last setpoint on for COM_OF_LOSS_T, made safe for {HELD_S:g} s; "
         f"every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
+    )
+
+
+def longer_loss_text(loss_s: float) -> str:
+    """One that is longer than a setpoint is safe, for people."""
+    return (
+        f"COM_OF_LOSS_T is {loss_s:g} s: if the companion dies, PX4 flies its last setpoint on for "
+        f"{loss_s - HELD_S:g} s more than it is made safe for"
     )
 
 
