@@ -146,12 +146,12 @@ def _with_way(target: Target, around: Surroundings, fence: Fence, reasons: list[
         return target
     motions = [Moving(around.vehicle_ned_m, around.velocity_ned_m_s)]
     if target.expected is not None:
-        # The vehicle is wrong about its motion, and what is expected is no more than that: both count. So does a tilt
-        # that the vehicle is right about by then.
-        place, besides = target.expected.position_ned_m, target.expected.acceleration_ned_m_s2
-        told = Moving(place, around.velocity_ned_m_s)
-        later = replace(told, acceleration_ned_m_s2=plus(REST, -1.0, besides))
-        motions = list(dict.fromkeys((replace(target.expected, acceleration_ned_m_s2=REST), told, later)))
+        # The vehicle is wrong about its motion, and what is expected is no more than that: places and velocities of
+        # both count. So does a tilt that the vehicle is right about by then.
+        expected = replace(target.expected, acceleration_ned_m_s2=REST)
+        told = replace(expected, velocity_ned_m_s=around.velocity_ned_m_s)
+        later = replace(told, acceleration_ned_m_s2=plus(REST, -1.0, target.expected.acceleration_ned_m_s2))
+        motions = list(dict.fromkeys((expected, told, later, *motions)))
     known = list(around.known)
     for motion in motions:
         known += _sides(held_way(target, motion), around.origin_ned_m, fence)

@@ -82,6 +82,15 @@ def test_a_vehicle_that_is_slower_off_the_wall_than_expected_may_brake_no_harder
     assert both.acceleration_ned_m_s2[0] < 0.6 * alone.acceleration_ned_m_s2[0]
 
 
+def test_a_vehicle_that_is_nearer_to_the_wall_than_expected_may_brake_no_harder_than_that_allows():
+    """The hit's law has it 0.5 m off the wall, its estimate 0.2 m: which of them is right nobody knows."""
+    off, asked = (-0.6, 0.0, 0.0), lean((2.0, 0.0, 0.0), (-0.6, 0.0, 0.0))
+    far, near = (
+        bounded(asked, around(off, [Known(WALL)], vehicle), FENCE, LIMITS)[0] for vehicle in (HERE, (0.3, 0.0, -1.5))
+    )
+    assert near.acceleration_ned_m_s2[0] < far.acceleration_ned_m_s2[0] - 0.1
+
+
 def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
     # Given a vehicle that leans by 0.7 m/s^2 towards the wall where it takes itself for level
     off = Moving(HERE, (-1.0, 0.0, 0.0), (0.7, 0.0, 0.0))
