@@ -59,12 +59,14 @@ class CollisionRecord:
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     estimated_down_m_s: float = 0.0  # by the vehicle's own estimate at this moment, be it right or wrong
+    level_leans_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
     def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
         """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
         if isinstance(self.claim, Claim):
             self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
+        self.level_leans_m_s2 = strapdown.level_leans_m_s2
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]

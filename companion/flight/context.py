@@ -31,7 +31,8 @@ class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
     `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; and of the
-    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known.
+    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known, with
+    the acceleration that it has where it takes itself for level.
     """
 
     position_ned_m: Vector3
@@ -171,6 +172,7 @@ class FlightContext:
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
+    loss_s: float | None = None  # the vehicle's COM_OF_LOSS_T
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)

@@ -3,9 +3,19 @@
 from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
+from companion.flight.held import HELD_S, LOSS_PARAMETER, longer_loss_text
 from companion.link.identity import identify, is_autopilot
 from companion.link.refusals import LASTING_US
-from companion.messages import Heartbeat, Refused, Sample, TimeSyncAnswer, TimeSyncReply, TimeSyncRequest
+from companion.messages import (
+    Heartbeat,
+    Parameter,
+    ReadParameter,
+    Refused,
+    Sample,
+    TimeSyncAnswer,
+    TimeSyncReply,
+    TimeSyncRequest,
+)
 from companion.px4_mode import mode_name
 
 
@@ -35,6 +45,10 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
             if text is not None:
                 flight.tell(now_us, "implausible", text, message=sample.message)
             continue
+        elif isinstance(sample, Parameter) and sample.name == LOSS_PARAMETER:
+            if flight.loss_s is None and sample.value > HELD_S:
+                flight.tell(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
+            flight.loss_s = sample.value
         elif isinstance(sample, TimeSyncRequest):
             flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, TimeSyncAnswer):
@@ -64,11 +78,15 @@ def _let_ways_go_on(flight: FlightContext, now_us: int) -> None:
 
 
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
-    """On the ground too long a one is a reason not to begin; in the air it is told."""
+    """On the ground too long a one is a reason not to begin; in the air it is told. COM_OF_LOSS_T is asked for beside
+    it until it comes.
+    """
     asked = flight.round_trip.ask(now_us)
     if asked is None:
         return
     flight.outbox.append(asked)
+    if flight.loss_s is None:
+        flight.outbox.append(ReadParameter(LOSS_PARAMETER))
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
         flight.tell(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)

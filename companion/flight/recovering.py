@@ -81,7 +81,8 @@ class Recover:
             is_new = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
             motion = level(motion, self._record.setpoint_ned_m[2], braking)
             a, b, _ = motion.acceleration_ned_m_s2 or REST
-            expected = Moving(motion.position_ned_m, motion.velocity_ned_m_s or REST)
+            besides = REST if self._spins else self._record.level_leans_m_s2
+            expected = Moving(motion.position_ned_m, motion.velocity_ned_m_s or REST, besides)
             leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
             is_free = is_new or climb.is_reckoned
             velocity = as_it_moves(self._record.estimated_down_m_s) if is_free else REST

@@ -285,3 +285,17 @@ def test_a_vehicle_that_never_disarms_is_reported_and_left_alone():
     f.run_to_end(130.0)
     assert "not disarmed" in f.companion.report().reason
     assert f.vehicle.mode == LAND
+
+
+@pytest.mark.parametrize(("loss_s", "said"), [(1.0, []), (3.0, [3.0])])
+def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told_once(loss_s, said):
+    # Given a vehicle that acts so late when setpoints stop, and a link that loses the first two answers
+    vehicle = FakeVehicle(loss_s=loss_s, lost_answers=2)
+    # When it is flown
+    flown = flight(vehicle)
+    flown.run_to("mission")
+    # Then what that costs is told before take-off
+    told = [event for event in flown.events if event.kind == "unattended"]
+    assert [event.data["loss_s"] for event in told] == said
+    assert all("2 s more than it is made safe for" in event.text for event in told)
+    assert vehicle.lost_answers == -1, "it was asked until it had answered"
