@@ -28,15 +28,16 @@ def run_kills(options: Namespace) -> int:
 
 def table(campaign: Campaign, results: Results) -> str:
     """What stands between the note's marks."""
-    return "\n".join([*_lines(list(results.results.values())), failures_text(campaign, results), ""])
+    lines = _lines(list(results.results.values()), campaign.parameters["first_seed"])
+    return "\n".join([*lines, failures_text(campaign, results), ""])
 
 
-def _lines(flights: Sequence[Json]) -> Iterator[str]:
+def _lines(flights: Sequence[Json], first_seed: int) -> Iterator[str]:
     kills = [kill for flight in flights for kill in flight["kills"]]
-    yield f"`python -m bench kills --kills {len(kills)}`: {len(flights)} flights, both airframes, IMU at 250 and 50 Hz;"
-    yield "0.7 to 5 m/s, up to 45° slanted. After the kill nothing is sent; PX4 holds the last setpoint for"
-    yield "COM_OF_LOSS_T, 1 s, and lands. Second contact: the centre closes with the wall at more than"
-    yield f"{SECOND_M_S:g} m/s after the kill, the hit itself apart. All by the simulator's truth."
+    yield f"`python -m bench kills --kills {len(kills)} --first-seed {first_seed}`: {len(flights)} flights, both"
+    yield "airframes, IMU at 250 and 50 Hz; 0.7 to 5 m/s, up to 45° slanted. After the kill nothing is sent;"
+    yield "PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s, and lands. Second contact: the centre closes"
+    yield f"with the wall at more than {SECOND_M_S:g} m/s after the kill, the hit itself apart. All by the truth."
     yield ""
     yield "| killed, after the touch | kills | second contact | hardest | at the ground, median | most |"
     yield "|---|---|---|---|---|---|"
