@@ -65,6 +65,7 @@ def run_fly(options: Namespace) -> int:
             remember_from(options.resume, document)
         mission = mission_from(document)
     world = world_from(document) if is_simulated else None
+    run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
         prepare_companion(console)
         if world is not None and options.lockstep:

@@ -11,6 +11,7 @@ from rebound_cli import __version__
 from rebound_cli.airframe_arguments import add_airframe
 from rebound_cli.arguments import SIMULATED_AUTOPILOTS
 from rebound_cli.check.arguments import add_check
+from rebound_cli.extras import needed_text
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
@@ -28,18 +29,6 @@ EXIT_INTERRUPTED = 130
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
-
-
-# What a drone does without, and the extra that brings it.
-EXTRAS = {
-    "numba": "sim",
-    "pygeomag": "sim",
-    "ambiance": "sim",
-    "matplotlib": "sim",
-    "pyulog": "logs",
-    "mavsdk": "mavsdk",
-    "distributed": "bench",
-}
 
 # Studies that were commands of the drone's program once, and what they are in the laboratory.
 MOVED = {
@@ -71,10 +60,7 @@ def run(options: argparse.Namespace, program: str) -> int:
         print(f"{program}: {error}", file=sys.stderr)
         return EXIT_ERROR
     except ModuleNotFoundError as error:
-        extra = EXTRAS.get((error.name or "").partition(".")[0])
-        if extra is None:
-            raise
-        print(f"{program}: this needs {error.name}: pip install 'px4-rebound[{extra}]'.", file=sys.stderr)
+        print(f"{program}: {needed_text(error)}", file=sys.stderr)
         return EXIT_ERROR
     except KeyboardInterrupt:
         text = "ended at once"

@@ -59,13 +59,23 @@ class RunFolderError(ReboundError):
     """The folder cannot be made, already holds a flight, or holds a damaged one."""
 
 
+def check_place(out: Path | None) -> None:
+    """Before minutes of compiling whose flight could not be kept. Raises RunFolderError."""
+    place = wanted = out or RUNS_FOLDER
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        raise RunFolderError(f"The run folder {wanted} cannot be made: nothing can be written to {place.absolute()}.")
+    if out is not None and (out / TLOG_NAME).exists():
+        raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
+
+
 def create_run_folder(out: Path | None, mission_name: str) -> Path:
     """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError."""
+    check_place(out)
     try:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
-            if (out / TLOG_NAME).exists():
-                raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
             return out
         slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
         stem = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}"

@@ -23,6 +23,7 @@ from rebound_cli.signed_connection import open_signed, refused_packets
 def run_guard(options: Namespace) -> int:
     """Guard until told to stop; 0 then. Raises ConfigurationError where there is nothing that can be guarded."""
     config = guard_config(options)
+    run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
         return _guard(options, config, console)
 
