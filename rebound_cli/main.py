@@ -11,6 +11,7 @@ from rebound_cli import __version__
 from rebound_cli.airframe_arguments import add_airframe
 from rebound_cli.arguments import SIMULATED_AUTOPILOTS
 from rebound_cli.check.arguments import add_check
+from rebound_cli.completion_arguments import add_completion
 from rebound_cli.extras import needed_text
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
@@ -99,6 +100,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_airframe(commands)
     add_identify(commands)
     add_key(commands)
+    add_completion(commands)
     return parser
 
 
