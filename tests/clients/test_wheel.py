@@ -51,7 +51,9 @@ def nowhere(tmp_path):
 def start(environment, folder, *arguments, **more):
     command = [*POWERLESS, WHEEL / environment / "bin/python", *arguments]
     where = {"cwd": folder, "env": {"PATH": os.environ["PATH"], "LANG": "C.UTF-8", **more}}
-    return subprocess.Popen(command, **where, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=-1)
+    return subprocess.Popen(
+        command, **where, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def finished(process, timeout_s):
