@@ -31,9 +31,18 @@ def start(*arguments, stdin=subprocess.DEVNULL):
     )
 
 
-def run(*arguments, timeout_s=60):
-    process = start(*arguments)
-    stdout, stderr = process.communicate(timeout=timeout_s)
+# Only a command that hangs is waited for so long: on a busy machine one that compiles takes minutes.
+HANGS_S = 600
+
+
+def run(*arguments, timeout_s=HANGS_S):
+    with start(*arguments) as process:
+        try:
+            stdout, stderr = process.communicate(timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            # Nothing goes on flying behind a test that has failed.
+            process.kill()
+            raise
     return subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
 
 
