@@ -32,6 +32,9 @@ set -e
 R=$1/root
 mount -t overlay overlay -o lowerdir=/,upperdir=$1/up,workdir=$1/work $R
 mount -t proc proc $R/proc
+# The kernel's settings are this machine's.
+mount --bind $R/proc/sys $R/proc/sys
+mount -o remount,ro,bind $R/proc/sys
 mount -t sysfs sysfs $R/sys
 mount -t tmpfs tmpfs $R/run -o mode=755
 mount -t tmpfs tmpfs $R/dev -o mode=755
