@@ -80,7 +80,7 @@ class Companion:
 
     @property
     def plan_is_confirmed(self) -> bool:
-        return self._confirmed
+        return self._confirmed if self._core is None else self._core.flight.plan_confirmed
 
     @property
     def stop_reason(self) -> str | None:
@@ -89,7 +89,7 @@ class Companion:
 
     def plan_is_ready(self) -> bool:
         """Connected, checked, waiting for nothing but the confirmation."""
-        return self._core is not None and self._core.machine.state is State.READY
+        return self._core is not None and self._core.machine.state is State.READY and not self.plan_is_confirmed
 
     def plan_text(self) -> str:
         """The plan for a person to agree to; complete once `plan_is_ready`."""

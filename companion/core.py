@@ -4,12 +4,14 @@ A `Core` belongs to one flight and is changed only by `advance`: the same sample
 same outputs, which is what makes a flight replayable.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from companion.detection.interface import Situation
 from companion.detection.watch import Watch, start_watch
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.resets import Resets
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.detecting import collisions, follow_contact
@@ -56,6 +58,7 @@ class Core:
     stop_reason: str | None = None
     values_due_us: int = 0
     limiter: Limiter = field(default_factory=Limiter)
+    resets: Resets = field(default_factory=Resets)
 
 
 def start(mission: Mission, now_us: int) -> Core:
@@ -100,6 +103,7 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
     """
     try:
+        samples = follow_resets(core, samples, now_us)
         refusal = hear(core.flight, samples, now_us)
         note_height(core.flight)
         impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
@@ -108,6 +112,17 @@ def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
     except Exception as error:
         return core.machine.fail(error, now_us)
     return moved
+
+
+def follow_resets(core: Core, samples: Sequence[Sample], now_us: int) -> Sequence[Sample]:
+    """The samples in a frame that goes on where the vehicle's own jumps."""
+    before = core.resets.shift_ned_m
+    samples = core.resets.follow(samples, core.flight.mission.limits.max_step_m)
+    jump_m = math.dist(core.resets.shift_ned_m, before)
+    if jump_m > 0.0:
+        text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
+        core.flight.tell(now_us, "estimate", text, jump_m=round(jump_m, 3))
+    return samples
 
 
 def situation(core: Core) -> Situation:
@@ -165,7 +180,7 @@ def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
         if core.limiter.last is None:
             return
         target = core.flight.target = core.limiter.last.at_rest()
-    core.flight.outbox.append(target.setpoint(now_us - core.started_at_us))
+    core.flight.outbox.append(core.resets.sent(target.setpoint(now_us - core.started_at_us)))
 
 
 def beat(core: Core, now_us: int) -> None:

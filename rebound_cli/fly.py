@@ -1,7 +1,6 @@
 """`rebound fly`: one mission from file to summary, on a connection, a simulated vehicle or in lockstep."""
 
 import json
-import shutil
 import time
 from argparse import Namespace
 from dataclasses import dataclass, replace
@@ -18,13 +17,16 @@ from rebound_cli.compiling import prepare_companion, prepare_vehicle
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
+from rebound_cli.flights.ring import room_for
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, fly_realtime
+from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, FlightFaultError, fly_realtime
 from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
+from rebound_cli.status.server import StatusServer, served
 from rebound_cli.summary import FlightFacts, Flown, build_summary
+from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth
 from rebound_cli.vehicle_process import VehicleProcess
 
@@ -65,6 +67,7 @@ def run_fly(options: Namespace) -> int:
             remember_from(options.resume, document)
         mission = mission_from(document)
     world = world_from(document) if is_simulated else None
+    run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
         prepare_companion(console)
         if world is not None and options.lockstep:
@@ -74,7 +77,8 @@ def run_fly(options: Namespace) -> int:
         folder = run_folder.create_run_folder(options.out, mission.name)
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
-        recorder = FlightRecorder(folder, None if options.lockstep else Background("log"))
+        make_room = None if is_simulated else room_for(folder, options.out, mission.companion.disk)
+        recorder = FlightRecorder(folder, None if options.lockstep else Background("log"), make_room)
         with Interrupts() as interrupts:
             flight = Flight(mission, world, folder, recorder, console, interrupts)
             try:
@@ -91,9 +95,9 @@ def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> F
         return _fly_beside_vehicle(flight)
     if options.connect is None:
         return _fly_beside_px4(flight, connection, options.instance)
-    return _fly_connected(
-        flight, connection, ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
-    )
+    confirmation = ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
+    with served(flight.console.print, command="fly", folder=str(flight.folder.resolve())) as server:
+        return _fly_connected(flight, connection, confirmation, server)
 
 
 def _connection_for(options: Namespace) -> Connection | None:
@@ -105,23 +109,30 @@ def _connection_for(options: Namespace) -> Connection | None:
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
     if mission_file.resolve() != (folder / run_folder.MISSION_NAME).resolve():
-        shutil.copyfile(mission_file, folder / run_folder.MISSION_NAME)
+        run_folder.write_whole(folder / run_folder.MISSION_NAME, mission_file.read_bytes())
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, world))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     if world is not None:
         run_folder.write_yaml(folder / run_folder.AIRFRAME_NAME, world.airframe.model_dump(mode="json"))
 
 
-def _fly_connected(flight: Flight, connection: Connection, confirmation: Confirmation) -> Flown:
+def _fly_connected(
+    flight: Flight, connection: Connection, confirmation: Confirmation, server: StatusServer | None = None
+) -> Flown:
     companion = Companion(flight.mission)
     started_s = time.monotonic()
+    timing, fault = Timing(), None
     try:
         timing = fly_realtime(
-            companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts
+            companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts, server
         )
+    except FlightFaultError as error:
+        # What is known of the flight is written first.
+        fault = error
     finally:
         connection.close()
-    return Flown(companion.report(), time.monotonic() - started_s, None, timing, refused_packets(connection))
+    duration_s, refused = time.monotonic() - started_s, refused_packets(connection)
+    return Flown(companion.report(), duration_s, None, timing, refused, connection.counts, fault)
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:
@@ -200,6 +211,8 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     finally:
         if json_on_stdout:
             print(json.dumps(summary, indent=2))
+    if flown.fault is not None:
+        raise flown.fault
     return 0 if summary["outcome"] == "completed" else 1
 
 

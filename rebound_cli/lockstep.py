@@ -95,7 +95,7 @@ def run_lockstep(
         if not is_confirmed and companion.plan_is_ready():
             is_confirmed = True
             companion.confirm_plan()
-            recorder.record_person(now_us, is_confirmed, None)
+            recorder.record_confirmation(now_us, is_confirmed)
         count += 1
         if count % _LOOK_EVERY:
             continue
@@ -104,7 +104,7 @@ def run_lockstep(
         if interrupts.reason is not None and not is_stopped:
             is_stopped = True
             companion.stop(interrupts.reason)
-            recorder.record_person(now_us, is_confirmed, interrupts.reason)
+            recorder.record_stop(now_us, interrupts.reason)
         look_for_file(companion, recorder, now_us)
         look(time_boot_us / 1e6)
     return True

@@ -11,6 +11,9 @@ from rebound_cli import __version__, exit_codes
 from rebound_cli.airframe_arguments import add_airframe
 from rebound_cli.arguments import SIMULATED_AUTOPILOTS
 from rebound_cli.check.arguments import add_check
+from rebound_cli.completion_arguments import add_completion
+from rebound_cli.extras import needed_text
+from rebound_cli.flights.arguments import add_doctor, add_logs
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
@@ -20,24 +23,13 @@ from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
 from rebound_cli.service.arguments import add_service
 from rebound_cli.sim_arguments import add_sim
+from rebound_cli.status.arguments import add_status
 from rebound_cli.tune.arguments import add_tune
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 # Whoever ends these at once leaves a vehicle to itself.
 COMMANDING = ("fly", "guard")
-
-
-# What a drone does without, and the extra that brings it.
-EXTRAS = {
-    "numba": "sim",
-    "pygeomag": "sim",
-    "ambiance": "sim",
-    "matplotlib": "sim",
-    "pyulog": "logs",
-    "mavsdk": "mavsdk",
-    "distributed": "bench",
-}
 
 # Studies that were commands of the drone's program once, and what they are in the laboratory.
 MOVED = {
@@ -70,10 +62,7 @@ def run(options: argparse.Namespace, program: str) -> int:
         is_in_vain = isinstance(error, ConfigurationError) and options.command in COMMANDING
         return exit_codes.CONFIGURATION if is_in_vain else exit_codes.ERROR
     except ModuleNotFoundError as error:
-        extra = EXTRAS.get((error.name or "").partition(".")[0])
-        if extra is None:
-            raise
-        print(f"{program}: this needs {error.name}: pip install 'px4-rebound[{extra}]'.", file=sys.stderr)
+        print(f"{program}: {needed_text(error)}", file=sys.stderr)
         return exit_codes.ERROR
     except KeyboardInterrupt:
         text = "ended at once"
@@ -107,11 +96,15 @@ def build_parser() -> argparse.ArgumentParser:
     add_plan(commands)
     add_sim(commands)
     add_preflight(commands)
+    add_status(commands)
+    add_logs(commands)
+    add_doctor(commands)
     add_replay(commands)
     add_tune(commands)
     add_airframe(commands)
     add_identify(commands)
     add_key(commands)
+    add_completion(commands)
     add_service(commands)
     return parser
 

@@ -18,6 +18,7 @@ from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.status.server import StatusServer
 from rebound_cli.timing import Heard, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
@@ -43,41 +44,40 @@ class ConfirmAtOnce:
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console
-        self._is_done = False
 
     def poll(self, companion: Companion) -> None:
-        if self._is_done or not companion.plan_is_ready():
+        if not companion.plan_is_ready():
             return
-        self._is_done = True
         if self._console is not None:
             self._console.print(companion.plan_text())
         companion.confirm_plan()
 
 
 class AskPerson:
-    """Prints the plan and waits for a line on stdin that says yes, without stopping the loop."""
+    """Prints the plan and waits for a line on stdin that says yes, without stopping the loop.
+
+    A plan that is made anew is asked for anew; what was typed meanwhile says nothing of it.
+    """
 
     def __init__(self, console: Console, stdin_descriptor: int = 0) -> None:
         self._console = console
         self._stdin = stdin_descriptor
-        self._is_asked = False
-        self._is_answered = False
+        self._is_asked = self._is_asked_again = False
         self._typed = b""
 
     def poll(self, companion: Companion) -> None:
-        if self._is_answered:
+        if not companion.plan_is_ready():
+            self._is_asked = self._console.live_is_held = False
             return
         if not self._is_asked:
-            if companion.plan_is_ready():
-                self._is_asked = True
-                self._console.print(companion.plan_text())
-                self._console.ask("Fly this plan? [y/N] ")
+            if self._is_asked_again:
+                self._read_answer()
+                self._typed = b""
+            self._is_asked = self._is_asked_again = True
+            self._console.print(companion.plan_text())
+            self._console.ask("Fly this plan? [y/N] ")
             return
         answer = self._read_answer()
-        if answer is None and not companion.finished:
-            return
-        self._is_answered = True
-        self._console.live_is_held = False
         if answer in ("y", "yes"):
             companion.confirm_plan()
         elif answer is not None:
@@ -201,9 +201,9 @@ class Loop:
         if self.interrupts.reason is not None and not self.is_interrupted:
             self.is_interrupted = True
             self._stop(self.interrupts.reason)
-        stranger = self.connection.news()
-        if stranger is not None:
-            self._note("stranger", stranger, now_us)
+        news = self.connection.news()
+        if news is not None:
+            self._note("link", news, now_us)
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return
@@ -219,7 +219,7 @@ class Loop:
     def _stop(self, reason: str) -> None:
         self.stepped.stop(reason)
         if self.now_us is not None:
-            self.recorder.record_person(self.now_us, False, reason)
+            self.recorder.record_stop(self.now_us, reason)
 
     def _hand_over(self, reason: str) -> None:
         """With the steps and the link alone. Where these fail again the next one is tried, for as long as it takes."""
@@ -246,6 +246,7 @@ def fly_realtime(
     console: Console,
     confirmation: Confirmation,
     interrupts: Interrupts,
+    server: StatusServer | None = None,
 ) -> Timing:
     """Run until the companion has finished; after the first interrupt it finishes by itself. How steadily it went."""
     started_us = clock.now_us()
@@ -257,8 +258,13 @@ def fly_realtime(
             console.events(result.events, began_us)
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
-        recorder.record_person(now_us, companion.plan_is_confirmed, companion.stop_reason)
-        console.live(companion.status, (now_us - started_us) / 1e6, loop.heard.text(now_us))
+        recorder.record_confirmation(now_us, companion.plan_is_confirmed)
+        if companion.stop_reason is not None:
+            recorder.record_stop(now_us, companion.stop_reason)
+        running_s, link = (now_us - started_us) / 1e6, loop.heard.text(now_us)
+        console.live(companion.status, running_s, link)
+        if server is not None:
+            server.hand_over(companion.status, result.events, running_s, link)
 
     loop = Loop(companion, connection, clock, recorder, console, interrupts)
     loop.run(beside)

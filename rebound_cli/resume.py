@@ -8,7 +8,7 @@ from companion.errors import ConfigurationError
 from companion.mission.model import Mission
 from rebound_cli.documents import Document, Override, apply_override
 from rebound_cli.inputs import load_flown, mission_from
-from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text
+from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text, whole_lines
 
 
 class ResumeError(ConfigurationError):
@@ -20,7 +20,7 @@ def resume_of(run: Path, mission: Mission) -> dict[str, Any]:
     flown = mission_from(load_flown(run / RESOLVED_NAME))
     if flown.items != mission.items:
         raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
-    events = _events(run / EVENTS_NAME)
+    events = list(read_records(run / EVENTS_NAME, whole_lines(read_text(run / EVENTS_NAME))))
     armed = _last(events, "armed")
     item, end = _last(events, "item"), _last(events, "aborted")
     if _last(events, "done") is not None:
@@ -46,12 +46,6 @@ def remember_from(run: Path, document: Document) -> None:
     if stored.exists():
         apply_override(document, Override(f"--resume {run}", ("obstacles", "known"), []))
         apply_override(document, Override(f"--resume {run}", ("obstacles", "file"), str(stored)))
-
-
-def _events(path: Path) -> Sequence[dict[str, Any]]:
-    """A killed process may leave its last line unfinished: that one is left out."""
-    whole, _, _ = read_text(path).rpartition("\n")
-    return list(read_records(path, whole))
 
 
 def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:

@@ -1,5 +1,6 @@
 """The folder of one flight: what was flown, with what, and every byte and event of it."""
 
+import fcntl
 import json
 import os
 import platform
@@ -19,7 +20,7 @@ from rebound_cli import __version__
 from rebound_cli.background import Background, at_once
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from companion.companion import StepResult
     from companion.memory.patch import Patch
@@ -41,6 +42,9 @@ VERSIONS_NAME = "versions.json"
 VEHICLE_LOG_NAME = "vehicle.log"
 OBSTACLES_NAME = "obstacles.json"
 
+# Events of a hit: one that was answered, and one that was left to the program that flies.
+HIT_KINDS = ("detection", "left_alone")
+
 # The packages whose version can change the bytes or the figures of a flight.
 _VERSIONED_PACKAGES = (
     "pymavlink",
@@ -59,13 +63,23 @@ class RunFolderError(ReboundError):
     """The folder cannot be made, already holds a flight, or holds a damaged one."""
 
 
+def check_place(out: Path | None) -> None:
+    """Before minutes of compiling whose flight could not be kept. Raises RunFolderError."""
+    place = wanted = out or RUNS_FOLDER
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        raise RunFolderError(f"The run folder {wanted} cannot be made: nothing can be written to {place.absolute()}.")
+    if out is not None and (out / TLOG_NAME).exists():
+        raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
+
+
 def create_run_folder(out: Path | None, mission_name: str) -> Path:
     """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError."""
+    check_place(out)
     try:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
-            if (out / TLOG_NAME).exists():
-                raise RunFolderError(f"{out} already holds a flight: give --out another folder.")
             return out
         slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
         stem = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}"
@@ -104,18 +118,29 @@ class FlightRecorder:
     """Writes packets and events as they happen and keeps the events for the timeline.
 
     What a replay needs besides is in a file of its own: the steps of which no packet tells, because nothing came
-    and nothing was sent, and what the companion was told. With a `writer` no call waits for the disk or raises.
+    and nothing was sent, and what the companion was told. With a `writer` no call waits for the disk or raises, and
+    what is written reaches the disk twice a second: a power cut takes no more than that, a packet's step and events
+    never before the packet. `make_room` is asked before packets are written, and raises where there is no room.
     """
 
-    def __init__(self, folder: Path, writer: Background | None = None) -> None:
+    def __init__(
+        self, folder: Path, writer: Background | None = None, make_room: "Callable[[int], None] | None" = None
+    ) -> None:
         self._folder = folder
         self.writer = writer
         self._do = at_once if writer is None else writer.give
+        self._make_room = make_room
         self._obstacles: Sequence[Patch] | None = None
-        self._tlog = TlogWriter(folder / TLOG_NAME)
+        self._tlog = TlogWriter(folder / TLOG_NAME, None if writer is None else self._sync_lines)
         # Line-buffered: events are few, and the last one before a kill is the one that matters.
         self._events_file = (folder / EVENTS_NAME).open("w", encoding="utf-8", buffering=1)
         self._inputs_file = (folder / INPUTS_NAME).open("w", encoding="utf-8", buffering=1)
+        # Not every file system knows locks; without one the flight is only told from others by its process.
+        with suppress(OSError):
+            fcntl.flock(self._events_file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        if writer is not None:
+            for entries in (folder, folder.parent):
+                _sync_folder(entries)
         self._is_confirmed = False
         self._stop_reason: str | None = None
         self.events: list[Event] = []
@@ -129,21 +154,32 @@ class FlightRecorder:
         # What is small first: a log that may grow no more costs no event.
         for event in result.events:
             self._events_file.write(event_line(event))
-        if not result.sent_frames and not any(map(is_packet, result.received_frames)):
+        # Foreign bytes among the packets could hide one of them from whoever reads the log.
+        received = [frame for frame in result.received_frames if is_packet(frame)]
+        if not result.sent_frames and not received:
             self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
-        if result.received_frames:
-            self._tlog.write(now_us, result.received_frames)
+        if self._make_room is not None:
+            self._make_room(now_us)
+        if received:
+            self._tlog.write(now_us, received)
         if result.sent_frames:
             self._tlog.write(now_us, result.sent_frames)
 
-    def record_person(self, now_us: int, is_confirmed: bool, stop_reason: str | None) -> None:
-        """What the companion has been told by now, after its step at `now_us`; only what is new is written."""
+    def _sync_lines(self) -> None:
+        for file in (self._events_file, self._inputs_file):
+            os.fdatasync(file.fileno())
+
+    def record_confirmation(self, now_us: int, is_confirmed: bool) -> None:
+        """Whether the plan is agreed to by now, after the companion's step at `now_us`; written when it is newly so."""
         if is_confirmed and not self._is_confirmed:
-            self._is_confirmed = True
             self._record_input(now_us, "confirm")
-        if stop_reason is not None and stop_reason != self._stop_reason:
-            self._stop_reason = stop_reason
-            self._record_input(now_us, "stop", reason=stop_reason)
+        self._is_confirmed = is_confirmed
+
+    def record_stop(self, now_us: int, reason: str) -> None:
+        """The companion has been asked to stop, after its step at `now_us`; written once a reason."""
+        if reason != self._stop_reason:
+            self._stop_reason = reason
+            self._record_input(now_us, "stop", reason=reason)
 
     def record_file(self, now_us: int) -> None:
         """The companion was told, after its step at `now_us`, that the file it waits for exists."""
@@ -157,17 +193,10 @@ class FlightRecorder:
         self._do(self._inputs_file.write, json.dumps({"time_us": now_us, "kind": kind, **data}) + "\n")
 
     def record_obstacles(self, patches: "Sequence[Patch]") -> None:
-        """The memory as it is by now. Whenever the program ends, the file is whole: the old one or the new one."""
-        if patches == self._obstacles:
-            return
-        self._obstacles = patches
-        self._do(self._write_obstacles, patches)
-
-    def _write_obstacles(self, patches: "Sequence[Patch]") -> None:
-        path = self._folder / OBSTACLES_NAME
-        half_written = path.with_suffix(".part")
-        write_json(half_written, file_data(patches))
-        half_written.replace(path)
+        """The memory as it is by now."""
+        if patches != self._obstacles:
+            self._obstacles = patches
+            self._do(write_json, self._folder / OBSTACLES_NAME, file_data(patches))
 
     def close(self) -> None:
         """Return when all is written that could be."""
@@ -194,6 +223,11 @@ def read_records(path: Path, text: str) -> "Iterator[dict[str, Any]]":
         yield record
 
 
+def whole_lines(text: str) -> str:
+    """Without a last line that a kill or a power cut left unfinished."""
+    return text[: text.rfind("\n") + 1]
+
+
 def read_text(path: Path) -> str:
     """Raises RunFolderError."""
     try:
@@ -204,11 +238,31 @@ def read_text(path: Path) -> str:
 
 
 def write_yaml(path: Path, data: Any) -> None:
-    path.write_text(yaml.safe_dump(data, sort_keys=False, allow_unicode=True), encoding="utf-8")
+    write_whole(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode())
 
 
 def write_json(path: Path, data: Any) -> None:
-    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    write_whole(path, (json.dumps(data, indent=2) + "\n").encode())
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Whenever the program or the power ends, the file is whole: the old one, the new one or none."""
+    unfinished = path.with_name(f"{path.name}.part")
+    with unfinished.open("wb") as file:
+        file.write(content)
+        file.flush()
+        # Without this a file system may know the new name before the content.
+        os.fsync(file.fileno())
+    unfinished.replace(path)
+
+
+def _sync_folder(folder: Path) -> None:
+    """So that its names outlive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def versions() -> dict[str, str]:

@@ -5,7 +5,7 @@ from argparse import Namespace
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import MOST_STRANGERS, Connection
+from companion.shell.connection import MOST_STRANGERS, Connection, LinkCounts
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -46,6 +46,10 @@ class SignedConnection:
 
     def news(self) -> str | None:
         return self._connection.news() or self._signing.news() or self._writer.news()
+
+    @property
+    def counts(self) -> LinkCounts:
+        return self._connection.counts
 
     def close(self) -> None:
         self._connection.close()

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from companion.errors import ReboundError
 from companion.memory.stored import as_data
 from companion.report import FlightReport
+from companion.shell.connection import LinkCounts
 from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth, match_contacts
 
@@ -36,6 +38,8 @@ class Flown:
     truth: FlightTruth | None
     timing: Timing | None = None  # None in lockstep, which knows no real time
     refused_packets: Mapping[str, int] = field(default_factory=dict)  # by reason; see mavlink/signing.py
+    link: LinkCounts = field(default_factory=LinkCounts)
+    fault: ReboundError | None = None  # of the program around the flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +61,8 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "mission": facts.mission,
-        "outcome": report.outcome,
-        "reason": report.reason,
+        "outcome": report.outcome if flown.fault is None else "failed",
+        "reason": report.reason if flown.fault is None else str(flown.fault),
         "autopilot": report.autopilot,
         "seed": facts.seed,
         "airframe": facts.airframe,
@@ -68,6 +72,7 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
         **(flown.timing or Timing()).summary(),
         "stream_rates_hz": {name: round(rate, 2) for name, rate in report.stream_rates_hz.items()},
         "round_trip_ms": report.round_trip.summary(),
+        **asdict(flown.link),
         "refused_messages": dict(report.refused_messages),
         "refused_packets": dict(flown.refused_packets),
         "unconfirmed": report.unconfirmed,

@@ -8,7 +8,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 # Everything that only an extra brings; filterpy's own matplotlib is there, and must not be imported either.
-LEFT_OUT = ("numba", "matplotlib", "distributed", "dask", "mavsdk", "pyulog", "pygeomag", "ambiance", "pytest")
+# rich is for a terminal: there is none here.
+LEFT_OUT = ("numba", "matplotlib", "distributed", "dask", "mavsdk", "pyulog", "pygeomag", "ambiance", "pytest", "rich")
 WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"
 QUICK = "'--set', 'companion.link.heartbeat_wait_s=0.2'"
 
@@ -23,6 +24,7 @@ def alone(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
         ("'guard', '--connect', 'udpin://127.0.0.1:0', '--out', folder, " + QUICK, "No HEARTBEAT"),
         ("'fly', 'missions/square.yaml', '--connect', 'udpin://127.0.0.1:0', '--out', folder, " + QUICK, "HEARTBEAT"),
         ("'fly', 'missions/square.yaml', '--lockstep', '--out', folder", "pip install 'px4-rebound[sim]'"),
+        ("'preflight', '--connect', 'nonsense'", "not a connection address"),
         ("'sim'", "pip install 'px4-rebound[sim]'"),
         ("'replay', 'some.ulg'", "pip install 'px4-rebound[logs]'"),
     ],
@@ -32,6 +34,13 @@ def test_each_command_works_or_names_the_extra_that_it_needs(tmp_path, command, 
     done = alone(code, tmp_path)
     assert done.returncode == 1 and "Traceback" not in done.stderr, done.stderr
     assert words in done.stderr + done.stdout
+
+
+def test_missions_are_checked_and_what_cannot_be_drawn_is_said(tmp_path):
+    code = f"from rebound_cli.main import main\nsys.exit(main(['check', 'wall', 'square', '--out', {str(tmp_path)!r}]))"
+    done = alone(code, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("not drawn: this needs matplotlib: pip install 'px4-rebound[sim]'.") == 2
 
 
 def test_a_mission_is_flown_and_a_wall_recovered_from(tmp_path):

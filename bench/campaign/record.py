@@ -48,6 +48,10 @@ class Record:
         entry = _write(self._file, entry)
         self.outcomes[outcome.number] = Outcome(outcome.number, entry.get("result"), entry.get("failure"))
 
+    def add_from_another_process(self, outcome: Outcome) -> None:
+        """Keep one that a worker has written to the file by `append`."""
+        self.outcomes[outcome.number] = outcome
+
     def close(self) -> None:
         self._file.close()
 
@@ -58,6 +62,12 @@ def _write(file: TextIO, entry: dict[str, Any]) -> dict[str, Any]:
     file.flush()
     read_back: dict[str, Any] = json.loads(line)
     return read_back
+
+
+def append(path: Path, outcome: Outcome) -> None:
+    """Write a result from a worker: a line of a file that is open for appending is written at once."""
+    with path.open("a", encoding="utf-8") as file:
+        _write(file, {"case": outcome.number, "result": outcome.result})
 
 
 def _cut_torn_line(path: Path) -> None:

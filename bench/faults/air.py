@@ -24,6 +24,7 @@ from bench.faults.packets import (
 )
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
+from companion.shell.connection import LinkCounts
 from rebound_cli.background import Background
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
@@ -192,6 +193,10 @@ class Air:
 
     def news(self) -> str | None:
         return None
+
+    @property
+    def counts(self) -> LinkCounts:
+        return LinkCounts()
 
     def close(self) -> None:
         """There is nothing to close."""

@@ -2,10 +2,11 @@
 
 import multiprocessing
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 
 from bench.campaign.plan import Campaign, Json, Outcome
-from bench.campaign.record import Record
+from bench.campaign.record import Record, append
 from bench.campaign.run import RECORDS_FOLDER
 from bench.faults import latency
 from bench.faults.catalogue import FILES, FLOWN
@@ -31,7 +32,7 @@ def run_faults(options: Namespace) -> int:
     try:
         for number, results in with_progress(_flown_seeds(record, options), options.seeds, "faults"):
             for name, result in results.items():
-                record.add(Outcome(_case(number, name), result))
+                record.add_from_another_process(Outcome(_case(number, name), result))
         under_load = _under_load(record, options.hits)
     finally:
         record.close()
@@ -56,8 +57,8 @@ def _flown_seeds(record: Record, options: Namespace) -> Iterator[tuple[int, Json
     with pool:
         if pressed:
             raise KeyboardInterrupt
-        results = pool.imap_unordered(fly_numbered, [(number, names) for number, names in wanted if names])
-        yield from results
+        cases = [(number, names, record.path) for number, names in wanted if names]
+        yield from pool.imap_unordered(fly_numbered, cases)
 
 
 def _missing(record: Record, number: int) -> list[str]:
@@ -66,24 +67,36 @@ def _missing(record: Record, number: int) -> list[str]:
     return names + [name for name in files if number < FILES[name].most_tries]
 
 
-def fly_numbered(case: tuple[int, Sequence[str]]) -> tuple[int, Json]:
-    """The seed's number with its results."""
-    return case[0], fly_seed(case)
+def fly_numbered(case: tuple[int, Sequence[str], Path]) -> tuple[int, Json]:
+    """The seed's number with its results, each of which is in the record's file as soon as it is known."""
+    number, names, path = case
+    results: Json = {}
+
+    def take(name: str, result: Json) -> None:
+        results[name] = result
+        append(path, Outcome(_case(number, name), result))
+
+    fly_faults(number, names, take)
+    return number, results
 
 
 def fly_seed(case: tuple[int, Sequence[str]]) -> Json:
     """What became of each of these faults with one seed, by name."""
-    number, names = case
     results: Json = {}
+    fly_faults(*case, results.__setitem__)
+    return results
+
+
+def fly_faults(number: int, names: Sequence[str], take: Callable[[str, Json], object]) -> None:
+    """`take` is given each fault's name and what became of it with this seed."""
     branching = [FLOWN[name] for name in names if name in FLOWN and not FLOWN[name].from_the_start]
     if branching:
-        fly_from_one_take_off(number, branching, results.__setitem__)
+        fly_from_one_take_off(number, branching, take)
     for name in names:
         if name in FILES:
-            results[name] = tried(FILES[name], number)
-        elif name not in results:
-            results[name] = fly(number, FLOWN[name])
-    return results
+            take(name, tried(FILES[name], number))
+        elif FLOWN[name].from_the_start:
+            take(name, fly(number, FLOWN[name]))
 
 
 def _row(record: Record, name: str, seeds: int) -> Row:

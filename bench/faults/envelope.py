@@ -22,6 +22,10 @@ def outside(core: Core, frame: bytes) -> str | None:
         return None
     mask, fence, limits = message.type_mask, core.flight.mission.fence, core.flight.mission.limits
     origin = core.flight.origin_ned_m
+    if origin is not None:
+        # A reset of the vehicle's estimate moves its frame under what stands still.
+        n, e, d = (o + s for o, s in zip(origin, core.resets.shift_ned_m, strict=True))
+        origin = (n, e, d)
     asked = [getattr(message, name) for bit, name in enumerate(_VALUES) if not mask >> bit & 1]
     if not asked or not all(map(math.isfinite, asked)):
         return "not finite"

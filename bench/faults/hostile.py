@@ -270,6 +270,6 @@ FAULTS = (
         "hostile packets",
         "the same, but mode, arming and landed state stay true",
         lambda c: Hostile(When.flying(c), (HEARTBEAT, MODE, EXTENDED_STATE, COMMAND_ACK)),
-        Expected((COMPLETED, HANDED_OVER, FAILED), finds=False, false_hits=99),
+        Expected((COMPLETED, HANDED_OVER, FAILED), finds=False, has_wall=False, false_hits=99),
     ),
 )

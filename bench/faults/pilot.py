@@ -62,7 +62,7 @@ FAULTS = (
         _TAKEN,
     ),
     Fault("takes over in a recovery", "pilot", "POSCTL within 0.6 s of the hit", _taken("recovering", 0.6), _TAKEN),
-    Fault("takes over in a landing", "pilot", "POSCTL within 1 s of its begin", _taken("landing", 1.0), _TAKEN),
+    Fault("takes over in a landing", "pilot", "POSCTL within 0.9 s of its begin", _taken("landing", 0.6), _TAKEN),
     Fault(
         "takes over in a stall of 1.2 s",
         "pilot",

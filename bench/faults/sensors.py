@@ -16,6 +16,8 @@ from sim_vehicle.bench.faults import other
 _BLIND = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
 _MAY_END = Expected((COMPLETED, HANDED_OVER), finds=False)
 _MAY_MISS = Expected(finds=False)
+# A sensor that steps and stays shows what a push does, and its own estimate is no second witness.
+_STEPS = Expected(finds=False, false_hits=1)
 _NAN = math.nan
 
 
@@ -161,14 +163,16 @@ FAULTS = (
     Fault(
         "accelerometer biased",
         "sensors",
-        "1 m/s2 on each axis, from the cruise on",
+        "1 m/s2 on each axis from one sample to the next, from the cruise on; the step may count as a push",
         lambda c: Simulated(other("imu_bias", accelerometer_frd_m_s2=(1.0, 1.0, 1.0)), When.flying(c)),
+        _STEPS,
     ),
     Fault(
         "gyro biased",
         "sensors",
-        "0.5 rad/s on each axis in HIGHRES_IMU, from the cruise on",
+        "0.5 rad/s on each axis of HIGHRES_IMU from one sample to the next, from the cruise on; the same",
         lambda c: Rewritten(When.flying(c), (IMU,), adding(xgyro=0.5, ygyro=0.5, zgyro=0.5)),
+        _STEPS,
     ),
     Fault(
         "ODOMETRY frozen",

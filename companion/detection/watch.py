@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
-from companion.detection.sight import Sameness, Sight, heard, why_blind
+from companion.detection.sight import Sameness, Sight, Turning, heard, why_blind
 from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.estimate.normal import prepare
@@ -44,6 +44,7 @@ class Watch:
     sight: Sight
     started_us: int
     sameness: Sameness = field(default_factory=Sameness)
+    turning: Turning = field(default_factory=Turning)
     last_imu_boot_us: int = 0
     useless: str | None = None  # what was wrong with the newest IMU message
     threshold_told: bool = False
@@ -105,12 +106,15 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
                 watch.useless = "IMU stuck at one value"
                 continue
             watch.useless = None
+            watch.turning.imu(sample)
             imu_samples += 1
             if 0 <= watch.last_imu_boot_us - sample.time_boot_us < REBOOT_US:
                 continue
             watch.last_imu_boot_us = sample.time_boot_us
         elif type(sample) is Attitude:
             watch.sameness.attitude(sample)
+            if not watch.turning.attitude(sample):
+                continue
         elif type(sample) is Refused:
             if sample.message == MessageId.HIGHRES_IMU.name:
                 watch.useless = f"HIGHRES_IMU not believed: {sample.reason}"

@@ -130,7 +130,8 @@ class ImpactEstimator:
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
-            self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
+            is_right = self.trust.is_attitude_right(sample.time_boot_us)
+            self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, is_right)
             self.attitudes.append(sample)
             if self.push is not None:
                 self.push.hear(sample)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from companion.messages import Vector3
 
 # The estimator has not yet begun to correct itself for 0.14 s, and swings through the truth at about 0.5 s.
+CORRECTED_US = 140_000
 LEAST_US = 600_000
 # By then the swing of the largest error seen is down to what a good estimate's own noise is.
 MOST_US = 1_500_000
@@ -36,6 +37,11 @@ class Trust:
     @property
     def is_trusted(self) -> bool:
         return self._since_us is None
+
+    def is_attitude_right(self, time_us: int) -> bool:
+        """Whether the estimator cannot have begun to correct itself, and its attitude with its velocity."""
+        since_us = self._since_us
+        return since_us is None or (self.earlier_boot_us is None and time_us - since_us < CORRECTED_US)
 
     @property
     def _since_us(self) -> int | None:

@@ -50,9 +50,8 @@ def is_carried(
     touch, comes_after = flight.touch, record.is_behind
     if touch is not None and touch.time_boot_us > pushed_us and split(touch.push_ned_m_s2, normal_ned)[0] > 0.0:
         pushed_us, comes_after = touch.time_boot_us, True
-    if now_us - pushed_us < STILL_PUSHING_US:
-        return True
     u, v, w = asked.velocity_ned_m_s or REST
     a, b, c = sample.velocity_ned_m_s
     faster_m_s = split((a - u, b - v, c - w), normal_ned)[0]
-    return comes_after and now_us - pushed_us < COMES_AFTER_US and faster_m_s > NOT_SLOWED_M_S
+    # A vehicle that flies as it is asked to is carried by nothing, however it shakes.
+    return now_us - pushed_us < (COMES_AFTER_US if comes_after else STILL_PUSHING_US) and faster_m_s > NOT_SLOWED_M_S

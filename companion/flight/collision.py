@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
+from companion.estimate.history import MotionHistory
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import DECIDED_US, Claim, Leap
@@ -45,6 +46,7 @@ class CollisionRecord:
     contact_ended_boot_us: int
     impulse_m_s: float
     climb: Climb
+    recovering_since_us: int = 0  # when the first came of the hits that the vehicle has not settled between
     doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
     inherits_doubt: bool = False  # from an earlier hit
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
@@ -57,12 +59,14 @@ class CollisionRecord:
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     estimated_down_m_s: float = 0.0  # by the vehicle's own estimate at this moment, be it right or wrong
+    level_leans_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
     def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
         """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
         if isinstance(self.claim, Claim):
             self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
+        self.level_leans_m_s2 = strapdown.level_leans_m_s2
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
@@ -97,12 +101,14 @@ class CollisionRecord:
         """Another sample of the contact's force has come."""
         return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > claim.time_boot_us
 
-    def is_contradicted(self, now_boot_us: int) -> bool:
+    def is_contradicted(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether, once that is decided, nothing but its first sample shows this hit."""
         if self.claim is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
-        found = self.claim.is_contradicted(self.fixes)
-        self.claim = None
+        claim, self.claim = self.claim, None
+        found = claim.is_contradicted(self.fixes)
+        if isinstance(claim, Leap) and not found:
+            found = claim.stays_in_place(places, position_noise_m)
         return found
 
     def follow_recovery(self, sample: LocalPosition) -> None:

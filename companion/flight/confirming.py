@@ -10,12 +10,14 @@ the obstacle, of which a velocity tells.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 
 from companion.detection.interface import Evidence
-from companion.estimate.approach import VelocityFix
+from companion.estimate.approach import HIT_LEAVES_M_S, VelocityFix
 from companion.estimate.guards import MOTORS_RAD_S2
+from companion.estimate.history import MotionHistory
 from companion.estimate.impact import ImpactEstimate
-from companion.messages import ImuSample, Vector3
+from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.mission.config import GuardsConfig
 
 # All but the longest contacts are over (0.12 s at 1 m/s), and the vehicle's estimate is 20 to 40 ms late. A setpoint
@@ -66,7 +68,8 @@ class Claim:
         noise = math.sqrt(sum((value - mean_was) ** 2 for value in was) / (len(was) - 1))
         spread = noise * math.sqrt(1.0 / len(was) + 1.0 / len(came))
         in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - self.earlier.time_boot_us)
-        pushed_m_s, least_m_s = mean_came - mean_was + in_sum_m_s, 0.5 * size_m_s2 * self.averaging_s
+        pushed_m_s = mean_came - mean_was + in_sum_m_s
+        least_m_s = 0.5 * max(size_m_s2 * self.averaging_s, HIT_LEAVES_M_S)
         return pushed_m_s < least_m_s and least_m_s > SURE * spread
 
 
@@ -86,8 +89,27 @@ class Leap:
         after = [_less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
         if len(before) < 2 or len(after) < 2:
             return False
-        was = tuple(sum(axis) / len(before) for axis in zip(*before, strict=True))
+        # One of them may be what was forged.
+        was = tuple(median(axis) for axis in zip(*before, strict=True))
         return all(self._departs_m_s(came, was) < 0.5 * self.change_m_s for came in after)
+
+    def stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
+        """Whether the places before and after show less than half of the change, as far as their noise lets them."""
+        free_us, hit_us = self.free_until_boot_us, self.time_boot_us
+        was = self._came_m_s(history.between(free_us - BEFORE_US, free_us + 1))
+        came = self._came_m_s(history.between(hit_us + 1, hit_us + DECIDED_US + 1))
+        least_m_s = 0.5 * self.change_m_s
+        if was is None or came is None or least_m_s * DECIDED_US * 1e-6 < SURE * position_noise_m:
+            return False
+        return came - was < least_m_s
+
+    def _came_m_s(self, places: Sequence[LocalPosition]) -> float | None:
+        """How fast the places went along the change."""
+        if self.away is None or not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
+            return None
+        over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
+        ends = zip(self.away, places[-1].position_ned_m, places[0].position_ned_m, strict=True)
+        return sum(a * (p - q) for a, p, q in ends) / over_s
 
     def _departs_m_s(self, came: Sequence[float], was: Sequence[float]) -> float:
         if self.away is None:

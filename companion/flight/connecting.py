@@ -24,12 +24,12 @@ class Connect:
         if flight.vehicle.identity is None:
             return self._wait_for_heartbeat(flight, now_us)
         if self._requests is None:
-            self._requests = deque(request_streams(flight))
+            self._requests, flight.was_silent = deque(request_streams(flight)), False
             flight.tell(now_us, "connected", _connected_text(flight), system_id=flight.vehicle.identity.system_id)
         if self._measuring_since_us is None:
             self._send_requests(flight, self._requests, inputs, now_us)
             return None
-        if now_us - self._measuring_since_us < flight.mission.companion.streams.window_s * 1e6:
+        if flight.is_silent or now_us - self._measuring_since_us < flight.mission.companion.streams.window_s * 1e6:
             return None
         return self._judge(flight, now_us)
 
@@ -78,7 +78,7 @@ class Ready:
         if not self._shown:
             self._shown = True
             flight.tell(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
-        if not flight.plan_confirmed:
+        if flight.is_silent or not flight.plan_confirmed:
             return None
         complaint = ground_check(flight)
         return Move(Trigger.REFUSED, complaint) if complaint is not None else Move(Trigger.PLAN_CONFIRMED)

@@ -31,7 +31,8 @@ class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
     `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; and of the
-    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known.
+    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known, with
+    the acceleration that it has where it takes itself for level.
     """
 
     position_ned_m: Vector3
@@ -141,9 +142,14 @@ class FlightContext:
     command_client: CommandClient = field(default_factory=CommandClient)
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
+    is_silent: bool = False  # for longer than a silent link is put up with
+    was_silent: bool = False  # since the streams were asked for; if it was restarted meanwhile it has forgotten them
     target: Target | None = None  # as last streamed
     is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
+    stepped_us: int | None = None  # when the step before was
+    way_us: int = 0  # a clock that stands still while no position comes: nobody flies on who does not hear the vehicle
+    is_heard: bool = True
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
@@ -166,6 +172,7 @@ class FlightContext:
     unconfirmed: int = 0  # hits of which nothing but one sample spoke
     refusals: Refusals = field(default_factory=Refusals)
     round_trip: RoundTrip = field(default_factory=RoundTrip)
+    loss_s: float | None = None  # the vehicle's COM_OF_LOSS_T
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
@@ -207,6 +214,15 @@ class FlightContext:
     def own_modes(self) -> tuple[int | None, ...]:
         """The modes that mean that the companion has the vehicle; none while it does not hold it."""
         return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
+
+    def silent_s(self, now_us: int) -> float:
+        """How long nothing has been heard of the vehicle."""
+        return (now_us - self.vehicle.last_heard_us) * 1e-6
+
+    def note_silence(self, now_us: int) -> None:
+        known = self.vehicle.identity is not None
+        self.is_silent = known and self.silent_s(now_us) > self.mission.companion.link.silence_s
+        self.was_silent |= self.is_silent
 
     def may_ask(self, now_us: int) -> bool:
         """Whether a command that moves a held vehicle may leave: not on old news, which the pilot may have made untrue.

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from companion.detection import watch
 from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.detection.watch import Watch
+from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate
 from companion.estimate.rotation import body_to_ned, ned_to_body
 from companion.flight.context import FlightContext, Touched
@@ -44,6 +45,12 @@ def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation
         elif type(sample) is AttitudeTarget:
             pressing.tell(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, LocalPosition):
+            late_us = leaning.time_us - sample.time_boot_us
+            if late_us >= REBOOT_US:
+                leaning.forget()
+                pressing.forget()
+            elif late_us >= 0:
+                continue
             held = leaning.step(sample, attitude.attitude_wxyz, flown_to)
             held = pressing.step(sample, leaning.thrust_m_s2, flown_to[2]) or held
             if held is not None:

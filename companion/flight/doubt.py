@@ -15,6 +15,7 @@ from collections.abc import Sequence
 
 from companion.detection.classify import HOVER_M_S
 from companion.estimate.approach import VelocityFix
+from companion.estimate.trust import CORRECTED_US
 from companion.messages import LocalPosition, Vector3
 from companion.recovery.direction import split
 
@@ -26,7 +27,6 @@ LEAST_REBOUND = 0.3
 # what an estimate has been seen to show of a hit that it missed.
 STRUCK_M_S = 0.5
 # Being put right begins after 0.14 s and is steep for a third of a second.
-CORRECTED_US = 140_000
 EARLIEST_US = 500_000
 # By then it is over whatever the signs.
 LATEST_US = 1_200_000

@@ -14,6 +14,7 @@ ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, S
 # After a hit the setpoint jumps, and the vehicle takes its time.
 FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
 
+HEARD_AGAIN = "the vehicle was silent: its streams are asked for again"
 # HEARTBEAT, which alone tells that the vehicle has disarmed, comes once a second; half a second for delays.
 DISARM_NEWS_US = 1_500_000
 
@@ -77,11 +78,15 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | Non
     link = flight.mission.companion.link
     if flight.vehicle.identity is None:
         return None
-    silent_s = (now_us - flight.vehicle.last_heard_us) * 1e-6
+    silent_s = flight.silent_s(now_us)
     if state in ON_THE_GROUND:
-        if silent_s <= link.heartbeat_wait_s:
+        if silent_s > link.heartbeat_wait_s:
+            return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
+        flight.note_silence(now_us)
+        if flight.is_silent or not flight.was_silent:
             return None
-        return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
+        flight.tell(now_us, "link", HEARD_AGAIN)
+        return Move(Trigger.HEARD_AGAIN)
     if silent_s <= link.silence_s:
         return None
     # A vehicle that has been told to land is already doing what is safe.

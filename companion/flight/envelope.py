@@ -19,6 +19,7 @@ from companion.mission.policy import Limits
 from companion.recovery.direction import plus, split
 from companion.recovery.interface import Moving
 from companion.recovery.room import Surface
+from companion.recovery.way import REST
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
@@ -65,6 +66,7 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) 
     target = _with_acceleration(target, limits, reasons)
     target = _with_way(target, around, fence, reasons)
     target = _with_height(target, around, fence, reasons)
+    target = _with_tilt_error(target, limits)
     if target.yaw_rad is not None and abs(target.yaw_rad) > math.pi:
         target = replace(target, yaw_rad=math.remainder(target.yaw_rad, math.tau))
     return target, ", ".join(reasons)
@@ -144,9 +146,12 @@ def _with_way(target: Target, around: Surroundings, fence: Fence, reasons: list[
         return target
     motions = [Moving(around.vehicle_ned_m, around.velocity_ned_m_s)]
     if target.expected is not None:
-        # The vehicle is wrong about its motion, and what is expected is no more than that: both count.
-        place = target.expected.position_ned_m
-        motions = [target.expected, Moving(place, around.velocity_ned_m_s)]
+        # The vehicle is wrong about its motion, and what is expected is no more than that: places and velocities of
+        # both count. So does a tilt that the vehicle is right about by then.
+        expected = replace(target.expected, acceleration_ned_m_s2=REST)
+        told = replace(expected, velocity_ned_m_s=around.velocity_ned_m_s)
+        later = replace(told, acceleration_ned_m_s2=plus(REST, -1.0, target.expected.acceleration_ned_m_s2))
+        motions = list(dict.fromkeys((expected, told, later, *motions)))
     known = list(around.known)
     for motion in motions:
         known += _sides(held_way(target, motion), around.origin_ned_m, fence)
@@ -232,6 +237,15 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
         room = (VELOCITY_GAIN_PER_S * (least_m_s - down_m_s), VELOCITY_GAIN_PER_S * (most_m_s - down_m_s))
         acceleration = (acceleration[0], acceleration[1], min(max(down_m_s2, room[0]), room[1]))
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
+
+
+def _with_tilt_error(target: Target, limits: Limits) -> Target:
+    """The lean to ask for of a vehicle that is wrong about its tilt, so that it has the one that was meant."""
+    if target.expected is None or target.acceleration_ned_m_s2 is None:
+        return target
+    asked = plus(target.acceleration_ned_m_s2, -1.0, target.expected.acceleration_ned_m_s2)
+    is_told = replace(target.expected, acceleration_ned_m_s2=REST)
+    return _with_acceleration(replace(target, acceleration_ned_m_s2=asked, expected=is_told), limits, [])
 
 
 def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3, bool]:

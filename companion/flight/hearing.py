@@ -3,9 +3,19 @@
 from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
+from companion.flight.held import HELD_S, LOSS_PARAMETER, longer_loss_text
 from companion.link.identity import identify, is_autopilot
 from companion.link.refusals import LASTING_US
-from companion.messages import Heartbeat, Refused, Sample, TimeSyncAnswer, TimeSyncReply, TimeSyncRequest
+from companion.messages import (
+    Heartbeat,
+    Parameter,
+    ReadParameter,
+    Refused,
+    Sample,
+    TimeSyncAnswer,
+    TimeSyncReply,
+    TimeSyncRequest,
+)
 from companion.px4_mode import mode_name
 
 
@@ -35,12 +45,17 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
             if text is not None:
                 flight.tell(now_us, "implausible", text, message=sample.message)
             continue
+        elif isinstance(sample, Parameter) and sample.name == LOSS_PARAMETER:
+            if flight.loss_s is None and sample.value > HELD_S:
+                flight.tell(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
+            flight.loss_s = sample.value
         elif isinstance(sample, TimeSyncRequest):
             flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, TimeSyncAnswer):
             flight.round_trip.hear(sample, now_us)
         vehicle.hear(sample, now_us, own_modes)
         streams.count(type(sample), now_us)
+    _let_ways_go_on(flight, now_us)
     if vehicle.conflicts > conflicts:
         _tell_conflict(flight, now_us)
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
@@ -52,12 +67,26 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
     return None
 
 
+def _let_ways_go_on(flight: FlightContext, now_us: int) -> None:
+    """After a silence, or a step that came as late, a way goes on where it was: nothing is caught up with."""
+    before_us, heard_us = flight.stepped_us, flight.vehicle.last_position_us
+    flight.stepped_us = now_us
+    longest_us = flight.mission.companion.sight.silence_s * 1e6
+    flight.is_heard = heard_us is not None and now_us - heard_us <= longest_us
+    if before_us is not None and flight.is_heard and now_us - before_us <= longest_us:
+        flight.way_us += now_us - before_us
+
+
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
-    """On the ground too long a one is a reason not to begin; in the air it is told."""
+    """On the ground too long a one is a reason not to begin; in the air it is told. COM_OF_LOSS_T is asked for beside
+    it until it comes.
+    """
     asked = flight.round_trip.ask(now_us)
     if asked is None:
         return
     flight.outbox.append(asked)
+    if flight.loss_s is None:
+        flight.outbox.append(ReadParameter(LOSS_PARAMETER))
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
         flight.tell(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)

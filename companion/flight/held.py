@@ -4,12 +4,13 @@ A companion that dies sends nothing more. PX4 flies its last setpoint on for COM
 
     x'' = k_v (v_s + k_x (x_s - x) - x') + a_s,    k_x: MPC_XY_P, MPC_Z_P,    k_v: MPC_XY_VEL_P_ACC, MPC_Z_VEL_P_ACC
 
-of which what is not asked for falls away: of a lean all but a_s.
+of which what is not asked for falls away: of a lean all but a_s, where the vehicle knows how it leans (see envelope).
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 from companion.flight.context import Target
 from companion.memory.patch import Patch
@@ -19,6 +20,7 @@ from companion.recovery.direction import plus
 from companion.recovery.interface import Moving
 from companion.recovery.room import BEHIND_M, Surface
 
+LOSS_PARAMETER = "COM_OF_LOSS_T"
 # PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
 HELD_S = 1.0
 PLACE_PER_S = (0.95, 0.95, 1.0)
@@ -72,21 +74,32 @@ def unattended_text(speed_m_s: float) -> str:
     )
 
 
+def longer_loss_text(loss_s: float) -> str:
+    """One that is longer than a setpoint is safe, for people."""
+    return (
+        f"COM_OF_LOSS_T is {loss_s:g} s: if the companion dies, PX4 flies its last setpoint on for "
+        f"{loss_s - HELD_S:g} s more than it is made safe for"
+    )
+
+
 def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:
     """What a vehicle touched whose centre was there, and how far off a held setpoint is to lead it."""
     return Surface(place_ned_m, normal_ned, LEAST_FREE_M)
 
 
 def held_way(target: Target, motion: Moving) -> list[Vector3]:
-    """Places that a vehicle which moves so passes, the present one first, the last where it stops."""
+    """Places that a vehicle which moves so passes, the present one first, the last where it stops.
+
+    The motion's own acceleration comes to that of a lean.
+    """
     axes = []
     for axis in range(3):
         place_m, speed_m_s = motion.position_ned_m[axis], motion.velocity_ned_m_s[axis]
-        axes.append([place_m, *_led(axis, place_m, speed_m_s, *_asked(target, axis))])
+        axes.append([place_m, *_led(axis, place_m, speed_m_s, *_asked(target, motion, axis))])
     return [(n, e, d) for n, e, d in zip(*axes, strict=True)]
 
 
-def _asked(target: Target, axis: int) -> tuple[float | None, float | None, float]:
+def _asked(target: Target, motion: Moving, axis: int) -> tuple[float | None, float | None, float]:
     """Place, velocity and acceleration on one axis; None where it is not asked for."""
     velocity, acceleration = target.velocity_ned_m_s, target.acceleration_ned_m_s2
     a_s = 0.0 if acceleration is None else acceleration[axis]
@@ -94,41 +107,35 @@ def _asked(target: Target, axis: int) -> tuple[float | None, float | None, float
     if not target.leans_only:
         return target.position_ned_m[axis], v_s, a_s
     if axis < 2:
-        return None, None, a_s
+        return None, None, a_s + motion.acceleration_ned_m_s2[axis]
     return None if target.is_height_free else target.position_ned_m[2], v_s, a_s
 
 
 def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_s: float) -> Iterator[float]:
     """Of one axis: at each time, and stopped."""
-    k_x, k_v = PLACE_PER_S[axis], VELOCITY_PER_S[axis]
-    way, after_m_s = x, v
-    for number, time_s in enumerate(_TIMES_S):
-        if x_s is not None:
-            rest_m = x_s + ((v_s or 0.0) + a_s / k_v) / k_x
-            a, b, c, d = _WEIGHTS[axis][number]
-            way, after_m_s = rest_m + a * (x - rest_m) + b * v, c * (x - rest_m) + d * v
-        elif v_s is not None:
-            ends_m_s, left = v_s + a_s / k_v, _LEFT[axis][number]
-            way = x + ends_m_s * time_s + (v - ends_m_s) * (1.0 - left) / k_v
-            after_m_s = ends_m_s + left * (v - ends_m_s)
-        else:
-            way, after_m_s = x + v * time_s + 0.5 * a_s * time_s**2, v + a_s * time_s
+    k_x, off_m = (0.0, 0.0) if x_s is None else (PLACE_PER_S[axis], x_s - x)
+    leans = x_s is None and v_s is None
+    k_v = 0.0 if leans else VELOCITY_PER_S[axis]
+    asked_m_s2, way, after_m_s = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, x, v
+    for by_asked, by_speed, left in _answers(k_x, k_v):
+        way, after_m_s = x + by_asked * asked_m_s2 + by_speed * v, by_speed * asked_m_s2 + left * v
         yield way
-    if x_s is None and v_s is None:
-        yield way + after_m_s * REPAIRED_S
-    else:
-        yield way + 0.5 * after_m_s * abs(after_m_s) / BRAKES_M_S2
+    yield way + after_m_s * (REPAIRED_S if leans else 0.5 * abs(after_m_s) / BRAKES_M_S2)
 
 
-def _weights(k_x: float, k_v: float, time_s: float) -> tuple[float, float, float, float]:
-    """What a place off its rest and a velocity make, in so long, of the place and of the velocity."""
-    half = 0.5 * k_v
-    turn = math.sqrt(max(0.0, k_v * k_x - half * half))
-    left, cosine = math.exp(-half * time_s), math.cos(turn * time_s)
-    sine = math.sin(turn * time_s) / turn if turn else time_s
-    return left * (cosine + half * sine), left * sine, -left * k_v * k_x * sine, left * (cosine - half * sine)
-
-
-_GAINS = tuple(zip(PLACE_PER_S, VELOCITY_PER_S, strict=True))
-_WEIGHTS = tuple(tuple(_weights(k_x, k_v, time_s) for time_s in _TIMES_S) for k_x, k_v in _GAINS)
-_LEFT = tuple(tuple(math.exp(-k_v * time_s) for time_s in _TIMES_S) for k_v in VELOCITY_PER_S)
+@cache
+def _answers(k_x: float, k_v: float) -> Sequence[tuple[float, float, float]]:
+    """At each time what an acceleration asked for makes of the way, the same of a speed, and what is left of that."""
+    half, stiff = 0.5 * k_v, k_v * k_x
+    turn, found = math.sqrt(max(0.0, stiff - half * half)), list[tuple[float, float, float]]()
+    for time_s in _TIMES_S:
+        left, cosine = math.exp(-half * time_s), math.cos(turn * time_s)
+        sine = math.sin(turn * time_s) / turn if turn else time_s
+        if stiff:
+            found.append(((1.0 - left * (cosine + half * sine)) / stiff, left * sine, left * (cosine - half * sine)))
+        elif k_v:
+            fades_s = (1.0 - math.exp(-k_v * time_s)) / k_v
+            found.append(((time_s - fades_s) / k_v, fades_s, 1.0 - k_v * fades_s))
+        else:
+            found.append((0.5 * time_s**2, time_s, 1.0))
+    return found

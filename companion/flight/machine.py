@@ -87,6 +87,8 @@ class Machine:
             remember(flight, len(flight.collisions) - (self.state is State.RECOVERING), now_us)
         match self.state:
             case State.CONNECT:
+                # A plan that has been shown is made anew, and agreed to anew.
+                flight.plan_confirmed &= previous is not State.READY
                 return Connect(now_us)
             case State.READY:
                 return Ready()

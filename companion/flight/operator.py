@@ -83,7 +83,6 @@ _WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
     "crossed": _as_it_stands,
     "left_alone": _as_it_stands,
     "lost": _as_it_stands,
-    "stranger": _as_it_stands,
     "late": _as_it_stands,
     "round_trip": _as_it_stands,
     "fault": _fault,

@@ -51,7 +51,7 @@ class FlyItems:
             flight.tally = StepTally(flight.step_index, now_us)
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
         self._flight, self._action = flight, step.action
-        self._started_us = now_us
+        self._started_us, self._way_began_us = now_us, flight.way_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
         self._waiting = Waiting(self._action, flight) if isinstance(self._action, WaitForItem) else None
@@ -98,15 +98,19 @@ class FlyItems:
     def interrupt(self, now_us: int) -> None:
         """A hit ends the present way: how much of a path has been flown?"""
         if isinstance(self._action, PathItem):
-            tally, elapsed_s = self._flight.tally, (now_us - self._started_us) * 1e-6
-            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, elapsed_s))
+            tally = self._flight.tally
+            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._on_the_way_s))
+
+    @property
+    def _on_the_way_s(self) -> float:
+        return (self._flight.way_us - self._way_began_us) * 1e-6
 
     def target(self, now_us: int) -> Target | None:
-        elapsed_s = (now_us - self._started_us) * 1e-6
+        elapsed_s = self._on_the_way_s
         position, velocity, acceleration = self._way.at(elapsed_s)
         yaw_rad = self._heading.turn(position, velocity, now_us)
         place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s:
+        if elapsed_s >= self._way.duration_s or not self._flight.is_heard:
             return Target(place, yaw_rad)
         # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
         return Target(place, yaw_rad, velocity, acceleration)
@@ -134,12 +138,12 @@ class FlyItems:
         self._begin(flight, now_us)
 
     def _is_done(self, flight: FlightContext, now_us: int) -> bool:
-        elapsed_s = (now_us - self._started_us) * 1e-6
+        elapsed_s = self._on_the_way_s
         match self._action:
             case SetSpeedItem() | ExpectItem():
                 return True
             case HoldItem(duration_s=duration_s):
-                return elapsed_s >= duration_s
+                return now_us - self._started_us >= duration_s * 1e6
             case WaitForItem():
                 assert self._waiting is not None
                 return self._waiting.is_over(flight, now_us)

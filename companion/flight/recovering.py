@@ -81,7 +81,8 @@ class Recover:
             is_new = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
             motion = level(motion, self._record.setpoint_ned_m[2], braking)
             a, b, _ = motion.acceleration_ned_m_s2 or REST
-            expected = Moving(motion.position_ned_m, motion.velocity_ned_m_s or REST)
+            besides = REST if self._spins else self._record.level_leans_m_s2
+            expected = Moving(motion.position_ned_m, motion.velocity_ned_m_s or REST, besides)
             leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
             is_free = is_new or climb.is_reckoned
             velocity = as_it_moves(self._record.estimated_down_m_s) if is_free else REST
@@ -94,7 +95,8 @@ class Recover:
         record = self._record
         self._hang(flight, now_us)
         for sample in inputs.positions:
-            if record.is_contradicted(sample.time_boot_us):
+            noise_m = flight.mission.companion.estimate.position_noise_m
+            if record.is_contradicted(sample.time_boot_us, flight.vehicle.history, noise_m):
                 move = take_back(flight, now_us)
                 if move is not None:
                     return move
@@ -110,7 +112,7 @@ class Recover:
                 flight.tell(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
-        if now_us - self._started_us > timeout_s * 1e6:
+        if now_us - record.recovering_since_us > timeout_s * 1e6:
             record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.tell(now_us, "recovered", text, settled_after_s=None)
@@ -223,6 +225,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     mission, impact = flight.mission, estimate.impact
     normal = away_from(estimate.normal_ned)
     law = _law(flight)
+    before = flight.collisions[-1] if flight.collisions else None
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
     doubted, behind = _doubted(flight), overtaken(flight, impact.specific_force_frd_m_s2, estimate.velocity_ned_m_s)
     if behind is not None:
@@ -253,6 +256,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
         inherits_doubt=doubted is not None,
         climb=climb,
+        recovering_since_us=now_us if before is None or before.is_over else before.recovering_since_us,
         is_behind=behind is not None,
         claim=_claim(flight, estimate),
     )

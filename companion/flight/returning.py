@@ -17,7 +17,7 @@ class FlyHome:
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
         self._flight = flight
-        self._started_us = now_us
+        self._began_us = flight.way_us
         flight.going_home = True
         flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
@@ -33,18 +33,22 @@ class FlyHome:
         text = f"returning over {self._way.distance_m:.1f} m{round_it}"
         flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
 
+    @property
+    def _elapsed_s(self) -> float:
+        return (self._flight.way_us - self._began_us) * 1e-6
+
     def target(self, now_us: int) -> Target | None:
-        elapsed_s = (now_us - self._started_us) * 1e-6
+        elapsed_s = self._elapsed_s
         position, velocity, acceleration = self._way.at(elapsed_s)
         place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s:
+        if elapsed_s >= self._way.duration_s or not self._flight.is_heard:
             return Target(place, self._flight.yaw_rad)
         return Target(place, self._flight.yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if self._is_cut_off:
             return Move(Trigger.LAND_DUE)
-        overdue_s = (now_us - self._started_us) * 1e-6 - self._way.duration_s
+        overdue_s = self._elapsed_s - self._way.duration_s
         if overdue_s < 0.0:
             return None
         latest, limits = flight.vehicle.history.latest(), flight.mission.companion.flight

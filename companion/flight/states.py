@@ -26,6 +26,7 @@ class Trigger(Enum):
     CONTROL_LOST = "pilot, failsafe or disarm took over"
     REFUSED = "the vehicle cannot or will not fly"
     INTERRUPTED = "stop, silent link, abort condition or a step that did not end in time"
+    HEARD_AGAIN = "heard again after a silence, as of a restart"
     COLLISION = "hit detected"
     VEHICLE_READY = "identified, streams fast enough"
     PLAN_CONFIRMED = "person confirmed the plan"
@@ -49,11 +50,13 @@ TABLE = StateTable[State, Trigger](
         State.CONNECT: {
             Trigger.INTERRUPTED: State.ABORTED,
             Trigger.REFUSED: State.ABORTED,
+            Trigger.HEARD_AGAIN: State.CONNECT,
             Trigger.VEHICLE_READY: State.READY,
         },
         State.READY: {
             Trigger.INTERRUPTED: State.ABORTED,
             Trigger.REFUSED: State.ABORTED,
+            Trigger.HEARD_AGAIN: State.CONNECT,
             Trigger.PLAN_CONFIRMED: State.TAKEOFF,
         },
         State.TAKEOFF: {

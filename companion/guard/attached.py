@@ -6,7 +6,7 @@ from typing import Any
 
 from companion.estimate.normal import Search, further
 from companion.guard.config import GuardConfig
-from companion.guard.core import GuardCore, advance, next_deadline_us, start
+from companion.guard.core import POLL_INTERVAL_US, GuardCore, advance, next_deadline_us, start
 from companion.guard.gate import SETPOINTS, Gate
 from companion.guard.states import State
 from companion.link.identity import AUTOPILOT_COMPONENT_ID
@@ -27,6 +27,9 @@ class AttachedStep:
 class AttachedGuard:
     """Joins fields with the pure core; holds no clock and no thread. Times are microseconds, any epoch.
 
+    After a stall, which is a step missed by a whole poll, what arrived meanwhile is still to be heard, one message
+    after the other. What is heard for POLL_INTERVAL_US counts as it, and is one step: no silence is judged before.
+
     The program's own heartbeats and its share of TIMESYNC are already there; none are added. A program would take an
     answer to a question of the guard's for one to its own, so the round trip is not measured here. `seek` takes the
     search for a hit's normal on, with each message.
@@ -41,6 +44,8 @@ class AttachedGuard:
         self._encoder = Encoder()
         self._encoder.speak_to(*self._source)
         self._gate = Gate()
+        self._arrived: list[Sample] = []
+        self._drained_us: int | None = None  # after a stall: when what arrived in it has been heard
 
     def hear(self, name: str, source: tuple[int, int], fields: Mapping[str, Any], now_us: int) -> AttachedStep:
         """A message that has arrived."""
@@ -51,7 +56,11 @@ class AttachedGuard:
 
     def step(self, samples: Sequence[Sample], now_us: int) -> AttachedStep:
         """Samples that have been heard, or none when only time has passed."""
-        outputs = advance(self.core, samples, now_us)
+        if self._is_draining(now_us):
+            self._arrived += samples
+            return AttachedStep((), ())
+        outputs = advance(self.core, [*self._arrived, *samples], now_us)
+        self._arrived.clear()
         sent: list[tuple[str, Mapping[str, Any]]] = []
         for message in outputs.messages:
             if not isinstance(message, OnboardHeartbeat | TimeSyncAsk | TimeSyncReply):
@@ -60,6 +69,14 @@ class AttachedGuard:
             if name in SETPOINTS:
                 self._gate.sends(fields)
         return AttachedStep(sent, outputs.events)
+
+    def _is_draining(self, now_us: int) -> bool:
+        if self._drained_us is None and now_us - next_deadline_us(self.core) >= POLL_INTERVAL_US:
+            self._drained_us = now_us + POLL_INTERVAL_US
+        if self._drained_us is not None and now_us >= self._drained_us:
+            self._drained_us = None
+            return False
+        return self._drained_us is not None
 
     def lets_pass(self, name: str, fields: Mapping[str, Any], now_us: int) -> bool:
         """Whether a message on its way to the vehicle may go on: all but others' setpoints while the guard holds."""
@@ -81,4 +98,4 @@ class AttachedGuard:
         return self.core.machine.state is State.ENDED
 
     def next_deadline_us(self) -> int:
-        return next_deadline_us(self.core)
+        return next_deadline_us(self.core) if self._drained_us is None else self._drained_us

@@ -160,7 +160,12 @@ def act(
         is_enabled=core.is_enabled,
     )
     core.is_enabled = False
-    return core.machine.step(inputs, now_us)
+    moved = core.machine.step(inputs, now_us)
+    if moved and core.machine.state is State.CONNECTING:
+        # What was seen of a vehicle that was restarted, perhaps by a hit, says nothing of the one that it is now.
+        seek, core.watch = core.watch.estimator.seek, start_watch(core.guard.config.companion, now_us)
+        core.watch.estimator.seek = seek
+    return moved
 
 
 def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from companion.estimate.rotation import yaw_rad
 from companion.flight.after_hit import note_before
 from companion.flight.authority import Holder, who_decided
+from companion.flight.early_end import HEARD_AGAIN
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
 from companion.guard.context import Activity, GuardContext, GuardInputs, Move
@@ -113,6 +114,7 @@ class GuardMachine:
     def _from_outside(self, inputs: GuardInputs, now_us: int) -> Move | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         flight = self.guard.flight
+        flight.note_silence(now_us)
         if flight.vehicle.armed is False and TABLE.moves(self.state, Trigger.DISARMED):
             return Move(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:
@@ -123,7 +125,7 @@ class GuardMachine:
             return Move(Trigger.REFUSED, inputs.flight.refusal)
         if inputs.flight.stop_reason is not None and TABLE.moves(self.state, Trigger.STOPPED):
             return Move(Trigger.STOPPED, inputs.flight.stop_reason)
-        return self._position_silent() if self.state in HOLDING else None
+        return self._position_silent() if self.state in HOLDING else self._heard_again()
 
     def _taken_by_another(self, inputs: GuardInputs) -> str | None:
         guard, flight = self.guard, self.guard.flight
@@ -145,10 +147,18 @@ class GuardMachine:
         return f"{who} took over in {mode_name(report.custom_mode)}"
 
     def _link_silent(self, now_us: int) -> str | None:
-        silent_s = (now_us - self.guard.flight.vehicle.last_heard_us) * 1e-6
+        silent_s = self.guard.flight.silent_s(now_us)
         if silent_s <= self.guard.config.companion.link.silence_s:
             return None
         return f"the link has been silent for {silent_s:.1f} s"
+
+    def _heard_again(self) -> Move | None:
+        """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
+        flight = self.guard.flight
+        may_be_restarted = self.state is State.CONNECTING or flight.vehicle.armed is False
+        if not may_be_restarted or flight.is_silent or not flight.was_silent:
+            return None
+        return Move(Trigger.STREAMS_GONE, HEARD_AGAIN)
 
     def _position_silent(self) -> Move | None:
         vehicle = self.guard.flight.vehicle
@@ -179,7 +189,7 @@ class GuardMachine:
                 flight.collisions[-1].is_over = True
         match self.state:
             case State.CONNECTING:
-                return Connect(now_us)
+                return Connect(now_us, is_first=False)
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:

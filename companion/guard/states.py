@@ -36,7 +36,7 @@ class Trigger(Enum):
     CROSSED = "another program's setpoints reach the vehicle"
     SETTLED = "settled, or not in time"
     GIVEN_BACK = "mode confirmed"
-    STREAMS_GONE = "the vehicle speaks, its streams have ended"
+    STREAMS_GONE = "the vehicle speaks, its streams have ended, or may have in a silence"
     ENABLED = "person enabled it again"
 
 
@@ -45,6 +45,7 @@ TABLE = StateTable[State, Trigger](
         State.CONNECTING: {
             Trigger.REFUSED: State.ENDED,
             Trigger.STOPPED: State.ENDED,
+            Trigger.STREAMS_GONE: State.CONNECTING,
             Trigger.CONNECTED: State.STANDING_BY,
         },
         State.STANDING_BY: {

@@ -1,7 +1,7 @@
 """States connecting, standing by and watching: nothing is commanded, at most it is made ready to be."""
 
 from companion.flight.connecting import request_streams
-from companion.flight.context import Inputs, Target
+from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.held import unattended_text
 from companion.guard.context import GuardContext, GuardInputs, Move
 from companion.guard.states import Trigger
@@ -36,10 +36,14 @@ def why_not(guard: GuardContext) -> str | None:
 
 
 class Connect:
-    """Who is there, and does it send what is needed? The vehicle may be flying."""
+    """Who is there, and does it send what is needed? The vehicle may be flying.
 
-    def __init__(self, now_us: int) -> None:
-        self._started_us = now_us
+    A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
+    """
+
+    def __init__(self, now_us: int, is_first: bool = True) -> None:
+        self._started_us, self._is_first = now_us, is_first
+        self._is_told = False
         self._commands: list[VehicleCommand] | None = None
         self._measuring_since_us: int | None = None
 
@@ -55,17 +59,13 @@ class Connect:
                 return None
             return Move(Trigger.REFUSED, f"no HEARTBEAT from an autopilot within {wait_s:g} s; is the address right?")
         if self._commands is None:
-            self._commands = [
-                *request_streams(flight),
-                SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
-                SetMessageInterval(MessageId.MANUAL_CONTROL, round(1e6 / STICKS_HZ)),
-            ]
+            self._commands, flight.was_silent = _requests(flight), False
             text = f"connected to a PX4 {identity.vehicle_type}, system {identity.system_id}"
             flight.tell(now_us, "connected", text, system_id=identity.system_id)
         if self._measuring_since_us is None:
             self._ask(guard, self._commands, inputs, now_us)
             return None
-        if now_us - self._measuring_since_us < companion.streams.window_s * 1e6:
+        if flight.is_silent or now_us - self._measuring_since_us < companion.streams.window_s * 1e6:
             return None
         return self._judge(guard, now_us)
 
@@ -83,14 +83,28 @@ class Connect:
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
 
-    def _judge(self, guard: GuardContext, now_us: int) -> Move:
+    def _judge(self, guard: GuardContext, now_us: int) -> Move | None:
         flight = guard.flight
+        complaint = flight.streams.too_slow() or flight.round_trip.complaint()
+        if complaint is not None and not self._is_first:
+            if not self._is_told:
+                self._is_told = True
+                flight.tell(now_us, "link", f"not guarded by now: {complaint}")
+            self._commands, self._measuring_since_us = _requests(flight), None
+            return None
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         flight.tell(now_us, "streams", f"streams in Hz: {text}", **rates)
-        complaint = flight.streams.too_slow() or flight.round_trip.complaint()
         flight.tell(now_us, "unattended", unattended_text(guard.config.limits.max_speed_m_s))
         return Move(Trigger.CONNECTED) if complaint is None else Move(Trigger.REFUSED, complaint)
+
+
+def _requests(flight: FlightContext) -> list[VehicleCommand]:
+    return [
+        *request_streams(flight),
+        SetMessageInterval(MessageId.POSITION_TARGET_LOCAL_NED, round(1e6 / ECHO_HZ)),
+        SetMessageInterval(MessageId.MANUAL_CONTROL, round(1e6 / STICKS_HZ)),
+    ]
 
 
 class StandBy:

@@ -9,6 +9,9 @@ import math
 _OF_RANGE = 1.1 * math.sqrt(3.0)
 # 40 g is the widest range among PX4's accelerometer drivers (ADIS16470, ADIS16507).
 SPECIFIC_FORCE_M_S2 = _OF_RANGE * 40.0 * 9.80665
+# The widest zero-g offset among PX4's accelerometers (MPU-6000, z: 80 mg). A sensor that is off reads no more; thrust
+# is more in all but free fall, which shows no contact.
+ZERO_G_OFFSET_M_S2 = 0.08 * 9.80665
 # 4000 deg/s is the widest range among PX4's gyroscope drivers (ICM-45686).
 ANGULAR_VELOCITY_RAD_S = _OF_RANGE * math.radians(4000.0)
 # EKF2 holds its own states within these: velocity_limit, and Ekf::constrainStates.

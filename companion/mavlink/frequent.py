@@ -15,6 +15,7 @@ from companion.mavlink.bounds import (
     SPECIFIC_FORCE_M_S2,
     TIME_US,
     VELOCITY_M_S,
+    ZERO_G_OFFSET_M_S2,
     is_rotation,
     within,
 )
@@ -29,8 +30,7 @@ def _imu(
 ) -> ImuSample | Refused | None:
     if updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED:
         return None
-    if x == y == z == 0.0:
-        # Not even in free fall: every accelerometer has noise. A sensor that is off reads so.
+    if within(ZERO_G_OFFSET_M_S2, x, y, z):
         return Refused("HIGHRES_IMU", "the accelerometer reads zero on all axes")
     if not (within(SPECIFIC_FORCE_M_S2, x, y, z) and within(ANGULAR_VELOCITY_RAD_S, p, q, r) and time_us < TIME_US):
         text = f"specific force {x:g} {y:g} {z:g} m/s^2, rates {p:g} {q:g} {r:g} rad/s at {time_us} us"

@@ -157,6 +157,16 @@ class OperatorConfig(Written):
     """Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none."""
 
 
+class DiskConfig(Written):
+    """How much of the disk recorded flights of real vehicles may take; the oldest go first, those with a hit last."""
+
+    max_use_mb: NotNegative | None = None
+    """Megabytes (10^6 bytes) of all flights together. Unset: a tenth of the file system, at most 4 GiB, as journald's
+    SystemMaxUse."""
+    keep_free_mb: NotNegative | None = None
+    """Megabytes that are left free. Unset: 300 MiB, or a tenth of a smaller file system, as PX4's logger leaves."""
+
+
 class CompanionConfig(Written):
     """All settings of the companion."""
 
@@ -176,6 +186,7 @@ class CompanionConfig(Written):
     link: LinkConfig = LinkConfig()
     flight: FlightConfig = FlightConfig()
     operator: OperatorConfig = OperatorConfig()
+    disk: DiskConfig = DiskConfig()
 
     @property
     def least_threshold_m_s2(self) -> float | None:

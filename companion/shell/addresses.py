@@ -13,15 +13,9 @@ import socket
 from collections.abc import Callable
 
 from companion.errors import AddressError, ConnectionSetupError
-from companion.shell.connection import (
-    Connection,
-    SerialConnection,
-    TcpInConnection,
-    TcpOutConnection,
-    UdpInConnection,
-    UdpOutConnection,
-)
+from companion.shell.connection import Connection, UdpInConnection, UdpOutConnection
 from companion.shell.peer import Peer
+from companion.shell.streams import TcpInConnection, serial_port, tcp_out
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
 _SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
@@ -39,7 +33,7 @@ def open_connection(
     if peer is not None and scheme not in ("udpin", "udp"):
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
-        return SerialConnection(*_device_and_baud(url, rest))
+        return serial_port(*_device_and_baud(url, rest))
     host, port = _host_and_port(url, rest)
     if scheme == "udp":
         scheme = "udpin" if host in ("", "0.0.0.0", "::") else "udpout"
@@ -50,7 +44,7 @@ def open_connection(
     if scheme == "udpout":
         return UdpOutConnection(host, port)
     if scheme == "tcpout":
-        return TcpOutConnection(host, port)
+        return tcp_out(host, port)
     return TcpInConnection(host, port)
 
 

@@ -32,6 +32,10 @@ STOP_TIMEOUT_S = 10.0
 # How long a thread of the program's that computes may keep Python from MAVSDK's: between the datagram that shows a hit
 # and the setpoint it is waited for up to three times. Python's own 5 ms would be 15; this costs such a thread some 1 %.
 SWITCH_INTERVAL_S = 0.0001
+# Giving back is two modes at most, each given up after 2.5 s (flight.commander), and a wait for a report of the mode.
+GIVING_BACK_US = 10_000_000
+# A setpoint's interval.
+TRIED_AGAIN_S = 0.02
 # Events kept for a program that asks later.
 EVENTS_KEPT = 1000
 
@@ -65,6 +69,7 @@ class CollisionGuard:
         self._untold: deque[Event] = deque()
         self._listeners: list[Callable[[Event], None]] = []
         self._is_over = False
+        self._faulty_until_us: int | None = None  # after a fault around the guard: when giving back must have ended
         self.events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._switch_interval_s = sys.getswitchinterval()
         self._thread = threading.Thread(target=self._run, name="rebound-guard", daemon=True)
@@ -166,11 +171,24 @@ class CollisionGuard:
     def _incoming(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread: the sample, and at once what follows from it."""
         if name in HEARD:
-            fields = json.loads(fields_json)
             with self._changed:
                 if not self._is_over:
-                    self._send(self._guard.hear(name, source, fields, self._clock.now_us()))
+                    self._guarded(lambda: self._send(self._heard(name, source, fields_json)))
         return True
+
+    def _heard(self, name: str, source: tuple[int, int], fields_json: bytes) -> AttachedStep:
+        return self._guard.hear(name, source, json.loads(fields_json), self._clock.now_us())
+
+    def _guarded(self, act: Callable[[], None]) -> None:
+        """Whatever is raised has the vehicle given back, for as long as the link and the steps still do it."""
+        try:
+            act()
+        except Exception as error:
+            _LOG.exception("a fault around the guard")
+            if self._faulty_until_us is None:
+                self._faulty_until_us = self._clock.now_us() + GIVING_BACK_US
+                self._guard.core.stop_reason = f"fault around the guard, please report it: {error!r}"
+            self._changed.notify_all()
 
     def _seek(self, search: Search) -> Search:
         """A piece of a search takes milliseconds: with each message what the guard's own thread has found by then."""
@@ -204,9 +222,16 @@ class CollisionGuard:
         """On MAVSDK's thread, the last before the socket."""
         if name not in SETPOINTS:
             return True
-        fields = json.loads(fields_json)
         with self._changed:
-            return self._is_over or self._guard.lets_pass(name, fields, self._clock.now_us())
+            passes = self._is_over or not self.holds
+
+            def look() -> None:
+                nonlocal passes
+                passes = self._guard.lets_pass(name, json.loads(fields_json), self._clock.now_us())
+
+            if not self._is_over:
+                self._guarded(look)
+            return passes
 
     def _send(self, step: AttachedStep) -> None:
         try:
@@ -221,25 +246,43 @@ class CollisionGuard:
             self._changed.notify_all()
 
     def _run(self) -> None:
-        """What is due when nothing arrives, what takes long, and telling; user code never runs on MAVSDK's thread."""
-        while True:
-            with self._changed:
-                wait_s = (self._guard.next_deadline_us() - self._clock.now_us()) * 1e-6
-                if wait_s > 0.0 and not self._untold and self._asked is None:
-                    self._changed.wait(wait_s)
-                if self._is_over:
-                    return
-                if self._clock.now_us() >= self._guard.next_deadline_us():
-                    self._send(self._guard.step((), self._clock.now_us()))
-                told = list(self._untold)
-                self._untold.clear()
-                self.events.extend(told)
-                listeners = list(self._listeners)
-                asked, self._asked = self._asked, None
-            if asked is not None:
-                self._work(asked)
-            for event in told:
-                self._tell(event, listeners)
+        while self._turn():
+            pass
+
+    def _turn(self) -> bool:
+        """What is due when nothing arrives, what takes long, and telling; user code never runs on MAVSDK's thread.
+
+        Whether there is to be another.
+        """
+        with self._changed:
+            wait_s = (self._guard.next_deadline_us() - self._clock.now_us()) * 1e-6
+            if self._faulty_until_us is not None:
+                # A step that fails again leaves its deadline where it was.
+                wait_s = max(wait_s, TRIED_AGAIN_S)
+            if wait_s > 0.0 and not self._untold and self._asked is None:
+                self._changed.wait(wait_s)
+            if self._is_over:
+                return False
+            if self._clock.now_us() >= self._guard.next_deadline_us():
+                self._guarded(lambda: self._send(self._guard.step((), self._clock.now_us())))
+            self._end_after_a_fault()
+            told = list(self._untold)
+            self._untold.clear()
+            self.events.extend(told)
+            listeners = list(self._listeners)
+            asked, self._asked = self._asked, None
+        if asked is not None:
+            self._work(asked)
+        for event in told:
+            self._tell(event, listeners)
+        return True
+
+    def _end_after_a_fault(self) -> None:
+        until_us = self._faulty_until_us
+        if until_us is not None and (self._guard.finished or self._clock.now_us() >= until_us):
+            # From here on the program's own setpoints pass.
+            self._is_over = True
+            self._changed.notify_all()
 
     def _tell(self, event: Event, listeners: list[Callable[[Event], None]]) -> None:
         try:

@@ -2,8 +2,9 @@
 
     open      packets from anybody; answers go to whoever sent the last whole packet
     pinned    a heartbeat of an autopilot has come: its address alone is heard and answered
-    released  the pinned address has sent no packet for RELEASED_US, as when a router was restarted: a heartbeat of the
-              same system and component pins its new address, and nobody else is heard
+    moved     a heartbeat of the same system and component has come from another address, as when a router was
+              restarted: that one is pinned, and nobody else is heard, once the old one has been silent for RELEASED_US.
+              A heartbeat from the old one takes it back: it was a gap, and who filled it was another
 
 An address can be forged where the network lets it be; what keeps such packets out is MAVLink's signing. With it only
 genuine packets pin, hold and move an address. Whoever is answered before has not to be genuine: the vehicle learns the
@@ -11,6 +12,7 @@ time stamp of its signatures from what it is sent.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import TypeAlias
 
 from companion.link.identity import AUTOPILOT_COMPONENT_ID
@@ -19,14 +21,16 @@ from companion.mavlink.packet import message_id_of, packet_length, source_of
 
 Address: TypeAlias = tuple[str, int]
 
-# A vehicle's heartbeat comes once a second, its streams far more often: two missed heartbeats and a half.
-RELEASED_US = 2_500_000
+# PX4 leaves OFFBOARD after one second without setpoints (COM_OF_LOSS_T). Half of it for the silence: a vehicle that has
+# moved is answered within the second, and streams that fly one come twenty times as often.
+RELEASED_US = 500_000
 HEARTBEAT = 0
 
 
 class Peer:
     """Changed by `accepts` alone; times in microseconds, any epoch.
 
+    `dropped` counts datagrams that were not heard, `moves` how often the vehicle came back from another address.
     `only` is the host, or the host and port, that the person named: nobody else is heard, pinned or not.
     """
 
@@ -36,12 +40,15 @@ class Peer:
         self._only = only
         self._is_genuine = is_genuine
         self._pinned: Address | None = None
+        self._moved: Address | None = None  # sent the vehicle's heartbeat since the pinned one last spoke
+        self._before: Address | None = None  # pinned until the last move
         self._vehicle: tuple[int, int] | None = None  # system and component
         self._last_us = 0
         self._told: set[Address] = set()
         self._news: str | None = None
         self.answered: Address | None = None
         self.dropped = 0
+        self.moves = 0
 
     def accepts(self, datagram: bytes, sender: Address, now_us: int) -> bool:
         """Whether the datagram is to be heard."""
@@ -61,19 +68,28 @@ class Peer:
             return False
         if sender == self._pinned:
             if any(map(self._is_genuine, _packets(datagram))):
-                self._last_us = now_us
+                self._last_us, self._moved = now_us, None
             return True
-        if self._vehicle is not None and now_us - self._last_us <= RELEASED_US:
-            return False
-        for packet in _packets(datagram):
+        is_released = self._pinned is None or now_us - self._last_us > RELEASED_US or sender == self._before
+        # Of a flood beside a vehicle that is heard the first packets are enough to look at.
+        for packet in islice(_packets(datagram), None if is_released else 1):
             source = source_of(packet)
             if self._vehicle is None:
                 self.answered = sender
-            is_autopilot = source[1] == AUTOPILOT_COMPONENT_ID
-            is_vehicle = is_autopilot and self._vehicle in (None, source)
+            is_vehicle = source[1] == AUTOPILOT_COMPONENT_ID and self._vehicle in (None, source)
             if message_id_of(packet) == HEARTBEAT and is_vehicle and self._is_genuine(packet):
-                self._vehicle, self._pinned, self._last_us, self.answered = source, sender, now_us, sender
+                self._vehicle, self._moved = source, sender
+        if is_released and sender == self._moved:
+            self._pin(sender, now_us)
         return self._vehicle is None or sender == self._pinned
+
+    def _pin(self, sender: Address, now_us: int) -> None:
+        if self._pinned is not None:
+            self.moves += 1
+            self._news = f"the vehicle speaks from {sender[0]}:{sender[1]} by now, and is answered there"
+        self._before = None if sender == self._before else self._pinned
+        self._pinned = self.answered = sender
+        self._last_us, self._moved = now_us, None
 
     def _note(self, sender: Address) -> None:
         # An attacker has sixty thousand ports; the first few tell all there is to tell.

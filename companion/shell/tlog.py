@@ -1,7 +1,8 @@
 """Telemetry logs as every MAVLink tool reads them: 8 bytes of big-endian microseconds, then the packet."""
 
+import os
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from companion.mavlink.packet import packet_length
@@ -17,10 +18,15 @@ _LONGEST_GAP_US = 3 * 24 * 3600 * 1_000_000
 
 
 class TlogWriter:
-    """Appends packets to a log and hands them to the operating system twice a second."""
+    """Appends packets to a log and hands them to the operating system twice a second.
 
-    def __init__(self, path: Path) -> None:
+    With `sync_first` they are on the disk by then, and after a power cut the log is never ahead of what that call
+    brings to the disk before.
+    """
+
+    def __init__(self, path: Path, sync_first: Callable[[], None] | None = None) -> None:
         self._file = path.open("wb", buffering=0)
+        self._sync_first = sync_first
         self._pending: list[bytes] = []
         self._flushed_at_us: int | None = None
 
@@ -41,9 +47,13 @@ class TlogWriter:
         """Write all that waits. Raises OSError, and drops what could not be written: the log goes on after a gap."""
         left = memoryview(b"".join(self._pending))
         self._pending.clear()
+        if self._sync_first is not None:
+            self._sync_first()
         # A file without a buffer takes what there is room for, and says only at the next write that there is no more.
         while left:
             left = left[self._file.write(left) :]
+        if self._sync_first is not None:
+            os.fdatasync(self._file.fileno())
 
     def close(self) -> None:
         if not self._file.closed:

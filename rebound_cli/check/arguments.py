@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, add_set, runs
+from rebound_cli.arguments import Commands, add_set, mission_file, runs
 
 
 def add_check(commands: Commands) -> None:
@@ -11,7 +11,9 @@ def add_check(commands: Commands) -> None:
         help="check a mission file and show what would be flown",
         description="Validates mission files, prints what would be flown and when, and draws it.",
     )
-    check.add_argument("missions", type=Path, nargs="*", metavar="MISSION", help="mission files")
+    check.add_argument(
+        "missions", type=mission_file, nargs="*", metavar="MISSION", help="mission files, or names of ones that ship"
+    )
     check.add_argument(
         "--schema", action="store_true", help="print the JSON schema of mission files, for editors, and nothing else"
     )

@@ -6,10 +6,10 @@ from argparse import Namespace
 from pathlib import Path
 
 from companion.errors import ConfigurationError, ReboundError
-from rebound_cli.check.picture import draw_mission
 from rebound_cli.check.schema import mission_schema
 from rebound_cli.check.table import mission_text
 from rebound_cli.check.ways import planned_ways
+from rebound_cli.extras import needed_text
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from sim_vehicle.errors import SimulationError
 
@@ -38,6 +38,12 @@ def _check(path: Path, options: Namespace) -> None:
     ways = planned_ways(mission, world)
     print(mission_text(mission, ways))
     if options.no_picture:
+        return
+    try:
+        # A drone has no matplotlib, and need not have.
+        from rebound_cli.check.picture import draw_mission
+    except ModuleNotFoundError as error:
+        print(f"\nnot drawn: {needed_text(error)}")
         return
     picture = options.out / f"{mission.name}.png"
     try:

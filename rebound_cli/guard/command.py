@@ -14,15 +14,18 @@ from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
+from rebound_cli.flights.ring import room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
+from rebound_cli.status.server import StatusServer, served
 
 
 def run_guard(options: Namespace) -> int:
     """Guard until told to stop; 0 then. Raises ReboundError where there is nothing that can be guarded."""
     config = guard_config(options)
+    run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
         return _guard(options, config, console)
 
@@ -34,11 +37,11 @@ def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
     folder = run_folder.create_run_folder(options.out, "guard")
     run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
-    recorder = FlightRecorder(folder, Background("log"))
+    recorder = FlightRecorder(folder, Background("log"), room_for(folder, options.out, config.companion.disk))
     guard = Guard(config)
     try:
-        with Interrupts() as interrupts:
-            _run(guard, connection, recorder, console, interrupts)
+        with served(console.print, command="guard", folder=str(folder.resolve())) as server, Interrupts() as interrupts:
+            _run(guard, connection, recorder, console, interrupts, server)
     finally:
         connection.close()
         recorder.close()
@@ -48,6 +51,7 @@ def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
             "collisions": hits,
             "left_alone": guard.left_alone(),
             "round_trip_ms": guard.round_trip().summary(),
+            **asdict(connection.counts),
             "refused_packets": refused_packets(connection),
         }
         run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
@@ -71,7 +75,12 @@ def guard_config(options: Namespace) -> GuardConfig:
 
 
 def _run(
-    guard: Guard, connection: Connection, recorder: FlightRecorder, console: Console, interrupts: Interrupts
+    guard: Guard,
+    connection: Connection,
+    recorder: FlightRecorder,
+    console: Console,
+    interrupts: Interrupts,
+    server: StatusServer | None,
 ) -> None:
     clock = Clock()
     started_us = clock.now_us()
@@ -79,7 +88,10 @@ def _run(
     def beside(now_us: int, result: StepResult) -> None:
         if result.events:
             console.events(result.events, started_us)
-        console.live(guard.status, (now_us - started_us) / 1e6, loop.heard.text(now_us))
+        running_s, link = (now_us - started_us) / 1e6, loop.heard.text(now_us)
+        console.live(guard.status, running_s, link)
+        if server is not None:
+            server.hand_over(guard.status, result.events, running_s, link)
 
     loop = Loop(guard, connection, clock, recorder, console, interrupts)
     loop.run(beside)

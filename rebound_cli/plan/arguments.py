@@ -4,7 +4,7 @@ import argparse
 import math
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, runs
+from rebound_cli.arguments import Commands, mission_file, runs
 
 
 def add_plan(commands: Commands) -> None:
@@ -20,7 +20,7 @@ def add_plan(commands: Commands) -> None:
     _add_out(reading, "default: standard output")
     reading.set_defaults(run=runs("rebound_cli.plan.command:run_import"))
     writing = ways.add_parser("export", help="a .plan from a mission file", description="Makes a .plan of a mission.")
-    writing.add_argument("mission", type=Path, metavar="MISSION")
+    writing.add_argument("mission", type=mission_file, metavar="MISSION")
     writing.add_argument(
         "--home",
         type=_home,

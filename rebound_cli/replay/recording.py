@@ -25,6 +25,7 @@ from rebound_cli.run_folder import (
     VERSIONS_NAME,
     read_records,
     read_text,
+    whole_lines,
 )
 
 
@@ -73,26 +74,44 @@ def read_recording(folder: Path) -> Recording:
     if not steps:
         raise LogError(f"{folder / TLOG_NAME}: no packet in it: nothing was ever heard in this flight.")
     last_packet_us = max(steps)
-    for record in read_records(inputs_file, read_text(inputs_file)):
+    is_cut = not (folder / SUMMARY_NAME).exists()
+    # Of a flight that was cut off a last line may be unfinished; in any other that is damage.
+    inputs, events = (
+        whole_lines(text) if is_cut else text for text in (read_text(inputs_file), read_text(folder / EVENTS_NAME))
+    )
+    for record in read_records(inputs_file, inputs):
         step = steps.setdefault(record["time_us"], Step(record["time_us"]))
         step.confirms |= record["kind"] == "confirm"
         step.file_appears |= record["kind"] == "file"
         step.stop_reason = record.get("reason", step.stop_reason)
         if record["kind"] == "note":
             step.notes.append((str(record.get("event")), str(record.get("text"))))
-    lines = read_text(folder / EVENTS_NAME).splitlines(keepends=True)
-    is_cut = not (folder / SUMMARY_NAME).exists()
+    lines = events.splitlines(keepends=True)
     if is_cut:
-        # Of the last step perhaps not all was written.
-        steps = {time_us: step for time_us, step in steps.items() if time_us < last_packet_us}
-        whole = "".join(line for line in lines if line.endswith("\n"))
-        events = zip(lines, read_records(folder / EVENTS_NAME, whole), strict=False)
-        lines = [line for line, event in events if event["time_us"] < last_packet_us]
+        end_us = _whole_until_us(steps, last_packet_us)
+        steps = {time_us: step for time_us, step in steps.items() if time_us < end_us}
+        if not steps:
+            raise LogError(f"{folder}: cut off before a whole step of the flight was written.")
+        told = zip(lines, read_records(folder / EVENTS_NAME, events), strict=True)
+        lines = [line for line, event in told if event["time_us"] < end_us]
     try:
         versions = dict(json.loads(read_text(folder / VERSIONS_NAME)))
     except (ValueError, TypeError) as error:
         raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
+
+
+def _whole_until_us(steps: Mapping[int, Step], last_packet_us: int) -> int:
+    """Where a flight that was cut off ends: of the step with the last packet perhaps not all was written.
+
+    Nor does it end after a step with notes, which are told with the step after it under the time of their own.
+    """
+    end_us = last_packet_us
+    for time_us in sorted((time_us for time_us in steps if time_us < last_packet_us), reverse=True):
+        if not steps[time_us].notes:
+            break
+        end_us = time_us
+    return end_us
 
 
 def settings_file(folder: Path) -> Path:

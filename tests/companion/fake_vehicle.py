@@ -67,6 +67,8 @@ class FakeVehicle:
     asked: list = field(default_factory=list)
     round_trip_us: int = 0  # after which it answers TIMESYNC; one interval at least
     does_answer_time: bool = True
+    loss_s: float = 1.0  # COM_OF_LOSS_T
+    lost_answers: int = 0  # to the first so many questions for it
     contact_times_us: list = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -118,6 +120,12 @@ class FakeVehicle:
                 self.asked.append((self.time_us + self.round_trip_us, message.ts1))
             else:
                 self.timesyncs.append(message)
+        elif kind == "PARAM_REQUEST_READ" and message.param_id == "COM_OF_LOSS_T":
+            self.lost_answers -= 1
+            if self.lost_answers < 0:
+                self.send(
+                    mav.MAVLink_param_value_message(b"COM_OF_LOSS_T", self.loss_s, mav.MAV_PARAM_TYPE_REAL32, 1, 0)
+                )
         elif kind == "COMMAND_LONG":
             self.obey_command(message)
 

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from companion.estimate.approach import VelocityFix
+from companion.estimate.strapdown import Strapdown
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.doubt import EARLIEST_US, LATEST_US, half_way, is_believed, is_steady
@@ -123,3 +124,23 @@ def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
     assert n < 2.7 and abs(e) < 0.1 and d == pytest.approx(-2.0)
     # And of the speed off the wall nothing is said: no velocity of that time was believed
     assert record.report().rebound_speed_m_s is None
+
+
+def test_a_lean_is_meant_for_the_tilt_that_the_gyroscopes_show():
+    # Given a clipped hit, after which the filter has the nose 4 degrees too high
+    strapdown, up_rad = Strapdown(), math.radians(4.0)
+    strapdown.attitude(1_140_000, (1.0, 0.0, 0.0, 0.0))
+    strapdown.imu(1_150_000, (0.0, 0.0, -9.81), ZERO)
+    strapdown.attitude(1_160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), is_right=False)
+    mission = Mission.model_validate({"name": "tilt", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
+    flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
+    flight.origin_ned_m = ZERO
+    wall = Contact(1_000_000, (3.0, 0.0, -2.0), (2.0, 0.0, 0.0), SOUTH)
+    record = CollisionRecord(0, 1_000_000, "fused", wall, (2.0, 0.0, -2.0), SOUTH, 150.0, 1_000_000, 2.0, NOT_KNOWN)
+    flight.collisions.append(record)
+    # When the recovery asks for a lean
+    record.follow_climb(strapdown, (), None)
+    target = Recover(flight, 0).target(160_000)
+    # Then it is known to what that is added
+    assert target is not None and target.leans_only and target.expected is not None
+    assert target.expected.acceleration_ned_m_s2[0] == pytest.approx(9.80665 * math.tan(up_rad))

@@ -7,6 +7,8 @@ from pymavlink.dialects.v20 import development as mav
 
 from tests.companion.fake_vehicle import EPOCH_US, LAND, LOITER, FakeVehicle, flight
 
+SET_MESSAGE_INTERVAL = 511
+
 
 def failed(vehicle: FakeVehicle, limit_s: float = 40.0, **changes):
     f = flight(vehicle, **changes)
@@ -184,6 +186,47 @@ def test_silence_before_the_flight_fails():
     assert "silent" in f.companion.report().reason
 
 
+def requests(f):
+    return [m.param1 for _, m in f.vehicle.commands if m.command == SET_MESSAGE_INTERVAL]
+
+
+def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_to_anew():
+    # Given a plan that is shown
+    f = flight(confirmed=False)
+    f.run_to("ready")
+    asked = requests(f)
+    # When the vehicle is silent for three seconds, the person says yes meanwhile, and its clock begins anew
+    f.vehicle.silent = True
+    f.run_for(2.0)
+    f.companion.confirm_plan()
+    f.run_for(1.0)
+    assert f.state == "ready", "nothing begins with a vehicle that is not heard"
+    f.vehicle.time_us, f.vehicle.silent = 0, False
+    # Then its streams are asked for and measured again, and nobody has agreed to the new plan
+    f.run_to("connect", 0.1)
+    f.run_to("ready", 10.0)
+    f.run_for(2.0)
+    assert f.state == "ready" and not f.vehicle.armed
+    assert requests(f) == 2 * asked and f.kinds().count("plan") == 2
+    assert f.event("link").text == "the vehicle was silent: its streams are asked for again"
+    # And it is flown when they have
+    f.companion.confirm_plan()
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_again():
+    f = flight()
+    f.run_until(lambda: "connected" in f.kinds())
+    f.run_for(0.5)
+    f.vehicle.silent = True
+    f.run_for(4.0)
+    assert f.state == "connect"
+    f.vehicle.time_us, f.vehicle.silent = 0, False
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed" and f.kinds().count("streams") == 1
+
+
 def test_a_lost_position_hands_over_though_the_link_lives():
     f = flight()
     f.run_to("mission")
@@ -242,3 +285,17 @@ def test_a_vehicle_that_never_disarms_is_reported_and_left_alone():
     f.run_to_end(130.0)
     assert "not disarmed" in f.companion.report().reason
     assert f.vehicle.mode == LAND
+
+
+@pytest.mark.parametrize(("loss_s", "said"), [(1.0, []), (3.0, [3.0])])
+def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told_once(loss_s, said):
+    # Given a vehicle that acts so late when setpoints stop, and a link that loses the first two answers
+    vehicle = FakeVehicle(loss_s=loss_s, lost_answers=2)
+    # When it is flown
+    flown = flight(vehicle)
+    flown.run_to("mission")
+    # Then what that costs is told before take-off
+    told = [event for event in flown.events if event.kind == "unattended"]
+    assert [event.data["loss_s"] for event in told] == said
+    assert all("2 s more than it is made safe for" in event.text for event in told)
+    assert vehicle.lost_answers == -1, "it was asked until it had answered"

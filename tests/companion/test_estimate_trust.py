@@ -116,3 +116,27 @@ def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
     impacts, told, trusted = after_a_hit(3.0, 20.0, 8, lambda since_s: 0.0)
     assert len(impacts) == 1 and not told
     assert trusted.count(False) <= 2
+
+
+@pytest.mark.parametrize(("turns", "leans_m_s2"), [(False, 9.80665 * math.tan(math.radians(4.0))), (True, 0.0)])
+def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2):
+    """Told to be level, a vehicle whose filter says nose up by 4 degrees too much leans forward by as much."""
+    # Given a clipped hit at 2.0 s, from 0.14 s after which the nose is told to come up at 20 degrees a second
+    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
+    rate_rad_s, up_rad = math.radians(20.0), 0.0
+    for t_us in range(4_000, 2_500_000, 4_000):
+        comes_up = 2_140_000 < t_us <= 2_340_000
+        up_rad += 0.004 * rate_rad_s * comes_up
+        push = -120.0 if 2_000_000 <= t_us < 2_012_000 else 0.0
+        # When the gyroscopes show that turn, or nothing of it
+        rates = (0.0, rate_rad_s if comes_up and turns else 0.0, 0.0)
+        samples: list[Sample] = [ImuSample(t_us, (push, 0.0, -9.80665), rates)]
+        if t_us % 20_000 == 0:
+            samples.append(Attitude(t_us, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), rates))
+        advance(watch, samples, situation, t_us)
+        if t_us < 2_140_000:
+            assert watch.estimator.strapdown.level_leans_m_s2 == STILL
+    # Then it is the filter's in the one case and the vehicle's in the other
+    assert not watch.estimate_trusted
+    assert watch.estimator.strapdown.level_leans_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)

@@ -10,6 +10,8 @@ EXPECTED = {
     (State.CONNECT, Trigger.VEHICLE_READY): State.READY,
     (State.READY, Trigger.REFUSED): State.ABORTED,
     (State.READY, Trigger.INTERRUPTED): State.ABORTED,
+    (State.CONNECT, Trigger.HEARD_AGAIN): State.CONNECT,
+    (State.READY, Trigger.HEARD_AGAIN): State.CONNECT,
     (State.READY, Trigger.PLAN_CONFIRMED): State.TAKEOFF,
     (State.TAKEOFF, Trigger.CONTROL_LOST): State.ABORTED,
     (State.TAKEOFF, Trigger.REFUSED): State.ABORTED,

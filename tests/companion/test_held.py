@@ -1,6 +1,7 @@
 """Where a setpoint leads that nothing follows, and what the envelope makes of one that leads into something."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -79,6 +80,44 @@ def test_a_vehicle_that_is_slower_off_the_wall_than_expected_may_brake_no_harder
     alone, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(expected, [Known(WALL)]), FENCE, LIMITS)
     both, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(told, [Known(WALL)]), FENCE, LIMITS)
     assert both.acceleration_ned_m_s2[0] < 0.6 * alone.acceleration_ned_m_s2[0]
+
+
+def test_a_vehicle_that_is_nearer_to_the_wall_than_expected_may_brake_no_harder_than_that_allows():
+    """The hit's law has it 0.5 m off the wall, its estimate 0.2 m: which of them is right nobody knows."""
+    off, asked = (-0.6, 0.0, 0.0), lean((2.0, 0.0, 0.0), (-0.6, 0.0, 0.0))
+    far, near = (
+        bounded(asked, around(off, [Known(WALL)], vehicle), FENCE, LIMITS)[0] for vehicle in (HERE, (0.3, 0.0, -1.5))
+    )
+    assert near.acceleration_ned_m_s2[0] < far.acceleration_ned_m_s2[0] - 0.1
+
+
+def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
+    # Given a vehicle that leans by 0.7 m/s^2 towards the wall where it takes itself for level
+    off = Moving(HERE, (-1.0, 0.0, 0.0), (0.7, 0.0, 0.0))
+    surroundings = around(off.velocity_ned_m_s, [Known(WALL)])
+    # When it is to brake by 0.5
+    sent, _ = bounded(replace(lean((0.5, 0.2, 0.0)), expected=off), surroundings, FENCE, LIMITS)
+    # Then it is told to lean off the wall by 0.2, once
+    assert sent.acceleration_ned_m_s2 == pytest.approx((-0.2, 0.2, 0.0))
+    assert bounded(sent, surroundings, FENCE, LIMITS)[0].acceleration_ned_m_s2 == sent.acceleration_ned_m_s2
+    # and never further than it may tilt
+    capsized = replace(off, acceleration_ned_m_s2=(90.0, 0.0, 0.0))
+    sent, _ = bounded(replace(lean((0.5, 0.2, 0.0)), expected=capsized), surroundings, FENCE, LIMITS)
+    assert math.hypot(*sent.acceleration_ned_m_s2[:2]) <= 9.81 * math.tan(math.radians(LIMITS.max_tilt_deg))
+
+
+def test_a_tilt_error_that_ends_meanwhile_does_not_lead_to_the_wall():
+    """What is told to lean to the wall, because it leans off it by itself, must be safe when it does not any more."""
+    off = Moving(HERE, (-1.0, 0.0, 0.0))
+    plain, _ = bounded(
+        replace(lean((0.8, 0.0, 0.0)), expected=off), around(off.velocity_ned_m_s, [Known(WALL)]), FENCE, LIMITS
+    )
+    errs = replace(off, acceleration_ned_m_s2=(-0.9, 0.0, 0.0))
+    sent, _ = bounded(
+        replace(lean((0.8, 0.0, 0.0)), expected=errs), around(off.velocity_ned_m_s, [Known(WALL)]), FENCE, LIMITS
+    )
+    assert plain.acceleration_ned_m_s2[0] < sent.acceleration_ned_m_s2[0] < 0.8 + 0.9
+    assert min(WALL.off_m(place) for place in held_way(sent, off)) > 0.1
 
 
 def test_what_leads_away_from_the_wall_or_along_it_passes():

@@ -49,7 +49,36 @@ def test_a_vehicle_that_comes_back_from_another_address_is_heard_once_the_first_
     assert peer.accepts(IMU, VEHICLE, RELEASED_US)
     assert not peer.accepts(HEARTBEAT, moved, 2 * RELEASED_US)
     assert peer.accepts(HEARTBEAT, moved, 2 * RELEASED_US + 1)
-    assert peer.answered == moved and not peer.accepts(HEARTBEAT, VEHICLE, 2 * RELEASED_US + 2)
+    assert peer.answered == moved and not peer.accepts(IMU, VEHICLE, 2 * RELEASED_US + 2)
+
+
+def test_a_vehicle_that_moved_is_heard_and_answered_within_a_second():
+    # Given a vehicle that streams at 50 Hz with a heartbeat a second, and moves just before a heartbeat, or just after
+    for first_beat_us in (10_000, 990_000):
+        peer, moved = Peer(), ("192.168.4.1", 50_001)
+        peer.accepts(HEARTBEAT, VEHICLE, 0)
+        # When it speaks from its new address
+        heard_us = None
+        for now_us in range(10_000, 2_000_000, 20_000):
+            beats = (now_us - first_beat_us) % 1_000_000 == 0
+            if peer.accepts(HEARTBEAT if beats else IMU, moved, now_us) and heard_us is None:
+                heard_us = now_us
+        # Then it is answered there within the second, and told once
+        assert heard_us is not None and heard_us <= 1_000_000
+        assert (peer.answered, peer.moves) == (moved, 1)
+        assert f"{moved[0]}:{moved[1]}" in peer.news()
+
+
+def test_who_fills_a_gap_of_the_vehicles_loses_its_place_to_it():
+    # Given somebody who forges heartbeats, and a vehicle that is not heard for longer than RELEASED_US
+    peer = Peer()
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    assert peer.accepts(HEARTBEAT, STRANGER, RELEASED_US + 1)
+    # When the vehicle is heard again
+    assert peer.accepts(HEARTBEAT, VEHICLE, RELEASED_US + 2)
+    # Then it is answered, and the other is not believed beside it
+    assert not peer.accepts(HEARTBEAT, STRANGER, RELEASED_US + 3)
+    assert peer.answered == VEHICLE
 
 
 def test_a_silent_vehicles_place_is_taken_by_nobody_else():

@@ -79,3 +79,9 @@ def test_below_the_height_of_the_ground_nothing_is_a_hit():
     air.until(lambda: air.position()[0] > 3.6, 20.0)
     air.run(1.0)
     assert air.state is State.WATCHING and air.told("detection") == []
+
+
+def test_a_com_of_loss_t_that_is_longer_than_a_setpoint_is_safe_is_told():
+    air = Air(parameters={"COM_OF_LOSS_T": 3.0})
+    air.run(5.0)
+    assert any("COM_OF_LOSS_T is 3 s" in text for text in air.told("unattended"))

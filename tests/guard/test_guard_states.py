@@ -7,6 +7,7 @@ from companion.guard.states import HOLDING, TABLE, State, Trigger
 EXPECTED = {
     (State.CONNECTING, Trigger.REFUSED): State.ENDED,
     (State.CONNECTING, Trigger.STOPPED): State.ENDED,
+    (State.CONNECTING, Trigger.STREAMS_GONE): State.CONNECTING,
     (State.CONNECTING, Trigger.CONNECTED): State.STANDING_BY,
     (State.STANDING_BY, Trigger.STOPPED): State.ENDED,
     (State.STANDING_BY, Trigger.WORTH_GUARDING): State.WATCHING,

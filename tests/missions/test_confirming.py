@@ -114,7 +114,7 @@ def cruising(*sets: str) -> Air:
     return air
 
 
-@pytest.mark.parametrize("force_m_s2", [-100.0, -40.0, 40.0])
+@pytest.mark.parametrize("force_m_s2", [-100.0, -40.0, -10.0, -5.0, 40.0])
 def test_one_forged_packet_costs_a_twitch(force_m_s2):
     air = cruising()
     before = len(air.setpoints)

@@ -1,6 +1,8 @@
 """Disks, terminals, garbage and faults beside the control path: none of them ends a flight in the air."""
 
 import gc
+import io
+import json
 import resource
 import sys
 import threading
@@ -9,7 +11,9 @@ from typing import Any
 import pytest
 
 from companion.companion import Companion, StepResult
-from companion.px4_mode import AUTO_LOITER
+from companion.px4_mode import AUTO_LOITER, OFFBOARD
+from companion.shell.connection import LinkCounts
+from rebound_cli import fly as command
 from rebound_cli import run_folder
 from rebound_cli.background import MOST_WAITING, Background
 from rebound_cli.console import Console
@@ -32,6 +36,7 @@ class World:
     def __init__(self, scene):
         self.vehicle = SimulatedVehicle(scene.airframe, scene.scene, scene.seed)
         self.sent, self.custom_mode, self.is_deaf = [], None, False
+        self.is_cut, self.told = False, []  # by the connection
         self._pending, self._readings = b"", 0
 
     def now_us(self):
@@ -50,11 +55,11 @@ class World:
         return self._pass() if timeout_s > 0.0 else b""
 
     def news(self):
-        return None
+        return self.told.pop(0) if self.told else None
 
     def send(self, frame):
         self.sent.append(frame)
-        self._pending += frame
+        self._pending += b"" if self.is_cut else frame
 
     def _pass(self):
         frames = self.vehicle.step(self._pending)
@@ -62,7 +67,7 @@ class World:
         for frame in frames:
             if frame[7:10] == bytes([HEARTBEAT, 0, 0]):
                 self.custom_mode = int.from_bytes(frame[10:14], "little")
-        return b"".join(frames)
+        return b"" if self.is_cut else b"".join(frames)
 
 
 class Gone:
@@ -94,6 +99,42 @@ class Deaf(ConfirmAtOnce):
     def poll(self, companion):
         super().poll(companion)
         self._world.is_deaf |= companion.status().state == "takeoff" and companion.status().armed
+
+
+class Unplugged(ConfirmAtOnce):
+    """Pulls the plug for so long once the vehicle climbs, and puts it in again."""
+
+    def __init__(self, world, seconds):
+        super().__init__()
+        self._world, self._us, self._since_us = world, seconds * 1e6, None
+
+    def poll(self, companion):
+        super().poll(companion)
+        world = self._world
+        now_us, status = world.vehicle.time_boot_us, companion.status()
+        if self._since_us is None and status.state == "takeoff" and status.armed:
+            self._since_us, world.is_cut = now_us, True
+            world.told.append("connection to /dev/ttyACM0 lost, reconnecting")
+        elif world.is_cut and now_us - self._since_us >= self._us:
+            world.is_cut = False
+            world.told.append("connected again: /dev/ttyACM1")
+
+
+class Restarted(ConfirmAtOnce):
+    """Restarts the vehicle while the plan is shown; the person says yes to that one, too."""
+
+    def __init__(self, world):
+        super().__init__()
+        self._world, self._since_us = world, None
+
+    def poll(self, companion):
+        world, now_us = self._world, self._world.vehicle.time_boot_us
+        if self._since_us is None and companion.plan_is_ready():
+            self._since_us, world.is_cut = now_us, True
+        silent_us = now_us - (self._since_us or now_us)
+        world.is_cut &= silent_us < 2_000_000
+        if silent_us > 1_800_000:
+            super().poll(companion)
 
 
 def fly(folder, stream=sys.stderr, confirm=None):
@@ -155,6 +196,35 @@ def test_a_fault_around_the_flight_hands_the_vehicle_over_first(tmp_path, confir
     assert words in problem and "the vehicle was handed over" in problem and "\n" not in problem
     assert words in companion.report().reason
     assert_comes_again(tmp_path)
+
+
+def test_a_link_that_is_back_within_a_second_is_told_and_the_flight_goes_on(tmp_path):
+    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: Unplugged(world, 0.6))
+    assert companion.report().outcome == "completed" and companion.report().collisions == ()
+    assert [event.text for event in recorder.events if event.kind == "link"] == [
+        "connection to /dev/ttyACM0 lost, reconnecting",
+        "connected again: /dev/ttyACM1",
+    ]
+    assert any(b"Connected again: /dev/ttyACM1" in frame for frame in world.sent)
+    assert_comes_again(tmp_path)
+
+
+def test_a_plan_that_is_made_anew_after_a_silence_is_agreed_to_twice_and_the_log_says_so(tmp_path):
+    companion, _, recorder, _, _ = fly(tmp_path, confirm=Restarted)
+    assert companion.report().outcome == "completed"
+    assert [event.kind for event in recorder.events].count("plan") == 2
+    assert (tmp_path / run_folder.INPUTS_NAME).read_text().count('"confirm"') == 2
+    assert_comes_again(tmp_path)
+
+
+def test_a_link_that_is_back_after_the_vehicle_took_care_of_itself_takes_nothing_back(tmp_path):
+    # Given a vehicle that lost its setpoints for two seconds, and PX4's failsafe acted (COM_OF_LOSS_T)
+    companion, world, recorder, _, _ = fly(tmp_path, confirm=lambda world: Unplugged(world, 2.0))
+    # Then the flight has ended in one sentence, and nobody asks for OFFBOARD again
+    assert "the link has been silent" in companion.report().reason and companion.report().collisions == ()
+    world.sleep(5.0)
+    assert world.custom_mode is not None and world.custom_mode != OFFBOARD
+    assert [event.kind for event in recorder.events].count("aborted") == 1
 
 
 def test_in_a_real_flight_neither_a_limit_of_size_nor_a_pipe_that_closes_matters(tmp_path):
@@ -270,3 +340,34 @@ def test_garbage_is_collected_while_disarmed_only():
         allow_collecting(False)
         assert not gc.isenabled() and sys.getswitchinterval() < switch_interval_s
     assert gc.isenabled() and gc.get_freeze_count() == 0 and sys.getswitchinterval() == switch_interval_s
+
+
+def test_a_fault_around_the_flight_leaves_a_summary_and_is_raised_then(tmp_path, monkeypatch):
+    # Given a flight that a fault of the program ended
+    document = load_mission_document(SQUARE, HOP_SETS)
+    problem = FlightFaultError("Fault around the flight; the vehicle was handed over.")
+
+    def breaks(*arguments):
+        raise problem
+
+    monkeypatch.setattr(command, "fly_realtime", breaks)
+    flight = command.Flight(
+        mission_from(document), None, tmp_path, FlightRecorder(tmp_path), Console(io.StringIO()), Interrupts()
+    )
+    connection: Any = Silent()
+    flown = command._fly_connected(flight, connection, ConfirmAtOnce())
+    with pytest.raises(FlightFaultError, match="handed over"):
+        command._finish(flight, flown, False)
+    # Then what is known of it is in its folder
+    summary = json.loads((tmp_path / run_folder.SUMMARY_NAME).read_text())
+    assert summary["outcome"] == "failed" and summary["reason"] == str(problem) and connection.is_closed
+
+
+class Silent:
+    """A connection that nobody uses."""
+
+    counts = LinkCounts()
+    is_closed = False
+
+    def close(self):
+        self.is_closed = True

@@ -100,7 +100,7 @@ def setpoints(folder: Path) -> list[bytes]:
 
 
 def decisions(folder: Path) -> list[str]:
-    return [event["text"] for event in events_of(folder) if event["kind"] not in ("stranger", "late")]
+    return [event["text"] for event in events_of(folder) if event["kind"] not in ("link", "late")]
 
 
 def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flight(tmp_path: Path):
@@ -118,7 +118,7 @@ def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flig
     assert min(loud.refused[reason] for reason in ("unsigned", "forged", "replayed")) > 500
     refused = loud.vehicle._signing.refused
     assert refused.unsigned > 500 and refused.replayed > 500
-    told = [event["text"] for event in events_of(tmp_path / "loud") if event["kind"] == "stranger"]
+    told = [event["text"] for event in events_of(tmp_path / "loud") if event["kind"] == "link"]
     assert any("without a signature are refused" in text for text in told)
 
 

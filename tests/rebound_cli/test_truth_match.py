@@ -182,8 +182,9 @@ def test_the_summary_has_exactly_the_documented_keys():
     summary = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
     assert " ".join(summary) == (
         "schema mission outcome reason autopilot seed airframe duration_s wall_clock_s realtime_factor "
-        "tick_lateness_ms step_ms stream_rates_hz round_trip_ms refused_messages refused_packets unconfirmed "
-        "false_detections missed_contacts recontacts expectations obstacles unreachable collisions"
+        "tick_lateness_ms step_ms stream_rates_hz round_trip_ms reconnects stranger_datagrams refused_messages "
+        "refused_packets unconfirmed false_detections missed_contacts recontacts expectations obstacles unreachable "
+        "collisions"
     )
     assert " ".join(summary["collisions"][0]) == (
         "detected_at_s detector impact_velocity_ned_m_s impact_speed_m_s normal_ned peak_specific_force_m_s2 "

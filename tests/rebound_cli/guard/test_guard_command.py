@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from companion.guard.config import GuardConfig
+from rebound_cli.status.asking import ask
 from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
 pytestmark = pytest.mark.realtime
@@ -58,6 +59,7 @@ def test_nobody_there_is_said_and_leaves_a_complete_folder(tmp_path):
 
 
 def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
+    monkeypatch.setenv("RUNTIME_DIRECTORY", str(tmp_path / "run"))
     # Given a systemd that waits for news and for signs of life
     systemd = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     systemd.bind(str(tmp_path / "notify"))
@@ -71,6 +73,7 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     guard = start("guard", "--connect", f"udpin://127.0.0.1:{port}", "--out", tmp_path, "--then", "previous", *QUICK)
     try:
         wait_for_event(tmp_path, "standing_by")
+        status = ask(tmp_path / "run" / "status.sock")
         guard.send_signal(signal.SIGTERM)
         stdout, stderr = guard.communicate(timeout=20)
     finally:
@@ -78,6 +81,9 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
         vehicle.stdin.close()
         vehicle.wait(20)
     assert guard.returncode == 0, stderr
+    assert status["command"] == "guard" and status["pid"] == guard.pid and status["folder"] == str(tmp_path)
+    assert status["age_s"] < 5.0 and status["hits"] == 0
+    assert not (tmp_path / "run" / "status.sock").exists()
     systemd.setblocking(False)
     told = []
     with contextlib.suppress(BlockingIOError):

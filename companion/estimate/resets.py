@@ -1,0 +1,94 @@
+"""A frame that goes on where the vehicle's own jumps: PX4's estimator resets its position, and shifts no setpoint.
+
+What is heard is moved back by the jumps so far, what is sent is moved on by them: the vehicle stays where it is, and so
+does all that is known around it. ODOMETRY says when (`reset_counter`); its place then is not where its velocity led.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from companion.mavlink.bounds import VELOCITY_M_S
+from companion.messages import LocalPosition, Odometry, PositionSetpoint, PositionTarget, Refused, Sample, Vector3
+
+# For as long after an ODOMETRY its counter is heard: 15 of PX4's default 30 Hz.
+TOLD_US = 500_000
+# LOCAL_POSITION_NED.time_boot_ms is cut to whole milliseconds.
+STAMP_US = 1_000
+STILL: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(slots=True)
+class Resets:
+    """A reset counts from the second message on that tells of it; one that was forged or broken moves nothing."""
+
+    shift_ned_m: Vector3 = STILL
+    """From the frame that goes on to the vehicle's."""
+    _shifts: dict[int, Vector3] = field(default_factory=dict)
+    """By the counters of before: of a counter that comes back the jump is known."""
+    _latest: Odometry | None = None
+    _first: Odometry | None = None
+    """The first message with another counter."""
+    _place: LocalPosition | None = None
+    """The latest one believed; None after a reset."""
+
+    def follow(self, samples: Sequence[Sample], most_m: float) -> Sequence[Sample]:
+        """What was heard, in the frame that goes on. A jump of more than `most_m` is no matter of this frame."""
+        return [self._moved(sample, most_m) for sample in samples]
+
+    def _moved(self, sample: Sample, most_m: float) -> Sample:
+        if type(sample) is Odometry:
+            self._hear(sample, most_m)
+        elif type(sample) is LocalPosition:
+            if self._jumps(sample):
+                return Refused("LOCAL_POSITION_NED", "the place jumps, and no reset is counted")
+            self._place = sample
+        n, e, d = self.shift_ned_m
+        if self.shift_ned_m == STILL:
+            return sample
+        if isinstance(sample, LocalPosition | Odometry):
+            x, y, z = sample.position_ned_m
+            return replace(sample, position_ned_m=(x - n, y - e, z - d))
+        if isinstance(sample, PositionTarget) and sample.position_ned_m is not None:
+            x, y, z = sample.position_ned_m
+            return PositionTarget((x - n, y - e, z - d))
+        return sample
+
+    def _jumps(self, sample: LocalPosition) -> bool:
+        """Where resets are counted, a place that no velocity leads to is none; nor is the next, for as long."""
+        place, told = self._place, self._latest
+        if place is None or told is None:
+            return False
+        over_us = sample.time_boot_us - place.time_boot_us
+        is_told = over_us >= 0 and abs(sample.time_boot_us - told.time_boot_us) < TOLD_US
+        return is_told and math.dist(sample.position_ned_m, place.position_ned_m) > VELOCITY_M_S * 1e-6 * (
+            over_us + STAMP_US
+        )
+
+    def _hear(self, sample: Odometry, most_m: float) -> None:
+        latest, first = self._latest, self._first
+        if latest is None or sample.reset_counter == latest.reset_counter:
+            self._latest, self._first = sample, None
+        elif first is None or first.reset_counter != sample.reset_counter:
+            self._first = sample
+        else:
+            self._shifts[latest.reset_counter] = self.shift_ned_m
+            known = self._shifts.get(sample.reset_counter)
+            self.shift_ned_m = self._after(latest, first, most_m) if known is None else known
+            self._latest, self._first, self._place = sample, None, None
+
+    def _after(self, before: Odometry, first: Odometry, most_m: float) -> Vector3:
+        over_s = (first.time_boot_us - before.time_boot_us) * 1e-6
+        came = zip(first.position_ned_m, before.position_ned_m, before.velocity_ned_m_s, strict=True)
+        jump = [p - q - over_s * v for p, q, v in came]
+        if sum(part * part for part in jump) > most_m * most_m:
+            return self.shift_ned_m
+        n, e, d = (s + j for s, j in zip(self.shift_ned_m, jump, strict=True))
+        return (n, e, d)
+
+    def sent(self, setpoint: PositionSetpoint) -> PositionSetpoint:
+        """A setpoint as the vehicle understands it."""
+        if self.shift_ned_m == STILL:
+            return setpoint
+        x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))
+        return replace(setpoint, position_ned_m=(x, y, z))

@@ -1,0 +1,1 @@
+"""Flights on disk: which are kept, and `rebound logs`, `rebound doctor`."""

@@ -1,0 +1,75 @@
+"""`rebound logs`: the flights on disk."""
+
+import json
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from companion.report import Event
+from rebound_cli.console import console_for
+from rebound_cli.flights.archive import Archive, add_flight
+from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights
+from rebound_cli.run_folder import EVENTS_NAME, RunFolderError, read_records
+
+
+def run_list(options: Namespace) -> int:
+    flights = [overview(flight) for flight in kept_flights(options.runs)]
+    if options.json:
+        print(json.dumps(flights, indent=2))
+        return 0
+    for flight in flights:
+        hits = "no hit" if flight["hits"] == 0 else f"{flight['hits']} hit{'s' if flight['hits'] > 1 else ''}"
+        size_mb, lasted_s = flight["size_bytes"] / 1e6, flight["duration_s"] or 0.0
+        print(f"{flight['name']:36} {lasted_s:8.1f} s {size_mb:8.1f} MB  {hits:8}  {flight['end']}")
+    total_mb = sum(flight["size_bytes"] for flight in flights) / 1e6
+    print(f"{len(flights)} flights, {total_mb:.1f} MB in {options.runs}")
+    return 0
+
+
+def run_show(options: Namespace) -> int:
+    """Raises FlightError, RunFolderError."""
+    flight = flight_named(options.runs, options.flight)
+    told = overview(flight)
+    events = list(read_records(flight.folder / EVENTS_NAME, "".join(flight.event_lines())))
+    if options.json:
+        print(json.dumps({**told, "summary": flight.summary(), "events": events}, indent=2))
+        return 0
+    console = console_for(False)
+    console.print(f"{told['name']}: {told['end']}; {told['hits']} hits, {told['size_bytes'] / 1e6:.1f} MB")
+    began_us = events[0]["time_us"] if events else 0
+    console.events(
+        [Event(event["time_us"], event["kind"], str(event.get("text", "")), {}) for event in events], began_us
+    )
+    return 0
+
+
+def run_export(options: Namespace) -> int:
+    """Raises FlightError, RunFolderError."""
+    flight = flight_named(options.runs, options.flight)
+    out = options.out or Path(f"{flight.name}.tar.gz")
+    with Archive(out, options.no_position) as archive:
+        add_flight(archive, flight, "")
+    print(f"{flight.name} is in {out}")
+    return 0
+
+
+def overview(flight: KeptFlight) -> dict[str, Any]:
+    """A flight in a line; nothing but its size of one whose events are damaged."""
+    try:
+        lines = flight.event_lines()
+        ends = list(read_records(flight.folder / EVENTS_NAME, "".join([*lines[:1], *lines[-1:]])))
+    except RunFolderError:
+        lines, ends = [], []
+    summary = flight.summary()
+    if flight.is_being_flown():
+        end = "being flown"
+    else:
+        end = "cut off" if summary is None else str(summary.get("reason") or summary.get("outcome"))
+    return {
+        "name": flight.name,
+        "begun": flight.begun,
+        "duration_s": (ends[-1]["time_us"] - ends[0]["time_us"]) / 1e6 if ends else None,
+        "size_bytes": flight.size_bytes,
+        "hits": hits_in(lines),
+        "end": end,
+    }

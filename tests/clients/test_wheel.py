@@ -1,0 +1,138 @@
+"""The wheel in environments of its own, `drone` and `sim` of the folder WHEEL, as somebody has it who has no checkout.
+
+`make wheel` makes the environments and runs this. The drone's user has no home and may write nowhere but below /tmp.
+"""
+
+import os
+import re
+import resource
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from simulator import ROOT, simulator, wait_until
+
+WHEEL = Path(os.environ["WHEEL"])
+# Root may write everywhere; without its capabilities it is a user like any other.
+POWERLESS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"] if os.geteuid() == 0 else []
+# A drone needs none of them; matplotlib is installed, because filterpy asks for it, and rich is for a terminal.
+NOT_IMPORTED = ("numba", "matplotlib", "dask", "distributed", "mavsdk", "rich", "pytest")
+REBOUND = f"""
+import sys
+from rebound_cli.main import main
+try:
+    code = main()
+finally:
+    assert not set(sys.modules) & set({NOT_IMPORTED!r}), sorted(set(sys.modules) & set({NOT_IMPORTED!r}))
+sys.exit(code)
+"""
+QUICK = ("--set", "companion.link.heartbeat_wait_s=0.2")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def read_only():
+    """Nothing can be written into the environments, as root's on a drone that a user runs."""
+    folders = [folder for name in ("drone", "sim") for folder in (WHEEL / name).rglob("*") if folder.is_dir()]
+    for folder in folders:
+        folder.chmod(0o555)
+    yield
+    for folder in folders:
+        folder.chmod(0o755)
+
+
+@pytest.fixture
+def nowhere(tmp_path):
+    folder = tmp_path / "read-only"
+    folder.mkdir(mode=0o555)
+    return folder
+
+
+def start(environment, folder, *arguments, **more):
+    command = [*POWERLESS, WHEEL / environment / "bin/python", *arguments]
+    where = {"cwd": folder, "env": {"PATH": os.environ["PATH"], "LANG": "C.UTF-8", **more}}
+    return subprocess.Popen(
+        command, **where, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def finished(process, timeout_s):
+    stdout, stderr = process.communicate(timeout=timeout_s)
+    return process.returncode, stdout, stderr
+
+
+def drone(folder, *arguments):
+    return start("drone", folder, "-c", REBOUND, *map(str, arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "exit_code", "words"),
+    [
+        (("--help",), 0, "COMMAND"),
+        (("--version",), 0, "rebound "),
+        (("check", "wall", "square", "--no-picture"), 0, "Unattended"),
+        (
+            ("guard", "--connect", "udpin://127.0.0.1:0"),
+            1,
+            "The run folder runs cannot be made: nothing can be written",
+        ),
+        (("fly", "square", "--connect", "udpin://127.0.0.1:0"), 1, "The run folder runs cannot be made: nothing can"),
+        (("fly", "wall"), 1, "The run folder runs cannot be made: nothing can be written"),
+        (("guard", "--connect", "udpin://127.0.0.1:0", "--out", "OUT", *QUICK), 1, "No HEARTBEAT from an autopilot"),
+        (("fly", "wall", "--lockstep", "--out", "OUT"), 1, "this needs numba: pip install 'px4-rebound[sim]'."),
+        (("sim",), 1, "this needs numba: pip install 'px4-rebound[sim]'."),
+        (("key", "new", "vehicle.key"), 1, "vehicle.key: cannot be written: Permission denied."),
+        (("plan", "export", "square", "--home", "47,8", "--out", "a.plan"), 1, "a.plan: cannot be written: Permission"),
+        (("replay", "flight.ulg"), 1, "this needs pyulog: pip install 'px4-rebound[logs]'."),
+    ],
+)
+def test_a_command_works_or_says_in_one_sentence_why_not(arguments, exit_code, words, nowhere, tmp_path):
+    process = drone(nowhere, *(tmp_path / "run" if word == "OUT" else word for word in arguments))
+    code, stdout, stderr = finished(process, timeout_s=60)
+    assert code == exit_code, stderr
+    assert words in (stderr if exit_code else stdout) and "Traceback" not in stderr
+    assert stderr.count("rebound: ") == exit_code
+
+
+def test_help_takes_no_time(nowhere):
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert finished(start("drone", nowhere, WHEEL / "drone/bin/rebound", "--help"), 30)[0] == 0
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    # What a person does not notice.
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.2
+
+
+def test_a_mission_is_flown_guarded_and_looked_over_on_a_connection(nowhere, tmp_path):
+    hop = "items=[{takeoff: {height_m: 1.5}}, {land: {}}]"
+    with simulator() as vehicle:
+        address = f"udpin://127.0.0.1:{vehicle.companion_port}"
+        code, stdout, stderr = finished(drone(nowhere, "preflight", "--connect", address), 60)
+        assert "COM_OF_LOSS_T" in stdout, stderr
+        guard = drone(nowhere, "guard", "--connect", address, "--out", tmp_path / "guard")
+        events = tmp_path / "guard" / "events.jsonl"
+        wait_until(lambda: events.exists() and "standing by" in events.read_text(), 60, "the guard stands by")
+        guard.send_signal(signal.SIGINT)
+        code, stdout, stderr = finished(guard, 30)
+        assert code == 0, stderr
+        flight = drone(nowhere, "fly", "square", "--connect", address, "--yes", "--set", hop, "--out", tmp_path / "fly")
+        code, stdout, stderr = finished(flight, 90)
+        assert code == 0, stdout + stderr
+
+
+def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path):
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    process = start("sim", folder, WHEEL / "sim/bin/rebound", "fly", "wall", "--lockstep", HOME=str(tmp_path))
+    code, stdout, stderr = finished(process, 600)
+    assert code == 0, stderr
+    assert "Hit a wall at" in stdout
+
+
+def test_the_fixture_of_the_documents_is_there(tmp_path):
+    examples = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/testing.md").read_text(), re.DOTALL | re.MULTILINE)
+    chosen = [text for text in examples if "rebound_vehicle" in text and "mavsdk" not in text]
+    for number, text in enumerate(chosen):
+        (tmp_path / f"test_{number}.py").write_text(text)
+    process = start("sim", tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider", HOME=str(tmp_path))
+    code, stdout, _ = finished(process, 600)
+    assert code == 0 and f"{len(chosen)} passed" in stdout, stdout

@@ -1,0 +1,178 @@
+"""What a vehicle says that cannot be: places, attitudes and forces that contradict each other cost a twitch at most."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.detection.sight import Turning
+from companion.estimate.approach import VelocityFix
+from companion.estimate.history import MotionHistory
+from companion.estimate.resets import Resets
+from companion.flight.confirming import Claim, Leap
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, PositionSetpoint, Refused
+from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
+from tests.companion.hostile import Attacker, attacked, flight_in
+
+STILL = (0.0, 0.0, 0.0)
+IMU_MS = 4
+
+
+def told(at_ms, north_m, counter=0, speed_m_s=0.0):
+    return Odometry(at_ms * 1000, (north_m, 0.0, -1.0), (speed_m_s, 0.0, 0.0), counter)
+
+
+def place(at_ms, north_m):
+    return LocalPosition(at_ms * 1000, (north_m, 0.0, -1.0), STILL)
+
+
+# --- the estimator's resets
+
+
+def test_a_reset_moves_what_is_heard_and_what_is_sent_and_the_vehicle_stays_where_it_is():
+    resets = Resets()
+    # Given a vehicle that flies north at 1 m/s
+    resets.follow([told(0, 0.0, 0, 1.0), place(0, 0.0)], 5.0)
+    # When its estimate jumps by 3 m within 20 ms, and says so twice
+    resets.follow([told(20, 3.02, 1, 1.0)], 5.0)
+    assert resets.shift_ned_m == STILL, "one message may be forged"
+    heard = resets.follow([told(40, 3.04, 1, 1.0), place(40, 3.04)], 5.0)
+    # Then the flight goes on where it was, and the setpoint is sent where the vehicle now thinks that this is
+    assert [sample.position_ned_m[0] for sample in heard] == pytest.approx([0.04, 0.04])
+    assert resets.sent(PositionSetpoint(0, (1.0, 0.0, -1.0), None)).position_ned_m == pytest.approx((4.0, 0.0, -1.0))
+
+
+def test_one_forged_reset_moves_nothing_and_two_only_until_the_vehicle_speaks_again():
+    resets = Resets()
+    resets.follow([told(0, 0.0)], 5.0)
+    resets.follow([told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9)], 5.0)
+    assert resets.shift_ned_m == pytest.approx((4.0, 0.0, 0.0))
+    resets.follow([told(40, 0.0), told(50, 0.0)], 5.0)
+    assert resets.shift_ned_m == STILL
+    resets.follow([told(60, 40.0, 7), told(70, 40.0, 7)], 5.0)
+    assert resets.shift_ned_m == STILL, "so far no setpoint goes"
+
+
+def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_reset():
+    resets = Resets()
+    resets.follow([told(0, 0.0), place(0, 0.0)], 5.0)
+    (jumped,) = resets.follow([place(20, 50.0)], 5.0)
+    assert isinstance(jumped, Refused) and "no reset" in jumped.reason
+    assert resets.follow([place(40, 0.1)], 5.0) == [place(40, 0.1)]
+    resets.follow([told(60, 50.0, 1), told(70, 50.0, 1)], 5.0)
+    assert resets.follow([place(80, 50.0)], 5.0) == [place(80, 50.0)]
+    # A vehicle that counts none has to be believed
+    assert [Resets().follow([place(at_ms, north_m)], 5.0) for at_ms, north_m in ((0, 0.0), (20, 50.0))][1][0] == place(
+        20, 50.0
+    )
+
+
+# --- the attitude
+
+
+def test_an_attitude_that_no_rate_leads_to_counts_from_the_second_on():
+    turning = Turning()
+    level, upside_down = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
+    assert turning.attitude(Attitude(0, level))
+    assert not turning.attitude(Attitude(20_000, upside_down))
+    assert turning.attitude(Attitude(40_000, level)), "it was one message"
+    assert not turning.attitude(Attitude(60_000, upside_down))
+    assert turning.attitude(Attitude(80_000, upside_down)), "the estimator has been reset"
+
+
+def test_a_vehicle_that_is_struck_turns_as_its_rates_say():
+    turning = Turning()
+    assert turning.attitude(Attitude(0, (1.0, 0.0, 0.0, 0.0)))
+    turning.imu(ImuSample(4_000, (0.0, 0.0, -9.8), (15.0, 0.0, 0.0)))
+    half_rad = 0.5 * 15.0 * 0.02
+    assert turning.attitude(Attitude(20_000, (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0)))
+
+
+# --- hits that nothing else shows
+
+
+def fixes(changes_by_m_s):
+    """Velocities of a vehicle that hovers, every 10 ms, less the accelerometer's sum, which has all of the claim's."""
+    return [
+        VelocityFix(at_ms * 1000, (changes_by_m_s if at_ms > 1000 else 0.0, 0.001 * (at_ms % 3), 0.0), STILL, STILL)
+        for at_ms in range(800, 1160, 10)
+    ]
+
+
+@pytest.mark.parametrize(("changed_m_s", "is_none"), [(0.0, True), (0.16, False)])
+def test_a_weak_force_of_one_sample_is_a_hit_only_where_the_velocity_shows_what_a_hit_leaves(changed_m_s, is_none):
+    # 7 m/s^2 for 5 ms are 0.035 m/s, which no velocity shows
+    earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
+    claim = Claim(1_000_000, earlier, (7.0, 0.0, 0.0), 0.005, later_boot_us=1_004_000)
+    assert claim.is_contradicted(fixes(changed_m_s)) is is_none
+
+
+def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_a_hit():
+    true = [VelocityFix(at_ms * 1000, STILL, STILL, STILL) for at_ms in range(800, 1160, 30)]
+    forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL, STILL)
+    leap = Leap(1_000_000, 930_000, 0.64, (0.0, 1.0, 0.0))
+    assert leap.is_contradicted(sorted([*true, forged], key=lambda fix: fix.time_boot_us))
+
+
+@pytest.mark.parametrize(("speed_m_s", "stays"), [(0.0, True), (3.0, False)])
+def test_a_velocity_that_jumps_is_no_hit_where_the_places_do_not_follow(speed_m_s, stays):
+    history = MotionHistory()
+    for at_ms in range(800, 1160, 20):
+        history.add(LocalPosition(at_ms * 1000, (max(0.0, speed_m_s * (at_ms - 1000) * 1e-3), 0.0, 0.0), STILL))
+    assert Leap(1_000_000, 950_000, 3.0, (1.0, 0.0, 0.0)).stays_in_place(history, 0.03) is stays
+
+
+def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
+    f = flight_in("mission")
+    f.vehicle.no_imu = True
+    attacker, chance = Attacker(f.vehicle, 1), (0.02, -0.03, 0.01, -0.02)
+    for number in range(300):
+        noise = [chance[(number + axis) % 4] for axis in range(3)]
+        off = mav.MAVLink_highres_imu_message(f.vehicle.time_us, *noise, *[0.0] * 10, 0x3F)
+        attacked(f, [bytes(off.pack(attacker._tx))])
+    assert f.state == "mission" and f.companion.report().collisions == ()
+    assert "the accelerometer reads zero on all axes" in f.event("implausible").text
+
+
+# --- silence
+
+
+def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing():
+    f = flight(FakeVehicle())
+    f.run_to("mission")
+    f.run_for(1.0)
+    # When positions stop coming for longer than the detector may be without a sample
+    f.vehicle.no_positions = True
+    f.run_for(0.4)
+    held = f.setpoints_since(f.now_us - 100_000)
+    places = {mav.MAVLink(None).decode(bytearray(frame)).x for _, frame in held}
+    # Then the setpoint stands still, and goes on from there
+    assert len(held) > 3 and len(places) == 1
+    f.vehicle.no_positions = False
+    f.run_for(0.1)
+    _, frame = f.setpoints_since(f.now_us - 30_000)[-1]
+    assert mav.MAVLink(None).decode(bytearray(frame)).x - places.pop() < 2.0 * 0.1 + 0.01
+
+
+def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
+    f = flight_in("recovering")
+    began_us = f.now_us
+    timeout_us = 10_000_000
+    while f.state == "recovering" and f.now_us - began_us < 2 * timeout_us:
+        f.vehicle.push_m_s2 = (-60.0, 0.0)
+        f.run_for(0.3)
+    assert len(f.companion.report().collisions) > 10
+    assert f.now_us - began_us == pytest.approx(timeout_us, abs=1_000_000)
+    f.run_for(0.1)
+    assert f.vehicle.mode != LOITER
+
+
+@pytest.mark.parametrize("late_ms", [200, 1000])
+def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms):
+    """By as much as a mean's time or a second, for which what is learnt of drag and wind would be divided by zero."""
+    f = flight_in("returning")
+    for _ in range(200):
+        stamp_ms = f.vehicle.time_us // 1000
+        late = mav.MAVLink_local_position_ned_message(stamp_ms - late_ms, *f.vehicle.position, *f.vehicle.velocity)
+        attacked(f, [bytes(late.pack(mav.MAVLink(None, 1, 1)))])
+    assert "fault" not in f.kinds(), f.texts()

@@ -1,0 +1,201 @@
+"""A stream that ended is there again within a second of the other end's return, and nothing waits for it meanwhile."""
+
+import os
+import pty
+import socket
+import time
+from pathlib import Path
+
+import pytest
+
+from companion.errors import ConnectionSetupError
+from companion.shell import streams
+from companion.shell.addresses import open_connection
+from companion.shell.streams import RETRY_S
+
+LOCAL = "127.0.0.1"
+# A test that fails waits so long; one that passes takes an attempt or two. A busy machine keeps a thread for seconds.
+DEADLINE_S = 20.0
+# The loop's own patience: no call may keep a setpoint from leaving.
+TICK_S = 0.02
+
+
+def until(connection, is_so):
+    """What came until then; all news are gathered."""
+    received, news, started_s = b"", [], time.monotonic()
+    while not is_so(received, news):
+        assert time.monotonic() - started_s < DEADLINE_S, f"{received!r} {news}"
+        received += connection.receive(TICK_S)
+        connection.send(b"setpoint")
+        text = connection.news()
+        news += [] if text is None else [text]
+    return received, news
+
+
+def until_heard(connection):
+    return until(connection, lambda received, _: received)[0]
+
+
+def until_told(connection, word):
+    (*_, text) = until(connection, lambda _, news: news and word in news[-1])[1]
+    return text
+
+
+@pytest.fixture
+def closing():
+    """Closes what it is given at the end."""
+    given = []
+
+    def remember(one):
+        given.append(one)
+        return one
+
+    yield remember
+    for one in given:
+        one.close()
+
+
+class Line:
+    """A serial line by a pseudo-terminal; `link` is udev's name for the vehicle at its end."""
+
+    def __init__(self, link: Path):
+        self._controller, self._device = pty.openpty()
+        self.path = os.ttyname(self._device)
+        link.unlink(missing_ok=True)
+        link.symlink_to(self.path)
+
+    def say(self, content):
+        os.write(self._controller, content)
+
+    def hears(self):
+        return os.read(self._controller, 4096)
+
+    def close(self):
+        """Pulls the plug."""
+        if self._controller >= 0:
+            os.close(self._device)
+            os.close(self._controller)
+        self._controller = -1
+
+
+@pytest.fixture
+def by_id(tmp_path, monkeypatch):
+    folder = tmp_path / "by-id"
+    folder.mkdir()
+    monkeypatch.setattr(streams, "SERIAL_BY_ID", folder)
+    return folder
+
+
+def test_a_serial_device_is_found_again_under_another_name(by_id, closing):
+    # Given a vehicle on a device that was given by its path
+    link = by_id / "usb-3D_Robotics_PX4_FMU_v5-if00"
+    line = closing(Line(link))
+    connection = closing(open_connection(f"serial://{line.path}:115200"))
+    line.say(b"before")
+    assert until_heard(connection) == b"before"
+    # When it is unplugged
+    link.unlink()
+    line.close()
+    assert until_told(connection, "lost") == f"connection to {line.path} lost, reconnecting"
+    # And comes back as another device, while somebody else's has the old one's name or number
+    closing(Line(by_id / "usb-somebody-elses"))
+    again = closing(Line(link))
+    # Then bytes pass again, both ways
+    assert until_told(connection, "again").endswith(f" s: {link}")
+    again.say(b"after")
+    assert until_heard(connection) == b"after" and b"setpoint" in again.hears()
+    assert connection.counts.reconnects == 1
+
+
+def test_a_serial_device_without_a_link_is_looked_for_at_its_path(tmp_path, by_id, closing):
+    # Given a device that udev has no link for, as /dev/ttyAMA0; here the path is a link that the test moves
+    path = tmp_path / "ttyAMA0"
+    line = closing(Line(path))
+    connection = closing(open_connection(f"serial://{path}:115200"))
+    line.close()
+    until_told(connection, "lost")
+    again = closing(Line(path))
+    until_told(connection, "again")
+    again.say(b"after")
+    assert until_heard(connection) == b"after"
+
+
+def test_a_port_whose_driver_does_not_return_is_waited_for_by_nobody(by_id, closing, monkeypatch):
+    # Given a driver that keeps whoever opens the port until something is written into a pipe
+    waiting, going_on = os.pipe()
+    link = by_id / "vehicle"
+    line = closing(Line(link))
+    opens = streams.SerialDevice.open
+    monkeypatch.setattr(streams.SerialDevice, "open", lambda device: os.read(waiting, 1) and opens(device))
+    os.write(going_on, b"1")
+    connection = closing(open_connection(f"serial://{line.path}:115200"))
+    line.close()
+    until_told(connection, "lost")
+    again = closing(Line(link))
+    # Then the loop goes on meanwhile, tick by tick
+    ticks = iter(range(20))
+    until(connection, lambda *_: next(ticks, None) is None)
+    assert connection.counts.reconnects == 0
+    # And it is there as soon as the driver is
+    os.write(going_on, b"1")
+    until_told(connection, "again")
+    again.say(b"after")
+    assert until_heard(connection) == b"after"
+    for descriptor in (waiting, going_on):
+        os.close(descriptor)
+
+
+def test_a_router_that_was_restarted_is_connected_to_again(closing):
+    # Given a client of a router
+    listener = closing(socket.create_server((LOCAL, 0)))
+    port = listener.getsockname()[1]
+    connection = closing(open_connection(f"tcpout://{LOCAL}:{port}"))
+    router, _ = listener.accept()
+    # When the router is stopped, and nobody listens for some attempts
+    router.close()
+    listener.close()
+    assert until_told(connection, "lost") == f"connection to {LOCAL}:{port} lost, reconnecting"
+    refused_until_s = time.monotonic() + 2 * RETRY_S
+    until(connection, lambda *_: time.monotonic() > refused_until_s)
+    assert connection.counts.reconnects == 0
+    # And is started again
+    listener = closing(socket.create_server((LOCAL, port)))
+    # Then bytes pass again, both ways
+    until_told(connection, "again")
+    router = closing(listener.accept()[0])
+    connection.send(b"setpoint")
+    router.sendall(b"after")
+    assert until_heard(connection) == b"after" and router.recv(8) == b"setpoint"
+    assert connection.counts.reconnects == 1
+
+
+def test_a_socket_that_met_itself_is_no_server(closing, monkeypatch):
+    # Given that the kernel chose the port that is asked for: on one machine TCP connects such a socket with itself
+    itself = closing(socket.socket())
+    itself.bind((LOCAL, 0))
+    itself.connect(itself.getsockname())
+    monkeypatch.setattr(streams.socket, "create_connection", lambda *_: itself)
+    with pytest.raises(ConnectionSetupError, match="refused"):
+        open_connection(f"tcpout://{LOCAL}:{itself.getsockname()[1]}")
+
+
+def test_a_client_that_closed_is_followed_by_the_next_at_once(closing):
+    # Given a server that has had no client yet, which is no reconnect
+    server = closing(open_connection(f"tcpin://{LOCAL}:0"))
+    with socket.create_connection((LOCAL, server.local_port)) as first:
+        first.sendall(b"first")
+        assert until_heard(server) == b"first" and server.counts.reconnects == 0
+    # When it goes and another comes
+    second = closing(socket.create_connection((LOCAL, server.local_port)))
+    second.sendall(b"second")
+    # Then that one is heard and answered
+    assert until_heard(server) == b"second" and server.counts.reconnects == 1
+    assert second.recv(8) == b"setpoint"
+
+
+def test_a_host_that_acknowledges_nothing_is_given_up_within_a_second(closing):
+    # The kernel is asked for it: a vehicle that went down without a word sends no end of its connection
+    listener = closing(socket.create_server((LOCAL, 0)))
+    client = closing(open_connection(f"tcpout://{LOCAL}:{listener.getsockname()[1]}"))
+    with socket.socket(fileno=os.dup(client._stream._port.fileno())) as same:
+        assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1000

@@ -1,0 +1,109 @@
+"""`rebound logs`: what a person sees of the flights on a drone, and takes away."""
+
+import json
+import tarfile
+
+import pytest
+
+from rebound_cli.main import main
+from tests.rebound_cli.flights.flying import pretend, record
+
+LAST = "20260103T000000Z-guard"
+
+
+@pytest.fixture
+def runs(tmp_path):
+    runs = tmp_path / "runs"
+    pretend(runs, "20260101T000000Z-square", 1_000_000, summary={"outcome": "completed", "reason": "landed"})
+    pretend(runs, "20260102T000000Z-guard", 500_000, hits=2)
+    folder = runs / LAST
+    folder.mkdir()
+    record(folder)
+    return runs
+
+
+def logs(*words):
+    return main(["logs", *map(str, words)])
+
+
+def test_list_has_every_flight_from_the_oldest_on_and_how_it_ended(runs, capsys):
+    assert logs("list", "--runs", runs) == 0
+    first, second, third, total = capsys.readouterr().out.splitlines()
+    assert first.startswith("20260101T000000Z-square") and "1.0 MB" in first and first.endswith("landed")
+    assert "no hit" in first and "2.5 s" in second and "2 hits" in second and second.endswith("cut off")
+    assert third.startswith(LAST)
+    assert total.startswith("3 flights, 1.5 MB")
+
+
+def test_list_as_json_holds_the_same(runs, capsys):
+    assert logs("list", "--runs", runs, "--json") == 0
+    flights = json.loads(capsys.readouterr().out)
+    assert [flight["hits"] for flight in flights] == [0, 2, 0]
+    assert [flight["end"] for flight in flights] == ["landed", "cut off", "cut off"]
+    assert flights[1]["duration_s"] == 2.5 and flights[1]["begun"] == "20260102T000000Z"
+
+
+def test_a_folder_without_flights_is_an_empty_list(tmp_path, capsys):
+    assert logs("list", "--runs", tmp_path / "none") == 0
+    assert capsys.readouterr().out.startswith("0 flights")
+
+
+def test_show_is_of_the_last_flight_and_has_its_events_in_order(runs, capsys):
+    assert logs("show", "--runs", runs) == 0
+    told = capsys.readouterr().out
+    assert told.startswith(f"{LAST}: cut off; 0 hits")
+    assert told.index("connected") < told.index("a step came late")
+    assert logs("show", "20260102T000000Z-guard", "--runs", runs, "--json") == 0
+    flight = json.loads(capsys.readouterr().out)
+    assert [event["kind"] for event in flight["events"]] == ["connected", "detection", "detection"]
+    assert flight["summary"] is None
+
+
+def test_a_flight_that_is_not_there_is_one_sentence(runs, capsys):
+    assert logs("show", "yesterday", "--runs", runs) == 1
+    assert (
+        capsys.readouterr().err
+        == f"rebound: No flight yesterday is in {runs}; `rebound logs list` names those that are.\n"
+    )
+
+
+def test_export_is_one_archive_with_every_byte_of_the_flight(runs, tmp_path, capsys):
+    archive = tmp_path / "out.tar.gz"
+    assert logs("export", LAST, "--runs", runs, "--out", archive) == 0
+    with tarfile.open(archive) as tar:
+        files = {member.name: tar.extractfile(member).read() for member in tar.getmembers()}
+    assert files == {f"{LAST}/{file.name}": file.read_bytes() for file in (runs / LAST).iterdir()}
+    assert str(archive) in capsys.readouterr().out
+
+
+def test_an_archive_that_cannot_be_written_is_one_sentence_and_leaves_nothing(runs, tmp_path, capsys):
+    assert logs("export", LAST, "--runs", runs, "--out", tmp_path / "no" / "out.tar.gz") == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_without_coordinates_there_is_no_place_in_what_is_handed_over(runs, tmp_path, capsys):
+    # Given a flight whose events, summary and settings say where it was
+    folder = runs / LAST
+    event = {
+        "time_us": 1,
+        "kind": "detection",
+        "text": "hit 1: 30.0 m/s^2, v_c [1.00, 0.00, 0.00] (1.00 m/s) at [47.11, -8.15, -1.50]; recovery setpoint",
+        "data": {"position_ned_m": [47.11, -8.15, -1.5], "impact_speed_m_s": 1.0},
+    }
+    (folder / "events.jsonl").write_text(json.dumps(event) + "\n" + '{"time_us": 2, "ki')
+    summary = {"outcome": "stopped", "collisions": [{"recovery_setpoint_ned_m": [47.11, 0, 0], "overshoot_m": 0.25}]}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    (folder / "guard.yaml").write_text("fence: {polygon_ne_m: [[47.11, 1], [2, 3], [4, 5]], max_height_m: 6}\n")
+    (folder / "obstacles.json").write_text('{"patches": [{"touches_ned_m": [[47.11, 0, 0]]}]}')
+    archive = tmp_path / "out.tar.gz"
+    # When it is exported without coordinates
+    assert logs("export", LAST, "--runs", runs, "--no-position", "--out", archive) == 0
+    with tarfile.open(archive) as tar:
+        files = {member.name.split("/")[1]: tar.extractfile(member).read().decode() for member in tar.getmembers()}
+    # Then packets and obstacles are left out, places are gone, and the rest is there
+    assert sorted(files) == ["events.jsonl", "guard.yaml", "inputs.jsonl", "summary.json", "versions.json"]
+    assert "47.11" not in "".join(files.values()) and "8.15" not in "".join(files.values())
+    assert json.loads(files["events.jsonl"])["data"] == {"impact_speed_m_s": 1.0}
+    assert "hit 1: 30.0 m/s^2" in json.loads(files["events.jsonl"])["text"]
+    assert json.loads(files["summary.json"])["collisions"] == [{"overshoot_m": 0.25}]
+    assert "max_height_m: 6" in files["guard.yaml"]

@@ -1,0 +1,130 @@
+"""Whatever of a flight's files the power left: it is read back, and decided again as far as it goes."""
+
+import os
+import shutil
+
+import pytest
+
+from companion.errors import ReboundError
+from companion.shell.tlog import TlogWriter
+from rebound_cli import run_folder
+from rebound_cli.background import Background
+from rebound_cli.replay.recording import read_recording
+from rebound_cli.replay.reproduction import reproduce
+from rebound_cli.run_folder import EVENTS_NAME, INPUTS_NAME, TLOG_NAME
+from tests.rebound_cli.flights.flying import EPOCH_US, record
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flight")
+    record(folder)
+    return folder
+
+
+@pytest.fixture
+def cut(flight, tmp_path):
+    """The flight with one of its files cut off after so many bytes."""
+    folder = tmp_path / "cut"
+    shutil.copytree(flight, folder)
+
+    def at(name, length):
+        for file in (TLOG_NAME, EVENTS_NAME, INPUTS_NAME):
+            (folder / file).write_bytes((flight / file).read_bytes()[: length if file == name else None])
+        return folder
+
+    return at
+
+
+def test_the_flight_is_small_and_all_its_files_hold_something(flight):
+    sizes = [(flight / name).stat().st_size for name in (TLOG_NAME, EVENTS_NAME, INPUTS_NAME)]
+    assert all(200 < size < 20_000 for size in sizes), sizes
+    assert reproduce(read_recording(flight)).first_difference is None
+
+
+def test_packets_cut_at_any_byte_are_decided_again_as_far_as_they_go(flight, cut):
+    # Events and inputs reach the disk before the packets of their step: the packets alone may be behind.
+    whole = read_recording(flight)
+    most = 0
+    for length in range((flight / TLOG_NAME).stat().st_size):
+        try:
+            recording = read_recording(cut(TLOG_NAME, length))
+        except ReboundError as error:
+            # Before the second step with a packet there is nothing that is known whole.
+            assert most == 0 and str(error).count(". ") == 0
+            continue
+        assert recording.is_cut
+        assert recording.steps == whole.steps[: len(recording.steps)]
+        assert len(recording.steps) >= most
+        if len(recording.steps) > most:
+            most = len(recording.steps)
+            reproduction = reproduce(recording)
+            assert reproduction.first_difference is None, length
+    assert most > 0.9 * len(whole.steps)
+
+
+@pytest.mark.parametrize("name", [EVENTS_NAME, INPUTS_NAME])
+def test_lines_cut_at_any_byte_are_read_to_the_last_whole_one(flight, cut, name):
+    whole = read_recording(flight)
+    for length in range((flight / name).stat().st_size):
+        recording = read_recording(cut(name, length))
+        assert list(recording.event_lines) == list(whole.event_lines)[: len(recording.event_lines)]
+        times_us = [step.time_us for step in recording.steps]
+        assert times_us == sorted(times_us) and set(times_us) <= {step.time_us for step in whole.steps}
+        if name == EVENTS_NAME:
+            assert recording.steps == whole.steps
+        else:
+            assert recording.event_lines == whole.event_lines
+
+
+def test_a_damaged_line_of_a_flight_that_is_over_is_no_power_cut(cut):
+    folder = cut(INPUTS_NAME, -5)
+    run_folder.write_json(folder / run_folder.SUMMARY_NAME, {"collisions": []})
+    with pytest.raises(ReboundError, match="damaged"):
+        read_recording(folder)
+
+
+def test_what_the_packets_must_not_be_ahead_of_is_on_the_disk_before_them(tmp_path):
+    # Given a log whose packets wait
+    path = tmp_path / "flight.tlog"
+    lengths = []
+    writer = TlogWriter(path, lambda: lengths.append(path.stat().st_size))
+    writer.write(EPOCH_US, [b"first"])
+    # When they are written, and later ones
+    writer.flush()
+    writer.write(EPOCH_US + 4000, [b"second"])
+    writer.close()
+    # Then what goes first was called while none of them had been
+    assert lengths == [0, 8 + len(b"first")]
+
+
+def test_a_recorder_brings_lines_and_packets_to_the_disk_in_that_order(tmp_path, monkeypatch):
+    # Given a recorder in real time, and what the kernel is asked to bring to the disk
+    synced = []
+    real = os.fdatasync
+
+    def sync(file):
+        synced.append(os.readlink(f"/proc/self/fd/{file}"))
+        real(file)
+
+    monkeypatch.setattr(os, "fdatasync", sync)
+    # When a flight of 3.5 s is recorded
+    recorder = record(tmp_path, 70, Background("log"))
+    # Then it happens about twice a second, each time in the order that a replay needs
+    names = [os.path.basename(name) for name in synced]
+    rounds = len(names) // 3
+    assert names == [EVENTS_NAME, INPUTS_NAME, TLOG_NAME] * rounds
+    assert 5 <= rounds <= 8
+    assert recorder.writer.loss is None
+
+
+def test_a_whole_file_is_never_seen_half_written(tmp_path, monkeypatch):
+    # Given a summary, and a power cut while another takes its place
+    path = tmp_path / "summary.json"
+    run_folder.write_json(path, {"outcome": "first"})
+    monkeypatch.setattr(os, "fsync", lambda file: (_ for _ in ()).throw(OSError("power cut")))
+    # When that is written
+    with pytest.raises(OSError, match="power cut"):
+        run_folder.write_json(path, {"outcome": "second"})
+    # Then the first is whole
+    assert path.read_text() == '{\n  "outcome": "first"\n}\n'

@@ -1,0 +1,227 @@
+"""Which flights go when room is short: tried on folders that look like flights, and on a recorder that writes one."""
+
+import errno
+import fcntl
+import os
+import shutil
+from collections import namedtuple
+
+import pytest
+
+from companion.mission.config import DiskConfig
+from rebound_cli.background import Background
+from rebound_cli.flights import ring
+from rebound_cli.flights.kept import kept_flights
+from rebound_cli.flights.ring import LAST_BYTES, LOOK_EVERY_US, Limits, Ring, bytes_to_go, limits_of, room_for
+from rebound_cli.run_folder import EVENTS_NAME, TLOG_NAME
+from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
+
+GIB, MIB = 1 << 30, 1 << 20
+MB = 1_000_000
+Usage = namedtuple("Usage", "total used free")
+PRESENT = "20260105T000000Z-guard"
+
+
+def names(runs):
+    return [flight.name for flight in kept_flights(runs)]
+
+
+@pytest.fixture
+def disk(monkeypatch):
+    """A disk with so much free, of which every removed flight gives back what it took."""
+
+    def of(runs, free, total=100 * GIB):
+        at_first = sum(flight.size_bytes for flight in kept_flights(runs))
+
+        def usage(_):
+            back = at_first - sum(flight.size_bytes for flight in kept_flights(runs))
+            return Usage(total, 0, free + back)
+
+        monkeypatch.setattr(ring.shutil, "disk_usage", usage)
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("config", "disk_bytes", "limits"),
+    [
+        # A 32 GB card: a tenth of it for flights, and 300 MiB free.
+        ({}, 32 * 10**9, Limits(3_200_000_000, 300 * MIB)),
+        # On a large disk no more than 4 GiB, on a small one a tenth is left free.
+        ({}, 1000 * GIB, Limits(4 * GIB, 300 * MIB)),
+        ({}, 1 * GIB, Limits(GIB // 10, GIB // 10)),
+        ({"max_use_mb": 500, "keep_free_mb": 50}, GIB, Limits(500 * MB, 50 * MB)),
+    ],
+)
+def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_others(config, disk_bytes, limits):
+    assert limits_of(DiskConfig.model_validate(config), disk_bytes) == limits
+
+
+@pytest.mark.parametrize(
+    ("used", "free", "to_go"), [(900, 300, 0), (1000, 200, 0), (1200, 300, 200), (900, 150, 50), (1200, 150, 200)]
+)
+def test_what_has_to_go_is_what_passes_the_budget_or_what_the_disk_lacks(used, free, to_go):
+    assert bytes_to_go(used, free, Limits(max_use=1000, keep_free=200)) == to_go
+
+
+def test_the_oldest_without_a_hit_go_first_those_with_one_last_and_the_present_one_never(tmp_path, disk):
+    # Given five flights of 1 MB, the oldest and the third with a hit, on a disk that lacks a little
+    for day, hits in ((1, 2), (2, 0), (3, 1), (4, 0)):
+        pretend(tmp_path, f"2026010{day}T000000Z-guard", MB, hits)
+    present = pretend(tmp_path, PRESENT, MB)
+    going = {}
+    # When more and more is to be left free
+    for lacking in range(6):
+        disk(tmp_path, 50 * MB)
+        keep_free = {"keep_free_mb": 50 + lacking, "max_use_mb": 1000}
+        Ring(present, DiskConfig.model_validate(keep_free)).make_room(EPOCH_US)
+        going[lacking] = [name[6:8] for name in names(tmp_path)]
+        for day, hits in ((1, 2), (2, 0), (3, 1), (4, 0)):
+            if not (tmp_path / f"2026010{day}T000000Z-guard").exists():
+                pretend(tmp_path, f"2026010{day}T000000Z-guard", MB, hits)
+    # Then they go in that order, and the present flight stays whatever is asked
+    assert going == {
+        0: ["01", "02", "03", "04", "05"],
+        1: ["01", "03", "04", "05"],
+        2: ["01", "03", "05"],
+        3: ["03", "05"],
+        4: ["05"],
+        5: ["05"],
+    }
+
+
+def test_the_budget_counts_the_present_flight_as_it_grows(tmp_path, disk):
+    # Given a budget of 3 MB and two flights of 1 MB
+    for day in (1, 2):
+        pretend(tmp_path, f"2026010{day}T000000Z-guard", MB)
+    present = pretend(tmp_path, PRESENT, BLOCK)
+    disk(tmp_path, 50 * GIB)
+    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 3}))
+    kept.make_room(EPOCH_US)
+    assert len(names(tmp_path)) == 3
+    # When the present one grows to 1.5 MB, nothing happens before it is looked at again
+    (present / TLOG_NAME).write_bytes(bytes(1_500_000))
+    kept.make_room(EPOCH_US + LOOK_EVERY_US - 1)
+    assert len(names(tmp_path)) == 3
+    kept.make_room(EPOCH_US + LOOK_EVERY_US)
+    # Then the oldest has gone
+    assert names(tmp_path) == ["20260102T000000Z-guard", PRESENT]
+
+
+def test_nothing_is_removed_that_is_not_a_flight_of_a_vehicle_which_we_have_named(tmp_path, disk):
+    # Given a simulated flight, one that a person has named, a link to one elsewhere, and other folders
+    simulated = pretend(tmp_path, "20260101T000000Z-wall", MB)
+    (simulated / "airframe.yaml").write_text("name: foldable\n")
+    pretend(tmp_path, "first-flight", MB)
+    elsewhere = pretend(tmp_path / "archive", "20260101T000000Z-guard", MB)
+    (tmp_path / "20260101T000000Z-linked").symlink_to(elsewhere)
+    (tmp_path / "20260101T000000Z-notes").mkdir()
+    present = pretend(tmp_path, PRESENT, BLOCK)
+    before = sorted(path.name for path in tmp_path.iterdir())
+    disk(tmp_path, 0)
+    # When there is no room at all
+    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 0}))
+    with pytest.raises(OSError, match="less than 10 MiB"):
+        kept.make_room(EPOCH_US)
+    # Then all of them stay
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+    assert (elsewhere / TLOG_NAME).exists()
+
+
+def test_a_flight_that_another_program_records_stays(tmp_path, disk):
+    # Given two flights, of which the older is being recorded
+    older = pretend(tmp_path, "20260101T000000Z-guard", MB)
+    pretend(tmp_path, "20260102T000000Z-guard", MB)
+    present = pretend(tmp_path, PRESENT, BLOCK)
+    disk(tmp_path, 50 * GIB)
+    with (older / EVENTS_NAME).open("a") as recorded:
+        fcntl.flock(recorded, fcntl.LOCK_SH)
+        # When nothing may be kept, then that one is
+        Ring(present, DiskConfig.model_validate({"max_use_mb": 0})).make_room(EPOCH_US)
+        assert names(tmp_path) == ["20260101T000000Z-guard", PRESENT]
+
+
+def test_a_recorder_marks_its_flight_as_being_flown_until_it_is_closed(tmp_path):
+    folder = tmp_path / PRESENT
+    folder.mkdir()
+    seen = []
+    record(folder, 3, make_room=lambda now_us: seen.append(kept_flights(tmp_path)[0].is_being_flown()))
+    assert seen == [True] * 3
+    assert not kept_flights(tmp_path)[0].is_being_flown()
+
+
+def test_a_power_cut_while_one_is_removed_leaves_no_half_of_it(tmp_path, disk, monkeypatch):
+    # Given a flight that is to go, and the power that ends before its first file is removed
+    pretend(tmp_path, "20260101T000000Z-guard", MB)
+    present = pretend(tmp_path, PRESENT, BLOCK)
+    disk(tmp_path, 50 * GIB)
+    config = DiskConfig.model_validate({"max_use_mb": 0})
+    with monkeypatch.context() as during:
+        during.setattr(ring.shutil, "rmtree", lambda *_, **__: None)
+        Ring(present, config).make_room(EPOCH_US)
+    # Then it is no flight any more, and the next program removes the rest
+    assert names(tmp_path) == [PRESENT]
+    assert len(list(tmp_path.iterdir())) == 2
+    Ring(present, config).make_room(EPOCH_US)
+    assert [path.name for path in tmp_path.iterdir()] == [PRESENT]
+
+
+def test_on_a_disk_that_is_as_good_as_full_packets_end_events_go_on_and_it_is_told(tmp_path, disk):
+    # Given a flight that begins with too little room, and finds room again after 10 s
+    folder = tmp_path / PRESENT
+    folder.mkdir()
+    disk(tmp_path, LAST_BYTES - 1)
+    # When it is recorded
+    recorder = record(folder, 50, Background("log"), Ring(folder, DiskConfig()).make_room)
+    # Then there is no packet, every event, and one sentence that says why
+    assert (folder / TLOG_NAME).stat().st_size == 0
+    assert len((folder / EVENTS_NAME).read_text().splitlines()) == len(recorder.events) > 2
+    assert recorder.writer.loss.startswith("log has gaps: less than 10 MiB of the disk are free")
+    # And with room again packets are written
+    disk(tmp_path, LAST_BYTES)
+    again = Ring(folder, DiskConfig.model_validate({"keep_free_mb": 10}))
+    again.make_room(EPOCH_US)
+
+
+def test_no_room_is_the_error_of_a_full_disk(tmp_path, disk):
+    present = pretend(tmp_path, PRESENT)
+    disk(tmp_path, 0)
+    with pytest.raises(OSError) as caught:
+        Ring(present, DiskConfig()).make_room(EPOCH_US)
+    assert caught.value.errno == errno.ENOSPC
+
+
+def test_a_folder_that_cannot_be_removed_does_not_end_the_flight(tmp_path, disk, monkeypatch):
+    # Given two old flights, of which the older is another user's
+    pretend(tmp_path, "20260101T000000Z-guard", MB)
+    pretend(tmp_path, "20260102T000000Z-guard", MB)
+    present = pretend(tmp_path, PRESENT, BLOCK)
+    disk(tmp_path, 50 * GIB)
+    rename = os.rename
+
+    def refuse(source, target):
+        if source.name == "20260101T000000Z-guard":
+            raise PermissionError(errno.EPERM, "Operation not permitted")
+        rename(source, target)
+
+    monkeypatch.setattr(ring.os, "rename", refuse)
+    # When a MB too much is there, then the next one goes
+    Ring(present, DiskConfig.model_validate({"max_use_mb": 1.1})).make_room(EPOCH_US)
+    assert names(tmp_path) == ["20260101T000000Z-guard", PRESENT]
+
+
+def test_a_folder_that_a_person_names_is_looked_after_by_that_person(tmp_path):
+    assert room_for(tmp_path, tmp_path, DiskConfig()) is None
+    assert room_for(tmp_path, None, DiskConfig()) is not None
+
+
+def test_what_is_free_is_what_this_disk_says(tmp_path):
+    # Nothing pretended: the flight is recorded by a ring on the disk of this machine.
+    folder = tmp_path / PRESENT
+    folder.mkdir()
+    recorder = record(
+        folder, 50, Background("log"), Ring(folder, DiskConfig.model_validate({"keep_free_mb": 0})).make_room
+    )
+    assert recorder.writer.loss is None
+    assert (folder / TLOG_NAME).stat().st_size > 200
+    assert shutil.disk_usage(folder).total > 0

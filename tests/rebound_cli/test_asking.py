@@ -1,0 +1,73 @@
+"""The person's yes to a plan, typed on a pipe."""
+
+import io
+import os
+from typing import Any
+
+import pytest
+
+from rebound_cli.console import Console
+from rebound_cli.realtime import AskPerson
+
+
+class Planned:
+    """A companion with a plan that is ready, or not, and what it was told."""
+
+    def __init__(self):
+        self.is_ready, self.told = True, []
+
+    def plan_is_ready(self):
+        return self.is_ready
+
+    def plan_text(self):
+        return "the plan"
+
+    def confirm_plan(self):
+        self.told.append("yes")
+
+    def stop(self, reason):
+        self.told.append(reason)
+
+
+@pytest.fixture
+def typed():
+    reads, writes = os.pipe()
+    yield reads, lambda text: os.write(writes, text)
+    for descriptor in (reads, writes):
+        os.close(descriptor)
+
+
+def test_a_plan_that_is_made_anew_is_asked_for_anew_whatever_was_typed_meanwhile(typed):
+    reads, types = typed
+    companion: Any = Planned()
+    shown = io.StringIO()
+    console = Console(shown)
+    person = AskPerson(console, reads)
+    # Given a question
+    person.poll(companion)
+    assert shown.getvalue().count("Fly this plan?") == 1 and console.live_is_held
+    # When the vehicle is away, and yes is typed
+    companion.is_ready = False
+    types(b"y\n")
+    person.poll(companion)
+    assert not console.live_is_held
+    # Then the next plan is asked for, and that yes says nothing of it
+    companion.is_ready = True
+    for _ in range(3):
+        person.poll(companion)
+    assert shown.getvalue().count("the plan") == 2 and companion.told == []
+    # And a yes to that one does
+    types(b"yes\n")
+    person.poll(companion)
+    assert companion.told == ["yes"]
+
+
+@pytest.mark.parametrize("line", [b"n\n", b"\n", b"yessir\n"])
+def test_all_but_a_yes_is_a_no(typed, line):
+    reads, types = typed
+    companion: Any = Planned()
+    person = AskPerson(Console(io.StringIO()), reads)
+    types(line)
+    for _ in range(2):
+        person.poll(companion)
+    assert companion.told == ["the plan was not confirmed"]

@@ -1,0 +1,42 @@
+"""The shell's own completion, asked as the shell asks it."""
+
+import shutil
+import subprocess
+
+import pytest
+
+from rebound_cli.main import main
+from tests.rebound_cli.command import ROOT
+
+ASK = """
+source /dev/stdin
+COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMP_LINE="$*"
+$(complete -p rebound | sed 's/.* -F \\([^ ]*\\) .*/\\1/')
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (["fl"], {"fly"}),
+        (["fly", "--lo"], {"--lockstep"}),
+        (["guard", "--then", ""], {"previous", "hold"}),
+        (["plan", "export", "missions/wal"], {"missions/wall.yaml"}),
+        (["guard", "--config", "CHANGELO"], {"CHANGELOG.md"}),
+    ],
+)
+def test_bash_completes_commands_options_choices_and_files(typed, offered, capsys):
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out
+    asked = ["bash", "-c", ASK, "bash", "rebound", *typed]
+    answer = subprocess.run(asked, input=script, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(answer.stdout.split()) == offered, answer.stderr
+
+
+def test_zsh_reads_its_script(capsys):
+    assert main(["completion", "zsh"]) == 0
+    script = capsys.readouterr().out
+    assert script.startswith("#compdef rebound")
+    if shutil.which("zsh"):
+        subprocess.run(["zsh", "-n"], input=script, text=True, check=True)
