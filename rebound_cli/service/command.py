@@ -1,5 +1,6 @@
 """`rebound service`: writes the files, and has systemd do the rest."""
 
+import shutil
 from argparse import Namespace
 
 from rebound_cli.service.check import run_check
@@ -83,5 +84,7 @@ def _uninstall(system: System, is_dry_run: bool) -> int:
 def _reload(system: System) -> None:
     if system.is_running:
         system.told("systemctl", "daemon-reload")
-        system.told("udevadm", "control", "--reload")
-        system.told("udevadm", "trigger", "--subsystem-match=tty")
+        # A container has its devices from outside, and no udev.
+        if shutil.which("udevadm") is not None:
+            system.told("udevadm", "control", "--reload")
+            system.told("udevadm", "trigger", "--subsystem-match=tty")

@@ -1,5 +1,6 @@
 """What systemd is told, on a socket of the test's own and in virtual time."""
 
+import contextlib
 import itertools
 import os
 import socket
@@ -80,11 +81,14 @@ def test_what_systemd_could_not_take_is_told_at_the_next_step(systemd):
     bound, address = systemd
     manager = ServiceManager(address, None)
     # Given a systemd whose queue is full
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
-        other.setblocking(False)
-        with pytest.raises(BlockingIOError):
-            for _ in range(100_000):
-                other.sendto(b"x", "\0" + address[1:] if address.startswith("@") else address)
+    place = "\0" + address[1:] if address.startswith("@") else address
+    with contextlib.ExitStack() as senders, pytest.raises(BlockingIOError):
+        while True:
+            # One sender alone fills its own queue first.
+            sender = senders.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            sender.setblocking(False)
+            for _ in range(100):
+                sender.sendto(b"x", place)
     manager.stepped(True, False, lambda: "", 0)
     assert "READY=1" not in heard(bound)
     # When it reads again

@@ -73,7 +73,7 @@ def test_the_file_in_a_mission_lies_beside_it(tmp_path):
 def test_what_is_wrong_in_the_file_is_named_with_its_line(tmp_path, capsys, text, words):
     stored = tmp_path / "hall.yaml"
     stored.write_text(text)
-    assert fly("--obstacles", stored, "--out", tmp_path / "run") == 1
+    assert fly("--obstacles", stored, "--out", tmp_path / "run") == 78
     error = capsys.readouterr().err
     assert "hall.yaml" in error and all(word in error for word in words)
 

@@ -38,8 +38,8 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
     assert resume["at_step"] == 3
     assert json.loads((second / "summary.json").read_text())["outcome"] == "completed"
     # and neither another mission nor a flight that is over can be resumed
-    assert fly("--resume", second) == 1 and "nothing to resume" in capsys.readouterr().err
-    assert fly("--set", "items.1.go_to.speed_m_s=1", "--resume", first) == 1
+    assert fly("--resume", second) == 78 and "nothing to resume" in capsys.readouterr().err
+    assert fly("--set", "items.1.go_to.speed_m_s=1", "--resume", first) == 78
     assert "its items are others" in capsys.readouterr().err
     # An item that a hit has ended is left behind, though no other had begun
     whole = (first / EVENTS_NAME).read_text()
@@ -55,7 +55,7 @@ def test_a_flight_cut_short_is_flown_on(tmp_path, capsys):
     for damage in (b"5\n", b"\xff\xfe\n", b'{"time_us": 1, "kind": "armed"}\n{"time_us": 2, "kind": "item"}\n'):
         (first / EVENTS_NAME).write_bytes(damage)
         capsys.readouterr()
-        assert fly(*QUICK, "--resume", first) == 1
+        assert fly(*QUICK, "--resume", first) != 0
         assert capsys.readouterr().err.startswith(f"rebound: {first / EVENTS_NAME}")
 
 

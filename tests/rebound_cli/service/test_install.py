@@ -31,7 +31,12 @@ def system(tmp_path, monkeypatch):
     monkeypatch.setattr(check, "hidden_program", lambda: None)
     monkeypatch.setattr(shutil, "which", lambda program: f"/usr/bin/{program}")
     called = []
-    monkeypatch.setattr(System, "call", lambda self, *words: called.append(words) or 0)
+
+    def call(_, *words):
+        called.append(words)
+        return 0
+
+    monkeypatch.setattr(System, "call", call)
     (tmp_path / "etc").mkdir()
     made = System(tmp_path)
     return Namespace(system=made, root=tmp_path, called=called)

@@ -1,0 +1,125 @@
+"""The guard as a service of a real systemd: installed, booted, hit, killed, hung, configured wrongly."""
+
+import contextlib
+import grp
+import json
+import os
+import pty
+import select
+import subprocess
+import sys
+import threading
+import tty
+
+import pytest
+from pymavlink import mavutil
+
+from tests.rebound_cli.service.sandbox import ROOT, Sandbox, why_not
+
+pytestmark = [pytest.mark.realtime, pytest.mark.skipif(why_not() is not None, reason=str(why_not()))]
+
+
+def events(sandbox):
+    """Of the newest run."""
+    runs = sorted(sandbox.file("/var/lib/rebound/runs").iterdir())
+    return [json.loads(line)["kind"] for line in (runs[-1] / "events.jsonl").read_text().splitlines()]
+
+
+def is_in(sandbox, state):
+    return sandbox.shown("SubState") == "running" and sandbox.shown("StatusText").startswith(f"state {state}")
+
+
+def test_installed_booted_hit_killed_hung_and_configured_wrongly(rebound_vehicle, tmp_path):
+    with Sandbox(tmp_path / "sandbox") as sandbox:
+        # Given a guard that was installed, and a computer that boots
+        sandbox.boot()
+        sandbox.install_rebound()
+        guard = ("--guard", ROOT / "examples" / "guard.yaml")
+        done = sandbox.rebound("service", "install", *guard, "--connect", rebound_vehicle.tcp_address)
+        assert done.returncode == 0, done.stderr
+        checked = sandbox.rebound("service", "check")
+        assert checked.returncode == 0, checked.stdout
+        sandbox.boot()
+        sandbox.wait_for(lambda: is_in(sandbox, "standing by"))
+        assert "MemoryDenyWriteExecute=yes" in sandbox.file("/etc/systemd/system/rebound.service").read_text()
+        # When a pilot flies
+        pilot = mavutil.mavlink_connection(rebound_vehicle.mavutil_address)
+        pilot.wait_heartbeat(timeout=10)
+        rebound_vehicle.wait_until(lambda truth: truth.may_arm, within_s=10)
+        pilot.arducopter_arm()
+        pilot.set_mode("TAKEOFF")
+        rebound_vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
+        sandbox.wait_for(lambda: is_in(sandbox, "watching"))
+        # Then a hit is recovered from
+        rebound_vehicle.hit(1.5, bearing_deg=90)
+        sandbox.wait_for(lambda: "given_back" in events(sandbox))
+        # And one that was killed, or hangs, is there again, takes nothing over by itself, and recovers from the next
+        for signal, restarts in (("KILL", "1"), ("STOP", "2")):
+            assert sandbox.run("systemctl", "kill", "-s", signal, "rebound").returncode == 0
+            sandbox.wait_for(lambda restarts=restarts: sandbox.shown("NRestarts") == restarts)
+            sandbox.wait_for(lambda: is_in(sandbox, "watching"))
+            assert "take_over" not in events(sandbox)
+            rebound_vehicle.hit(1.5, bearing_deg=90)
+            sandbox.wait_for(lambda: "given_back" in events(sandbox))
+        pilot.close()
+        # A configuration that is wrong is no reason to start again
+        sandbox.file("/etc/rebound/guard.yaml").write_text("max_hits: none\n")
+        sandbox.run("systemctl", "restart", "--no-block", "rebound")
+        sandbox.wait_for(lambda: sandbox.shown("ExecMainStatus") == "78")
+        assert sandbox.shown("ActiveState") == "failed" and sandbox.shown("NRestarts") == "0"
+
+
+@contextlib.contextmanager
+def serial_cable():
+    """Two serial ports, and what goes into one comes out of the other."""
+    pairs = [pty.openpty() for _ in range(2)]
+    (near, far), is_over = pairs, threading.Event()
+
+    def carry():
+        ends = {near[0]: far[0], far[0]: near[0]}
+        while not is_over.is_set():
+            for end in select.select(list(ends), [], [], 0.1)[0]:
+                os.write(ends[end], os.read(end, 4096))
+
+    for _, port in pairs:
+        tty.setraw(port)
+        os.fchown(port, 0, grp.getgrnam("dialout").gr_gid)
+        os.fchmod(port, 0o660)
+    thread = threading.Thread(target=carry)
+    thread.start()
+    try:
+        yield os.ttyname(near[1]), os.ttyname(far[1])
+    finally:
+        is_over.set()
+        thread.join()
+        for descriptor in (*near, *far):
+            os.close(descriptor)
+
+
+def test_ready_at_the_first_heartbeat_on_the_one_device_that_it_may_open(tmp_path):
+    with serial_cable() as (ours, theirs), Sandbox(tmp_path / "sandbox") as sandbox:
+        # Given a computer that is up before the vehicle is
+        sandbox.boot()
+        sandbox.install_rebound()
+        guard = ("--guard", ROOT / "examples" / "guard.yaml")
+        done = sandbox.rebound("service", "install", *guard, "--connect", f"serial://{ours}:921600")
+        assert done.returncode == 0, done.stderr
+        sandbox.wait_for(lambda: "none heard yet" in sandbox.shown("StatusText"))
+        assert sandbox.shown("ActiveState") == "activating"
+        # When the vehicle starts
+        simulator = [sys.executable, "-m", "rebound_cli", "sim", "--port", "0", "--remote", "127.0.0.1:9"]
+        link = ["--link", f"serial://{theirs}:921600", "--stop-with-stdin"]
+        vehicle = subprocess.Popen([*simulator, *link], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+        try:
+            # Then the service is ready, and sees it over that device alone: no network, no other
+            sandbox.wait_for(lambda: is_in(sandbox, "standing by"))
+        finally:
+            vehicle.stdin.close()
+            vehicle.wait(20)
+        assert sandbox.shown("PrivateNetwork") == "yes"
+        # Its clock is ProtectClock's, to be read.
+        assert sandbox.shown("DeviceAllow").splitlines() == ["char-rtc r", f"{ours} rw"]
+        assert sandbox.shown("NRestarts") == "0"
+        # And a vehicle that has gone is waited for
+        sandbox.wait_for(lambda: "link silent for" in sandbox.shown("StatusText"))
+        assert sandbox.shown("SubState") == "running"
