@@ -119,12 +119,6 @@ def test_a_mission_is_flown_guarded_and_looked_over_on_a_connection(nowhere, tmp
         assert code == 0, stdout + stderr
 
 
-<<<<<<< HEAD
-def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path):
-    folder = tmp_path / "empty"
-    folder.mkdir()
-    process = start("sim", folder, WHEEL / "sim/bin/rebound", "fly", "wall", "--lockstep", HOME=str(tmp_path))
-=======
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
     """Kernels are compiled once, and kept there."""
@@ -133,25 +127,16 @@ def home(tmp_path_factory):
 
 def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path, home):
     process = start("sim", tmp_path, WHEEL / "sim/bin/rebound", "fly", "wall", "--lockstep", HOME=home)
->>>>>>> install
     code, stdout, stderr = finished(process, 600)
     assert code == 0, stderr
     assert "Hit a wall at" in stdout
 
 
-<<<<<<< HEAD
-def test_the_fixture_of_the_documents_is_there(tmp_path):
-=======
 def test_the_fixture_of_the_documents_is_there(tmp_path, home):
->>>>>>> install
     examples = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/testing.md").read_text(), re.DOTALL | re.MULTILINE)
     chosen = [text for text in examples if "rebound_vehicle" in text and "mavsdk" not in text]
     for number, text in enumerate(chosen):
         (tmp_path / f"test_{number}.py").write_text(text)
-<<<<<<< HEAD
-    process = start("sim", tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider", HOME=str(tmp_path))
-=======
     process = start("sim", tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider", HOME=home)
->>>>>>> install
     code, stdout, _ = finished(process, 600)
     assert code == 0 and f"{len(chosen)} passed" in stdout, stdout
