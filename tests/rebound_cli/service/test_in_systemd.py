@@ -50,6 +50,7 @@ def test_installed_booted_hit_killed_hung_and_configured_wrongly(rebound_vehicle
         pilot.set_mode("TAKEOFF")
         rebound_vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
         sandbox.wait_for(lambda: is_in(sandbox, "watching"))
+        assert json.loads(sandbox.rebound("status", "--json").stdout)["state"] == "watching"
         # Then a hit is recovered from
         rebound_vehicle.hit(1.5, bearing_deg=90)
         sandbox.wait_for(lambda: "given_back" in events(sandbox))
