@@ -17,6 +17,7 @@ from rebound_cli.flights.arguments import add_doctor, add_logs
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
+from rebound_cli.init_arguments import add_init
 from rebound_cli.key_arguments import add_key
 from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
@@ -92,6 +93,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
     add_fly(commands)
     add_guard(commands)
+    add_init(commands)
     add_check(commands)
     add_plan(commands)
     add_sim(commands)

@@ -1,0 +1,40 @@
+"""`rebound init`: a copy of a mission that ships with the program, for somebody to change."""
+
+import importlib.resources
+import json
+import re
+import shlex
+from argparse import Namespace
+from importlib.resources.abc import Traversable
+
+from companion.errors import ConfigurationError
+from rebound_cli.run_folder import make_place
+
+
+def run_init(options: Namespace) -> int:
+    """Raises ConfigurationError for a file that is there or a mission that is not."""
+    if options.file.exists():
+        raise ConfigurationError(f"{options.file} is there already: nothing was written.")
+    missions = _shipped()
+    if options.model not in missions:
+        raise ConfigurationError(
+            f"No mission {options.model!r} ships with the program; there are {', '.join(missions)}."
+        )
+    text = missions[options.model].read_text(encoding="utf-8")
+    # The schema lies beside the original.
+    text = re.sub(r"^# yaml-language-server:.*\n", "", text)
+    text = re.sub(
+        rf"^name: {options.model}$", lambda _: f"name: {json.dumps(options.file.stem)}", text, flags=re.MULTILINE
+    )
+    make_place(options.file)
+    options.file.write_text(text, encoding="utf-8")
+    print(f"{options.file} is a copy of the mission '{options.model}'. Change it, then:")
+    file = shlex.quote(str(options.file))
+    print(f"    rebound check {file}    # says and draws what it would do")
+    print(f"    rebound fly {file}      # flies it with the simulated vehicle")
+    return 0
+
+
+def _shipped() -> dict[str, Traversable]:
+    files = importlib.resources.files("rebound_missions").iterdir()
+    return dict(sorted((file.name.removesuffix(".yaml"), file) for file in files if file.name.endswith(".yaml")))
