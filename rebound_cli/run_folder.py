@@ -154,7 +154,7 @@ class FlightRecorder:
         # What is small first: a log that may grow no more costs no event.
         for event in result.events:
             self._events_file.write(event_line(event))
-        # Foreign bytes among the packets could hide one of them from whoever reads the log.
+        # Foreign bytes and broken packets could hide a good one from whoever reads the log.
         received = [frame for frame in result.received_frames if is_packet(frame)]
         if not result.sent_frames and not received:
             self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')

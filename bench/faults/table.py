@@ -1,5 +1,6 @@
 """The table, a row a fault: what is injected, expected and happened, the worst of it, and the verdict."""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -98,10 +99,19 @@ def _cause(text: str) -> str:
     return text.strip().splitlines()[-1].partition(" at ")[0][:160]
 
 
+def _early(under_load: Json) -> str:
+    early = under_load["busy"]["early"] + under_load["quiet"]["early"]
+    return f"{early} were answered before their sample." if early else "Nothing was detected before its sample."
+
+
+def _ms(milliseconds: float) -> str:
+    return f"{milliseconds:.1f} ms" if math.isfinite(milliseconds) else "more than 500 ms"
+
+
 def _under_load(under_load: Json | None) -> list[str]:
     if under_load is None:
         return []
-    spread = "p50 {p50:.1f} ms, p99 {p99:.1f} ms, p99.9 {p999:.1f} ms, most {most:.1f} ms"
+    names = {"p50": "p50", "p99": "p99", "p999": "p99.9", "most": "most"}
     return [
         "### From the hit to the setpoint under load",
         "",
@@ -112,10 +122,11 @@ def _under_load(under_load: Json | None) -> list[str]:
         "| beside it | hit to setpoint | found |",
         "|---|---|---|",
         *(
-            f"| {name} | {spread.format(**under_load[key])} | {under_load[key]['found']} of {under_load['hits']} |"
+            f"| {name} | {', '.join(f'{words} {_ms(under_load[key][at])}' for at, words in names.items())} "
+            f"| {under_load[key]['found']} of {under_load['hits']} |"
             for key, name in (("busy", "two busy loops at normal priority"), ("quiet", "what else runs on the machine"))
         ),
         "",
-        f"Two cores, load average {under_load['load']:.1f} at the end. Nothing was detected before its sample.",
+        f"Two cores, load average {under_load['load']:.1f} at the end. {_early(under_load)}",
         "",
     ]

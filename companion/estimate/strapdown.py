@@ -38,11 +38,12 @@ class Strapdown:
     """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; none while that is right."""
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_right: bool = True) -> None:
-        if is_right:
+        behind_s = 1e-6 * (self.time_boot_us - self.attitude_boot_us)
+        if is_right or (self.by_rates_wxyz is None and behind_s > ATTITUDE_KEPT_S):
+            # Right, or too long ago that one was: rates of one moment lead nowhere from there.
             self.by_rates_wxyz, self.level_leans_m_s2 = None, ZERO
         else:
             if self.by_rates_wxyz is None:
-                behind_s = 1e-6 * (self.time_boot_us - self.attitude_boot_us)
                 self.by_rates_wxyz = turned(self.attitude_wxyz, self.rates_frd_rad_s, behind_s)
             right_wxyz = turned(self.by_rates_wxyz, self.rates_frd_rad_s, 1e-6 * (time_us - self.time_boot_us))
             n, e, d = body_to_ned(right_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))

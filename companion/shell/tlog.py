@@ -5,6 +5,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
+from companion.mavlink.decode import checksum_holds
 from companion.mavlink.packet import packet_length
 
 _STAMP = struct.Struct(">Q")
@@ -86,8 +87,8 @@ def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def is_packet(frame: bytes) -> bool:
-    """Whether bytes are as long as their own header says: `read_tlog` gives them back; others it passes over."""
-    return len(frame) > 0 and packet_length(frame) == len(frame)
+    """Whether bytes are a packet by their header and their checksum: what is not could hide others from a reader."""
+    return len(frame) > 0 and packet_length(frame) == len(frame) and checksum_holds(frame, 0, len(frame))
 
 
 def _plausible(stamp_us: int, last_us: int | None) -> bool:

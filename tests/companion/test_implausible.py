@@ -9,6 +9,7 @@ from companion.detection.sight import Turning
 from companion.estimate.approach import VelocityFix
 from companion.estimate.history import MotionHistory
 from companion.estimate.resets import Resets
+from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import Claim, Leap
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, PositionSetpoint, Refused
 from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
@@ -176,3 +177,16 @@ def test_a_position_that_comes_late_or_from_before_a_reboot_is_no_fault(late_ms)
         late = mav.MAVLink_local_position_ned_message(stamp_ms - late_ms, *f.vehicle.position, *f.vehicle.velocity)
         attacked(f, [bytes(late.pack(mav.MAVLink(None, 1, 1)))])
     assert "fault" not in f.kinds(), f.texts()
+
+
+def test_an_attitude_after_a_silence_makes_no_lean_of_what_the_rates_were_in_one_moment():
+    # Given a level vehicle that has told no attitude for half a second, and turns fast for a moment after a hit
+    strapdown = Strapdown()
+    strapdown.attitude(0, (1.0, 0.0, 0.0, 0.0))
+    for at_ms in range(0, 501, IMU_MS):
+        turning_rad_s = 5.0 if at_ms > 490 else 0.0
+        strapdown.imu(at_ms * 1000, (0.0, 0.0, -9.8), (0.0, turning_rad_s, 0.0))
+    # When it tells one again, which is not to be believed
+    strapdown.attitude(500_000, (1.0, 0.0, 0.0, 0.0), is_right=False)
+    # Then no lean is made of half a second of such rates
+    assert strapdown.level_leans_m_s2 == STILL

@@ -6,7 +6,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.shell.clock import Clock, round_down_to_stamp_us
-from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, read_tlog
+from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, is_packet, read_tlog
 
 EPOCH_US = 1_600_000_000_000_000
 
@@ -91,3 +91,10 @@ def test_the_clock_gives_stamps_that_never_go_back():
     assert times_us == sorted(times_us)
     assert all(time_us % 4 == 0 for time_us in times_us)
     assert round_down_to_stamp_us(1007) == 1004
+
+
+def test_a_packet_is_what_its_header_and_its_checksum_say():
+    (packet,) = heartbeats(1)
+    broken = packet[:12] + bytes([packet[12] ^ 1]) + packet[13:]
+    assert is_packet(packet)
+    assert not any(map(is_packet, (broken, packet[:-1], packet + b"\0", b"", b"\xfd")))
