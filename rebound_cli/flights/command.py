@@ -23,7 +23,7 @@ def run_list(options: Namespace) -> int:
         size_mb, lasted_s = flight["size_bytes"] / 1e6, flight["duration_s"] or 0.0
         print(f"{flight['name']:36} {lasted_s:8.1f} s {size_mb:8.1f} MB  {hits:8}  {flight['end']}")
     total_mb = sum(flight["size_bytes"] for flight in flights) / 1e6
-    print(f"{len(flights)} flights, {total_mb:.1f} MB in {runs}")
+    print(f"{len(flights)} flight{'' if len(flights) == 1 else 's'}, {total_mb:.1f} MB in {runs}")
     return 0
 
 
