@@ -10,6 +10,7 @@ from companion.flight.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.memory.patch import Patch
+from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.px4_mode import mode_name
 from companion.report import Event, ExpectationReport, FlightReport, Status
@@ -115,6 +116,11 @@ class Companion:
         """An event of the program around this one, told with the next step's; nothing before the first."""
         if self._core is not None:
             self._core.flight.tell(self._core.now_us, kind, text)
+
+    def tell_computer(self, computer: ComputerStatus) -> None:
+        """How this computer is, for the ground station: sent with the next step; nothing before the first."""
+        if self._core is not None:
+            self._core.flight.outbox.append(computer)
 
     @property
     def armed(self) -> bool | None:

@@ -19,7 +19,7 @@ from companion.flight.hearing import hear
 from companion.flight.leaving_ground import note_height, too_low
 from companion.flight.limiting import Limiter
 from companion.flight.machine import Machine
-from companion.flight.operator import status_text, values
+from companion.flight.operator import Texts, status_text, values
 from companion.flight.outputs import Outputs, collect
 from companion.flight.states import FINAL_STATES, State
 from companion.link.streams import StreamMonitor
@@ -59,6 +59,7 @@ class Core:
     values_due_us: int = 0
     limiter: Limiter = field(default_factory=Limiter)
     resets: Resets = field(default_factory=Resets)
+    texts: Texts = field(default_factory=Texts)
 
 
 def start(mission: Mission, now_us: int) -> Core:
@@ -195,13 +196,14 @@ def beat(core: Core, now_us: int) -> None:
 def inform(core: Core, now_us: int) -> None:
     """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
     flight = core.flight
-    if flight.vehicle.identity is None or not (flight.events or now_us >= core.values_due_us):
+    if flight.vehicle.identity is None or not (flight.events or core.texts.waiting or now_us >= core.values_due_us):
         return
     operator = flight.mission.companion.operator
     hits = len(flight.collisions)
     if operator.status_texts:
-        texts = [status_text(event, flight.mission.name, hits) for event in flight.events]
-        flight.outbox += [text for text in texts if text is not None]
+        told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
+        texts = [(kind, text) for kind, text in told if text is not None]
+        flight.outbox += core.texts.due(texts, core.machine.finished, now_us)
     if operator.values_hz and now_us >= core.values_due_us and not core.machine.finished:
         core.values_due_us = now_us + round(1e6 / operator.values_hz)
         latest = flight.collisions[-1] if flight.collisions else None

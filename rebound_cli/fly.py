@@ -14,6 +14,7 @@ from companion.shell.connection import Connection, UdpInConnection
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
+from rebound_cli.computer import Computer, watched
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
@@ -96,8 +97,12 @@ def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> F
     if options.connect is None:
         return _fly_beside_px4(flight, connection, options.instance)
     confirmation = ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
-    with served(flight.console.print, command="fly", folder=str(flight.folder.resolve())) as server:
-        return _fly_connected(flight, connection, confirmation, server)
+    operator = flight.mission.companion.operator
+    with (
+        served(flight.console.print, command="fly", folder=str(flight.folder.resolve())) as server,
+        watched(flight.folder, operator.computer_status) as computer,
+    ):
+        return _fly_connected(flight, connection, confirmation, server, computer)
 
 
 def _connection_for(options: Namespace) -> Connection | None:
@@ -117,14 +122,18 @@ def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: Sim
 
 
 def _fly_connected(
-    flight: Flight, connection: Connection, confirmation: Confirmation, server: StatusServer | None = None
+    flight: Flight,
+    connection: Connection,
+    confirmation: Confirmation,
+    server: StatusServer | None = None,
+    computer: Computer | None = None,
 ) -> Flown:
-    companion = Companion(flight.mission)
+    companion, interrupts = Companion(flight.mission), flight.interrupts
     started_s = time.monotonic()
     timing, fault = Timing(), None
     try:
         timing = fly_realtime(
-            companion, connection, Clock(), flight.recorder, flight.console, confirmation, flight.interrupts, server
+            companion, connection, Clock(), flight.recorder, flight.console, confirmation, interrupts, server, computer
         )
     except FlightFaultError as error:
         # What is known of the flight is written first.

@@ -11,10 +11,12 @@ from typing import Protocol
 
 from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
+from companion.messages import ComputerStatus
 from companion.report import Status
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from companion.shell.service_manager import ServiceManager, service_manager
+from rebound_cli.computer import Computer
 from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
@@ -113,6 +115,8 @@ class Stepped(Protocol):
 
     def status(self) -> Status: ...
 
+    def tell_computer(self, computer: ComputerStatus) -> None: ...
+
 
 def waiting(connection: Connection, timeout_s: float) -> bytes:
     """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
@@ -142,6 +146,7 @@ class Loop:
     recorder: FlightRecorder
     console: Console
     interrupts: Interrupts
+    computer: Computer | None = None
     timing: Timing = field(default_factory=Timing)
     heard: Heard = field(default_factory=Heard)
     manager: ServiceManager | None = field(default_factory=service_manager)
@@ -207,6 +212,10 @@ class Loop:
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return
+        computer = None if self.computer is None else self.computer.status(now_us)
+        if computer is not None:
+            self.stepped.tell_computer(computer)
+            self.recorder.record_computer(now_us, computer)
         for writer in (self.recorder.writer, self.console.writer, self.manager):
             loss = None if writer is None else writer.news()
             if loss is not None:
@@ -247,6 +256,7 @@ def fly_realtime(
     confirmation: Confirmation,
     interrupts: Interrupts,
     server: StatusServer | None = None,
+    computer: Computer | None = None,
 ) -> Timing:
     """Run until the companion has finished; after the first interrupt it finishes by itself. How steadily it went."""
     started_us = clock.now_us()
@@ -266,6 +276,6 @@ def fly_realtime(
         if server is not None:
             server.hand_over(companion.status, result.events, running_s, link)
 
-    loop = Loop(companion, connection, clock, recorder, console, interrupts)
+    loop = Loop(companion, connection, clock, recorder, console, interrupts, computer)
     loop.run(beside)
     return loop.timing

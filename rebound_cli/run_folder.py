@@ -6,6 +6,7 @@ import os
 import platform
 import re
 from contextlib import suppress
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from companion.companion import StepResult
     from companion.memory.patch import Patch
+    from companion.messages import ComputerStatus
     from companion.report import Event
 
 RUNS_FOLDER = Path("runs")
@@ -189,7 +191,11 @@ class FlightRecorder:
         """The companion was given an event to tell, after its step at `now_us`."""
         self._record_input(now_us, "note", event=event, text=text)
 
-    def _record_input(self, now_us: int, kind: str, **data: str) -> None:
+    def record_computer(self, now_us: int, computer: "ComputerStatus") -> None:
+        """The companion was told, after its step at `now_us`, how this computer is."""
+        self._record_input(now_us, "computer", status=asdict(computer))
+
+    def _record_input(self, now_us: int, kind: str, **data: Any) -> None:
         self._do(self._inputs_file.write, json.dumps({"time_us": now_us, "kind": kind, **data}) + "\n")
 
     def record_obstacles(self, patches: "Sequence[Patch]") -> None:

@@ -5,7 +5,8 @@ on links with MAV_x_FORWARD, or over the ground station's own link to the compan
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 
 from companion.detection.interface import Phase
@@ -21,6 +22,33 @@ _BLIND = -1.0
 _COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 # Slower than this a hit came to the vehicle, and from where is told by the push.
 _LEAST_SPEED_M_S = 0.3
+
+
+# A ground station shows a text for some seconds and keeps a list: more of one subject pushes all others out of sight.
+TEXT_INTERVAL_US = 1_000_000
+
+
+@dataclass(slots=True)
+class Texts:
+    """Of each kind of event one text a second: the latest, and not the one that was just sent."""
+
+    sent: dict[str, tuple[int, StatusText]] = field(default_factory=dict)  # when, and what
+    waiting: dict[str, StatusText] = field(default_factory=dict)
+
+    def due(self, told: Iterable[tuple[str, StatusText]], is_last: bool, now_us: int) -> list[StatusText]:
+        """What to send now, of what is told now and of what waits; at the last step all of it."""
+        for kind, text in told:
+            if self._may_go(kind, now_us) or text != self.sent[kind][1]:
+                self.waiting[kind] = text
+            else:
+                self.waiting.pop(kind, None)
+        going = [kind for kind in self.waiting if is_last or self._may_go(kind, now_us)]
+        for kind in going:
+            self.sent[kind] = now_us, self.waiting[kind]
+        return [self.waiting.pop(kind) for kind in going]
+
+    def _may_go(self, kind: str, now_us: int) -> bool:
+        return kind not in self.sent or now_us - self.sent[kind][0] >= TEXT_INTERVAL_US
 
 
 def status_text(event: Event, mission: str, hits: int) -> StatusText | None:

@@ -11,7 +11,7 @@ from companion.flight.detecting import collisions, follow_contact
 from companion.flight.hearing import hear
 from companion.flight.leaving_ground import note_height, too_low
 from companion.flight.limiting import Limiter
-from companion.flight.operator import status_text, values
+from companion.flight.operator import Texts, status_text, values
 from companion.flight.outputs import Outputs, collect
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext, GuardInputs
@@ -50,6 +50,7 @@ class GuardCore:
     stop_reason: str | None = None
     is_enabled: bool = False  # asked for, and not yet taken up
     limiter: Limiter = field(default_factory=Limiter)
+    texts: Texts = field(default_factory=Texts)
 
     @property
     def guard(self) -> GuardContext:
@@ -209,8 +210,9 @@ def inform(core: GuardCore, now_us: int) -> None:
         return
     hits = len(flight.collisions)
     if operator.status_texts:
-        texts = [status_text(event, flight.mission.name, hits) for event in flight.events]
-        flight.outbox += [text for text in texts if text is not None]
+        told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
+        texts = [(kind, text) for kind, text in told if text is not None]
+        flight.outbox += core.texts.due(texts, core.machine.state is State.ENDED, now_us)
     if operator.values_hz and now_us >= core.values_due_us and core.machine.state is not State.ENDED:
         core.values_due_us = now_us + round(1e6 / operator.values_hz)
         latest = flight.collisions[-1] if flight.collisions else None

@@ -8,6 +8,7 @@ from companion.guard.core import GuardCore, advance, fault, next_deadline_us, st
 from companion.guard.states import State
 from companion.mavlink.decode import LONE_GUARD_CONVERTERS, Decoder
 from companion.mavlink.encode import Encoder
+from companion.messages import ComputerStatus
 from companion.px4_mode import mode_name
 from companion.report import CollisionReport, RoundTripReport, Status
 
@@ -69,6 +70,11 @@ class Guard:
         """An event of the program around this one, told with the next step's; nothing before the first."""
         if self._core is not None:
             self._core.flight.tell(self._core.now_us, kind, text)
+
+    def tell_computer(self, computer: ComputerStatus) -> None:
+        """How this computer is, for the ground station: sent with the next step; nothing before the first."""
+        if self._core is not None:
+            self._core.flight.outbox.append(computer)
 
     @property
     def armed(self) -> bool | None:

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.messages import (
+    ComputerStatus,
     DebugVector,
     NamedValue,
     OnboardHeartbeat,
@@ -40,6 +41,10 @@ IGNORE_YAW_RATE = 0x800
 
 NAN = float("nan")
 
+# ONBOARD_COMPUTER_STATUS: the largest number of a field says that it is not used.
+_UNUSED_INT8, _UNUSED_UINT8, _UNUSED_INT16, _UNUSED_UINT32 = 0x7F, 0xFF, 0x7FFF, 0xFFFFFFFF
+_CORES = 8
+
 # STATUSTEXT's field.
 TEXT_LENGTH = 50
 
@@ -53,6 +58,7 @@ SinglePacket: TypeAlias = (
     | SetParameter
     | NamedValue
     | DebugVector
+    | ComputerStatus
 )
 
 
@@ -129,6 +135,8 @@ class Encoder:
                 return dialect.MAVLink_named_value_float_message(time_us // 1000 & 0xFFFFFFFF, name.encode(), value)
             case DebugVector(time_us, name, vector):
                 return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
+            case ComputerStatus():
+                return _computer(outgoing)
             case TimeSyncReply(vehicle_time_ns, companion_time_ns):
                 return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
             case TimeSyncAsk(companion_time_ns):
@@ -177,6 +185,36 @@ class Encoder:
             yaw,
             NAN,
         )
+
+
+def _computer(status: ComputerStatus) -> Any:
+    """The cores by themselves, the first eight; one temperature, one memory, one disk, no link."""
+    cores = (*status.cpu_percent, *[_UNUSED_UINT8] * _CORES)[:_CORES]
+    temperature = status.temperature_deg_c
+    board = _UNUSED_INT8 if temperature is None else min(max(temperature, -0x80), _UNUSED_INT8 - 1)
+    none = [_UNUSED_UINT32]
+    return dialect.MAVLink_onboard_computer_status_message(
+        time_usec=status.at_us,
+        uptime=status.uptime_ms & 0xFFFFFFFF,
+        type=0,  # the main computer
+        cpu_cores=cores,
+        cpu_combined=[_UNUSED_UINT8] * 10,
+        gpu_cores=[_UNUSED_UINT8] * 4,
+        gpu_combined=[_UNUSED_UINT8] * 10,
+        temperature_board=board,
+        temperature_core=[_UNUSED_INT8] * 8,
+        fan_speed=[_UNUSED_INT16] * 4,
+        ram_usage=status.memory_used_mib,
+        ram_total=status.memory_total_mib,
+        storage_type=none * 4,
+        storage_usage=[status.disk_used_mib, *none * 3],
+        storage_total=[status.disk_total_mib, *none * 3],
+        link_type=none * 6,
+        link_tx_rate=none * 6,
+        link_rx_rate=none * 6,
+        link_tx_max=none * 6,
+        link_rx_max=none * 6,
+    )
 
 
 def _as_float(value: int | float) -> tuple[float, int]:

@@ -1,6 +1,7 @@
 """Typed samples in and typed commands out: the only language between the codec and the core."""
 
 from companion.messages.outgoing import (
+    ComputerStatus,
     DebugVector,
     NamedValue,
     OnboardHeartbeat,
@@ -56,6 +57,7 @@ __all__ = [
     "Battery",
     "CommandAck",
     "CommandResult",
+    "ComputerStatus",
     "CurrentMode",
     "DebugVector",
     "EstimatorStatus",

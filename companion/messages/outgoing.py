@@ -138,6 +138,20 @@ class DebugVector:
     vector: Vector3
 
 
+@dataclass(frozen=True, slots=True)
+class ComputerStatus:
+    """ONBOARD_COMPUTER_STATUS; `at_us` since the epoch, a MiB is 2^20 bytes, a temperature nobody measures None."""
+
+    at_us: int
+    uptime_ms: int
+    cpu_percent: tuple[int, ...]  # of each core
+    temperature_deg_c: int | None
+    memory_used_mib: int
+    memory_total_mib: int
+    disk_used_mib: int
+    disk_total_mib: int
+
+
 Outgoing: TypeAlias = (
     SendCommand
     | PositionSetpoint
@@ -149,4 +163,5 @@ Outgoing: TypeAlias = (
     | StatusText
     | NamedValue
     | DebugVector
+    | ComputerStatus
 )

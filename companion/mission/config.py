@@ -155,6 +155,8 @@ class OperatorConfig(Written):
     """Hits, recoveries, limits and the outcome, as STATUSTEXT."""
     values_hz: Annotated[NotNegative, Field(le=50.0)] = 2.0
     """Enough for a plot, and with seven messages of some 30 bytes less than a tenth of a 57 600 baud radio. 0: none."""
+    computer_status: bool = True
+    """CPU, temperature, memory and disk of this computer once a second, as ONBOARD_COMPUTER_STATUS. Real vehicles."""
 
 
 class DiskConfig(Written):

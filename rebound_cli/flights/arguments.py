@@ -5,8 +5,6 @@ from pathlib import Path
 
 from rebound_cli.arguments import Commands, add_json, count, runs
 
-RUNS = Path("runs")
-
 
 def add_logs(commands: Commands) -> None:
     logs = commands.add_parser(
@@ -55,7 +53,9 @@ def add_doctor(commands: Commands) -> None:
 
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="where the flights are (default: runs)")
+    parser.add_argument(
+        "--runs", type=Path, metavar="DIR", help="where the flights are (default: runs here, or the service's)"
+    )
 
 
 def _add_no_position(parser: argparse.ArgumentParser) -> None:

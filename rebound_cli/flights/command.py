@@ -8,12 +8,13 @@ from typing import Any
 from companion.report import Event
 from rebound_cli.console import console_for
 from rebound_cli.flights.archive import Archive, add_flight
-from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights
+from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
 from rebound_cli.run_folder import EVENTS_NAME, RunFolderError, read_records
 
 
 def run_list(options: Namespace) -> int:
-    flights = [overview(flight) for flight in kept_flights(options.runs)]
+    runs = runs_folder(options.runs)
+    flights = [overview(flight) for flight in kept_flights(runs)]
     if options.json:
         print(json.dumps(flights, indent=2))
         return 0
@@ -22,13 +23,13 @@ def run_list(options: Namespace) -> int:
         size_mb, lasted_s = flight["size_bytes"] / 1e6, flight["duration_s"] or 0.0
         print(f"{flight['name']:36} {lasted_s:8.1f} s {size_mb:8.1f} MB  {hits:8}  {flight['end']}")
     total_mb = sum(flight["size_bytes"] for flight in flights) / 1e6
-    print(f"{len(flights)} flights, {total_mb:.1f} MB in {options.runs}")
+    print(f"{len(flights)} flight{'' if len(flights) == 1 else 's'}, {total_mb:.1f} MB in {runs}")
     return 0
 
 
 def run_show(options: Namespace) -> int:
     """Raises FlightError, RunFolderError."""
-    flight = flight_named(options.runs, options.flight)
+    flight = flight_named(runs_folder(options.runs), options.flight)
     told = overview(flight)
     events = list(read_records(flight.folder / EVENTS_NAME, "".join(flight.event_lines())))
     if options.json:
@@ -45,7 +46,7 @@ def run_show(options: Namespace) -> int:
 
 def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError."""
-    flight = flight_named(options.runs, options.flight)
+    flight = flight_named(runs_folder(options.runs), options.flight)
     out = options.out or Path(f"{flight.name}.tar.gz")
     with Archive(out, options.no_position) as archive:
         add_flight(archive, flight, "")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from companion.errors import ConfigurationError
 from rebound_cli.flights.archive import Archive, add_flight
-from rebound_cli.flights.kept import kept_flights
+from rebound_cli.flights.kept import kept_flights, runs_folder
 from rebound_cli.run_folder import read_text, versions
 from rebound_cli.status.asking import StatusError, ask
 
@@ -29,9 +29,10 @@ def run_doctor(options: Namespace) -> int:
     for file in (*options.config, *([options.preflight] if options.preflight else ())):
         if not file.is_file():
             raise ConfigurationError(f"{file} does not exist: give a file, or leave the option out.")
+    runs = runs_folder(options.runs)
     with Archive(options.out, options.no_position) as archive:
         archive.add_data("versions.json", json.dumps(versions(), indent=2) + "\n")
-        archive.add_text("machine.txt", _machine(options.runs))
+        archive.add_text("machine.txt", _machine(runs))
         archive.add_text("journal.txt", _journal())
         archive.add_data("status.json", _status())
         settings = [*options.config, *(sorted(SETTINGS.glob("*.yaml")) if SETTINGS.is_dir() else ())]
@@ -42,7 +43,7 @@ def run_doctor(options: Namespace) -> int:
                 archive.add_text(f"system/{file.name}", read_text(file))
         if options.preflight is not None:
             archive.add_data("preflight.json", read_text(options.preflight))
-        flights = kept_flights(options.runs)[-options.flights :]
+        flights = kept_flights(runs)[-options.flights :]
         for flight in flights:
             add_flight(archive, flight, "flights/")
     size_mb = options.out.stat().st_size / 1e6

@@ -14,6 +14,7 @@ from rebound_cli.run_folder import (
     AIRFRAME_NAME,
     EVENTS_NAME,
     HIT_KINDS,
+    RUNS_FOLDER,
     SUMMARY_NAME,
     TLOG_NAME,
     read_text,
@@ -24,6 +25,10 @@ from rebound_cli.run_folder import (
 _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")
 # The unit of stat's st_blocks, whatever the file system's own is.
 _BLOCK_BYTES = 512
+
+
+# Where a service flies: below systemd's StateDirectory=rebound.
+SERVICE_RUNS = Path("/var/lib/rebound/runs")
 
 
 class FlightError(ReboundError):
@@ -80,6 +85,11 @@ def has_hit(flight: KeptFlight) -> bool:
 def size_of(folder: Path) -> int:
     """What it takes of the disk, in bytes: an empty file is smaller than that."""
     return sum(file.lstat().st_blocks * _BLOCK_BYTES for file in folder.iterdir())
+
+
+def runs_folder(given: Path | None) -> Path:
+    """The folder of runs that a person means."""
+    return given or (SERVICE_RUNS if SERVICE_RUNS.is_dir() and not RUNS_FOLDER.is_dir() else RUNS_FOLDER)
 
 
 def kept_flights(runs: Path) -> list[KeptFlight]:

@@ -8,10 +8,10 @@ from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
+from rebound_cli.computer import watched
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
 from rebound_cli.flights.ring import room_for
@@ -40,8 +40,13 @@ def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
     recorder = FlightRecorder(folder, Background("log"), room_for(folder, options.out, config.companion.disk))
     guard = Guard(config)
     try:
-        with served(console.print, command="guard", folder=str(folder.resolve())) as server, Interrupts() as interrupts:
-            _run(guard, connection, recorder, console, interrupts, server)
+        with (
+            served(console.print, command="guard", folder=str(folder.resolve())) as server,
+            watched(folder, config.companion.operator.computer_status) as computer,
+            Interrupts() as interrupts,
+        ):
+            loop = Loop(guard, connection, Clock(), recorder, console, interrupts, computer)
+            _run(loop, guard, server)
     finally:
         connection.close()
         recorder.close()
@@ -74,24 +79,15 @@ def guard_config(options: Namespace) -> GuardConfig:
     return validated(GuardConfig, document, document.data)
 
 
-def _run(
-    guard: Guard,
-    connection: Connection,
-    recorder: FlightRecorder,
-    console: Console,
-    interrupts: Interrupts,
-    server: StatusServer | None,
-) -> None:
-    clock = Clock()
-    started_us = clock.now_us()
+def _run(loop: Loop, guard: Guard, server: StatusServer | None) -> None:
+    started_us = loop.clock.now_us()
 
     def beside(now_us: int, result: StepResult) -> None:
         if result.events:
-            console.events(result.events, started_us)
+            loop.console.events(result.events, started_us)
         running_s, link = (now_us - started_us) / 1e6, loop.heard.text(now_us)
-        console.live(guard.status, running_s, link)
+        loop.console.live(guard.status, running_s, link)
         if server is not None:
             server.hand_over(guard.status, result.events, running_s, link)
 
-    loop = Loop(guard, connection, clock, recorder, console, interrupts)
     loop.run(beside)

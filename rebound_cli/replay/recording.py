@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 from companion.guard.config import GuardConfig
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
+from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.shell.tlog import read_tlog
 from rebound_cli.documents import validated
@@ -39,6 +41,7 @@ class Step:
     confirms: bool = False
     stop_reason: str | None = None
     file_appears: bool = False
+    computer: ComputerStatus | None = None
     notes: list[tuple[str, str]] = field(default_factory=list)  # kinds of events and their texts
 
 
@@ -84,6 +87,8 @@ def read_recording(folder: Path) -> Recording:
         step.confirms |= record["kind"] == "confirm"
         step.file_appears |= record["kind"] == "file"
         step.stop_reason = record.get("reason", step.stop_reason)
+        if record["kind"] == "computer":
+            step.computer = _computer(inputs_file, record.get("status"))
         if record["kind"] == "note":
             step.notes.append((str(record.get("event")), str(record.get("text"))))
     lines = events.splitlines(keepends=True)
@@ -99,6 +104,13 @@ def read_recording(folder: Path) -> Recording:
     except (ValueError, TypeError) as error:
         raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
+
+
+def _computer(file: Path, status: Any) -> ComputerStatus:
+    try:
+        return ComputerStatus(**{**status, "cpu_percent": tuple(status["cpu_percent"])})
+    except (TypeError, KeyError) as error:
+        raise LogError(f"{file}: a status of the computer is damaged.") from error
 
 
 def _whole_until_us(steps: Mapping[int, Step], last_packet_us: int) -> int:

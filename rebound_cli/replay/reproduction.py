@@ -51,6 +51,8 @@ def reproduce(recording: Recording) -> Reproduction:
                 stepped.file_is_there()
         if step.stop_reason is not None:
             stepped.stop(step.stop_reason)
+        if step.computer is not None:
+            stepped.tell_computer(step.computer)
         for kind, text in step.notes:
             stepped.note(kind, text)
     comparison.finish()

@@ -5,6 +5,7 @@ import itertools
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from companion.flight.operator import Texts
 from companion.mavlink.encode import Encoder
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
 from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
@@ -102,6 +103,47 @@ def test_the_detectors_state_is_there_to_plot_twice_a_second_and_no_more_after_t
     v_c = [m for _, m in sent(f, "DEBUG_VECT") if m.name == "rb_v_c"]
     assert v_c[0].x == pytest.approx(2.0, abs=0.1)
     assert phases[-1][0] <= f.companion.report().ended_at_us
+
+
+def warning(text):
+    return StatusText(Severity.WARNING, text)
+
+
+def spoken(steps, ends_at=None):
+    """What is sent when, in tenths of a second, of texts about a subject that are told then."""
+    texts, heard = Texts(), []
+    for tenth in range(40):
+        told = [(subject, warning(text)) for at, subject, text in steps if at == tenth]
+        heard += [(tenth, text.text) for text in texts.due(told, tenth == ends_at, EPOCH_US + tenth * 100_000)]
+    return heard
+
+
+@pytest.mark.parametrize(
+    ("told", "sent"),
+    [
+        # One alone goes at once; the same again within the second not at all, and after it anew.
+        ([(0, "hit", "A")], [(0, "A")]),
+        ([(0, "hit", "A"), (5, "hit", "A"), (9, "hit", "A")], [(0, "A")]),
+        ([(0, "hit", "A"), (10, "hit", "A")], [(0, "A"), (10, "A")]),
+        # Others of the subject wait until the second is over; the latest is sent.
+        ([(0, "hit", "A"), (3, "hit", "B")], [(0, "A"), (10, "B")]),
+        ([(0, "hit", "A"), (3, "hit", "B"), (8, "hit", "C"), (12, "hit", "D")], [(0, "A"), (10, "C"), (20, "D")]),
+        ([(0, "hit", "A"), (3, "hit", "B"), (8, "hit", "A")], [(0, "A")]),
+        # Subjects do not wait for each other.
+        ([(0, "hit", "A"), (1, "recovered", "R"), (2, "hit", "B")], [(0, "A"), (1, "R"), (10, "B")]),
+    ],
+)
+def test_of_each_subject_one_text_a_second_is_sent_and_none_twice(told, sent):
+    assert spoken(told) == sent
+
+
+def test_a_flood_of_texts_is_one_a_second():
+    flood = [(tenth, "implausible", f"message {tenth} refused") for tenth in range(40)]
+    assert [tenth for tenth, _ in spoken(flood)] == [0, 10, 20, 30]
+
+
+def test_at_the_end_nothing_waits_any_more():
+    assert spoken([(0, "hit", "A"), (3, "hit", "B")], ends_at=5) == [(0, "A"), (5, "B")]
 
 
 def test_both_can_be_switched_off():

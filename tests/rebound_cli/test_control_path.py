@@ -2,6 +2,7 @@
 
 import gc
 import io
+import itertools
 import json
 import resource
 import sys
@@ -11,11 +12,15 @@ from typing import Any
 import pytest
 
 from companion.companion import Companion, StepResult
+from companion.mavlink.packet import message_id_of
+from companion.messages import ComputerStatus
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from companion.shell.connection import LinkCounts
+from companion.shell.tlog import read_tlog
 from rebound_cli import fly as command
 from rebound_cli import run_folder
 from rebound_cli.background import MOST_WAITING, Background
+from rebound_cli.computer import INTERVAL_US, Computer
 from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
@@ -137,7 +142,19 @@ class Restarted(ConfirmAtOnce):
             super().poll(companion)
 
 
-def fly(folder, stream=sys.stderr, confirm=None):
+class EverySecond:
+    """A computer that is the same every second."""
+
+    due_us = 0
+
+    def status(self, now_us):
+        if now_us < self.due_us:
+            return None
+        self.due_us = now_us + INTERVAL_US
+        return ComputerStatus(now_us, 90_500, (5, 50), 61, 812, 3792, 9_000, 30_000)
+
+
+def fly(folder, stream=sys.stderr, confirm=None, computer=None):
     """A hop in virtual time through the loop of real flights."""
     document = load_mission_document(SQUARE, HOP_SETS)
     mission, scene = mission_from(document), world_from(document)
@@ -150,11 +167,40 @@ def fly(folder, stream=sys.stderr, confirm=None):
     confirmation = ConfirmAtOnce() if confirm is None else confirm(world)
     problem = None
     try:
-        fly_realtime(companion, world, world, recorder, console, confirmation, Interrupts())
+        fly_realtime(companion, world, world, recorder, console, confirmation, Interrupts(), None, computer)
     except FlightFaultError as error:
         problem = str(error)
     recorder.close()
     return companion, world, recorder, console, problem
+
+
+def test_the_ground_station_is_told_of_the_computer_every_second_and_a_replay_tells_the_same(tmp_path):
+    # When a mission is flown beside a computer that is watched
+    companion, _, recorder, _, problem = fly(tmp_path, computer=EverySecond())
+    # Then the vehicle's link carries its status once a second from the vehicle's first packets to the end
+    assert problem is None and companion.report().outcome == "completed"
+    sent_us = [
+        time_us for time_us, packet in read_tlog(tmp_path / run_folder.TLOG_NAME) if message_id_of(packet) == 390
+    ]
+    report = companion.report()
+    lasted_s = (report.ended_at_us - report.started_at_us) / 1e6
+    assert lasted_s - 2.5 <= len(sent_us) <= lasted_s + 1.0
+    assert all(0.9e6 < b - a < 1.2e6 for a, b in itertools.pairwise(sent_us))
+    # And the flight is decided again to the bit, with what the computer said then
+    assert_comes_again(tmp_path)
+    assert recorder.writer.loss is None
+
+
+def test_the_computer_is_read_aside_and_told_a_second_later(tmp_path):
+    # Given a computer that is asked for the first time
+    computer = Computer(tmp_path)
+    assert computer.status(5) is None
+    # When it has been read
+    computer.close()
+    # Then that is told once, when the next is due
+    assert computer.status(4 + INTERVAL_US) is None
+    assert computer.status(5 + INTERVAL_US).at_us == 5
+    assert computer.status(6 + INTERVAL_US) is None
 
 
 def test_a_full_disk_ends_no_flight_and_is_told(tmp_path):

@@ -4,12 +4,14 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
+from companion.messages import ComputerStatus
 from rebound_cli import run_folder
 from rebound_cli.run_folder import FlightRecorder
 
 EPOCH_US = 1_600_000_000_000_000
 STEP_US = 50_000
 BLOCK = 4096
+COMPUTER = ComputerStatus(EPOCH_US, 90_500, (5, 50), 61, 812, 3792, 9_000, 30_000)
 
 
 def record(folder, steps=50, writer=None, make_room=None):
@@ -28,6 +30,9 @@ def record(folder, steps=50, writer=None, make_room=None):
         if number % 3 == 1:
             messages.append(dialect.MAVLink_attitude_message(number * 50, 0.01, 0.02, 0.03, 0.0, 0.0, 0.0))
         recorder.record(now_us, guard.step(b"".join(message.pack(vehicle) for message in messages), now_us))
+        if number == 20:
+            guard.tell_computer(COMPUTER)
+            recorder.record_computer(now_us, COMPUTER)
         if number == 30:
             guard.note("late", "a step came late")
             recorder.record_note(now_us, "late", "a step came late")

@@ -5,6 +5,7 @@ import tarfile
 
 import pytest
 
+from rebound_cli.flights import kept
 from rebound_cli.main import main
 from tests.rebound_cli.flights.flying import pretend, record
 
@@ -57,6 +58,17 @@ def test_show_is_of_the_last_flight_and_has_its_events_in_order(runs, capsys):
     flight = json.loads(capsys.readouterr().out)
     assert [event["kind"] for event in flight["events"]] == ["connected", "detection", "detection"]
     assert flight["summary"] is None
+
+
+def test_without_flights_here_those_of_the_service_are_meant(runs, tmp_path, monkeypatch, capsys):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setattr(kept, "SERVICE_RUNS", runs)
+    assert logs("list") == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("3 flights")
+    (tmp_path / "here" / "runs").mkdir()
+    assert logs("list") == 0
+    assert capsys.readouterr().out.startswith("0 flights")
 
 
 def test_a_flight_that_is_not_there_is_one_sentence(runs, capsys):
