@@ -23,9 +23,8 @@ def run_init(options: Namespace) -> int:
     text = missions[options.model].read_text(encoding="utf-8")
     # The schema lies beside the original.
     text = re.sub(r"^# yaml-language-server:.*\n", "", text)
-    text = re.sub(
-        rf"^name: {options.model}$", lambda _: f"name: {json.dumps(options.file.stem)}", text, flags=re.MULTILINE
-    )
+    name = json.dumps(re.sub("[^A-Za-z0-9._-]+", "-", options.file.stem))
+    text = re.sub(rf"^name: {options.model}$", f"name: {name}", text, flags=re.MULTILINE)
     make_place(options.file)
     options.file.write_text(text, encoding="utf-8")
     print(f"{options.file} is a copy of the mission '{options.model}'. Change it, then:")
