@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 WHEEL := $(abspath .venv-wheel)
 READY := $(VENV)/.ready
 
-.PHONY: fly test rest clients check lint types results paper schema diagrams wheel requirements audit aarch64 clean
+.PHONY: fly test rest sandbox clients check lint types results paper schema diagrams wheel requirements audit aarch64 clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml
@@ -64,6 +64,10 @@ requirements: $(READY)
 	echo pytest | $(PIN) --universal -c requirements.txt --extra sim pyproject.toml - -o requirements/sim.txt
 	printf '%s\n' mavsdk==3.17.4 pytest==9.2.0 | $(PIN) - -o requirements/mavsdk3.txt
 	printf '%s\n' MAVProxy==1.8.75 pytest==9.2.0 | $(PIN) - -o requirements/mavproxy.txt
+
+# The service installed, booted, hit, killed and hung under a real systemd; as root, in a checkout outside /tmp and homes.
+sandbox: $(READY)
+	REBOUND_SANDBOX=1 $(BIN)/python -m pytest -n 0 -rs tests/rebound_cli/service/test_in_systemd.py
 
 # Fails on a known vulnerability of what is pinned; where nobody can be asked, says so.
 audit: $(READY)

@@ -56,8 +56,16 @@ exec env -i container=rebound PATH=/usr/sbin:/usr/bin:/sbin:/bin """
 _BOOT += f"""{_SYSTEMD} --system --log-target=journal --show-status=no' $R"""
 
 
+# What the unit hides from the service: neither a checkout nor an environment there can be its program.
+_HIDDEN = ("/tmp", "/var/tmp", "/home", "/root", "/run")
+
+
 def why_not() -> str | None:
     """Why there is no sandbox on this machine; None where there is."""
+    if not os.environ.get("REBOUND_SANDBOX"):
+        return "`make sandbox` boots a systemd, as root, in namespaces of its own; nobody gets that unasked"
+    if any(Path(place).is_relative_to(hidden) for place in (ROOT, sys.prefix) for hidden in _HIDDEN):
+        return f"a service does not see {ROOT} or {sys.prefix}"
     if os.geteuid() != 0:
         return "a sandbox with a systemd needs root"
     if not Path(_SYSTEMD).exists() or shutil.which("unshare") is None:
