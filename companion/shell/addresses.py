@@ -30,13 +30,13 @@ def open_connection(
     Raises ConnectionSetupError with one clear sentence.
     """
     scheme, rest = _scheme_and_rest(url)
-    if peer is not None and scheme not in ("udpin", "udp"):
+    if scheme == "udp":
+        scheme = "udpin" if _host_and_port(url, rest)[0] in ("", "0.0.0.0", "[::]") else "udpout"
+    if peer is not None and scheme != "udpin":
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
         return serial_port(*_device_and_baud(url, rest))
     host, port = _host_and_port(url, rest)
-    if scheme == "udp":
-        scheme = "udpin" if host in ("", "0.0.0.0", "::") else "udpout"
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme == "udpin":

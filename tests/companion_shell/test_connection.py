@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from companion.errors import ConnectionSetupError
+from companion.shell import addresses
 from companion.shell.addresses import open_connection
 from companion.shell.connection import UdpInConnection
 
@@ -55,7 +56,15 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
     connection.close()
 
 
-@pytest.mark.parametrize(("url", "named"), [("udpout://127.0.0.1:9", "127.0.0.1"), ("udpin://127.0.0.1:0", "no such")])
+@pytest.mark.parametrize(
+    ("url", "named"),
+    [
+        ("udpout://127.0.0.1:9", "127.0.0.1"),
+        ("udp://127.0.0.1:9", "127.0.0.1"),
+        ("serial:///dev/null:57600", "127.0.0.1"),
+        ("udpin://127.0.0.1:0", "no such"),
+    ],
+)
 def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named):
     with pytest.raises(ConnectionSetupError, match="--peer"):
         open_connection(url, named)
@@ -77,6 +86,12 @@ def test_other_programs_habits_are_answered_with_what_was_meant(habit, meant):
     with pytest.raises(ConnectionSetupError) as refused:
         open_connection(habit)
     assert str(refused.value).endswith(f"did you mean {meant}?")
+
+
+@pytest.mark.parametrize("host", ["", "0.0.0.0", "[::]"])
+def test_the_older_form_listens_where_it_names_no_host(monkeypatch, host):
+    monkeypatch.setattr(addresses, "UdpInConnection", lambda host, port, _: (host, port))
+    assert open_connection(f"udp://{host}:14540") == (host, 14540)
 
 
 def test_udpin_drops_what_nobody_is_there_to_take():
