@@ -27,8 +27,8 @@ class AttachedStep:
 class AttachedGuard:
     """Joins fields with the pure core; holds no clock and no thread. Times are microseconds, any epoch.
 
-    After a stall, which is a step missed by a whole poll, what arrived meanwhile is still to be heard, one message
-    after the other. What is heard for POLL_INTERVAL_US counts as it, and is one step: no silence is judged before.
+    A step that is late by a whole poll shows a stall. The messages that waited then arrive one after the other: all
+    that is heard within POLL_INTERVAL_US becomes one step, and no silence is judged before it.
 
     The program's own heartbeats and its share of TIMESYNC are already there; none are added. A program would take an
     answer to a question of the guard's for one to its own, so the round trip is not measured here. `seek` takes the
@@ -71,11 +71,11 @@ class AttachedGuard:
         return AttachedStep(sent, outputs.events)
 
     def _is_draining(self, now_us: int) -> bool:
-        if self._drained_us is None and now_us - next_deadline_us(self.core) >= POLL_INTERVAL_US:
-            self._drained_us = now_us + POLL_INTERVAL_US
-        if self._drained_us is not None and now_us >= self._drained_us:
+        if self._drained_us is None:
+            if now_us - next_deadline_us(self.core) >= POLL_INTERVAL_US:
+                self._drained_us = now_us + POLL_INTERVAL_US
+        elif now_us >= self._drained_us:
             self._drained_us = None
-            return False
         return self._drained_us is not None
 
     def lets_pass(self, name: str, fields: Mapping[str, Any], now_us: int) -> bool:

@@ -7,7 +7,8 @@ import logging
 import sys
 import threading
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
@@ -27,12 +28,11 @@ __all__ = ["CollisionGuard", "GuardError"]
 _LOG = logging.getLogger(__name__)
 # Heartbeat within ten seconds, ten streams asked for, two seconds of measuring.
 START_TIMEOUT_S = 20.0
-# Giving back takes 10 ms; a vehicle that refuses is asked five times, then for the next mode.
-STOP_TIMEOUT_S = 10.0
 # How long a thread of the program's that computes may keep Python from MAVSDK's: between the datagram that shows a hit
 # and the setpoint it is waited for up to three times. Python's own 5 ms would be 15; this costs such a thread some 1 %.
 SWITCH_INTERVAL_S = 0.0001
-# Giving back is two modes at most, each given up after 2.5 s (flight.commander), and a wait for a report of the mode.
+# Giving back takes 10 ms. At most three modes are asked for, each given up after 2.5 s (flight.command_client), after a
+# wait for a report of the present one.
 GIVING_BACK_US = 10_000_000
 # A setpoint's interval.
 TRIED_AGAIN_S = 0.02
@@ -94,7 +94,7 @@ class CollisionGuard:
         with self._changed:
             self._guard.core.stop_reason = "stopped by the program"
             self._changed.notify_all()
-            self._changed.wait_for(lambda: self._guard.finished or self._is_over, STOP_TIMEOUT_S)
+            self._changed.wait_for(lambda: self._guard.finished or self._is_over, GIVING_BACK_US * 1e-6)
             self._is_over = True
             self._changed.notify_all()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
@@ -173,16 +173,15 @@ class CollisionGuard:
         if name in HEARD:
             with self._changed:
                 if not self._is_over:
-                    self._guarded(lambda: self._send(self._heard(name, source, fields_json)))
+                    with self._guarded():
+                        self._send(self._guard.hear(name, source, json.loads(fields_json), self._clock.now_us()))
         return True
 
-    def _heard(self, name: str, source: tuple[int, int], fields_json: bytes) -> AttachedStep:
-        return self._guard.hear(name, source, json.loads(fields_json), self._clock.now_us())
-
-    def _guarded(self, act: Callable[[], None]) -> None:
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
         """Whatever is raised has the vehicle given back, for as long as the link and the steps still do it."""
         try:
-            act()
+            yield
         except Exception as error:
             _LOG.exception("a fault around the guard")
             if self._faulty_until_us is None:
@@ -224,13 +223,9 @@ class CollisionGuard:
             return True
         with self._changed:
             passes = self._is_over or not self.holds
-
-            def look() -> None:
-                nonlocal passes
-                passes = self._guard.lets_pass(name, json.loads(fields_json), self._clock.now_us())
-
             if not self._is_over:
-                self._guarded(look)
+                with self._guarded():
+                    passes = self._guard.lets_pass(name, json.loads(fields_json), self._clock.now_us())
             return passes
 
     def _send(self, step: AttachedStep) -> None:
@@ -264,7 +259,8 @@ class CollisionGuard:
             if self._is_over:
                 return False
             if self._clock.now_us() >= self._guard.next_deadline_us():
-                self._guarded(lambda: self._send(self._guard.step((), self._clock.now_us())))
+                with self._guarded():
+                    self._send(self._guard.step((), self._clock.now_us()))
             self._end_after_a_fault()
             told = list(self._untold)
             self._untold.clear()
