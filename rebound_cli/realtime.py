@@ -14,7 +14,7 @@ from companion.errors import ReboundError
 from companion.messages import ComputerStatus
 from companion.report import Status
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection
+from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.computer import Computer
 from rebound_cli.console import Console, state_fields
@@ -25,8 +25,6 @@ from rebound_cli.timing import Heard, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
-# A socket holds no more: Linux counts each datagram as 768 bytes or more of the 212,992 in net.core.rmem_default.
-MOST_DATAGRAMS = 300
 # Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
 HANDING_OVER_US = 10_000_000
 

@@ -5,7 +5,7 @@ from argparse import Namespace
 from companion.mavlink.signing import MINUTE, Signing
 from companion.shell.addresses import open_connection
 from companion.shell.clock import Clock
-from companion.shell.connection import MOST_STRANGERS, Connection, LinkCounts
+from companion.shell.connection import MOST_DATAGRAMS, Connection, LinkCounts
 from companion.shell.signing_files import StampFile, read_key
 from rebound_cli.background import Background
 
@@ -27,7 +27,7 @@ class SignedConnection:
 
     def receive(self, timeout_s: float) -> bytes:
         opened = b""
-        for _ in range(MOST_STRANGERS):
+        for _ in range(MOST_DATAGRAMS):
             received = self._connection.receive(timeout_s)
             opened = self._signing.opened(received, self._clock.now_us())
             if opened or not received:

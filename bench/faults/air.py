@@ -24,12 +24,11 @@ from bench.faults.packets import (
 )
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
-from companion.shell.connection import LinkCounts
+from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from rebound_cli.background import Background
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import EPOCH_US
-from rebound_cli.realtime import MOST_DATAGRAMS
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.mavlink.link import Link, LinkOptions

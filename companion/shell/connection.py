@@ -10,8 +10,8 @@ from typing import Any, Protocol
 from companion.errors import ConnectionSetupError
 from companion.shell.peer import Peer
 
-# Datagrams of others that are passed over before the next step is taken.
-MOST_STRANGERS = 300
+# A socket holds no more: Linux counts each datagram as 768 bytes or more of the 212,992 in net.core.rmem_default.
+MOST_DATAGRAMS = 300
 # More than the longest MAVLink packet (280 bytes) and more than one UDP datagram can hold.
 READ_SIZE = 65_536
 
@@ -61,7 +61,7 @@ class UdpInConnection:
     def receive(self, timeout_s: float) -> bytes:
         if not readable(self._socket, timeout_s):
             return b""
-        for _ in range(MOST_STRANGERS):
+        for _ in range(MOST_DATAGRAMS):
             try:
                 datagram, sender = self._socket.recvfrom(READ_SIZE)
             except OSError:

@@ -15,7 +15,7 @@ from companion.companion import Companion, StepResult
 from companion.mavlink.packet import message_id_of
 from companion.messages import ComputerStatus
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
-from companion.shell.connection import LinkCounts
+from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from companion.shell.tlog import read_tlog
 from rebound_cli import fly as command
 from rebound_cli import run_folder
@@ -24,7 +24,7 @@ from rebound_cli.computer import INTERVAL_US, Computer
 from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import HANDING_OVER_US, MOST_DATAGRAMS, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.realtime import HANDING_OVER_US, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.timing import TOO_LATE_US, Timing, undisturbed
 from sim_vehicle.vehicle import SimulatedVehicle
