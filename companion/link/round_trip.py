@@ -10,8 +10,8 @@ from statistics import median_low
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
 from companion.report import RoundTripReport
 
-# Until a first answer as often as PX4 asks by itself (its TIMESYNC stream has 10 Hz), so that a flight that is about to
-# begin is judged by several answers. Then as often as a HEARTBEAT.
+# Until a first answer as often as PX4 asks by itself (its TIMESYNC stream has 10 Hz): a lost packet delays nothing, and
+# a slow link is judged by several answers at once. Then as often as a HEARTBEAT.
 FIRST_INTERVAL_US, INTERVAL_US = 100_000, 1_000_000
 # The median of five stands when two of them were held up by a busy computer, and follows a change within three seconds.
 RECENT = 5
@@ -31,7 +31,7 @@ class RoundTrip:
     ignored: int = 0
     _recent_us: deque[int] = field(default_factory=lambda: deque(maxlen=RECENT))
     _all_us: Counter[int] = field(default_factory=Counter)
-    _asked_us: dict[int, int] = field(default_factory=dict)  # by the time stamp sent, ns
+    _asked_ns: deque[int] = field(default_factory=lambda: deque(maxlen=_MOST_ON_THE_WAY))  # not yet answered
     _due_us: int | None = None
     _is_told: bool = False
 
@@ -40,19 +40,17 @@ class RoundTrip:
         if self._due_us is not None and now_us < self._due_us:
             return None
         self._due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
-        asked = TimeSyncAsk(now_us * 1000)
-        self._asked_us[asked.companion_time_ns] = now_us
-        if len(self._asked_us) > _MOST_ON_THE_WAY:
-            del self._asked_us[next(iter(self._asked_us))]
-        return asked
+        self._asked_ns.append(now_us * 1000)
+        return TimeSyncAsk(now_us * 1000)
 
     def hear(self, answer: TimeSyncAnswer, now_us: int) -> None:
         """An answer; the first to each question counts."""
-        asked_us = self._asked_us.pop(answer.companion_time_ns, None)
-        if asked_us is None:
+        asked_ns = answer.companion_time_ns
+        if asked_ns not in self._asked_ns:
             self.ignored += 1
             return
-        trip_us = now_us - asked_us
+        self._asked_ns.remove(asked_ns)
+        trip_us = now_us - asked_ns // 1000
         self._recent_us.append(trip_us)
         self._all_us[round(trip_us / _RESOLUTION_US) * _RESOLUTION_US] += 1
         self.worst_us = trip_us if self.worst_us is None else max(self.worst_us, trip_us)
