@@ -11,6 +11,7 @@ from companion.errors import ConfigurationError
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, UdpInConnection
+from companion.shell.files import write_whole
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
@@ -114,7 +115,7 @@ def _connection_for(options: Namespace) -> Connection | None:
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
     if mission_file.resolve() != (folder / run_folder.MISSION_NAME).resolve():
-        run_folder.write_whole(folder / run_folder.MISSION_NAME, mission_file.read_bytes())
+        write_whole(folder / run_folder.MISSION_NAME, mission_file.read_bytes())
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, world))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     if world is not None:

@@ -16,6 +16,7 @@ import yaml
 
 from companion.errors import ReboundError
 from companion.memory.stored import file_data
+from companion.shell.files import write_whole
 from companion.shell.tlog import TlogWriter, is_packet
 from rebound_cli import __version__
 from rebound_cli.background import Background, at_once
@@ -249,17 +250,6 @@ def write_yaml(path: Path, data: Any) -> None:
 
 def write_json(path: Path, data: Any) -> None:
     write_whole(path, (json.dumps(data, indent=2) + "\n").encode())
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Whenever the program or the power ends, the file is whole: the old one, the new one or none."""
-    unfinished = path.with_name(f"{path.name}.part")
-    with unfinished.open("wb") as file:
-        file.write(content)
-        file.flush()
-        # Without this a file system may know the new name before the content.
-        os.fsync(file.fileno())
-    unfinished.replace(path)
 
 
 def _sync_folder(folder: Path) -> None:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from companion.errors import ConfigurationError
 from companion.mavlink.signing import KEY_LENGTH, LAST_STAMP, MINUTE, stamp_at
+from companion.shell.files import write_whole
 
 _DIGITS = re.compile(rb"\s*([0-9a-fA-F]{64})\s*")
 _STAMP = re.compile(rb"\s*([0-9]{1,15})\s*")
-# A file for which it makes no difference whether more is read: neither a key nor a stamp is that long.
+# A key with white space around it is shorter: of a longer file no more has to be read.
 _MOST_BYTES = 200
 _FOR_OTHERS = 0o077
 
@@ -68,7 +69,7 @@ class StampFile:
         Raises SigningFileError.
         """
         try:
-            content = self._path.read_bytes()[:_MOST_BYTES]
+            content = self._path.read_bytes()
         except FileNotFoundError:
             return max(stamp_at(now_us), 0)
         except OSError as error:
@@ -80,10 +81,8 @@ class StampFile:
         return min(max(stamp_at(now_us), int(kept[1]) + 2 * MINUTE), LAST_STAMP)
 
     def keep(self, stamp: int) -> None:
-        """Whenever the program ends, the file holds the old stamp or the new one. Raises OSError."""
-        half_written = self._path.with_name(self._path.name + ".part")
-        half_written.write_text(f"{stamp}\n")
-        half_written.replace(self._path)
+        """Whenever the program or the power ends, the file holds the old stamp or the new one. Raises OSError."""
+        write_whole(self._path, b"%d\n" % stamp)
 
     def keep_first(self, stamp: int) -> None:
         """Before the first packet; shows that it can be kept at all. Raises SigningFileError."""

@@ -1,10 +1,11 @@
 """The key's file and the time stamp beside it."""
 
+import os
 import stat
 
 import pytest
 
-from companion.mavlink.signing import MINUTE, UNIX_AT_2015_US, stamp_at
+from companion.mavlink.signing import LAST_STAMP, MINUTE, UNIX_AT_2015_US, stamp_at
 from companion.shell.signing_files import SigningFileError, StampFile, read_key, write_new
 
 KEY = bytes(range(32))
@@ -61,6 +62,21 @@ def test_after_a_restart_stamps_go_on_two_minutes_later_whatever_the_clock_says(
 def test_after_a_long_pause_the_clock_counts(file):
     StampFile(file).keep(NOW)
     assert StampFile(file).first(NOW_US + 121_000_000) == NOW + 121 * 100_000
+
+
+def test_after_the_last_stamp_there_is_none_later(file):
+    StampFile(file).keep(LAST_STAMP)
+    assert StampFile(file).first(NOW_US) == LAST_STAMP
+
+
+def test_a_power_cut_leaves_the_old_stamp(file, monkeypatch):
+    # Given a stamp that was kept, and a power cut before the next has reached the disk
+    StampFile(file).keep(NOW)
+    monkeypatch.setattr(os, "fsync", lambda file: (_ for _ in ()).throw(OSError("power cut")))
+    with pytest.raises(OSError, match="power cut"):
+        StampFile(file).keep(NOW + 10 * MINUTE)
+    # Then the companion begins after the old one, and is not refused
+    assert StampFile(file).first(0) == NOW + 2 * MINUTE
 
 
 @pytest.mark.parametrize("content", ["", "yesterday", "-5", str(2**48)])
