@@ -71,7 +71,7 @@ class Peer:
                 self._last_us, self._moved = now_us, None
             return True
         is_released = self._pinned is None or now_us - self._last_us > RELEASED_US or sender == self._before
-        # Of a flood beside a vehicle that is heard the first packets are enough to look at.
+        # Of a flood beside a vehicle that is heard the first packet is enough to look at.
         for packet in islice(_packets(datagram), None if is_released else 1):
             source = source_of(packet)
             if self._vehicle is None:

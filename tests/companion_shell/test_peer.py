@@ -89,6 +89,26 @@ def test_a_silent_vehicles_place_is_taken_by_nobody_else():
     assert peer.answered == VEHICLE and peer.accepts(HEARTBEAT, VEHICLE, 2 * RELEASED_US + 1)
 
 
+def test_a_heartbeat_from_before_the_vehicle_last_spoke_moves_nothing():
+    peer = Peer()
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    # Given a stranger's forged heartbeat, after which the vehicle is heard once more
+    peer.accepts(HEARTBEAT, STRANGER, 1)
+    peer.accepts(IMU, VEHICLE, 2)
+    # Then the stranger has to forge another to be heard in the vehicle's silence
+    assert not peer.accepts(IMU, STRANGER, RELEASED_US + 3)
+    assert peer.accepts(HEARTBEAT, STRANGER, RELEASED_US + 4)
+
+
+def test_of_a_flood_beside_a_vehicle_that_is_heard_one_packet_a_datagram_is_looked_at():
+    seen = []
+    peer = Peer(is_genuine=lambda packet: bool(seen.append(packet)) or True)
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    seen.clear()
+    assert not peer.accepts(HEARTBEAT * 1_000, STRANGER, 1)
+    assert seen == [HEARTBEAT]
+
+
 def test_noise_from_the_vehicles_address_does_not_keep_it_pinned():
     peer, moved = Peer(), ("192.168.4.1", 50_001)
     peer.accepts(HEARTBEAT, VEHICLE, 0)

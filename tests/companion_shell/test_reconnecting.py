@@ -41,6 +41,13 @@ def until_told(connection, word):
     return text
 
 
+def through_attempts(connection):
+    """As long as two attempts that find nobody."""
+    until_s = time.monotonic() + 2 * RETRY_S
+    until(connection, lambda *_: time.monotonic() > until_s)
+    assert connection.counts.reconnects == 0
+
+
 @pytest.fixture
 def closing():
     """Closes what it is given at the end."""
@@ -86,19 +93,23 @@ def by_id(tmp_path, monkeypatch):
     return folder
 
 
-def test_a_serial_device_is_found_again_under_another_name(by_id, closing):
+def test_a_serial_device_is_found_again_under_another_name(tmp_path, by_id, closing):
     # Given a vehicle on a device that was given by its path
-    link = by_id / "usb-3D_Robotics_PX4_FMU_v5-if00"
+    link, path = by_id / "usb-3D_Robotics_PX4_FMU_v5-if00", tmp_path / "ttyACM0"
     line = closing(Line(link))
-    connection = closing(open_connection(f"serial://{line.path}:115200"))
+    path.symlink_to(line.path)
+    connection = closing(open_connection(f"serial://{path}:115200"))
     line.say(b"before")
     assert until_heard(connection) == b"before"
     # When it is unplugged
     link.unlink()
     line.close()
-    assert until_told(connection, "lost") == f"connection to {line.path} lost, reconnecting"
-    # And comes back as another device, while somebody else's has the old one's name or number
-    closing(Line(by_id / "usb-somebody-elses"))
+    assert until_told(connection, "lost") == f"connection to {path} lost, reconnecting"
+    # And somebody else's device has the old one's path for some attempts, then it comes back as another
+    others = closing(Line(by_id / "usb-somebody-elses"))
+    path.unlink()
+    path.symlink_to(others.path)
+    through_attempts(connection)
     again = closing(Line(link))
     # Then bytes pass again, both ways
     assert until_told(connection, "again").endswith(f" s: {link}")
@@ -152,12 +163,15 @@ def test_a_router_that_was_restarted_is_connected_to_again(closing):
     connection = closing(open_connection(f"tcpout://{LOCAL}:{port}"))
     router, _ = listener.accept()
     # When the router is stopped, and nobody listens for some attempts
-    router.close()
+    router.shutdown(socket.SHUT_WR)
     listener.close()
     assert until_told(connection, "lost") == f"connection to {LOCAL}:{port} lost, reconnecting"
-    refused_until_s = time.monotonic() + 2 * RETRY_S
-    until(connection, lambda *_: time.monotonic() > refused_until_s)
-    assert connection.counts.reconnects == 0
+    through_attempts(connection)
+    # Then this end has closed the old connection, too
+    router.settimeout(DEADLINE_S)
+    while router.recv(4096):
+        pass
+    router.close()
     # And is started again
     listener = closing(socket.create_server((LOCAL, port)))
     # Then bytes pass again, both ways
@@ -193,9 +207,10 @@ def test_a_client_that_closed_is_followed_by_the_next_at_once(closing):
     assert second.recv(8) == b"setpoint"
 
 
-def test_a_host_that_acknowledges_nothing_is_given_up_within_a_second(closing):
+def test_a_host_that_acknowledges_nothing_is_given_up_within_a_second_and_no_packet_waits_for_another(closing):
     # The kernel is asked for it: a vehicle that went down without a word sends no end of its connection
     listener = closing(socket.create_server((LOCAL, 0)))
     client = closing(open_connection(f"tcpout://{LOCAL}:{listener.getsockname()[1]}"))
     with socket.socket(fileno=os.dup(client._stream._port.fileno())) as same:
         assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1000
+        assert same.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
