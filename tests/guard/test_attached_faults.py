@@ -41,6 +41,7 @@ def test_after_a_stall_all_that_has_arrived_is_heard_before_silence_is_judged():
     air._outgoing.clear()
     # When the guard's own thread wakes first, and what arrived is heard one message after the other
     air.take(air.guard.step((), air.now_us))
+    assert air.guard.next_deadline_us() == air.now_us + POLL_INTERVAL_US, "its thread waits meanwhile"
     for number, message in enumerate(waiting):
         heard = json.loads(json.dumps(fields_of(message)))
         now_us = air.now_us + number * POLL_INTERVAL_US // len(waiting)
@@ -126,6 +127,19 @@ def test_a_fault_on_either_thread_gives_the_vehicle_back(monkeypatch, broken):
     told = [event.text for event in joined.guard.events]
     assert any("nobody thought of this" in text for text in told)
     assert joined.guard._outgoing("SET_POSITION_TARGET_LOCAL_NED", (245, 190), b"{}")
+
+
+def test_a_fault_in_the_gate_lets_no_setpoint_pass_while_the_guard_holds(monkeypatch):
+    joined = Joined(monkeypatch, holding())
+
+    def fails(*_):
+        raise ValueError("of the gate")
+
+    monkeypatch.setattr(joined.air.guard, "lets_pass", fails)
+    setpoint = ("SET_POSITION_TARGET_LOCAL_NED", (245, 190), b"{}")
+    assert not joined.guard._outgoing(*setpoint)
+    until_over(joined, GIVING_BACK_US)
+    assert joined.air.mode == AUTO_LOITER and joined.guard._outgoing(*setpoint)
 
 
 def test_a_fault_that_stays_ends_the_guard_in_time(monkeypatch):

@@ -54,6 +54,11 @@ def test_it_is_given_back_to_hold_where_the_programs_setpoints_mean_nothing(air)
     assert len([event for event in air.events if event.kind == "detection"]) == 1
 
 
+def test_the_programs_own_heartbeats_and_time_questions_have_none_of_the_guards_beside_them(air):
+    sent = {name for _, who, name, _ in air.on_wire if who == "guard"}
+    assert "COMMAND_LONG" in sent and not sent & {"HEARTBEAT", "TIMESYNC"}
+
+
 def test_given_back_to_the_program_its_setpoints_count_again_until_the_hits_allowed_are_used_up():
     air = AttachedAir(GuardConfig(then="previous", max_hits=2))
     air.fly_into_the_wall()

@@ -1,10 +1,12 @@
 """A vehicle that is restarted while it is guarded: by its own reboot, on the ground."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from companion.detection.interface import Phase
+from companion.estimate.normal import further
 from companion.guard.states import State
 from tests.guard.attached_air import AttachedAir
 from tests.guard.flying import Air
@@ -24,7 +26,7 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     core = air.guard.core
     assert core is not None
     core.watch.state = replace(core.watch.state, phase=Phase.CONTACT, last_loud_boot_us=10**12)
-    seek = core.watch.estimator.seek
+    seek = core.watch.estimator.seek = partial(further)  # another than the one a detector begins with
     # When the vehicle is restarted, and sends what it sends by default
     air.command(REBOOT, 1)
     air.until(lambda: air.state is State.CONNECTING, 8.0)
