@@ -102,7 +102,12 @@ def test_a_heartbeat_from_before_the_vehicle_last_spoke_moves_nothing():
 
 def test_of_a_flood_beside_a_vehicle_that_is_heard_one_packet_a_datagram_is_looked_at():
     seen = []
-    peer = Peer(is_genuine=lambda packet: bool(seen.append(packet)) or True)
+
+    def is_genuine(packet):
+        seen.append(packet)
+        return True
+
+    peer = Peer(is_genuine=is_genuine)
     peer.accepts(HEARTBEAT, VEHICLE, 0)
     seen.clear()
     assert not peer.accepts(HEARTBEAT * 1_000, STRANGER, 1)
