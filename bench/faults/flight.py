@@ -17,7 +17,7 @@ import numpy as np
 from bench.campaign.plan import Json
 from bench.faults.air import Air, Branched, Hung, Injector, Killed, Landing
 from bench.faults.fault import COMPLETED, FAILED, KILLED, Fault
-from bench.random_missions.crashes import crashes, heights_m, tilts_deg
+from bench.random_missions.crashes import AIRBORNE_M, crashes, heights_m, tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.generator import AIRFRAMES
 from companion.companion import Companion, StepResult
@@ -312,7 +312,7 @@ class _Flight:
     def _ground_m_s(flown: JudgedFlight) -> float | None:
         """Speed down at the first touch of the ground; None where it stays up."""
         height_m = heights_m(flown)
-        airborne = np.flatnonzero(height_m > 0.3)
+        airborne = np.flatnonzero(height_m > AIRBORNE_M)
         if not len(airborne):
             return None
         touching = np.flatnonzero(height_m[airborne[0] :] < STANDS_M)
