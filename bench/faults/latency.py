@@ -162,10 +162,10 @@ def _exchanged(flight: Recorded, start: int, ours: socket.socket) -> float | Non
 
 def _address_of_child(ours: socket.socket) -> tuple[str, int]:
     """Where its first packet came from; what an earlier child sent last is passed over."""
-    while True:
+    data, sender = b"", ("", 0)
+    while data != b"\0":
         data, sender = ours.recvfrom(65_536)
-        if data == b"\0":
-            return sender
+    return sender
 
 
 def _jumps(last: tuple[int, float, float], place: tuple[int, float, float]) -> bool:

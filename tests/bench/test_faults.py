@@ -6,6 +6,7 @@ import random
 import pytest
 
 from bench.campaign.plan import Json
+from bench.campaign.record import Record
 from bench.faults import command, latency
 from bench.faults.air import POSCTL, Air, Injector, When
 from bench.faults.catalogue import FILES, FLOWN
@@ -198,7 +199,7 @@ def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, c
     missing, wanted, spread = command._missing, [], _spread([0.004])
     monkeypatch.setattr(latency, "measured", lambda hits: {"hits": hits, "load": 1.0, "busy": spread, "quiet": spread})
 
-    def of_one_row(record: object, number: int) -> list[str]:
+    def of_one_row(record: Record, number: int) -> list[str]:
         names = [name for name in missing(record, number) if name == "obstacle file cut"]
         wanted.append((number, names))
         return names
