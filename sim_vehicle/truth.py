@@ -70,6 +70,12 @@ class Hit:
         return 1e-6 * (self.ended_at_boot_us - self.contact_at_boot_us)
 
     @property
+    def closing_speed_m_s(self) -> float:
+        """How fast the centre of mass came towards the surface, which may move itself."""
+        came = zip(self.impact_velocity_ned_m_s, self.surface_velocity_ned_m_s, self.normal_ned, strict=True)
+        return -sum((v - s) * n for v, s, n in came)
+
+    @property
     def rebound_speed_m_s(self) -> float:
         """Speed along the face's normal at the last touch, away positive."""
         return sum(v * n for v, n in zip(self.rebound_velocity_ned_m_s, self.normal_ned, strict=True))
@@ -109,7 +115,7 @@ class TruthRecorder:
         self._used += 1
 
     def add_hit(self, row: Floats, world: World) -> None:
-        """Add a finished row of `State.finished_hits`."""
+        """Add a finished row of `PlantState.finished_hits`."""
         self._add(
             Hit(
                 obstacle=world.names[int(row[HIT_FACE])],

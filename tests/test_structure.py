@@ -102,3 +102,8 @@ def test_every_command_runs_a_function_that_there_is() -> None:
     for function in named:
         module, _, attribute = str(function).partition(":")
         assert callable(getattr(importlib.import_module(module), attribute)), function
+
+
+@pytest.mark.parametrize("path", sources("tests/benchmarks"), ids=lambda path: path.stem)
+def test_a_benchmark_can_be_started(path: Path) -> None:
+    importlib.import_module(f"tests.benchmarks.{path.stem}")

@@ -33,12 +33,12 @@ class Campaign:
     cases: Sequence[Any]
     work_out: Callable[[Any], Json]
     uses: tuple[str, ...] = ()
-    """Packages on which results depend beside both programs and the function's own."""
+    """Packages of `bench` on which results depend beside the programs and the function's own."""
 
     @property
     def rooms(self) -> tuple[str, ...]:
         """Modules in the folders of which all code that decides a case's result is."""
-        return ("companion", "sim_vehicle", self.work_out.__module__, *self.uses)
+        return ("companion", "sim_vehicle", "rebound_cli", self.work_out.__module__, *self.uses)
 
     @property
     def version(self) -> str:

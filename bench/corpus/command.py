@@ -18,7 +18,7 @@ from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME, make_folder, make_plac
 
 # Each recorded impact so often, each time in another flight.
 ROUNDS = 4
-USES = ("rebound_cli.logs", "rebound_cli.replay", "bench.random_missions")
+USES = ("bench.baselines", "bench.detectors", "bench.random_missions")
 
 
 class CorpusError(ReboundError):

@@ -39,7 +39,7 @@ def _figures(verdicts: Sequence[Json]) -> dict[str, str]:
     normals = [hit["normal_error_deg"] for hit in found]
     return {
         "hits found": f"{len(found)}/{len(plain)}",
-        "of those under 0.15 m/s": f"{sum('latency_ms' in hit for hit in faint)}/{len(faint)}",
+        f"of those under {VISIBLE_M_S:g} m/s": f"{sum('latency_ms' in hit for hit in faint)}/{len(faint)}",
         "told, and none": str(sum(len(verdict["false_boot_us"]) for verdict in verdicts)),
         "ms late, median": text_of(percentile(late, 50)),
         "ms late, 99 %": text_of(percentile(late, 99)),

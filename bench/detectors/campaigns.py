@@ -40,7 +40,7 @@ VELOCITY_NOISES_M_S = (0.01, 0.06, 0.1, 0.2)
 # Over a bad link, of a hovering vehicle, by hand: one in so many each, by the default detector and the baseline alone.
 # No more than these, which take two minutes of one core together; a missed one in a hundred shows.
 SIDE_SHARE, SIDE_HITS_AT_MOST, HANDS_AT_MOST = 16, 240, 160
-USES = ("rebound_cli.logs", "rebound_cli.replay")
+USES = ("bench.baselines", "bench.random_missions")
 
 # Take-off, climb, descent and landing come on top of what a flight's manoeuvres take.
 FLIGHT_S = AIRBORNE_S + 40.0
@@ -58,7 +58,7 @@ class Drawing:
     ) -> Campaign:
         parameters = {**size, "first_seed": self.first_seed, "vehicles": "drawn" if self.is_drawn else "named"}
         drawn = [replace(case, is_drawn=self.is_drawn) for case in cases]
-        return Campaign(name, parameters, drawn, work_out, ("bench.random_missions",))
+        return Campaign(name, parameters, drawn, work_out, USES)
 
 
 NAMED = Drawing()

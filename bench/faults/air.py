@@ -6,6 +6,7 @@ Whatever an injector does, it does here: to the bytes of either direction, to th
 from __future__ import annotations
 
 import io
+import math
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -75,23 +76,23 @@ class Injector:
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """So long after the companion was first in a state, and for how long."""
+    """From some time after the companion was first in a state, and for how long."""
 
     state: str
     after_s: float = 0.0
-    for_s: float = 1e9
+    for_s: float = math.inf
 
     def is_on(self, air: Air) -> bool:
         since_s = air.since.get(self.state)
         return since_s is not None and 0.0 <= air.now_s - since_s - self.after_s < self.for_s
 
     @classmethod
-    def flying(cls, chance: random.Random, for_s: float = 1e9) -> When:
+    def flying(cls, chance: random.Random, for_s: float = math.inf) -> When:
         """In the cruise towards the wall, or at the hit: at a random instant of the first 1.5 s of the item."""
         return cls("mission", chance.uniform(0.0, 1.5), for_s)
 
     @classmethod
-    def recovering(cls, chance: random.Random, for_s: float = 1e9) -> When:
+    def recovering(cls, chance: random.Random, for_s: float = math.inf) -> When:
         """At a random instant of the first 0.6 s after the hit."""
         return cls("recovering", chance.uniform(0.0, 0.6), for_s)
 
@@ -129,7 +130,7 @@ class Air:
     since: dict[str, float] = field(default_factory=dict)
     """When the companion was first in a state; seconds of the vehicle's clock."""
     stall_s: float = 0.0
-    """The process gets no time for so long, from now on."""
+    """How long the process gets no time, from now on."""
     outside: list[str] = field(default_factory=list)
     """Setpoints outside the envelope."""
     pilot_mode: int | None = None
@@ -143,8 +144,6 @@ class Air:
     """Whether somebody else has flown since the first item: PX4's failsafe, its landing, a pilot."""
     is_overruled: bool = False
     """Whether the vehicle has left the pilot's mode."""
-    sent: int = 0
-    received: int = 0
     _to_vehicle: list[bytes] = field(default_factory=list)
     _waiting: list[bytes] = field(default_factory=list)
     _pilot: Link | None = None
@@ -201,7 +200,6 @@ class Air:
         """There is nothing to close."""
 
     def send(self, frame: bytes) -> None:
-        self.sent += 1
         core = self.companion.core
         wrong = None if core is None else outside(core, frame)
         if wrong is not None:
@@ -211,7 +209,6 @@ class Air:
         self._to_vehicle.append(frame)
 
     def _hand_over(self, frames: Sequence[bytes]) -> bytes:
-        self.received += len(frames)
         if self.pilot_mode is not None and not self.is_told:
             self.is_told = any(custom_mode(frame) == self.pilot_mode for frame in frames if len(frame) > 12)
         return b"".join(frames)
@@ -241,7 +238,7 @@ class Air:
         return list(self.injector.to_companion(self, list(said)))
 
     def alone(self, seconds: float) -> None:
-        """The vehicle goes on until it is disarmed, or so long; nobody reads what it says."""
+        """The vehicle goes on until it is disarmed, or for this long; nobody reads what it says."""
         until_s = self.now_s + seconds
         while self.now_s < until_s and self.vehicle.is_armed:
             self.vehicle.step(b"")

@@ -9,7 +9,7 @@ from bench.faults.air import Injector
 
 Group = Literal[
     "link", "sensors", "clock", "process", "disk and console", "estimator", "wind and body", "hostile packets",
-    "hostile files", "pilot", "load",
+    "hostile files", "pilot",
 ]  # fmt: skip
 COMPLETED, HANDED_OVER, FAILED, KILLED = "completed", "aborted", "failed", "killed"
 _WORDS = {
@@ -32,14 +32,11 @@ class Expected:
     """Without one where nobody could see it: a hit that nobody answers shows PX4 and the airframe, not this program."""
     false_hits: int = 0
     """Recoveries from nothing that a flight may count as a collision."""
-    again_m_s: float | None = None
-    """No second contact with the wall harder than this."""
 
     def text(self) -> str:
         parts = [" or ".join(_WORDS[outcome] for outcome in self.outcomes)]
         parts += ["the hit found"] if self.finds else [] if self.has_wall else ["(no wall in the way)"]
         parts += [] if self.false_hits else ["nothing else taken for one"]
-        parts += [] if self.again_m_s is None else [f"no second contact above {self.again_m_s:g} m/s"]
         return "; ".join(parts)
 
 

@@ -14,7 +14,7 @@ from companion.errors import ReboundError
 from companion.shell.tlog import TlogWriter, read_tlog
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 
-# A person waits for `rebound check` so long, on a computer that has other things to do.
+# As long as a person waits for `rebound check`, on a computer that has other things to do.
 SECONDS_MOST = 60.0
 
 

@@ -1,5 +1,6 @@
 """The ways in which most faults act: by the simulated vehicle, on packets that pass, or with packets of their own."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,7 +22,7 @@ class Simulated(Injector):
     def each(self, air: Air) -> None:
         if not self.is_injected and self.when.is_on(air):
             self.is_injected = True
-            air.inject(self.request, self.when.for_s if self.when.for_s < 1e6 else None)
+            air.inject(self.request, self.when.for_s if math.isfinite(self.when.for_s) else None)
 
 
 @dataclass

@@ -38,7 +38,7 @@ FLIGHTS = 10
 BUSY_LOOPS = 2
 # A forked process first has to make its memory its own; by the hit it runs as any other.
 LEAD = 30
-# Setpoints are waited for so long after the hit: half of PX4's COM_OF_LOSS_T.
+# Intervals after the hit in which a setpoint is waited for: half of PX4's COM_OF_LOSS_T.
 AFTER = 125
 # The cruise's setpoint moves by 6 cm from one to the next at 3 m/s; a recovery's jumps, or is a lean.
 JUMP_M = 0.2
@@ -136,7 +136,7 @@ def _fly_on(companion: Companion, now_us: int, port: int, folder: Path) -> None:
 
 def _exchanged(flight: Recorded, start: int, ours: socket.socket) -> float | None:
     ours.settimeout(10.0)
-    _, theirs = _from(ours)
+    theirs = _address_of_child(ours)
     began_s, hit_s, last = time.monotonic(), math.inf, None
     for interval in range(start, len(flight.said)):
         due_s = began_s + 0.004 * (interval - start)
@@ -160,12 +160,12 @@ def _exchanged(flight: Recorded, start: int, ours: socket.socket) -> float | Non
     return None
 
 
-def _from(ours: socket.socket) -> tuple[bytes, tuple[str, int]]:
-    """The child's first word; what an earlier child said last is passed over."""
-    while True:
+def _address_of_child(ours: socket.socket) -> tuple[str, int]:
+    """Where its first packet came from; what an earlier child sent last is passed over."""
+    data, sender = b"", ("", 0)
+    while data != b"\0":
         data, sender = ours.recvfrom(65_536)
-        if data == b"\0":
-            return data, sender
+    return sender
 
 
 def _jumps(last: tuple[int, float, float], place: tuple[int, float, float]) -> bool:

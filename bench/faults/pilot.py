@@ -52,7 +52,7 @@ FAULTS = (
         "POSCTL at a random instant of the climb",
         _taken("takeoff", 2.3, from_s=1.7),
         _TAKEN,
-        True,
+        from_the_start=True,
     ),
     Fault(
         "takes over in the cruise",

@@ -33,18 +33,13 @@ class _BrokenError(Exception):
     """A mistake in the program."""
 
 
-def _stalled(seconds: float) -> Callable[[random.Random], Injector]:
+def _stalled(
+    seconds: float, when: Callable[[random.Random], When] = When.flying
+) -> Callable[[random.Random], Injector]:
     def stall(air: Air) -> None:
         air.stall_s = seconds
 
-    return lambda chance: Once(When.flying(chance), stall)
-
-
-def _stalled_after_hit(seconds: float) -> Callable[[random.Random], Injector]:
-    def stall(air: Air) -> None:
-        air.stall_s = seconds
-
-    return lambda chance: Once(When.recovering(chance), stall)
+    return lambda chance: Once(when(chance), stall)
 
 
 def _signalled(reason: str) -> Callable[[Air], None]:
@@ -96,7 +91,11 @@ FAULTS = (
     Fault("stall 1.2 s", "process", "the same for 1.2 s: PX4 leaves OFFBOARD meanwhile", _stalled(1.2), _MAY_END),
     Fault("stall 3 s", "process", "the same for 3 s: PX4 lands by itself", _stalled(3.0), _MAY_END),
     Fault(
-        "stall 1.2 s in a recovery", "process", "the same, up to 0.6 s after the hit", _stalled_after_hit(1.2), _MAY_END
+        "stall 1.2 s in a recovery",
+        "process",
+        "the same, up to 0.6 s after the hit",
+        _stalled(1.2, When.recovering),
+        _MAY_END,
     ),
     Fault(
         "SIGTERM",

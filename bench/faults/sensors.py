@@ -33,7 +33,6 @@ class Stuck(Injector):
 
     when: When
     numbers: Sequence[int]
-    stamp: str
     first: dict[int, bytes] = field(default_factory=dict)
 
     def to_companion(self, air: Air, frames: list[bytes]) -> Sequence[bytes]:
@@ -72,7 +71,7 @@ class Thinned(Injector):
         return self.count % self.keep_every == 0
 
 
-def _rewritten(number: int, for_s: float = 1e9, **fields: float) -> Any:
+def _rewritten(number: int, for_s: float = math.inf, **fields: float) -> Any:
     return lambda chance: Rewritten(When.flying(chance, for_s), (number,), setting(**fields))
 
 
@@ -150,7 +149,7 @@ FAULTS = (
         "IMU stuck",
         "sensors",
         "the same six values with new stamps, from the cruise on",
-        lambda c: Stuck(When.flying(c), (IMU,), "time_usec"),
+        lambda c: Stuck(When.flying(c), (IMU,)),
         _BLIND,
     ),
     Fault(
@@ -178,7 +177,7 @@ FAULTS = (
         "ODOMETRY frozen",
         "sensors",
         "ODOMETRY and LOCAL_POSITION_NED stay where they are, with new stamps, for 2 s",
-        lambda c: Stuck(When.flying(c, 2.0), (ODOMETRY, POSITION), "time_usec"),
+        lambda c: Stuck(When.flying(c, 2.0), (ODOMETRY, POSITION)),
         _BLIND,
     ),
     Fault("wrong frame", "sensors", "ODOMETRY in body frames, from the cruise on", _of_body),

@@ -8,9 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from bench.campaign.plan import Campaign, Json
+from bench.recoveries.hits import AIRFRAMES, into_a_wall
 from companion.companion import Companion
 from companion.mission.model import Mission
 from rebound_cli.lockstep import EPOCH_US, virtual_time_limit_s
@@ -23,9 +22,9 @@ SPEEDS_M_S = (0.7, 5.0)
 # From before the touch to after it.
 KILLED_S = (-0.3, 1.5)
 KILLS_A_FLIGHT = 10
-AIRFRAMES, IMU_HZ = ("foldable", "rigid"), (250, 50)
+IMU_HZ = (250, 50)
 MOST_SLANT_DEG = 45.0
-HEIGHT_M, RUN_UP_M_S2, STEADY_S = 1.5, 3.0, 1.0
+HEIGHT_M = 1.5
 # A landing from this height takes 5 s; what is not down by then has another trouble, which is told.
 WATCHED_S = 12.0
 # Closer than this to how it stands, a vehicle is on the ground.
@@ -36,7 +35,7 @@ WITH_IT_S = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A flight, and when after the first touch its companion is killed; None for never."""
+    """A flight, and when after the first touch its companion is killed."""
 
     airframe: str
     imu_hz: int
@@ -47,7 +46,8 @@ class Case:
 
 
 def kills_campaign(kills: int, first_seed: int) -> Campaign:
-    return Campaign("kills", {"kills": kills, "first_seed": first_seed}, cases(kills, first_seed), work_out)
+    parameters = {"kills": kills, "first_seed": first_seed}
+    return Campaign("kills", parameters, cases(kills, first_seed), work_out, ("bench.recoveries",))
 
 
 def cases(kills: int, first_seed: int) -> list[Case]:
@@ -65,24 +65,10 @@ def cases(kills: int, first_seed: int) -> list[Case]:
 
 
 def mission_data(case: Case) -> dict[str, Any]:
-    """Up, and into a wall that nobody knows of; the target is so far behind it that braking has not begun there."""
-    speed, slant = case.speed_m_s, math.radians(case.slant_deg)
-    wall_m = round(0.5 * speed**2 / RUN_UP_M_S2 + STEADY_S * speed + 1.0, 3)
-    beyond_m = wall_m + speed**2 / RUN_UP_M_S2 + 2.0
-    go_to = {"position_ned_m": [beyond_m, 0, -HEIGHT_M], "speed_m_s": speed, "acceleration_m_s2": RUN_UP_M_S2}
-    wall = {
-        "point_ned_m": [wall_m, 0, -4],
-        "normal_ned": [-math.cos(slant), -math.sin(slant), 0],
-        "width_m": 40,
-        "height_m": 8,
-    }
-    return {
-        "name": "kills",
-        "items": [{"takeoff": {"height_m": HEIGHT_M}}, {"go_to": go_to}, {"land": {}}],
-        "companion": {"flight": {"speeding_up_m_s2": RUN_UP_M_S2}, "streams": {"highres_imu_hz": case.imu_hz}},
-        "fence": {"radius_m": 40, "max_height_m": 8},
-        "sim": {"walls": [wall]},
-    }
+    """With the case's IMU rate; nobody knows of the wall."""
+    data = into_a_wall("kills", case.speed_m_s, case.slant_deg, HEIGHT_M)
+    data["companion"]["streams"] = {"highres_imu_hz": case.imu_hz}
+    return data
 
 
 class Flight:
@@ -134,7 +120,7 @@ def work_out(case: Case) -> Json:
         killed.append(_in_a_copy(lambda: _killed(flight, touch)))
     flight.fly_until(touch.contact_at_boot_us + 1e6 * (KILLED_S[1] + WITH_IT_S))
     again_m_s = _hardest(flight.vehicle.truth.hits[1:])
-    return {"touch_m_s": closing_m_s(touch), "again_m_s": again_m_s, "kills": killed}
+    return {"touch_m_s": touch.closing_speed_m_s, "again_m_s": again_m_s, "kills": killed}
 
 
 def _in_a_copy(work: Callable[[], Json]) -> Json:
@@ -157,30 +143,17 @@ def _in_a_copy(work: Callable[[], Json]) -> Json:
 def _killed(flight: Flight, touch: Hit) -> Json:
     killed_at_us = flight.vehicle.time_boot_us
     since_s = 1e-6 * (killed_at_us - touch.contact_at_boot_us)
-    core = flight.companion.core
-    target = None if core is None else core.flight.target
     flight.fall()
     truth = flight.vehicle.truth
     # The touch itself is no second one, whenever it came.
     later = [hit for hit in truth.hits if hit.contact_at_boot_us >= killed_at_us][1 if since_s < 0.0 else 0 :]
-    series = truth.series()
-    after = series["time_boot_us"] >= killed_at_us
-    off_m = (series["position_ned_m"][after] - np.array(touch.contact_position_ned_m)) @ np.array(touch.normal_ned)
     return {
         "kill_s": since_s,
         "again_m_s": _hardest(later),
-        "ground_m_s": float(np.linalg.norm(series["velocity_ned_m_s"][-1])) if flight.is_down else None,
-        "furthest_m": float(off_m.max()),
-        "leans": target is not None and target.leans_only,
+        "ground_m_s": math.hypot(*truth.series()["velocity_ned_m_s"][-1]) if flight.is_down else None,
     }
-
-
-def closing_m_s(hit: Hit) -> float:
-    """How fast the vehicle's centre came towards the surface."""
-    came = zip(hit.impact_velocity_ned_m_s, hit.surface_velocity_ned_m_s, hit.normal_ned, strict=True)
-    return -sum((v - s) * n for v, s, n in came)
 
 
 def _hardest(hits: Sequence[Hit]) -> float:
     """0 where there is none."""
-    return max((closing_m_s(hit) for hit in hits), default=0.0)
+    return max((hit.closing_speed_m_s for hit in hits), default=0.0)

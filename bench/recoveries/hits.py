@@ -62,11 +62,16 @@ def recoveries_campaign(seeds: int) -> Campaign:
 
 def mission_data(case: RecoveryCase) -> dict[str, Any]:
     """The mission: up, into the wall, hold, down."""
-    speed = case.speed_m_s
-    wall_m = round(0.5 * speed**2 / RUN_UP_M_S2 + STEADY_S * speed + 1.0, 3)
-    beyond_m = wall_m + speed**2 / RUN_UP_M_S2 + 2.0
-    slant = math.radians(case.slant_deg)
-    go_to = {"position_ned_m": [beyond_m, 0, -HEIGHT_M], "speed_m_s": speed, "acceleration_m_s2": RUN_UP_M_S2}
+    data = into_a_wall("recovery", case.speed_m_s, case.slant_deg, HEIGHT_M)
+    return data | {"on_collision": {"then": "hold", "hold_s": HOLD_S}, "recovery": {"law": case.law}}
+
+
+def into_a_wall(name: str, speed_m_s: float, slant_deg: float, height_m: float) -> dict[str, Any]:
+    """Up, and at the speed into a wall; the target is so far behind it that braking has not begun there."""
+    wall_m = round(0.5 * speed_m_s**2 / RUN_UP_M_S2 + STEADY_S * speed_m_s + 1.0, 3)
+    beyond_m = wall_m + speed_m_s**2 / RUN_UP_M_S2 + 2.0
+    slant = math.radians(slant_deg)
+    go_to = {"position_ned_m": [beyond_m, 0, -height_m], "speed_m_s": speed_m_s, "acceleration_m_s2": RUN_UP_M_S2}
     wall = {
         "point_ned_m": [wall_m, 0, -4],
         "normal_ned": [-math.cos(slant), -math.sin(slant), 0],
@@ -74,10 +79,8 @@ def mission_data(case: RecoveryCase) -> dict[str, Any]:
         "height_m": 8,
     }
     return {
-        "name": "recovery",
-        "items": [{"takeoff": {"height_m": HEIGHT_M}}, {"go_to": go_to}, {"land": {}}],
-        "on_collision": {"then": "hold", "hold_s": HOLD_S},
-        "recovery": {"law": case.law},
+        "name": name,
+        "items": [{"takeoff": {"height_m": height_m}}, {"go_to": go_to}, {"land": {}}],
         "companion": {"flight": {"speeding_up_m_s2": RUN_UP_M_S2}},
         "fence": {"radius_m": 40, "max_height_m": 8},
         "sim": {"walls": [wall]},

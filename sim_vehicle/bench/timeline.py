@@ -71,9 +71,5 @@ class Timeline:
 
 
 def _of_hit(hit: Hit) -> TimelineEntry:
-    speed_m_s = -sum(
-        (own - its) * n
-        for own, its, n in zip(hit.impact_velocity_ned_m_s, hit.surface_velocity_ned_m_s, hit.normal_ned, strict=True)
-    )
-    text = f"hits '{hit.obstacle}' at {speed_m_s:.2f} m/s, for {1e3 * hit.contact_duration_s:.0f} ms"
+    text = f"hits '{hit.obstacle}' at {hit.closing_speed_m_s:.2f} m/s, for {1e3 * hit.contact_duration_s:.0f} ms"
     return TimelineEntry(1e-6 * hit.contact_at_boot_us, f"{text}, with at most {hit.peak_force_n:.0f} N")

@@ -73,7 +73,7 @@ def advance_interval(
 
     Who drives the motors from outside has an estimate and a frame of its own: a hit notes no offset of ours then.
 
-    ``motors``: off, idling, flying the setpoint, or driven (as `State.motor_command_n` says). ``noise`` is
+    ``motors``: off, idling, flying the setpoint, or driven (as `PlantState.motor_command_n` says). ``noise`` is
     standard normal: six values a raw sample, then nine for the estimate.
     ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
     the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory. ``moving`` are the rows of

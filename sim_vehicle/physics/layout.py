@@ -10,7 +10,7 @@ from sim_vehicle.physics.record import Floats, Matrix3, Vector3, Vector4, new_re
 
 GRAVITY_M_S2 = 9.81
 
-# Size of `State.body`, the rigid body of the paper's eq. 1.
+# Size of `PlantState.body`, the rigid body of the paper's eq. 1.
 BODY_SIZE = 13
 
 # Points that can touch something: four guards (motor order), the hub, four feet.
@@ -184,7 +184,7 @@ class Scratch:
     relaxed_m: Vector4  # folds that arms pressed by nothing would have
 
 
-# Rows of `State.hit`.
+# Rows of `PlantState.hit`.
 HIT_ACTIVE, HIT_FACE, HIT_START_US, HIT_LAST_US, HIT_PEAK_N, HIT_FOLD_M = range(6)
 HIT_POSITION, HIT_VELOCITY, HIT_NORMAL, HIT_EXIT_VELOCITY = slice(6, 9), slice(9, 12), slice(12, 15), slice(15, 18)
 HIT_IMPULSE, HIT_ENERGY_BEFORE_J, HIT_ENERGY_AFTER_J = slice(18, 21), 21, 22

@@ -1,6 +1,6 @@
 """Attitude arithmetic: quaternions are (w, x, y, z) and rotate body FRD into world NED.
 
-A "body" here is an array laid out as `State.body`, of which rows 6..9 are the quaternion: passing the
+A "body" here is an array laid out as `PlantState.body`, of which rows 6..9 are the quaternion: passing the
 whole array costs a kernel less than cutting a slice.
 """
 

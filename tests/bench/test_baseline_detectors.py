@@ -7,6 +7,7 @@ import pytest
 from bench.baselines.config import BaselineConfig
 from bench.baselines.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
+from companion.detection.registry import BASELINES, DETECTORS
 from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.recovery.direction import plus
@@ -138,3 +139,7 @@ def test_the_fuzzy_inputs_are_signed_towards_the_wall():
     assert flip_deg((0.0, 2.0, 0.0), north) == pytest.approx(180.0)
     assert flip_deg((0.0, -2.0, 0.0), north) == pytest.approx(0.0)
     assert flip_deg((2.0, 0.0, 5.0), north) == pytest.approx(90.0)
+
+
+def test_the_companion_knows_each_baseline_by_name():
+    assert set(BaselineConfig.detectors) - set(DETECTORS) == BASELINES

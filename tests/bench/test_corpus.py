@@ -2,16 +2,20 @@
 
 import copy
 import json
+from types import SimpleNamespace
 
 import pytest
 
+from bench.corpus import command
 from bench.corpus.comparison import comparison_text
 from bench.corpus.recording import record
-from bench.corpus.verdict import FlightCase, work_out
+from bench.corpus.verdict import verdict
 from bench.main import main
 from bench.random_missions.generator import MissionCase
+from rebound_cli.replay.findings import Findings
 from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME
 from sim_vehicle.shell.truth_file import load_truth
+from tests.bench.random_missions.made_up import hit
 
 # The first random mission, of a drawn vehicle, in which something is hit.
 CASE = MissionCase(70003, "foldable", is_drawn=True)
@@ -25,8 +29,12 @@ def flight(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def verdicts(flight):
-    return {"flights": {"flight": work_out(FlightCase(str(flight)))}}
+def verdicts(flight, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("judged")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["corpus", "judge", str(flight.parent), "--out", "verdicts.json"]) == 0
+    return json.loads((folder / "verdicts.json").read_text())
 
 
 def test_a_flight_is_judged_from_its_bytes_against_its_truth(flight, verdicts):
@@ -43,6 +51,36 @@ def test_a_flight_is_judged_from_its_bytes_against_its_truth(flight, verdicts):
         assert rates[rate]["false_boot_us"] == []
 
 
+def finding(at_s, is_collision=True):
+    told = SimpleNamespace(
+        impact=SimpleNamespace(sample_time_boot_us=round(at_s * 1e6)),
+        velocity_ned_m_s=(2.0, 0.0, 0.0),
+        normal_ned=(-1.0, 0.0, 0.0),
+    )
+    return SimpleNamespace(is_collision=is_collision, first=told, final=told)
+
+
+def test_a_collision_that_is_told_twice_or_of_nothing_is_false():
+    # Given a hit that is told twice, one that is not told, something told of nothing, and a touch that is no collision
+    hits = [hit(at_s=10.0), hit(at_s=14.0)]
+    told = [finding(10.004), finding(10.02), finding(12.0), finding(13.0, is_collision=False)]
+    # When they are set against each other
+    found = verdict(Findings(impacts=told), hits)
+    # Then the first is the hit's, 4 ms late
+    assert found["false_boot_us"] == [10_020_000, 12_000_000]
+    assert [row.get("latency_ms") for row in found["hits"]] == [4.0, None]
+
+
+def test_drawn_vehicles_of_both_kinds_fly_a_mission_of_each_seed(monkeypatch, tmp_path):
+    flown = []
+    monkeypatch.setattr(command, "in_processes", lambda work, places, jobs: flown.extend(places))
+    words = ["--missions", "2", "--first-seed", "7"]
+    assert main(["corpus", "record", str(tmp_path / "corpus"), *words]) == 0
+    assert [(folder.name, case.seed, case.airframe, case.is_drawn) for folder, case in flown] == [
+        (f"{kind}-{seed}", seed, kind, True) for seed in (7, 8) for kind in ("foldable", "rigid")
+    ]
+
+
 def test_a_flight_that_is_there_is_not_flown_again(flight):
     before = (flight / TLOG_NAME).stat().st_mtime_ns
     record((flight, CASE))
@@ -52,10 +90,10 @@ def test_a_flight_that_is_there_is_not_flown_again(flight):
 def test_a_hit_that_is_lost_and_a_false_one_are_told(verdicts, tmp_path, capsys):
     # Given a version that misses the first hit at 50 Hz and tells one that is none
     worse = copy.deepcopy(verdicts)
-    verdict = worse["flights"]["flight"]["rates"]["50"]
+    heard = worse["flights"]["flight"]["rates"]["50"]
     for key in ("latency_ms", "velocity_error_m_s", "normal_error_deg"):
-        del verdict["hits"][0][key]
-    verdict["false_boot_us"].append(12_000_000)
+        del heard["hits"][0][key]
+    heard["false_boot_us"].append(12_000_000)
     for name, content in (("old.json", verdicts), ("new.json", worse)):
         (tmp_path / name).write_text(json.dumps(content))
     # When both are compared

@@ -1,20 +1,32 @@
 """The table of faults: its rows, what it flies, and what it calls a failure."""
 
 import math
+import random
 
 import pytest
 
 from bench.campaign.plan import Json
-from bench.faults.air import Injector, When
+from bench.campaign.record import Record
+from bench.faults import command, latency
+from bench.faults.air import POSCTL, Air, Injector, When
 from bench.faults.catalogue import FILES, FLOWN
 from bench.faults.envelope import outside
-from bench.faults.fault import COMPLETED, Expected, Fault
+from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
 from bench.faults.files import tried
 from bench.faults.flight import fly, fly_from_one_take_off
-from bench.faults.injectors import Rewritten, setting
+from bench.faults.injectors import Rewritten, Simulated, setting
 from bench.faults.latency import _spread
-from bench.faults.packets import IMU, made
+from bench.faults.packets import ARM, IMU, SET_MODE, made
+from bench.faults.pilot import Taken
 from bench.faults.table import Row, text_of
+from bench.main import main
+from companion.mavlink.encode import COMPONENT_ID
+from rebound_cli.background import Background
+from rebound_cli.interrupts import Interrupts
+from sim_vehicle.airframe import load_built_in
+from sim_vehicle.bench.changeable import ChangeableVehicle
+from sim_vehicle.bench.faults import motor_failure, other
+from sim_vehicle.scene import Scene
 from tests.companion.hostile import flight_in
 
 SETPOINT = {"x": 1.0, "z": -1.5, "type_mask": 0xDF8}
@@ -35,6 +47,7 @@ def test_every_group_has_rows_and_there_are_as_many_as_promised() -> None:
         ({"z": 0.5}, "-0.5 m high"),
         ({"type_mask": 0xDC0, "vx": 30.0}, "30.0 m/s"),
         ({"type_mask": 0xC38, "afx": 20.0}, "20.0 m/s2 sideways"),
+        ({"type_mask": 0xC38, "afz": 12.0}, "12.0 m/s2 up or down"),
         ({"type_mask": 0x9F8, "yaw": 4.0}, "yaw 4 rad"),
     ],
 )
@@ -56,6 +69,95 @@ def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     # Then the hit is found by the one that could, and the other is told as what it is
     assert results["calm"]["found"] and results["calm"]["complaints"] == []
     assert not results["blind"]["found"] and "hit not found" in results["blind"]["complaints"]
+
+
+@pytest.fixture
+def air() -> Air:
+    """Around a companion that flies a mission, and a vehicle with a pilot."""
+    vehicle = ChangeableVehicle(load_built_in("foldable"), Scene(), 1, 0, {})
+    companion = flight_in("mission").companion
+    air = Air(vehicle, companion, Interrupts(), Injector(), random.Random(1), 60.0)
+    air.add_pilot()
+    return air
+
+
+def test_what_the_companion_sends_once_it_has_heard_of_the_pilot_counts(air: Air) -> None:
+    setpoint = made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT)
+    # Given a pilot who has taken over, of which the companion has not heard
+    air.take_over()
+    air.send(setpoint)
+    assert air.after_told == 0
+    # When it has been handed the packet that says so
+    air._waiting.append(made("CURRENT_MODE", {"custom_mode": POSCTL}))
+    air.receive(0.0)
+    # Then setpoints, modes and arming count, and nothing else does
+    for frame in (setpoint, made("COMMAND_LONG", {"command": SET_MODE}), made("COMMAND_LONG", {"command": ARM})):
+        air.send(frame)
+    air.send(made("HEARTBEAT", {}))
+    air.send(made("COMMAND_LONG", {"command": 511}))
+    assert air.after_told == 3
+
+
+def test_a_setpoint_outside_the_envelope_is_kept_with_its_moment(air: Air) -> None:
+    air.send(made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT))
+    assert air.outside == []
+    air.send(made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0}))
+    assert air.outside == ["outside the fence at 0.00 s"]
+
+
+class Sending(Injector):
+    """One setpoint far outside, as if the companion had sent it."""
+
+    is_sent = False
+
+    def each(self, air: Air) -> None:
+        if not self.is_sent:
+            self.is_sent = True
+            air.send(made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | {"x": 40.0}))
+
+
+class Overruling(Taken):
+    """Soon after the pilot has taken over, somebody asks for OFFBOARD in the companion's name."""
+
+    def to_vehicle(self, air: Air, frames: list[bytes]) -> list[bytes]:
+        if air.pilot_at_s is None or not 0.2 < air.now_s - air.pilot_at_s < 0.3:
+            return frames
+        fields = {"command": SET_MODE, "param1": 1.0, "param2": 6.0, "target_system": 1, "target_component": 1}
+        setpoint = SETPOINT | {"target_system": 1, "target_component": 1, "coordinate_frame": 1}
+        ours = (1, COMPONENT_ID)
+        return [made("SET_POSITION_TARGET_LOCAL_NED", setpoint, ours), made("COMMAND_LONG", fields, ours)]
+
+
+class _Forgetful(Background):
+    """Writes nothing and says nothing of it."""
+
+    def give(self, call: object, *arguments: object) -> None:
+        if getattr(call, "__name__", "") == "close":
+            super().give(call, *arguments)  # type: ignore[arg-type]
+
+
+class Forgetting(Injector):
+    def writer(self) -> Background:
+        return _Forgetful("log")
+
+
+def test_a_judge_names_each_kind_of_loss() -> None:
+    no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
+    bad = {
+        "setpoint outside: outside the fence": lambda _: Sending(),
+        "the pilot was overruled": lambda _: Overruling(When("mission", 0.3)),
+        "log lost: ": lambda _: Forgetting(),
+        "tumbled: ": lambda _: Simulated(motor_failure(0), When("mission", 0.3)),
+        "1 false hits counted": lambda _: Simulated(
+            other("push", force_ned_n=(0.0, 12.0, 0.0), rise_s=0.01), When("mission", 0.3, 0.1)
+        ),
+    }
+    faults = [Fault(words, "link", "", inject, no_wall) for words, inject in bad.items()]
+    results: dict[str, Json] = {}
+    fly_from_one_take_off(7, faults, results.__setitem__)
+    assert [*results] == [*bad]
+    for words, result in results.items():
+        assert any(text.startswith(words) for text in result["complaints"]), (words, result)
 
 
 def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:
@@ -89,3 +191,25 @@ def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None
     assert (spread["found"], spread["p50"], spread["most"]) == (2, 6.0, math.inf)
     text = text_of([], {"hits": 3, "load": 1.0, "busy": spread, "quiet": spread}, 1, "1.0")
     assert "| p50 6.0 ms, p99 more than 500 ms, p99.9 more than 500 ms, most more than 500 ms | 2 of 3 |" in text
+
+
+def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
+    # Given one row, of which one seed has been tried before
+    monkeypatch.chdir(tmp_path)
+    missing, wanted, spread = command._missing, [], _spread([0.004])
+    monkeypatch.setattr(latency, "measured", lambda hits: {"hits": hits, "load": 1.0, "busy": spread, "quiet": spread})
+
+    def of_one_row(record: Record, number: int) -> list[str]:
+        names = [name for name in missing(record, number) if name == "obstacle file cut"]
+        wanted.append((number, names))
+        return names
+
+    monkeypatch.setattr(command, "_missing", of_one_row)
+    words = ["faults", "--jobs", "1", "--hits", "1", "--out", str(tmp_path / "faults.md")]
+    assert main([*words, "--seeds", "1"]) == 0
+    # When two are asked for
+    assert main([*words, "--seeds", "2"]) == 0
+    # Then only the other is tried, and the table has both
+    assert wanted == [(0, ["obstacle file cut"]), (0, []), (1, ["obstacle file cut"])]
+    assert "1 rows, 0 not as expected." in capsys.readouterr().out
+    assert "refused in one sentence within 60 s | 2 | refused 2 |" in (tmp_path / "faults.md").read_text()

@@ -1,10 +1,15 @@
 """Kills around a hit: what is drawn, what a flight shows, and the table."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
 
 from bench.campaign.run import Results
 from bench.kills.command import table
-from bench.kills.killed import KILLED_S, SPEEDS_M_S, cases, kills_campaign, work_out
+from bench.kills.killed import KILLED_S, SPEEDS_M_S, _killed, cases, kills_campaign, work_out
+from tests.bench.random_missions.made_up import hit
 
 
 def test_so_many_kills_are_drawn_within_the_bounds_and_the_same_each_time():
@@ -25,12 +30,29 @@ def test_so_many_kills_are_drawn_within_the_bounds_and_the_same_each_time():
 def test_a_brake_that_nobody_ends_does_not_lead_back_to_the_wall():
     """Held, the brake of 0.6 s after the hit led the vehicle back at 1 m/s."""
     case = cases(50, first_seed=1)[4]
-    flight = work_out(replace(case, kills_s=(0.6, 0.87)))
+    flight = work_out(replace(case, kills_s=(-0.1, 0.6, 0.87)))
     assert flight["touch_m_s"] > 2.5 and flight["again_m_s"] == 0.0
-    for kill, at_s in zip(flight["kills"], (0.6, 0.87), strict=True):
+    unanswered, *braked = flight["kills"]
+    for kill, at_s in zip(braked, (0.6, 0.87), strict=True):
         assert abs(kill["kill_s"] - at_s) < 0.01
         assert kill["again_m_s"] == 0.0
         assert kill["ground_m_s"] < 1.5
+    # Killed before the touch nobody answers it: what is held then leads back to the wall.
+    assert abs(unanswered["kill_s"] + 0.1) < 0.01
+    assert 0.3 < unanswered["again_m_s"] < 0.5 * flight["touch_m_s"]
+
+
+@pytest.mark.parametrize(("killed_at_s", "again_m_s"), [(9.9, 0.8), (10.05, 0.8), (10.4, 0.6), (10.9, 0.0)])
+def test_a_second_contact_is_the_hardest_after_the_kill_the_touch_itself_apart(killed_at_s, again_m_s):
+    # Given a touch at 2 m/s and two contacts after it, and a kill before or between them
+    touch = hit(10.0, 2.0)
+    truth = SimpleNamespace(
+        hits=[touch, hit(10.2, 0.8), hit(10.6, 0.6)], series=lambda: {"velocity_ned_m_s": [(0.0, 0.3, 0.4)]}
+    )
+    vehicle = SimpleNamespace(time_boot_us=killed_at_s * 1e6, truth=truth)
+    flight: Any = SimpleNamespace(vehicle=vehicle, fall=lambda: None, is_down=True)
+    kill = _killed(flight, touch)
+    assert kill["again_m_s"] == pytest.approx(again_m_s) and kill["ground_m_s"] == pytest.approx(0.5)
 
 
 def test_the_table_has_a_line_for_every_100_ms_and_counts_the_hard_contacts():

@@ -12,12 +12,13 @@ import random
 import statistics
 import time
 
-from bench.baselines.config import BaselineConfig, GuardsConfig
+from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Situation
 from companion.detection.watch import advance, start_watch
 from companion.estimate.normal import begin, further
 from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
+from companion.mission.config import GuardsConfig
 
 INTERVAL_US = 4_000
 SAMPLES = 20_000

@@ -31,7 +31,12 @@ def test_it_hits_what_is_in_its_way_at_the_speed_it_cruised() -> None:
     scene = Scene.model_validate({"walls": [{"point_ned_m": [2, 0, -3], "normal_ned": [-1, 0, 0]}]})
     airframe = filtered(changes={"estimate": {"kind": "markov"}})
     cruise = Cruise(airframe, scene, (0.0, 0.0, -3.0), (2.0, 0.0, 0.0), seed=5)
-    while not cruise.plant.truth.hits:
+    truth, told = cruise.plant.truth, []
+    truth.on_hit = told.append
+    while not truth.hits:
+        assert told == []
         cruise.step()
-    (hit,) = cruise.plant.truth.hits
+    # Whoever wants to know of it is told when it is over.
+    (hit,) = truth.hits
+    assert told == [hit]
     assert hit.impact_velocity_ned_m_s[0] == pytest.approx(2.0, abs=0.05)

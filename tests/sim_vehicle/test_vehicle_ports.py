@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.errors import LinkAddressError, PortInUse
+from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.addresses import open_port, px4_ports
 from sim_vehicle.shell.port import Port
@@ -110,6 +111,27 @@ def test_a_udp_server_answers_each_client_at_its_address():
         first.send(REQUEST.pack(client()))
         read_socket(first, {"AUTOPILOT_VERSION", "HIGHRES_IMU"})
         assert "AUTOPILOT_VERSION" not in read_socket(second, {"HIGHRES_IMU", "HEARTBEAT"}).kinds()
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "is_usb"),
+    [
+        ("", None, False),
+        ("?usb", None, True),
+        ("?set=normal", LinkKind.NORMAL, False),
+        ("?set=normal&usb", LinkKind.NORMAL, True),
+    ],
+)
+def test_an_address_says_whose_streams_it_has_and_whether_it_stands_for_usb(words, kind, is_usb):
+    ours, theirs = pty.openpty()
+    addresses = {"udpout://127.0.0.1:9": LinkKind.GROUND, f"serial://{os.ttyname(theirs)}:57600": LinkKind.ONBOARD}
+    for address, default in addresses.items():
+        vehicle = new_vehicle()
+        open_port(vehicle, address + words).close()
+        (link,) = vehicle._links
+        assert (link.options.kind, link.options.is_usb) == (kind or default, is_usb)
+    os.close(ours)
+    os.close(theirs)
 
 
 def test_a_serial_line_over_a_pseudo_terminal_carries_no_more_than_its_speed():

@@ -373,10 +373,14 @@ def test_px4_1_17_has_the_time_stamp_of_its_card_until_it_hears_a_later_one_on_t
     vehicle.run(0.5)
     later = [stamp for stamp in stamps(companion) if stamp > 10**14]
     assert later[:2] == [10**14 + 1, 10**14 + 2] and max(stamps(usb)) < 10**6
-    # And after a restart it begins again
+    # And after a restart it begins again, with no memory of what was heard
     restarted(vehicle)
     vehicle.run(0.5)
     assert stamps(companion)[0] < 10**6
+    signed(companion, time_stamp=10**13)
+    companion.command(400, 0)
+    vehicle.run(0.05)
+    assert companion.all("COMMAND_ACK")
 
 
 # As a SITL answered: operation, path, and the code of its refusal (None: acknowledged)
