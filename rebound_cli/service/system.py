@@ -11,6 +11,7 @@ from pathlib import Path
 
 import rebound_cli
 from companion.errors import ReboundError
+from rebound_cli.run_folder import write_whole
 
 # ProtectHome= hides these from the service.
 _HIDDEN = ("/home", "/root", "/run/user")
@@ -76,11 +77,9 @@ class System:
         """Whenever this ends, the file is whole: the old one or the new one."""
         file = self.root / path
         file.parent.mkdir(parents=True, exist_ok=True)
-        half_written = file.with_name(file.name + ".part")
-        half_written.write_text(text, encoding="utf-8")
+        write_whole(file, text.encode())
         # The service's user reads it, whatever the umask of whoever installs.
-        half_written.chmod(0o644)
-        half_written.replace(file)
+        file.chmod(0o644)
 
 
 def hidden_program() -> str | None:
