@@ -76,9 +76,11 @@ class System:
     def write(self, path: str, text: str) -> None:
         """Whenever this ends, the file is whole: the old one or the new one."""
         file = self.root / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(file, text.encode())
         # The service's user reads it, whatever the umask of whoever installs.
+        if not file.parent.is_dir():
+            file.parent.mkdir(parents=True)
+            file.parent.chmod(0o755)
+        write_whole(file, text.encode())
         file.chmod(0o644)
 
 
