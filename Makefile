@@ -47,7 +47,7 @@ results: $(READY)
 	$(BIN)/python -m bench paper results
 
 # Every version is pinned in requirements.txt, and every file by its hash: a fresh machine gets what was tested, or stops.
-$(READY): pyproject.toml setup.py requirements.txt
+$(READY): pyproject.toml requirements.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .

@@ -55,7 +55,7 @@ class Background:
         return f"{self._what} has gaps: {why}"
 
     def close(self, timeout_s: float | None = None) -> None:
-        """Return when all that was given has been tried, or after so long."""
+        """Return when all that was given has been tried, or after `timeout_s`."""
         self._waiting.put(None)
         self._thread.join(timeout_s)
 

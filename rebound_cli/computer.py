@@ -1,7 +1,6 @@
 """The computer's status beside a flight: read on a thread of its own, because a disk that hangs answers nobody."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, closing, nullcontext
 from pathlib import Path
 
 from companion.messages import ComputerStatus
@@ -38,12 +37,6 @@ class Computer:
         self._background.close(_LAST_WAIT_S)
 
 
-@contextmanager
-def watched(folder: Path, is_wanted: bool) -> Iterator[Computer | None]:
+def watched(folder: Path, is_wanted: bool) -> AbstractContextManager[Computer | None]:
     """The computer, and the disk that the folder is on; None where nobody wants to know."""
-    computer = Computer(folder) if is_wanted else None
-    try:
-        yield computer
-    finally:
-        if computer is not None:
-            computer.close()
+    return closing(Computer(folder)) if is_wanted else nullcontext()

@@ -1,5 +1,6 @@
 """The end of a flight in words: what a pilot asks. Every figure behind it is in summary.json."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -40,9 +41,7 @@ def _collision(collision: Mapping[str, Any]) -> str:
     if truth is None:
         hit, seen, height = f"Hit something at {collision['impact_speed_m_s']:.2f} m/s.", "", ""
     else:
-        speed_m_s = sum(component**2 for component in truth["impact_velocity_ned_m_s"]) ** 0.5
-        article = "an" if truth["kind"] == "edge" else "a"
-        hit = f"Hit {article} {truth['kind']} at {speed_m_s:.2f} m/s."
+        hit = f"Hit {impact_text(truth['kind'], truth['impact_velocity_ned_m_s'])}."
         seen = f" Seen after {truth['detection_latency_ms']:.1f} ms."
         height = f", {_length(truth['height_lost_m'])} of height lost"
     off_m = (truth or collision)["stopped_off_m"]
@@ -51,6 +50,11 @@ def _collision(collision: Mapping[str, Any]) -> str:
     else:
         stopped = f"Stopped {off_m:.1f} m off it in {settled_s:.1f} s{height}."
     return f"{hit}{seen} {stopped}"
+
+
+def impact_text(kind: str, velocity_ned_m_s: Sequence[float]) -> str:
+    """What was hit, and how fast."""
+    return f"{'an' if kind == 'edge' else 'a'} {kind} at {math.hypot(*velocity_ned_m_s):.2f} m/s"
 
 
 def _frame(collisions: Sequence[Mapping[str, Any]]) -> list[str]:

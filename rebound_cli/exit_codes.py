@@ -8,5 +8,5 @@ CONFIGURATION = 78
 # The shell's convention for a program ended by Ctrl-C: 128 + SIGINT.
 INTERRUPTED = 130
 
-# With the same command line and files it goes the same way again.
-IN_VAIN = (USAGE, CONFIGURATION)
+# A restart with the same command line and files ends the same way.
+PERMANENT = (USAGE, CONFIGURATION)

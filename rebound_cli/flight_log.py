@@ -10,15 +10,14 @@ import numpy.typing as npt
 from companion.estimate.strapdown import Strapdown
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
-from companion.messages import Attitude, ImuSample, LocalPosition
+from companion.messages import Attitude, ImuSample, LocalPosition, MessageId
 from companion.shell.tlog import read_tlog
 
 Floats = npt.NDArray[np.float64]
 
-# Only messages with these ids are decoded; a log holds many more.
-_HIGHRES_IMU = 105
-_ATTITUDES = (30, 31)
-_LOCAL_POSITION_NED = 32
+_ATTITUDE = 30
+# Only these are decoded; a log holds many more.
+_DECODED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION, _ATTITUDE)
 _SET_POSITION_TARGET_LOCAL_NED = 84
 
 # SET_POSITION_TARGET_LOCAL_NED's payload: time_boot_ms, then x, y, z in metres; MAVLink 2 leaves out
@@ -54,7 +53,7 @@ def read_flight_log(path: Path) -> FlightLog:
         if message_id == _SET_POSITION_TARGET_LOCAL_NED:
             payload = payload_of(packet).ljust(_SETPOINT_LENGTH, b"\0")
             setpoints.append((at_us, *_SETPOINT_POSITION.unpack_from(payload)))
-        elif message_id in (_HIGHRES_IMU, _LOCAL_POSITION_NED, *_ATTITUDES):
+        elif message_id in _DECODED:
             decoder.listen_to(*source_of(packet))
             for _, sample in decoder.feed(packet):
                 if isinstance(sample, ImuSample):

@@ -60,8 +60,8 @@ def run(options: argparse.Namespace, program: str) -> int:
         return int(options.run(options))
     except (ReboundError, SimulationError) as error:
         print(f"{program}: {error}", file=sys.stderr)
-        is_in_vain = isinstance(error, ConfigurationError) and options.command in COMMANDING
-        return exit_codes.CONFIGURATION if is_in_vain else exit_codes.ERROR
+        is_permanent = isinstance(error, ConfigurationError) and options.command in COMMANDING
+        return exit_codes.CONFIGURATION if is_permanent else exit_codes.ERROR
     except ModuleNotFoundError as error:
         print(f"{program}: {needed_text(error)}", file=sys.stderr)
         return exit_codes.ERROR

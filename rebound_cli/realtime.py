@@ -144,6 +144,7 @@ class Loop:
     recorder: FlightRecorder
     console: Console
     interrupts: Interrupts
+    server: StatusServer | None = None
     computer: Computer | None = None
     timing: Timing = field(default_factory=Timing)
     heard: Heard = field(default_factory=Heard)
@@ -154,14 +155,17 @@ class Loop:
     def run(self, beside: Callable[[int, StepResult], None]) -> None:
         """After the first interrupt it finishes by itself. `beside` is what happens besides with each step.
 
-        Whatever is raised in all this hands the vehicle over first, and then ends in FlightFaultError.
+        The state is shown on the console and told over the status socket. Whatever is raised in all this hands the
+        vehicle over first, and then ends in FlightFaultError.
         """
+        started_us = self.clock.now_us()
         with undisturbed() as allow_collecting:
             try:
                 while not self.stepped.finished:
                     now_us, result = self.exchange()
                     allow_collecting(self.stepped.armed is False)
                     beside(now_us, result)
+                    self._show(result, (now_us - started_us) / 1e6)
                     self._look_up(now_us)
             except Exception as error:
                 place = traceback.extract_tb(error.__traceback__)[-1]
@@ -198,6 +202,12 @@ class Loop:
     def _status_text(self) -> str:
         _, *fields = state_fields(self.stepped.status(), 0.0, self.heard.text(self.now_us or 0))
         return ", ".join(f"{name} {text}" for name, text in fields)
+
+    def _show(self, result: StepResult, running_s: float) -> None:
+        link = self.heard.text(self.now_us or 0)
+        self.console.live(self.stepped.status, running_s, link)
+        if self.server is not None:
+            self.server.hand_over(self.stepped.status, result.events, running_s, link)
 
     def _look_up(self, now_us: int) -> None:
         """Whether somebody wants an end, and whether all that was to be written was."""
@@ -269,11 +279,7 @@ def fly_realtime(
         recorder.record_confirmation(now_us, companion.plan_is_confirmed)
         if companion.stop_reason is not None:
             recorder.record_stop(now_us, companion.stop_reason)
-        running_s, link = (now_us - started_us) / 1e6, loop.heard.text(now_us)
-        console.live(companion.status, running_s, link)
-        if server is not None:
-            server.hand_over(companion.status, result.events, running_s, link)
 
-    loop = Loop(companion, connection, clock, recorder, console, interrupts, computer)
+    loop = Loop(companion, connection, clock, recorder, console, interrupts, server, computer)
     loop.run(beside)
     return loop.timing

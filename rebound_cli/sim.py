@@ -1,6 +1,5 @@
 """`rebound sim`: the simulated vehicle alone, in real time, for any MAVLink client."""
 
-import math
 import os
 import signal
 import threading
@@ -14,6 +13,7 @@ from companion.shell.signing_files import read_key
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_vehicle
 from rebound_cli.console import Console, console_for
+from rebound_cli.ending import impact_text
 from rebound_cli.inputs import SimulatedWorld, load_world
 from rebound_cli.vehicle_process import READY_WORDS
 from sim_vehicle.mavlink.signing import Signing
@@ -51,8 +51,7 @@ def _serve(options: Namespace, world: SimulatedWorld, console: Console) -> None:
 
 
 def _tell_of(hit: Hit, console: Console) -> None:
-    article = "an" if hit.kind == "edge" else "a"
-    text = f"{article} {hit.kind} at {math.hypot(*hit.impact_velocity_ned_m_s):.2f} m/s, {hit.peak_force_n:.0f} N"
+    text = f"{impact_text(hit.kind, hit.impact_velocity_ned_m_s)}, {hit.peak_force_n:.0f} N"
     console.event(hit.contact_at_boot_us / 1e6, "hit", text)
 
 

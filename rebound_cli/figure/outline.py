@@ -1,36 +1,25 @@
 """What an obstacle covers of the ground, seen from above."""
 
 import itertools
-import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull, QhullError
+from shapely import MultiPoint, get_coordinates
 
 from sim_vehicle.world import Box, Obstacle, Pole
 
 Floats = npt.NDArray[np.float64]
 
-_ROUND_CORNERS = 24
-
 
 def footprint(obstacle: Obstacle) -> Floats:
     """Corners (n, 2) of its outline, north and east, world coordinates, where it stands at first."""
     if isinstance(obstacle, Pole):
-        points = np.concatenate([_ring(end, obstacle.radius_m) for end in obstacle.ends()])
+        ends_ne_m = [end[:2] for end in obstacle.ends()]
+        outline = MultiPoint(ends_ne_m).convex_hull.buffer(obstacle.radius_m)
     else:
-        points = _corners(obstacle if isinstance(obstacle, Box) else obstacle.box())
-    try:
-        hull: Floats = points[ConvexHull(points).vertices]
-    except QhullError:
-        # thinner than can be told from a line
-        return points
-    return hull
-
-
-def _ring(centre_ned_m: Floats, radius_m: float) -> Floats:
-    angles = np.arange(_ROUND_CORNERS) * math.tau / _ROUND_CORNERS
-    return centre_ned_m[:2] + radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+        outline = MultiPoint(_corners(obstacle if isinstance(obstacle, Box) else obstacle.box())).convex_hull
+    corners: Floats = get_coordinates(outline)
+    return corners
 
 
 def _corners(box: Box) -> Floats:

@@ -12,9 +12,10 @@ from companion.errors import ConfigurationError
 from rebound_cli.flights.archive import Archive, add_flight
 from rebound_cli.flights.kept import kept_flights, runs_folder
 from rebound_cli.run_folder import read_text, versions
+from rebound_cli.service.settings import FOLDER
 from rebound_cli.status.asking import StatusError, ask
 
-SETTINGS = Path("/etc/rebound")
+SETTINGS = Path("/", FOLDER)
 # What a service's unit and the rule of its device are called.
 _SYSTEM_FILES = ("/etc/systemd/system", "rebound*.service"), ("/etc/udev/rules.d", "*rebound*.rules")
 # Some hours of a guard that prints a line every five seconds.

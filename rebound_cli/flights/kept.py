@@ -25,8 +25,6 @@ from rebound_cli.run_folder import (
 _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")
 # The unit of stat's st_blocks, whatever the file system's own is.
 _BLOCK_BYTES = 512
-
-
 # Where a service flies: below systemd's StateDirectory=rebound.
 SERVICE_RUNS = Path("/var/lib/rebound/runs")
 

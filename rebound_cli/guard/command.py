@@ -3,7 +3,6 @@
 from argparse import Namespace
 from dataclasses import asdict
 
-from companion.companion import StepResult
 from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -19,7 +18,7 @@ from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
-from rebound_cli.status.server import StatusServer, served
+from rebound_cli.status.server import served
 
 
 def run_guard(options: Namespace) -> int:
@@ -45,8 +44,10 @@ def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
             watched(folder, config.companion.operator.computer_status) as computer,
             Interrupts() as interrupts,
         ):
-            loop = Loop(guard, connection, Clock(), recorder, console, interrupts, computer)
-            _run(loop, guard, server)
+            clock = Clock()
+            started_us = clock.now_us()
+            loop = Loop(guard, connection, clock, recorder, console, interrupts, server, computer)
+            loop.run(lambda _, result: console.events(result.events, started_us))
     finally:
         connection.close()
         recorder.close()
@@ -77,17 +78,3 @@ def guard_config(options: Namespace) -> GuardConfig:
     if options.then is not None:
         apply_override(document, Override(f"--then {options.then}", ("then",), options.then))
     return validated(GuardConfig, document, document.data)
-
-
-def _run(loop: Loop, guard: Guard, server: StatusServer | None) -> None:
-    started_us = loop.clock.now_us()
-
-    def beside(now_us: int, result: StepResult) -> None:
-        if result.events:
-            loop.console.events(result.events, started_us)
-        running_s, link = (now_us - started_us) / 1e6, loop.heard.text(now_us)
-        loop.console.live(guard.status, running_s, link)
-        if server is not None:
-            server.hand_over(guard.status, result.events, running_s, link)
-
-    loop.run(beside)

@@ -15,7 +15,6 @@ from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
 Packets = list[tuple[int, bytes]]
 Source = tuple[int, int]
 
-_POSITION_TARGET_LOCAL_NED = 85
 # time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros at the end are left out.
 _TARGET = struct.Struct("<I11fHB")
 _MASK_POSITION, _MASK_VELOCITY, _MASK_VELOCITY_DOWN = 0x07, 0x38, 0x20
@@ -37,7 +36,7 @@ def read_telemetry(path: Path) -> Log:
     for at_us, packet in packets:
         if source_of(packet) != source:
             continue
-        if message_id_of(packet) == _POSITION_TARGET_LOCAL_NED:
+        if message_id_of(packet) == MessageId.POSITION_TARGET_LOCAL_NED:
             heard.append(Heard(at_us, _demand(packet)))
             continue
         heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)

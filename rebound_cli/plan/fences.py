@@ -6,6 +6,7 @@ from typing import Any
 
 from companion.errors import ConfigurationError
 from companion.mission.fence import Fence
+from rebound_cli.plan.shape import Circle, GeoFence
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 
@@ -19,29 +20,27 @@ _CIRCLE_CORNERS = 24
 
 
 def fence_of_plan(
-    written: Any, origin: Origin, furthest_m: float, highest_m: float
+    written: GeoFence | None, origin: Origin, furthest_m: float, highest_m: float
 ) -> tuple[dict[str, Any], Sequence[str]]:
     """The mission's fence and notes. Raises ConfigurationError for what it cannot say."""
-    circles = list((written or {}).get("circles", ()))
-    polygons = list((written or {}).get("polygons", ()))
-    if any(not part.get("inclusion", True) for part in [*circles, *polygons]):
+    circles, polygons = (written.circles, written.polygons) if written is not None else ([], [])
+    if not all(part.inclusion for part in (*circles, *polygons)):
         raise ConfigurationError("the plan has a fence that keeps out, which a mission does not know: leave it out.")
     if len(circles) > 1 or len(polygons) > 1 or (circles and polygons):
         raise ConfigurationError("the plan has several fences, and a mission has one: leave one.")
     top_m = math.ceil(highest_m + _MARGIN_UP_M)
     note = f"a plan's fence has no top: {top_m} m was put in"
     if circles:
-        return {**_circle(circles[0]["circle"], origin), "max_height_m": top_m}, [note]
+        return {**_circle(circles[0].circle, origin), "max_height_m": top_m}, [note]
     if polygons:
-        return {"polygon_ne_m": _corners(polygons[0]["polygon"], origin), "max_height_m": top_m}, [note]
+        return {"polygon_ne_m": _corners(polygons[0].polygon, origin), "max_height_m": top_m}, [note]
     radius_m = math.ceil(furthest_m + _MARGIN_M)
     fence = {"radius_m": radius_m, "max_height_m": top_m}
     return fence, [f"the plan has no fence: one of {radius_m} m and {top_m} m up was put in"]
 
 
-def _circle(circle: dict[str, Any], origin: Origin) -> dict[str, Any]:
-    radius_m = float(circle["radius"])
-    latitude_deg, longitude_deg = circle["center"]
+def _circle(circle: Circle, origin: Origin) -> dict[str, Any]:
+    radius_m, (latitude_deg, longitude_deg) = circle.radius, circle.center
     north_m, east_m, _ = origin.position_of(Place(latitude_deg, longitude_deg, origin.place.altitude_m))
     if math.hypot(north_m, east_m) < _AT_HOME_M:
         return {"radius_m": radius_m}

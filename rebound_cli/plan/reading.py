@@ -11,7 +11,7 @@ from companion.messages import Vector3
 from companion.mission.items import MAX_SPEED_M_S
 from rebound_cli.plan import commands
 from rebound_cli.plan.fences import fence_of_plan
-from rebound_cli.plan.shape import fault_of
+from rebound_cli.plan.shape import Item, PlanShape, SimpleItem, whole_plan
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 
@@ -67,65 +67,61 @@ def mission_of_plan(plan: Any, name: str) -> tuple[dict[str, Any], Sequence[str]
     """The content of a mission file and notes on what was left out or put in. Raises PlanError."""
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan" or not isinstance(plan.get("mission"), dict):
         raise PlanError("this is no plan of QGroundControl: it has no fileType 'Plan' and mission.")
-    fault = fault_of(plan)
-    if fault is not None:
-        raise PlanError(f"this is no whole plan of QGroundControl: {fault}.")
-    mission = _Mission(Origin(_home(plan["mission"])))
-    items = list(_items(plan["mission"]))
+    try:
+        whole = whole_plan(plan)
+    except ValueError as fault:
+        raise PlanError(f"this is no whole plan of QGroundControl: {fault}.") from fault
+    mission = _Mission(Origin(_home(whole.mission.plannedHomePosition)))
+    items = list(_items(whole.mission.items))
     if not items:
         raise PlanError("the plan has no items.")
-    _take_off(mission, items, plan["mission"])
+    _take_off(mission, items, whole.mission.hoverSpeed)
     for item in items:
         mission.begins[item.jump_id] = len(mission.items)
         _add(mission, item)
     if not ({"land", "return"} & mission.items[-1].keys()):
         mission.items.append({"return": {}})
         mission.notes.append("the plan does not land: a return was put at its end")
-    mission.notes += _left_out(plan)
-    fence, fence_notes = fence_of_plan(plan.get("geoFence"), mission.origin, mission.furthest_m, mission.highest_m)
+    mission.notes += _left_out(whole)
+    fence, fence_notes = fence_of_plan(whole.geoFence, mission.origin, mission.furthest_m, mission.highest_m)
     data = {"name": name, "items": mission.items, "fence": fence}
     return data, [*mission.notes, *fence_notes]
 
 
-def _left_out(plan: dict[str, Any]) -> Iterator[str]:
+def _left_out(plan: PlanShape) -> Iterator[str]:
     """What of a plan is not of its items."""
-    if (plan.get("rallyPoints") or {}).get("points"):
+    if plan.rallyPoints is not None and plan.rallyPoints.points:
         yield "left out: rally points; a mission returns to where the vehicle was armed"
-    if (plan["mission"].get("vehicleType") or commands.QUADROTOR) not in commands.MULTICOPTERS:
+    if (plan.mission.vehicleType or commands.QUADROTOR) not in commands.MULTICOPTERS:
         yield "the plan was made for another kind of vehicle: only multicopters are flown"
 
 
-def _home(mission: dict[str, Any]) -> Place:
-    home = mission.get("plannedHomePosition")
-    if not isinstance(home, list) or len(home) < 2 or not all(isinstance(value, int | float) for value in home):
+def _home(home: Sequence[float] | None) -> Place:
+    if home is None or len(home) < 2:
         raise PlanError("the plan has no plannedHomePosition, to which its places could be related.")
     return Place(home[0], home[1], home[2] if len(home) > 2 else 0.0)
 
 
-def _items(mission: dict[str, Any]) -> Iterator[PlanItem]:
+def _items(items: Sequence[Item]) -> Iterator[PlanItem]:
     """Simple items, and those that surveys and other patterns are made of."""
-    for number, item in enumerate(mission.get("items", ()), start=1):
-        if item.get("type") == "SimpleItem":
+    for number, item in enumerate(items, start=1):
+        if item.type == "SimpleItem":
             yield _plan_item(item)
             continue
-        parts = item.get("TransectStyleComplexItem", {}).get("Items")
+        parts = item.TransectStyleComplexItem.Items
         if parts is None:
-            kind = item.get("complexItemType", item.get("type"))
+            kind = item.complexItemType or item.type
             raise PlanError(f"item {number} of the plan is a '{kind}', whose way the file does not state.")
         yield from map(_plan_item, parts)
 
 
-def _plan_item(item: dict[str, Any]) -> PlanItem:
-    try:
-        parameters = tuple(None if value is None else float(value) for value in item["params"])
-        if len(parameters) != 7:
-            raise ValueError
-        return PlanItem(int(item.get("doJumpId", 0)), int(item["command"]), int(item["frame"]), parameters)
-    except (KeyError, TypeError, ValueError) as error:
-        raise PlanError(f"item {item.get('doJumpId', '?')} of the plan is not complete.") from error
+def _plan_item(item: SimpleItem) -> PlanItem:
+    if item.params is None or len(item.params) != 7 or item.command is None or item.frame is None:
+        raise PlanError(f"item {item.doJumpId or '?'} of the plan is not complete.")
+    return PlanItem(item.doJumpId, item.command, item.frame, tuple(item.params))
 
 
-def _take_off(mission: _Mission, items: Sequence[PlanItem], written: dict[str, Any]) -> None:
+def _take_off(mission: _Mission, items: Sequence[PlanItem], speed_m_s: float | None) -> None:
     """A mission begins with one: the plan's own comes later to the front, one of ours is put in now."""
     if all(item.command != commands.TAKEOFF for item in items):
         first = next((item for item in items if item.command == commands.WAYPOINT), None)
@@ -135,9 +131,8 @@ def _take_off(mission: _Mission, items: Sequence[PlanItem], written: dict[str, A
         mission.items.append({"takeoff": {"height_m": round(-place[2], 3)}})
         mission.note_place((0.0, 0.0, place[2]))
         mission.notes.append("the plan does not take off: a take-off to the height of its first waypoint was put in")
-    speed_m_s = written.get("hoverSpeed")
-    if isinstance(speed_m_s, int | float) and speed_m_s > 0.0:
-        mission.items.append({"set_speed": {"speed_m_s": _speed(mission, float(speed_m_s))}})
+    if speed_m_s is not None and speed_m_s > 0.0:
+        mission.items.append({"set_speed": {"speed_m_s": _speed(mission, speed_m_s)}})
 
 
 def _add(mission: _Mission, item: PlanItem) -> None:

@@ -52,14 +52,16 @@ class Circle(_Part):
     center: Place
 
 
-class CircleFence(_Part):
+class _Fence(_Part):
+    inclusion: bool = True
+
+
+class CircleFence(_Fence):
     circle: Circle
-    inclusion: bool = True
 
 
-class PolygonFence(_Part):
+class PolygonFence(_Fence):
     polygon: list[Place]
-    inclusion: bool = True
 
 
 class GeoFence(_Part):
@@ -77,12 +79,11 @@ class PlanShape(_Part):
     rallyPoints: RallyPoints | None = None  # noqa: N815
 
 
-def fault_of(plan: object) -> str | None:
-    """Where the first part lies that is not as it must be, and how it is; None where all are."""
+def whole_plan(plan: object) -> PlanShape:
+    """Raises ValueError: where the first part lies that is not as it must be, and how it is."""
     try:
-        PlanShape.model_validate(plan)
+        return PlanShape.model_validate(plan)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        return f"{place}: {first['msg'][:1].lower()}{first['msg'][1:]}"
-    return None
+        raise ValueError(f"{place}: {first['msg'][:1].lower()}{first['msg'][1:]}") from error

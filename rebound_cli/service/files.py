@@ -5,6 +5,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from rebound_cli import exit_codes
+from rebound_cli.flights.kept import SERVICE_RUNS
 from rebound_cli.service.settings import ServiceSettings
 
 UNIT_NAME = "rebound.service"
@@ -12,7 +13,7 @@ UNIT = f"etc/systemd/system/{UNIT_NAME}"
 UDEV = "etc/udev/rules.d/90-rebound.rules"
 SYSUSERS = "etc/sysusers.d/rebound.conf"
 USER = "rebound"
-STATE_FOLDER = "/var/lib/rebound"
+STATE_FOLDER = SERVICE_RUNS.parent
 
 # The release of systemd that brought RestartSteps and RestartMaxDelaySec; older ones complain of them.
 BACK_OFF_SINCE = 254
@@ -120,7 +121,7 @@ def _restarting(is_guard: bool, systemd: int | None) -> list[str]:
         "Restart=on-failure",
         "RestartSec=1",
         "# The command line or the configuration is wrong: the next start would end the same way.",
-        f"RestartPreventExitStatus={' '.join(map(str, exit_codes.IN_VAIN))}",
+        f"RestartPreventExitStatus={' '.join(map(str, exit_codes.PERMANENT))}",
     ]
     if systemd is not None and systemd >= BACK_OFF_SINCE:
         # 1 s in the air, where it counts; after five failures in a row the time for which a vehicle is waited for.

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import rebound_cli
 from companion.errors import ReboundError
+from rebound_cli.run_folder import write_whole
 
 # ProtectHome= hides these from the service.
 _HIDDEN = ("/home", "/root", "/run/user")
@@ -75,12 +76,12 @@ class System:
     def write(self, path: str, text: str) -> None:
         """Whenever this ends, the file is whole: the old one or the new one."""
         file = self.root / path
-        file.parent.mkdir(parents=True, exist_ok=True)
-        half_written = file.with_name(file.name + ".part")
-        half_written.write_text(text, encoding="utf-8")
         # The service's user reads it, whatever the umask of whoever installs.
-        half_written.chmod(0o644)
-        half_written.replace(file)
+        if not file.parent.is_dir():
+            file.parent.mkdir(parents=True)
+            file.parent.chmod(0o755)
+        write_whole(file, text.encode())
+        file.chmod(0o644)
 
 
 def hidden_program() -> str | None:

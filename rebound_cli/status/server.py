@@ -10,7 +10,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,7 @@ class StatusServerError(ReboundError):
 
 
 class StatusServer:
-    """From `with` to its end. `about` is what does not change: which command, which folder."""
+    """Until `close`. `about` is what does not change: which command, which folder."""
 
     def __init__(self, path: Path, about: Mapping[str, Any]) -> None:
         """Raises StatusServerError."""
@@ -120,18 +120,11 @@ def is_answered(path: Path) -> bool:
         return probe.connect_ex(str(path)) == 0
 
 
-@contextlib.contextmanager
-def served(tell: Callable[[str], None], **about: Any) -> Iterator[StatusServer | None]:
+def served(tell: Callable[[str], None], **about: Any) -> contextlib.AbstractContextManager[StatusServer | None]:
     """None where the machine has no place for a socket, or the place is taken: `tell` is told of that."""
     path = socket_of_this_program()
-    server = None
-    if path is not None:
-        try:
-            server = StatusServer(path, about)
-        except StatusServerError as error:
-            tell(str(error))
     try:
-        yield server
-    finally:
-        if server is not None:
-            server.close()
+        return contextlib.nullcontext() if path is None else contextlib.closing(StatusServer(path, about))
+    except StatusServerError as error:
+        tell(str(error))
+        return contextlib.nullcontext()

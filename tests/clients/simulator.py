@@ -4,7 +4,6 @@ REBOUND_PYTHON names the interpreter in whose environment the simulator is insta
 """
 
 import os
-import select
 import socket
 import subprocess
 import sys
@@ -15,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-START_TIMEOUT_S = 60.0
 
 
 @dataclass(frozen=True)
@@ -44,8 +42,8 @@ def simulator(*options: str) -> Iterator[Simulator]:
     )
     assert process.stdin is not None and process.stdout is not None
     try:
-        ready, _, _ = select.select([process.stdout], [], [], START_TIMEOUT_S)
-        assert ready and process.stdout.readline().startswith(b"Simulated vehicle"), "the simulator did not start"
+        # Before it come lines on what is compiled, where nothing has been compiled yet.
+        assert any(line.startswith(b"Simulated vehicle") for line in process.stdout), "the simulator did not start"
         yield Simulator(companion, tcp)
     finally:
         process.stdin.close()

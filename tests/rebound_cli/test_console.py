@@ -99,11 +99,12 @@ def test_only_what_is_compiled_has_a_progress():
     with compiling_shown(console, "Compiling"):
         kernel(1)
     assert stream.getvalue().splitlines()[-1].startswith("Compiling: ")
-    # When it is called again, then nobody waits and nothing is shown
+    # When it is called again, or one is compiled that is not ours, then nothing is shown
     stream.truncate(0)
     stream.seek(0)
     with compiling_shown(console, "Compiling"):
         kernel(2)
+        numba.njit(lambda value: value - 1)(2)
     assert stream.getvalue() == ""
 
 

@@ -17,6 +17,7 @@ from rebound_cli.status.place import socket_of_this_program, sockets_to_ask
 from rebound_cli.status.server import StatusServer, StatusServerError, served
 
 WATCHING = Status("watching", "POSCTL", True, (1.0, 2.0, -3.0), 0.5, "armed", 12_000)
+ARMED = Event(500_000, "armed", "armed", {})
 HIT = Event(1_000_000, "detection", "hit 1: 30.0 m/s^2", {})
 
 
@@ -37,7 +38,7 @@ def hand_over(server, *events, running_s=5.0):
 
 
 def test_who_asks_hears_the_latest_state_and_how_old_it_is(server, path):
-    hand_over(server, HIT)
+    hand_over(server, ARMED, HIT)
     status = ask(path)
     assert status["command"] == "guard" and status["folder"] == "/runs/now" and status["pid"] == os.getpid()
     assert status["state"] == "watching" and status["armed"] is True and status["position_ned_m"] == [1.0, 2.0, -3.0]

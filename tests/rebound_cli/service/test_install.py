@@ -1,5 +1,6 @@
 """`rebound service` in a folder that stands for a system's root: what is written, kept, refused and taken away."""
 
+import os
 import shutil
 from argparse import Namespace
 from pathlib import Path
@@ -26,7 +27,7 @@ NEEDS_SYSTEMD = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reas
 
 @pytest.fixture
 def system(tmp_path, monkeypatch):
-    """One with systemd, in a folder; the interpreter of the tests may lie where a service cannot read it."""
+    """One with systemd, in a folder, of a careful administrator; the tests' interpreter may be hidden from services."""
     monkeypatch.setattr(command, "hidden_program", lambda: None)
     monkeypatch.setattr(check, "hidden_program", lambda: None)
     monkeypatch.setattr(shutil, "which", lambda program: f"/usr/bin/{program}")
@@ -38,8 +39,9 @@ def system(tmp_path, monkeypatch):
 
     monkeypatch.setattr(System, "call", call)
     (tmp_path / "etc").mkdir()
-    made = System(tmp_path)
-    return Namespace(system=made, root=tmp_path, called=called)
+    before = os.umask(0o077)
+    yield Namespace(system=System(tmp_path), root=tmp_path, called=called)
+    os.umask(before)
 
 
 def service(system, what, **options):
@@ -72,7 +74,9 @@ def test_a_guard_is_installed_enabled_and_taken_away_again(system, capsys):
     assert service(system, "install", guard=GUARD, connect=f"serial://{UART}:921600") == 0
     etc = {"etc/rebound/service.yaml", "etc/rebound/guard.yaml"}
     assert files(system.root) == etc | {SYSUSERS, UDEV, UNIT}
-    assert (system.root / UNIT).stat().st_mode & 0o777 == 0o644
+    # All of it can be read by the service's user
+    assert {(system.root / file).stat().st_mode & 0o777 for file in files(system.root)} == {0o644}
+    assert (system.root / "etc/rebound").stat().st_mode & 0o777 == 0o755
     at = f"--root={system.root}"
     assert system.called == [("systemd-sysusers", at, "rebound.conf"), ("systemctl", at, "enable", "rebound.service")]
     # And what is taken away leaves what a person wrote
@@ -195,7 +199,7 @@ def test_a_step_that_systemd_refuses_is_named(system, monkeypatch):
 def test_exit_codes_that_no_restart_mends_end_the_service(monkeypatch):
     monkeypatch.setattr("rebound_cli.guard.command.prepare_companion", lambda console: None)
     assert values(unit(), "RestartPreventExitStatus") == ["2 78"]
-    assert (exit_codes.USAGE, exit_codes.CONFIGURATION) == exit_codes.IN_VAIN
+    assert (exit_codes.USAGE, exit_codes.CONFIGURATION) == exit_codes.PERMANENT
     assert main(["guard", "--connect", "nowhere"]) == exit_codes.CONFIGURATION
     assert main(["guard", "--connect", UDP, "--config", "none.yaml"]) == exit_codes.CONFIGURATION
     # A cable that is not there yet is no fault of the configuration.
