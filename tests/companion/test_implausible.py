@@ -5,6 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.faults.packets import made
 from companion.detection.sight import Turning
 from companion.estimate.approach import VelocityFix
 from companion.estimate.history import MotionHistory
@@ -66,6 +67,30 @@ def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_res
     assert [Resets().follow([place(at_ms, north_m)], 5.0) for at_ms, north_m in ((0, 0.0), (20, 50.0))][1][0] == place(
         20, 50.0
     )
+
+
+def test_a_reset_moves_no_vehicle_and_is_told():
+    # Given a vehicle that hovers, and counts its resets
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 9}}, {"land": {}}])
+    f.run_to("mission")
+    f.run_for(1.0)
+
+    def counted(resets, later_us=0):
+        places = dict(zip(("x", "y", "z"), f.vehicle.position, strict=True)) | {"frame_id": 1, "child_frame_id": 1}
+        stamp = {"time_usec": f.vehicle.time_us + later_us, "reset_counter": resets, "q": [1.0, 0.0, 0.0, 0.0]}
+        return made("ODOMETRY", places | stamp)
+
+    attacked(f, [counted(0)])
+    before_m = list(f.vehicle.position)
+    # When its estimate jumps by 3 m north
+    f.vehicle.position[0] += 3.0
+    attacked(f, [counted(1, 1000), counted(1, 2000)])
+    f.run_for(1.0)
+    # Then it stays where it is, which it now calls 3 m further north, and the mission goes on
+    assert f.vehicle.position == pytest.approx([before_m[0] + 3.0, *before_m[1:]], abs=0.02)
+    assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0] + 3.0, abs=0.02)
+    assert f.event("estimate").data["jump_m"] == pytest.approx(3.0, abs=0.01)
+    assert f.companion.status().position_ned_m == pytest.approx(before_m, abs=0.02) and f.state == "mission"
 
 
 # --- the attitude
