@@ -8,10 +8,13 @@ import pytest
 from companion.flight.context import Target
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.held import HELD_S, NOTICED_S, Known, held_way, touched, unattended_text
+from companion.flight.limiting import Limiter
+from companion.flight.remembering import known_surfaces
 from companion.memory.patch import Patch
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
 from companion.recovery.interface import Moving
+from tests.companion.hostile import flight_in
 
 ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
@@ -169,6 +172,28 @@ def test_a_patch_counts_as_far_as_it_is_believed_to_go(east_m, is_held_back):
     _, said = bounded(Target(vehicle, 0.0, velocity, REST), around(velocity, [known], vehicle), FENCE, LIMITS)
     # Then it is held back where the wall is, and not beside it
     assert bool(said) is is_held_back
+
+
+def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remembers():
+    # Given a vehicle that comes off a wall 3 m north
+    f = flight_in("recovering")
+    f.run_for(0.2)
+    flown, record = f.companion.core.flight, f.companion.core.flight.collisions[-1]
+    # When something asks for 2 m/s back into it, in the recovery and after it
+    for state in ("recovering", "holding"):
+        f.run_to(state)
+        (wall,) = known_surfaces(flown)
+        assert wall.surface.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.05)
+        asked = Target(flown.vehicle.history.latest().position_ned_m, 0.0, (2.0, 0.5, 0.0), REST)
+        sent = Limiter().passed(flown, asked, has_floor=True, moved=True, now_us=f.now_us)
+        # Then it is held back
+        assert sent.velocity_ned_m_s is None or sent.velocity_ned_m_s[0] < 1.9
+        assert (wall.patch is None) is (state == "recovering")
+    # and a hit that the vehicle is to come to rest behind holds nothing back
+    flown.patches, record.is_over = (), False
+    assert len(known_surfaces(flown)) == 1
+    record.setpoint_ned_m = (4.0, 0.0, -1.5)
+    assert known_surfaces(flown) == []
 
 
 def test_what_a_longer_loss_costs_is_told_in_metres():

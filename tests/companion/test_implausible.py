@@ -12,7 +12,15 @@ from companion.estimate.history import MotionHistory
 from companion.estimate.resets import Resets
 from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import Claim, Leap
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, PositionSetpoint, Refused
+from companion.messages import (
+    Attitude,
+    ImuSample,
+    LocalPosition,
+    Odometry,
+    PositionSetpoint,
+    PositionTarget,
+    Refused,
+)
 from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
 from tests.companion.hostile import Attacker, attacked, flight_in
 
@@ -42,12 +50,14 @@ def test_a_reset_moves_what_is_heard_and_what_is_sent_and_the_vehicle_stays_wher
     # Then the flight goes on where it was, and the setpoint is sent where the vehicle now thinks that this is
     assert [sample.position_ned_m[0] for sample in heard] == pytest.approx([0.04, 0.04])
     assert resets.sent(PositionSetpoint(0, (1.0, 0.0, -1.0), None)).position_ned_m == pytest.approx((4.0, 0.0, -1.0))
+    (echo,) = resets.follow([PositionTarget((4.0, 0.0, -1.0))], 5.0)
+    assert echo.position_ned_m == pytest.approx((1.0, 0.0, -1.0)), "a setpoint comes back as it was meant"
 
 
 def test_one_forged_reset_moves_nothing_and_two_only_until_the_vehicle_speaks_again():
     resets = Resets()
     resets.follow([told(0, 0.0)], 5.0)
-    resets.follow([told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9)], 5.0)
+    resets.follow([told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9, 50.0)], 5.0)
     assert resets.shift_ned_m == pytest.approx((4.0, 0.0, 0.0))
     resets.follow([told(40, 0.0), told(50, 0.0)], 5.0)
     assert resets.shift_ned_m == STILL
