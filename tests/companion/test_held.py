@@ -9,9 +9,11 @@ from companion.flight.context import Target
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.held import HELD_S, NOTICED_S, Known, held_way, touched, unattended_text
 from companion.flight.limiting import Limiter
+from companion.flight.plan import mission_lines
 from companion.flight.remembering import known_surfaces
 from companion.memory.patch import Patch
 from companion.mission.fence import Fence
+from companion.mission.model import Mission
 from companion.mission.policy import Limits
 from companion.recovery.interface import Moving
 from tests.companion.hostile import flight_in
@@ -200,3 +202,12 @@ def test_what_a_longer_loss_costs_is_told_in_metres():
     text = unattended_text(2.5)
     assert "COM_OF_LOSS_T" in text and "1 s" in text and "2.5 m" in text
     assert math.isclose(HELD_S, 1.0)
+    # in the plan by the fastest item
+    items = [
+        {"takeoff": {"height_m": 2}},
+        {"go_to": {"position_ned_m": [1, 0, -2], "speed_m_s": 1.7}},
+        {"velocity": {"velocity_ned_m_s": [1.5, 2.0, 0], "duration_s": 1}},
+        {"land": {}},
+    ]
+    lines = mission_lines(Mission.model_validate({"name": "fast", "items": items}))
+    assert f"Unattended {text}" in lines

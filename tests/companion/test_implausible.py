@@ -21,7 +21,7 @@ from companion.messages import (
     PositionTarget,
     Refused,
 )
-from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
+from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import Attacker, attacked, flight_in
 
 STILL = (0.0, 0.0, 0.0)
@@ -173,21 +173,38 @@ def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
 # --- silence
 
 
-def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing():
-    f = flight(FakeVehicle())
-    f.run_to("mission")
-    f.run_for(1.0)
+def setpoint(frame):
+    return mav.MAVLink(None).decode(bytearray(frame))
+
+
+@pytest.mark.parametrize("state", ["mission", "returning"])
+def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing(state):
+    f = flight_in(state)
+    f.run_for(0.7)
     # When positions stop coming for longer than the detector may be without a sample
     f.vehicle.no_positions = True
     f.run_for(0.4)
     held = f.setpoints_since(f.now_us - 100_000)
-    places = {mav.MAVLink(None).decode(bytearray(frame)).x for _, frame in held}
-    # Then the setpoint stands still, and goes on from there
-    assert len(held) > 3 and len(places) == 1
+    places = {setpoint(frame).x for _, frame in held}
+    # Then the setpoint stands still, asks for no velocity, and goes on from there
+    assert len(held) > 3 and len(places) == 1 and all(setpoint(frame).type_mask & 0x038 == 0x038 for _, frame in held)
     f.vehicle.no_positions = False
     f.run_for(0.1)
     _, frame = f.setpoints_since(f.now_us - 30_000)[-1]
-    assert mav.MAVLink(None).decode(bytearray(frame)).x - places.pop() < 2.0 * 0.1 + 0.01
+    assert abs(setpoint(frame).x - places.pop()) < 2.0 * 0.1 + 0.01
+
+
+def test_a_step_that_comes_late_catches_up_with_nothing():
+    f = flight_in("mission")
+    f.run_for(0.7)
+    # Given a position in the step that comes, half a second late
+    f.run_until(lambda: f.vehicle.ticks % 5 == 4)
+    _, before = f.setpoints_since(f.now_us - 30_000)[-1]
+    f.now_us += 500_000
+    f.step()
+    # Then the setpoint goes on from where it was
+    _, after = f.setpoints_since(f.now_us - 1)[-1]
+    assert setpoint(after).x - setpoint(before).x < 2.0 * 0.05
 
 
 def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
