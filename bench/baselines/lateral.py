@@ -13,10 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bench.baselines.noise import NoiseFloor
 from companion.detection.interface import DetectorState, Impact, Phase, Situation
-from companion.detection.noise import MEMORY_US, NoiseFloor
 from companion.messages import ImuSample, MessageId, Sample, Vector3
 from companion.written import Positive, Written
+from rebound_cli.logs.shaking import MEMORY_US
 
 
 class LateralConfig(Written):

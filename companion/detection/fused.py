@@ -3,8 +3,8 @@
 By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs of a
 contact, each against what this vehicle shows in its own flight:
 
-* sideways: a departure of f_x, f_y from their running mean, with room for the drag that changes as
-  the vehicle turns;
+* sideways: a departure of f_x, f_y from their running mean, with room for the drag that changes as the
+  vehicle turns;
 * vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
   fall, a dropped payload and every manoeuvre stay inside;
 * aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
@@ -35,6 +35,7 @@ from companion.detection.fused_state import FusedState
 from companion.detection.hidden_signs import Hidden, dipped, kicked, spun, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
+from companion.estimate.history import ODOMETRY_KEPT_US
 from companion.estimate.rotation import body_to_ned
 from companion.messages import (
     Attitude,
@@ -57,8 +58,6 @@ WORSE = 1.5
 # where the hit seemed to have been measured whole, which a slow stream's samples, a quarter of the time, cannot know.
 # Those steps reach 0.25 m/s (random missions at 50 Hz); a second hit of 0.5 m/s makes twice that.
 SWING_US, SWINGING = 1_500_000, 3.0
-# Velocities of ODOMETRY are taken for as long as they come; LOCAL_POSITION_NED has no reset counter.
-ODOMETRY_KEPT_US = 500_000
 
 
 class FusedDetector:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from companion.estimate.guards import MOTORS_RAD_S2
+from companion.estimate.history import STAMP_RESOLUTION_US
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.written import Positive, Written
 
@@ -14,9 +15,6 @@ RATE_WINDOW_US = 1_000_000
 # because two that happen to be short would pass a slower stream, and at 50 Hz they take 0.1 s.
 PROOF_SAMPLES = 5
 PROOF_US = 100_000
-
-# ATTITUDE_QUATERNION.time_boot_ms is cut to whole milliseconds.
-STAMP_US = 1_000
 
 # Least threshold of a detector that is told to be blind.
 BLIND_M_S2 = 30.0
@@ -72,8 +70,8 @@ class Sameness:
 
 @dataclass(slots=True)
 class Turning:
-    """Whether an attitude is one that the vehicle could have turned to. Another counts from the second on that agrees
-    with it, as after the estimator's reset: one forged or broken message turns no sum of the accelerometer's."""
+    """Whether the vehicle can have turned to an attitude. One that it cannot have turned to counts from the second on
+    that agrees with it, as after the estimator's reset. One forged or broken message turns no sum of accelerations."""
 
     latest: Attitude | None = None
     doubted: Attitude | None = None
@@ -86,19 +84,16 @@ class Turning:
 
     def attitude(self, sample: Attitude) -> bool:
         """Take one attitude; whether it counts."""
-        if not self._leads_to(self.latest, sample) and (
-            self.doubted is None or not self._leads_to(self.doubted, sample)
-        ):
+        known = [before for before in (self.latest, self.doubted) if before is not None]
+        if known and not any(self._leads_to(before, sample) for before in known):
             self.doubted = sample
             return False
         self.latest, self.doubted, self.most_rad_s = sample, None, 0.0
         return True
 
-    def _leads_to(self, before: Attitude | None, sample: Attitude) -> bool:
-        """By its rates, and by what motors may have changed them by since."""
-        if before is None:
-            return True
-        over_s = 1e-6 * (abs(sample.time_boot_us - before.time_boot_us) + STAMP_US)
+    def _leads_to(self, before: Attitude, sample: Attitude) -> bool:
+        """By the fastest rate, and by what motors may have changed it by since."""
+        over_s = 1e-6 * (abs(sample.time_boot_us - before.time_boot_us) + STAMP_RESOLUTION_US)
         (a, b, c, d), (w, x, y, z) = before.attitude_wxyz, sample.attitude_wxyz
         turned_rad = 2.0 * math.acos(min(1.0, abs(a * w + b * x + c * y + d * z)))
         return turned_rad <= (self.most_rad_s + MOTORS_RAD_S2 * over_s) * over_s

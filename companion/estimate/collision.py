@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from filterpy.kalman import KalmanFilter
 
+from companion.estimate.history import STAMP_RESOLUTION_US
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
 
 # The acceleration of half a second ago says nothing about now, and 25 velocities are enough.
 BATCH_US = 500_000
-# LOCAL_POSITION_NED.time_boot_ms is cut to whole milliseconds: a stamp may be this much before its sample.
-STAMP_RESOLUTION_US = 1_000
 # Before the first sample nothing is known of the acceleration but the vehicle's limits (about 0.3 g).
 INITIAL_ACCELERATION_M_S2 = 3.0
 

@@ -1,6 +1,7 @@
 """The last two seconds of motion, in the vehicle's boot clock."""
 
 from collections import deque
+from itertools import islice
 
 from companion.messages import LocalPosition
 
@@ -8,6 +9,11 @@ from companion.messages import LocalPosition
 KEPT_US = 2_000_000
 # A time this far back is not a reordered packet but a rebooted vehicle.
 REBOOT_US = 1_000_000
+# PX4 cuts time_boot_ms to whole milliseconds: a stamp may be this much before its sample.
+STAMP_RESOLUTION_US = 1_000
+# ODOMETRY counts as coming for as long after the latest: 15 of PX4's default 30 Hz. Until then its velocities and its
+# reset counter are the ones to go by.
+ODOMETRY_KEPT_US = 500_000
 
 
 class MotionHistory:
@@ -35,8 +41,7 @@ class MotionHistory:
 
     def newest(self, count: int) -> list[LocalPosition]:
         """The newest of all, the very newest first."""
-        samples = self._samples
-        return [samples[-number] for number in range(1, min(count, len(samples)) + 1)]
+        return list(islice(reversed(self._samples), count))
 
     def latest(self) -> LocalPosition | None:
         return self._samples[-1] if self._samples else None

@@ -9,9 +9,9 @@ from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.estimate.approach import BATCH_US, VelocityFix, free_until, position_at, velocity_at
 from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
-from companion.estimate.collision import STAMP_RESOLUTION_US, ContactMotion, motion_before_contact
+from companion.estimate.collision import ContactMotion, motion_before_contact
 from companion.estimate.facing import normal_by, whole_normal
-from companion.estimate.history import MotionHistory
+from companion.estimate.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US, MotionHistory
 from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
 from companion.estimate.push import Push, unit
 from companion.estimate.rotation import body_to_ned, turned
@@ -22,8 +22,6 @@ from companion.mission.config import EstimateConfig
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
-# Velocities of ODOMETRY are taken for as long as they come: they have microseconds and the reset counter.
-ODOMETRY_KEPT_US = 500_000
 # After a contact the estimate swings (delay, a filter's switching): velocities count again after this.
 REST_US = 150_000
 # PX4 sends VIBRATION every two seconds by default.

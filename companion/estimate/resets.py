@@ -1,39 +1,37 @@
-"""A frame that goes on where the vehicle's own jumps: PX4's estimator resets its position, and shifts no setpoint.
+"""A local frame that stays where it is when PX4's estimator resets its position, which moves no setpoint along.
 
-What is heard is moved back by the jumps so far, what is sent is moved on by them: the vehicle stays where it is, and so
-does all that is known around it. ODOMETRY says when (`reset_counter`); its place then is not where its velocity led.
+What is heard is moved back by the resets so far, what is sent is moved on by them: the vehicle stays where it is. So
+does all that is known around it. ODOMETRY counts the resets (`reset_counter`). The jump is what lies between its place
+after a reset and where its velocity led.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from companion.mavlink.bounds import VELOCITY_M_S
+from companion.estimate.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US
 from companion.messages import LocalPosition, Odometry, PositionSetpoint, PositionTarget, Refused, Sample, Vector3
+from companion.messages.bounds import VELOCITY_M_S
 
-# For as long after an ODOMETRY its counter is heard: 15 of PX4's default 30 Hz.
-TOLD_US = 500_000
-# LOCAL_POSITION_NED.time_boot_ms is cut to whole milliseconds.
-STAMP_US = 1_000
 STILL: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
 class Resets:
-    """A reset counts from the second message on that tells of it; one that was forged or broken moves nothing."""
+    """A reset counts from the second message on that tells of it: one forged or broken message moves nothing."""
 
     shift_ned_m: Vector3 = STILL
-    """From the frame that goes on to the vehicle's."""
+    """From this frame to the vehicle's."""
     _shifts: dict[int, Vector3] = field(default_factory=dict)
-    """By the counters of before: of a counter that comes back the jump is known."""
+    """By earlier counters: a counter that comes back brings its shift back."""
     _latest: Odometry | None = None
     _first: Odometry | None = None
-    """The first message with another counter."""
+    """The first message with another counter than the latest's."""
     _place: LocalPosition | None = None
     """The latest one believed; None after a reset."""
 
     def follow(self, samples: Sequence[Sample], most_m: float) -> Sequence[Sample]:
-        """What was heard, in the frame that goes on. A jump of more than `most_m` is no matter of this frame."""
+        """What was heard, in this frame. A jump of more than `most_m` does not shift it."""
         return [self._moved(sample, most_m) for sample in samples]
 
     def _moved(self, sample: Sample, most_m: float) -> Sample:
@@ -55,15 +53,15 @@ class Resets:
         return sample
 
     def _jumps(self, sample: LocalPosition) -> bool:
-        """Where resets are counted, a place that no velocity leads to is none; nor is the next, for as long."""
+        """Whether no velocity that EKF2 can have leads to a place, while ODOMETRY comes and counts no reset."""
         place, told = self._place, self._latest
         if place is None or told is None:
             return False
         over_us = sample.time_boot_us - place.time_boot_us
-        is_told = over_us >= 0 and abs(sample.time_boot_us - told.time_boot_us) < TOLD_US
-        return is_told and math.dist(sample.position_ned_m, place.position_ned_m) > VELOCITY_M_S * 1e-6 * (
-            over_us + STAMP_US
-        )
+        if over_us < 0 or abs(sample.time_boot_us - told.time_boot_us) >= ODOMETRY_KEPT_US:
+            return False
+        most_m = VELOCITY_M_S * 1e-6 * (over_us + STAMP_RESOLUTION_US)
+        return math.dist(sample.position_ned_m, place.position_ned_m) > most_m
 
     def _hear(self, sample: Odometry, most_m: float) -> None:
         latest, first = self._latest, self._first
@@ -87,7 +85,7 @@ class Resets:
         return (n, e, d)
 
     def sent(self, setpoint: PositionSetpoint) -> PositionSetpoint:
-        """A setpoint as the vehicle understands it."""
+        """A setpoint in the vehicle's own frame."""
         if self.shift_ned_m == STILL:
             return setpoint
         x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))

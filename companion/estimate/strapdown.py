@@ -14,7 +14,7 @@ ATTITUDE_KEPT_S = 0.1
 LONGEST_GAP_US = 100_000
 # A velocity that is held against the sum lags by no more than this (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
-# No thrust holds a vehicle on its side: a lean is taken for no more than 87 degrees.
+# Cosine of 87 degrees, for a division that stays finite: no lean holds a vehicle up that lies on its side.
 LEAST_UP = 0.05
 
 
@@ -29,13 +29,13 @@ class Strapdown:
     acceleration_ned_m_s2: Vector3 = ZERO
     sum_ned_m_s: Vector3 = ZERO
     by_rates_wxyz: Quaternion | None = None
-    """The attitude by the rates alone, from the last that was told right; None while it is told right.
+    """The attitude by the rates alone, from the last one told that was right; None while those told are right.
 
-    A filter that puts a velocity right takes part of its error for a tilt, the gyroscopes do not: of 2.4 m/s that a
-    real PX4 had missed it made 4 degrees, for more than a second (docs/px4.md).
+    A filter that puts a velocity right takes part of its error for a tilt. Gyroscopes do not. Of 2.4 m/s that a real
+    PX4 had missed it made 4 degrees, for more than a second (docs/px4.md).
     """
     level_leans_m_s2: Vector3 = ZERO
-    """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; none while that is right."""
+    """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; zero while that is right."""
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_right: bool = True) -> None:
         behind_s = 1e-6 * (self.time_boot_us - self.attitude_boot_us)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
@@ -46,7 +47,6 @@ class CollisionRecord:
     contact_ended_boot_us: int
     impulse_m_s: float
     climb: Climb
-    recovering_since_us: int = 0  # when the first came of the hits that the vehicle has not settled between
     doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
     inherits_doubt: bool = False  # from an earlier hit
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
@@ -106,10 +106,9 @@ class CollisionRecord:
         if self.claim is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
         claim, self.claim = self.claim, None
-        found = claim.is_contradicted(self.fixes)
-        if isinstance(claim, Leap) and not found:
-            found = claim.stays_in_place(places, position_noise_m)
-        return found
+        if claim.is_contradicted(self.fixes):
+            return True
+        return isinstance(claim, Leap) and claim.stays_in_place(places, position_noise_m)
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""
@@ -173,3 +172,8 @@ class CollisionRecord:
             overshoot_m=self.overshoot_m,
             rebound_speed_m_s=self.rebound_speed_m_s(),
         )
+
+
+def in_one_recovery(records: Sequence[CollisionRecord]) -> list[CollisionRecord]:
+    """The last hits, the newest first, between which the vehicle has not settled."""
+    return list(takewhile(lambda record: not record.is_over, reversed(records)))

@@ -29,7 +29,8 @@ class Connect:
         if self._measuring_since_us is None:
             self._send_requests(flight, self._requests, inputs, now_us)
             return None
-        if flight.is_silent or now_us - self._measuring_since_us < flight.mission.companion.streams.window_s * 1e6:
+        window_us = flight.mission.companion.streams.window_s * 1e6
+        if flight.is_silent(now_us) or now_us - self._measuring_since_us < window_us:
             return None
         return self._judge(flight, now_us)
 
@@ -78,7 +79,7 @@ class Ready:
         if not self._shown:
             self._shown = True
             flight.tell(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
-        if flight.is_silent or not flight.plan_confirmed:
+        if flight.is_silent(now_us) or not flight.plan_confirmed:
             return None
         complaint = ground_check(flight)
         return Move(Trigger.REFUSED, complaint) if complaint is not None else Move(Trigger.PLAN_CONFIRMED)

@@ -142,14 +142,13 @@ class FlightContext:
     command_client: CommandClient = field(default_factory=CommandClient)
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
-    is_silent: bool = False  # for longer than a silent link is put up with
     was_silent: bool = False  # since the streams were asked for; if it was restarted meanwhile it has forgotten them
     target: Target | None = None  # as last streamed
     is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
     stepped_us: int | None = None  # when the step before was
     way_us: int = 0  # a clock that stands still while no position comes: nobody flies on who does not hear the vehicle
-    is_heard: bool = True
+    is_heard: bool = True  # a position has come within as long as the detector may be without a sample
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
@@ -219,10 +218,12 @@ class FlightContext:
         """How long nothing has been heard of the vehicle."""
         return (now_us - self.vehicle.last_heard_us) * 1e-6
 
+    def is_silent(self, now_us: int) -> bool:
+        """Whether a vehicle that is known has not been heard for longer than a silent link is put up with."""
+        return self.vehicle.identity is not None and self.silent_s(now_us) > self.mission.companion.link.silence_s
+
     def note_silence(self, now_us: int) -> None:
-        known = self.vehicle.identity is not None
-        self.is_silent = known and self.silent_s(now_us) > self.mission.companion.link.silence_s
-        self.was_silent |= self.is_silent
+        self.was_silent |= self.is_silent(now_us)
 
     def may_ask(self, now_us: int) -> bool:
         """Whether a command that moves a held vehicle may leave: not on old news, which the pilot may have made untrue.

@@ -83,7 +83,7 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | Non
         if silent_s > link.heartbeat_wait_s:
             return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
         flight.note_silence(now_us)
-        if flight.is_silent or not flight.was_silent:
+        if flight.is_silent(now_us) or not flight.was_silent:
             return None
         flight.tell(now_us, "link", HEARD_AGAIN)
         return Move(Trigger.HEARD_AGAIN)

@@ -12,20 +12,21 @@ from dataclasses import dataclass, replace
 
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
-from companion.flight.held import HELD_S, PLACE_PER_S, VELOCITY_PER_S, Known, held_way
+from companion.flight.held import HELD_S, Known, held_way
 from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
+from companion.recovery.climb import HEIGHT_PER_S
 from companion.recovery.direction import plus, split
+from companion.recovery.height import VELOCITY_GAIN_PER_S
 from companion.recovery.interface import Moving
 from companion.recovery.room import Surface
 from companion.recovery.way import REST
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
-HEIGHT_GAIN_PER_S, VELOCITY_GAIN_PER_S = PLACE_PER_S[2], VELOCITY_PER_S[2]
 # How far from a height a velocity beside it leads within HELD_S, over that velocity.
-_LEADS_S = (1.0 - math.exp(-HEIGHT_GAIN_PER_S * HELD_S)) / HEIGHT_GAIN_PER_S
+_LEADS_S = (1.0 - math.exp(-HEIGHT_PER_S * HELD_S)) / HEIGHT_PER_S
 # What is taken from a setpoint is found by halving: to 3 %.
 _HALVINGS = 5
 
@@ -200,8 +201,10 @@ def _sides(way: Sequence[Vector3], origin: Vector3 | None, fence: Fence) -> list
     if origin is None:
         return []
     places = [(n - origin[0], e - origin[1]) for n, e, _ in way]
+    if not fence.contains(*places[0]):
+        return []
     furthest_m, sides = 0.0, list[Known]()
-    for place in places[1:] if fence.contains(*places[0]) else []:
+    for place in places[1:]:
         inside = fence.nearest_inside(*place)
         beyond_m = math.dist(inside, place)
         if beyond_m > furthest_m + _ROUNDING_M:

@@ -16,20 +16,23 @@ from companion.flight.context import Target
 from companion.memory.patch import Patch
 from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
+from companion.recovery.climb import HEIGHT_PER_S
 from companion.recovery.direction import plus
+from companion.recovery.height import VELOCITY_GAIN_PER_S
 from companion.recovery.interface import Moving
 from companion.recovery.room import BEHIND_M, Surface
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
 # PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
 HELD_S = 1.0
-PLACE_PER_S = (0.95, 0.95, 1.0)
-VELOCITY_PER_S = (1.8, 1.8, 4.0)
-# PX4's commander looks now and then: of 1 s it made 1.03 to 1.11 s.
+PLACE_PER_S = (0.95, 0.95, HEIGHT_PER_S)
+VELOCITY_PER_S = (1.8, 1.8, VELOCITY_GAIN_PER_S)
+# PX4 notices the silence late: with 1 s set, after 1.03 to 1.11 s (bench/notes/kills.md).
 NOTICED_S = 0.11
-# What PX4's own modes brake with: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
+# PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
 BRAKES_M_S2 = 3.0
-# What it brings to rest after a lean is its estimate, which is wrong about it; a second later that is right again.
+# After a lean PX4 brings to rest what its estimate says, which is wrong. It was right again after 0.4 s with the
+# parameters of `rebound airframe px4`, after 1.2 to 1.5 s with PX4's own (docs/px4.md).
 REPAIRED_S = 1.0
 # At a rebound of 1 m/s a look every 0.2 m.
 _TIMES_S = tuple((HELD_S + NOTICED_S) * look / 6 for look in range(1, 7))

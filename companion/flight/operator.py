@@ -22,9 +22,8 @@ _BLIND = -1.0
 _COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 # Slower than this a hit came to the vehicle, and from where is told by the push.
 _LEAST_SPEED_M_S = 0.3
-
-
 # A ground station shows a text for some seconds and keeps a list: more of one subject pushes all others out of sight.
+# Once a second, as a HEARTBEAT.
 TEXT_INTERVAL_US = 1_000_000
 
 

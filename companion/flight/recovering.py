@@ -9,7 +9,7 @@ from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, overtaken
-from companion.flight.collision import CollisionRecord
+from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.confirming import Claim, Leap, claim_of
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
@@ -42,6 +42,7 @@ class Recover:
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._record = flight.collisions[-1]
+        self._first_hit_us = in_one_recovery(flight.collisions)[-1].detected_at_us
         self._law = _law(flight)
         self._started_us = now_us
         self._contact = self._record.contact
@@ -112,7 +113,7 @@ class Recover:
                 flight.tell(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
         timeout_s = flight.mission.companion.settled.timeout_s
-        if now_us - record.recovering_since_us > timeout_s * 1e6:
+        if now_us - self._first_hit_us > timeout_s * 1e6:
             record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.tell(now_us, "recovered", text, settled_after_s=None)
@@ -225,7 +226,6 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     mission, impact = flight.mission, estimate.impact
     normal = away_from(estimate.normal_ned)
     law = _law(flight)
-    before = flight.collisions[-1] if flight.collisions else None
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
     doubted, behind = _doubted(flight), overtaken(flight, impact.specific_force_frd_m_s2, estimate.velocity_ned_m_s)
     if behind is not None:
@@ -256,7 +256,6 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
         inherits_doubt=doubted is not None,
         climb=climb,
-        recovering_since_us=now_us if before is None or before.is_over else before.recovering_since_us,
         is_behind=behind is not None,
         claim=_claim(flight, estimate),
     )
@@ -305,9 +304,7 @@ def _allowed(
 def _surfaces(law: RecoveryLaw, earlier: Sequence[CollisionRecord]) -> list[Surface]:
     """What was hit before in the same recovery, each with the distance that its own recovery wants."""
     surfaces: list[Surface] = []
-    for record in reversed(earlier):
-        if record.is_over:
-            break
+    for record in in_one_recovery(earlier):
         contact = replace(record.contact, normal_ned=record.normal_ned)
         touched = Surface(contact.position_ned_m, contact.normal_ned, 0.0)
         wanted = law.goal_ned_m(contact, law.expected(contact))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from companion.flight.collision import CollisionRecord
+from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
 from companion.flight.held import Known, touched
 from companion.flight.states import Trigger
@@ -11,6 +11,7 @@ from companion.memory.patch import Patch, Touch
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import Surroundings
 from companion.memory.touching import touch_of
+from companion.messages import Vector3
 from companion.recovery.direction import plus
 from companion.recovery.interface import Contact
 from companion.recovery.room import Surface
@@ -59,11 +60,7 @@ def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface
     reach_m = flight.mission.companion.estimate.reach_m
     touch = touch_of(place, contact.velocity_ned_m_s, contact.normal_ned, False, reach_m, 0)
     return [
-        Surface(
-            flight.local_ned_m(plus(patch.centre_ned_m, reach_m, patch.normal_ned)),
-            patch.normal_ned,
-            flight.mission.obstacles.margin_m,
-        )
+        Surface(_touching_ned_m(flight, patch), patch.normal_ned, flight.mission.obstacles.margin_m)
         for patch in flight.patches
         if patch.faces(place, clearance_m) and not (touch is not None and is_same(patch, touch, clearance_m))
     ]
@@ -72,9 +69,7 @@ def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface
 def known_surfaces(flight: FlightContext) -> list[Known]:
     """What a setpoint must not lead into: what has been hit in this recovery, and what ways are planned around."""
     known = []
-    for record in reversed(flight.collisions):
-        if record.is_over:
-            break
+    for record in in_one_recovery(flight.collisions):
         surface = touched(record.contact.position_ned_m, record.contact.normal_ned)
         # One past which the vehicle has slid, and where it is to come to rest behind, is in nobody's way.
         if surface.off_m(record.setpoint_ned_m) > 0.0:
@@ -82,9 +77,15 @@ def known_surfaces(flight: FlightContext) -> list[Known]:
     if flight.patches and flight.origin_ned_m is not None:
         reach_m = flight.mission.companion.estimate.reach_m
         for patch in surroundings(flight).patches:
-            centre = flight.local_ned_m(plus(patch.centre_ned_m, reach_m, patch.normal_ned))
-            known.append(Known(touched(centre, patch.normal_ned), patch, flight.origin_ned_m, reach_m))
+            surface = touched(_touching_ned_m(flight, patch), patch.normal_ned)
+            known.append(Known(surface, patch, flight.origin_ned_m, reach_m))
     return known
+
+
+def _touching_ned_m(flight: FlightContext, patch: Patch) -> Vector3:
+    """Where the vehicle's centre is when it touches the middle of a patch; local NED."""
+    reach_m = flight.mission.companion.estimate.reach_m
+    return flight.local_ned_m(plus(patch.centre_ned_m, reach_m, patch.normal_ned))
 
 
 def _with_hits(flight: FlightContext, hits: int) -> tuple[Patch, ...]:

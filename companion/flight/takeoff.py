@@ -40,7 +40,7 @@ class TakeOff:
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
-        self._stepped_us = flight.way_us
+        self._climbed_until_us = flight.way_us  # on the clock of ways
         attitude = flight.vehicle.attitude
         flight.yaw_rad = yaw_rad(attitude.attitude_wxyz) if attitude is not None else None
         self._yaw_rad = flight.yaw_rad
@@ -92,7 +92,7 @@ class TakeOff:
             return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
         self._step = Step.CLIMB
         self._started_us = flight.armed_at_us = now_us
-        self._stepped_us = flight.way_us
+        self._climbed_until_us = flight.way_us
         self._ground_ned_m = mean_position(flight)
         latest = flight.vehicle.history.latest()
         assert latest is not None, "a flight begins only with positions arriving"
@@ -110,8 +110,8 @@ class TakeOff:
         assert profile is not None
         limits = flight.mission.companion.flight
         if latest is not None and latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
-            self._climbing_s += (flight.way_us - self._stepped_us) * 1e-6
-        self._stepped_us = flight.way_us
+            self._climbing_s += (flight.way_us - self._climbed_until_us) * 1e-6
+        self._climbed_until_us = flight.way_us
         is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
         if is_up and self._climbing_s >= profile.duration_s:
             return Move(Trigger.TAKEN_OFF)

@@ -125,7 +125,7 @@ class GuardMachine:
             return Move(Trigger.REFUSED, inputs.flight.refusal)
         if inputs.flight.stop_reason is not None and TABLE.moves(self.state, Trigger.STOPPED):
             return Move(Trigger.STOPPED, inputs.flight.stop_reason)
-        return self._position_silent() if self.state in HOLDING else self._heard_again()
+        return self._position_silent() if self.state in HOLDING else self._heard_again(now_us)
 
     def _taken_by_another(self, inputs: GuardInputs) -> str | None:
         guard, flight = self.guard, self.guard.flight
@@ -152,11 +152,11 @@ class GuardMachine:
             return None
         return f"the link has been silent for {silent_s:.1f} s"
 
-    def _heard_again(self) -> Move | None:
+    def _heard_again(self, now_us: int) -> Move | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
         flight = self.guard.flight
         may_be_restarted = self.state is State.CONNECTING or flight.vehicle.armed is False
-        if not may_be_restarted or flight.is_silent or not flight.was_silent:
+        if not may_be_restarted or flight.is_silent(now_us) or not flight.was_silent:
             return None
         return Move(Trigger.STREAMS_GONE, HEARD_AGAIN)
 

@@ -65,7 +65,7 @@ class Connect:
         if self._measuring_since_us is None:
             self._ask(guard, self._commands, inputs, now_us)
             return None
-        if flight.is_silent or now_us - self._measuring_since_us < companion.streams.window_s * 1e6:
+        if flight.is_silent(now_us) or now_us - self._measuring_since_us < companion.streams.window_s * 1e6:
             return None
         return self._judge(guard, now_us)
 

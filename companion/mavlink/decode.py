@@ -13,15 +13,6 @@ from typing import Any
 from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.mavlink.bounds import (
-    ANGULAR_VELOCITY_RAD_S,
-    POSITION_M,
-    SPECIFIC_FORCE_M_S2,
-    THRUST_FRACTION,
-    TIME_US,
-    is_rotation,
-    within,
-)
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.frequent import FREQUENT
 from companion.mavlink.packet import (
@@ -57,6 +48,15 @@ from companion.messages import (
     TimeSyncAnswer,
     TimeSyncRequest,
     Vibration,
+)
+from companion.messages.bounds import (
+    ANGULAR_VELOCITY_RAD_S,
+    POSITION_M,
+    SPECIFIC_FORCE_M_S2,
+    THRUST_FRACTION,
+    TIME_US,
+    is_rotation,
+    within,
 )
 
 Frame = tuple[bytes, Sample | None]

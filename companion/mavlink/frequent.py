@@ -9,7 +9,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.mavlink.bounds import (
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Refused, Sample
+from companion.messages.bounds import (
     ANGULAR_VELOCITY_RAD_S,
     POSITION_M,
     SPECIFIC_FORCE_M_S2,
@@ -19,7 +20,6 @@ from companion.mavlink.bounds import (
     is_rotation,
     within,
 )
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Refused, Sample
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7

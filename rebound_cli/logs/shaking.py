@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.noise import MEMORY_US
 from companion.messages import ExtendedState, Heartbeat, LandedState, LocalPosition
 from rebound_cli.logs.log import Log
 
@@ -25,6 +24,9 @@ class Stage(Enum):
     LANDING = "landing"
 
 
+# The running mean's. Long enough for 25 samples at 50 Hz (a spread good to 15 %), short enough to have forgotten the
+# ground by the top of a take-off and to follow drag as the speed changes.
+MEMORY_US = 500_000
 # PX4's take-off ramp lasts MPC_TKO_RAMP_T, 3 s.
 TAKEOFF_US = 3_000_000
 # The land detector says "landed" a second or more after the touch; the slowest of four real landings took 2.4 s.

@@ -8,10 +8,15 @@ import pytest
 from companion.flight.context import Target
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.held import HELD_S, NOTICED_S, Known, held_way, touched, unattended_text
+from companion.flight.limiting import Limiter
+from companion.flight.plan import mission_lines
+from companion.flight.remembering import known_surfaces
 from companion.memory.patch import Patch
 from companion.mission.fence import Fence
+from companion.mission.model import Mission
 from companion.mission.policy import Limits
 from companion.recovery.interface import Moving
+from tests.companion.hostile import flight_in
 
 ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
@@ -171,7 +176,38 @@ def test_a_patch_counts_as_far_as_it_is_believed_to_go(east_m, is_held_back):
     assert bool(said) is is_held_back
 
 
+def test_a_flights_setpoints_keep_off_what_it_has_just_hit_and_off_what_it_remembers():
+    # Given a vehicle that comes off a wall 3 m north
+    f = flight_in("recovering")
+    f.run_for(0.2)
+    flown, record = f.companion.core.flight, f.companion.core.flight.collisions[-1]
+    # When something asks for 2 m/s back into it, in the recovery and after it
+    for state in ("recovering", "holding"):
+        f.run_to(state)
+        (wall,) = known_surfaces(flown)
+        assert wall.surface.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.05)
+        asked = Target(flown.vehicle.history.latest().position_ned_m, 0.0, (2.0, 0.5, 0.0), REST)
+        sent = Limiter().passed(flown, asked, has_floor=True, moved=True, now_us=f.now_us)
+        # Then it is held back
+        assert sent.velocity_ned_m_s is None or sent.velocity_ned_m_s[0] < 1.9
+        assert (wall.patch is None) is (state == "recovering")
+    # and a hit that the vehicle is to come to rest behind holds nothing back
+    flown.patches, record.is_over = (), False
+    assert len(known_surfaces(flown)) == 1
+    record.setpoint_ned_m = (4.0, 0.0, -1.5)
+    assert known_surfaces(flown) == []
+
+
 def test_what_a_longer_loss_costs_is_told_in_metres():
     text = unattended_text(2.5)
     assert "COM_OF_LOSS_T" in text and "1 s" in text and "2.5 m" in text
     assert math.isclose(HELD_S, 1.0)
+    # in the plan by the fastest item
+    items = [
+        {"takeoff": {"height_m": 2}},
+        {"go_to": {"position_ned_m": [1, 0, -2], "speed_m_s": 1.7}},
+        {"velocity": {"velocity_ned_m_s": [1.5, 2.0, 0], "duration_s": 1}},
+        {"land": {}},
+    ]
+    lines = mission_lines(Mission.model_validate({"name": "fast", "items": items}))
+    assert f"Unattended {text}" in lines

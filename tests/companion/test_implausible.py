@@ -5,14 +5,23 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.faults.packets import made
 from companion.detection.sight import Turning
 from companion.estimate.approach import VelocityFix
 from companion.estimate.history import MotionHistory
 from companion.estimate.resets import Resets
 from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import Claim, Leap
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, PositionSetpoint, Refused
-from tests.companion.fake_vehicle import LOITER, FakeVehicle, flight
+from companion.messages import (
+    Attitude,
+    ImuSample,
+    LocalPosition,
+    Odometry,
+    PositionSetpoint,
+    PositionTarget,
+    Refused,
+)
+from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import Attacker, attacked, flight_in
 
 STILL = (0.0, 0.0, 0.0)
@@ -41,12 +50,14 @@ def test_a_reset_moves_what_is_heard_and_what_is_sent_and_the_vehicle_stays_wher
     # Then the flight goes on where it was, and the setpoint is sent where the vehicle now thinks that this is
     assert [sample.position_ned_m[0] for sample in heard] == pytest.approx([0.04, 0.04])
     assert resets.sent(PositionSetpoint(0, (1.0, 0.0, -1.0), None)).position_ned_m == pytest.approx((4.0, 0.0, -1.0))
+    (echo,) = resets.follow([PositionTarget((4.0, 0.0, -1.0))], 5.0)
+    assert echo.position_ned_m == pytest.approx((1.0, 0.0, -1.0)), "a setpoint comes back as it was meant"
 
 
 def test_one_forged_reset_moves_nothing_and_two_only_until_the_vehicle_speaks_again():
     resets = Resets()
     resets.follow([told(0, 0.0)], 5.0)
-    resets.follow([told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9)], 5.0)
+    resets.follow([told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9, 50.0)], 5.0)
     assert resets.shift_ned_m == pytest.approx((4.0, 0.0, 0.0))
     resets.follow([told(40, 0.0), told(50, 0.0)], 5.0)
     assert resets.shift_ned_m == STILL
@@ -66,6 +77,30 @@ def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_res
     assert [Resets().follow([place(at_ms, north_m)], 5.0) for at_ms, north_m in ((0, 0.0), (20, 50.0))][1][0] == place(
         20, 50.0
     )
+
+
+def test_a_reset_moves_no_vehicle_and_is_told():
+    # Given a vehicle that hovers, and counts its resets
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 9}}, {"land": {}}])
+    f.run_to("mission")
+    f.run_for(1.0)
+
+    def counted(resets, later_us=0):
+        places = dict(zip(("x", "y", "z"), f.vehicle.position, strict=True)) | {"frame_id": 1, "child_frame_id": 1}
+        stamp = {"time_usec": f.vehicle.time_us + later_us, "reset_counter": resets, "q": [1.0, 0.0, 0.0, 0.0]}
+        return made("ODOMETRY", places | stamp)
+
+    attacked(f, [counted(0)])
+    before_m = list(f.vehicle.position)
+    # When its estimate jumps by 3 m north
+    f.vehicle.position[0] += 3.0
+    attacked(f, [counted(1, 1000), counted(1, 2000)])
+    f.run_for(1.0)
+    # Then it stays where it is, which it now calls 3 m further north, and the mission goes on
+    assert f.vehicle.position == pytest.approx([before_m[0] + 3.0, *before_m[1:]], abs=0.02)
+    assert f.vehicle.setpoints[-1][1].x == pytest.approx(before_m[0] + 3.0, abs=0.02)
+    assert f.event("estimate").data["jump_m"] == pytest.approx(3.0, abs=0.01)
+    assert f.companion.status().position_ned_m == pytest.approx(before_m, abs=0.02) and f.state == "mission"
 
 
 # --- the attitude
@@ -138,21 +173,38 @@ def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
 # --- silence
 
 
-def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing():
-    f = flight(FakeVehicle())
-    f.run_to("mission")
-    f.run_for(1.0)
+def setpoint(frame):
+    return mav.MAVLink(None).decode(bytearray(frame))
+
+
+@pytest.mark.parametrize("state", ["mission", "returning"])
+def test_who_does_not_hear_where_the_vehicle_is_flies_no_further_and_catches_up_with_nothing(state):
+    f = flight_in(state)
+    f.run_for(0.7)
     # When positions stop coming for longer than the detector may be without a sample
     f.vehicle.no_positions = True
     f.run_for(0.4)
     held = f.setpoints_since(f.now_us - 100_000)
-    places = {mav.MAVLink(None).decode(bytearray(frame)).x for _, frame in held}
-    # Then the setpoint stands still, and goes on from there
-    assert len(held) > 3 and len(places) == 1
+    places = {setpoint(frame).x for _, frame in held}
+    # Then the setpoint stands still, asks for no velocity, and goes on from there
+    assert len(held) > 3 and len(places) == 1 and all(setpoint(frame).type_mask & 0x038 == 0x038 for _, frame in held)
     f.vehicle.no_positions = False
     f.run_for(0.1)
     _, frame = f.setpoints_since(f.now_us - 30_000)[-1]
-    assert mav.MAVLink(None).decode(bytearray(frame)).x - places.pop() < 2.0 * 0.1 + 0.01
+    assert abs(setpoint(frame).x - places.pop()) < 2.0 * 0.1 + 0.01
+
+
+def test_a_step_that_comes_late_catches_up_with_nothing():
+    f = flight_in("mission")
+    f.run_for(0.7)
+    # Given a position in the step that comes, half a second late
+    f.run_until(lambda: f.vehicle.ticks % 5 == 4)
+    _, before = f.setpoints_since(f.now_us - 30_000)[-1]
+    f.now_us += 500_000
+    f.step()
+    # Then the setpoint goes on from where it was
+    _, after = f.setpoints_since(f.now_us - 1)[-1]
+    assert setpoint(after).x - setpoint(before).x < 2.0 * 0.05
 
 
 def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():

@@ -146,6 +146,23 @@ def test_at_the_end_nothing_waits_any_more():
     assert spoken([(0, "hit", "A"), (3, "hit", "B")], ends_at=5) == [(0, "A"), (5, "B")]
 
 
+def test_a_text_that_waits_leaves_when_its_second_is_over_and_with_the_flights_end_at_once():
+    f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"hold": {"duration_s": 9}}, {"land": {}}])
+    f.run_to("mission")
+    for text in ("first", "second"):
+        f.companion.note("late", text)
+        f.step()
+    f.run_for(1.5)
+    times = {message.text: t for t, message in sent(f, "STATUSTEXT")}
+    assert times["Second"] - times["First"] == 1_000_000
+    for text in ("third", "fourth"):
+        f.companion.note("late", text)
+        f.step()
+    f.companion.stop("Ctrl-C")
+    f.run_to_end(0.5)
+    assert "Fourth" in [message.text for _, message in sent(f, "STATUSTEXT")]
+
+
 def test_both_can_be_switched_off():
     f = flight(companion={"operator": {"status_texts": False, "values_hz": 0}})
     f.run_to_end()

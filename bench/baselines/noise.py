@@ -3,9 +3,7 @@
 import math
 from dataclasses import dataclass
 
-# Long enough for 25 samples at 50 Hz (a spread good to 15 %), short enough to have forgotten the ground by the
-# top of a take-off and to follow drag as the speed changes.
-MEMORY_US = 500_000
+from rebound_cli.logs.shaking import MEMORY_US
 
 
 @dataclass(frozen=True, slots=True)
