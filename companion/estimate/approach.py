@@ -1,7 +1,7 @@
 """v_c: the velocity just before a contact, from velocities with their real stamps and the accelerometer between them.
 
 The accelerometer's sum u (see `strapdown`) knows how the velocity changes, the vehicle's estimate where it is: the
-difference c = v - u is nearly constant, and what it drifts by is the accelerometer's bias. A Kalman filter (filterpy)
+difference c = v - u is nearly constant, and what it drifts by is the accelerometer's bias. A Kalman filter
 follows c, its slope and the estimate's delay, state [c (3), slope (3), delay]:
 
     v_k = c + u(t_k) - delay * a(t_k) + noise,      v_c = c + u(t_c)
@@ -14,9 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-from filterpy.kalman import KalmanFilter
 
+from companion.estimate.kalman import Floats, KalmanFilter
 from companion.estimate.strapdown import LONGEST_DELAY_US
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
@@ -81,12 +80,14 @@ def velocity_at(
     batch = _thinned([fix for fix in fixes if contact_boot_us - BATCH_US <= fix.time_boot_us])
     if not batch:
         return None
-    kalman = _filter(batch[0], config)
+    # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
+    colour = max(1.0, 2.0 * config.velocity_correlation_s / (SPACING_US * 1e-6))
+    noise = np.eye(3) * (config.velocity_noise_m_s**2 * colour)
+    kalman = _filter(batch[0], noise)
     time_us, surprise = batch[0].time_boot_us, 0.0
     for fix in batch[1:]:
         _predict(kalman, (fix.time_boot_us - time_us) * 1e-6)
-        _update(kalman, fix)
-        surprise += float(kalman.mahalanobis) ** 2
+        surprise += _update(kalman, fix, noise)
         time_us = fix.time_boot_us
     if surprise > SURPRISE * 3 * max(len(batch) - 1, 1):
         return None
@@ -162,20 +163,15 @@ def _less_sum(fix: VelocityFix) -> Vector3:
     return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
 
 
-def _offset(fix: VelocityFix) -> npt.NDArray[np.float64]:
+def _offset(fix: VelocityFix) -> Floats:
     return np.array(_less_sum(fix))
 
 
-def _filter(first: VelocityFix, config: EstimateConfig) -> KalmanFilter:
-    kalman = KalmanFilter(dim_x=7, dim_z=3)
+def _filter(first: VelocityFix, noise: Floats) -> KalmanFilter:
     a = np.array(first.acceleration_ned_m_s2)
-    kalman.x = np.concatenate([_offset(first) + DELAY_S * a, np.zeros(3), [DELAY_S]])
-    # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
-    colour = max(1.0, 2.0 * config.velocity_correlation_s / (SPACING_US * 1e-6))
-    noise = config.velocity_noise_m_s**2
-    kalman.R = np.eye(3) * noise * colour
-    kalman.P = np.diag([noise * colour] * 3 + [BIAS_M_S2**2] * 3 + [DELAY_SPREAD_S**2])
-    return kalman
+    x = np.concatenate([_offset(first) + DELAY_S * a, np.zeros(3), [DELAY_S]])
+    unknown = np.diag([0.0] * 3 + [BIAS_M_S2**2] * 3 + [DELAY_SPREAD_S**2])
+    return KalmanFilter(x, np.pad(noise, (0, 4)) + unknown)
 
 
 def _predict(kalman: KalmanFilter, dt_s: float) -> None:
@@ -185,7 +181,7 @@ def _predict(kalman: KalmanFilter, dt_s: float) -> None:
     kalman.predict(F=transition, Q=np.diag([SUM_DENSITY_M2_S3 * dt_s] * 3 + [walk] * 3 + [0.0]))
 
 
-def _update(kalman: KalmanFilter, fix: VelocityFix) -> None:
+def _update(kalman: KalmanFilter, fix: VelocityFix, noise: Floats) -> float:
     measures = np.eye(3, 7)
     measures[:, 6] = np.negative(fix.acceleration_ned_m_s2)
-    kalman.update(_offset(fix), H=measures)
+    return kalman.update(_offset(fix), measures, noise)

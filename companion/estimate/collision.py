@@ -1,6 +1,6 @@
 """Collision velocity v_c and position x(t_c): what the vehicle was doing just before the contact.
 
-A Kalman filter (filterpy) with a constant-acceleration model for each axis runs over the telemetry from
+A Kalman filter with a constant-acceleration model for each axis runs over the telemetry from
 before the contact and is extrapolated to it. It is made only when a hit has been detected.
 """
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from filterpy.kalman import KalmanFilter
 
 from companion.estimate.history import STAMP_RESOLUTION_US
+from companion.estimate.kalman import KalmanFilter
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
 
@@ -19,6 +19,9 @@ from companion.mission.config import EstimateConfig
 BATCH_US = 500_000
 # Before the first sample nothing is known of the acceleration but the vehicle's limits (about 0.3 g).
 INITIAL_ACCELERATION_M_S2 = 3.0
+
+Floats = npt.NDArray[np.float64]
+_MEASURED: Floats = np.eye(6, 9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,26 +44,24 @@ def motion_before_contact(
     batch = [s for s in samples if contact_boot_us - BATCH_US <= s.time_boot_us <= end_us]
     if not batch:
         return None
-    kalman = _filter_at(batch[0], config)
+    position_variance, velocity_variance = config.position_noise_m**2, config.velocity_noise_m_s**2
+    noise = np.diag([position_variance] * 3 + [velocity_variance] * 3)
+    kalman = _filter_at(batch[0], noise)
     time_us = batch[0].time_boot_us
     for sample in batch[1:]:
         _predict(kalman, (sample.time_boot_us - time_us) * 1e-6, config.jerk_density_m2_s5)
-        kalman.update(np.array(sample.position_ned_m + sample.velocity_ned_m_s))
+        kalman.update(np.array(sample.position_ned_m + sample.velocity_ned_m_s), _MEASURED, noise)
         time_us = sample.time_boot_us
     _predict(kalman, (contact_boot_us - time_us) * 1e-6, config.jerk_density_m2_s5)
     x = [float(value) for value in kalman.x]
     return ContactMotion(contact_boot_us, (x[0], x[1], x[2]), (x[3], x[4], x[5]))
 
 
-def _filter_at(sample: LocalPosition, config: EstimateConfig) -> KalmanFilter:
+def _filter_at(sample: LocalPosition, noise: Floats) -> KalmanFilter:
     """State: position, velocity, acceleration (three axes each); measured: position and velocity."""
-    position_variance, velocity_variance = config.position_noise_m**2, config.velocity_noise_m_s**2
-    kalman = KalmanFilter(dim_x=9, dim_z=6)
-    kalman.x = np.array(sample.position_ned_m + sample.velocity_ned_m_s + (0.0, 0.0, 0.0))
-    kalman.H = np.eye(6, 9)
-    kalman.R = np.diag([position_variance] * 3 + [velocity_variance] * 3)
-    kalman.P = np.diag([position_variance] * 3 + [velocity_variance] * 3 + [INITIAL_ACCELERATION_M_S2**2] * 3)
-    return kalman
+    x = np.array(sample.position_ned_m + sample.velocity_ned_m_s + (0.0, 0.0, 0.0))
+    unknown = np.diag([0.0] * 6 + [INITIAL_ACCELERATION_M_S2**2] * 3)
+    return KalmanFilter(x, np.pad(noise, (0, 3)) + unknown)
 
 
 def _predict(kalman: KalmanFilter, dt_s: float, jerk_density_m2_s5: float) -> None:
@@ -77,5 +78,5 @@ def _predict(kalman: KalmanFilter, dt_s: float, jerk_density_m2_s5: float) -> No
     kalman.predict(F=_on_each_axis(transition), Q=_on_each_axis(noise))
 
 
-def _on_each_axis(block: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _on_each_axis(block: npt.NDArray[np.float64]) -> Floats:
     return np.kron(block, np.eye(3)).astype(np.float64, copy=False)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 
 from companion.flight.trajectory import REST, SPEEDING_SHARE, TURNING_SHARE, Motion
 from companion.messages import Vector3
@@ -24,7 +23,7 @@ LEAST_GAP_M = 0.01
 
 
 class CurveProfile:
-    """Cubic spline over centripetal knots (Catmull-Rom's remedy against loops and overshoot), timed by its curvature.
+    """Natural cubic spline over centripetal knots (Catmull-Rom's remedy against loops), timed by its curvature.
 
     Where the curve bends, v^2 / R stays within its share of the acceleration; a pass forwards and one backwards
     along the curve hold the change of speed within its own (the method of Bobrow, Dubowsky and Gibson, 1985).
@@ -61,7 +60,7 @@ class CurveProfile:
     def _plan(self, points: Floats, speed_m_s: float, acceleration_m_s2: float, speeding_up_m_s2: float) -> None:
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
         knots = np.concatenate([[0.0], np.cumsum(np.sqrt(chords))])
-        spline = CubicSpline(knots, points)
+        spline = _Spline(knots, points)
         steps = int(np.clip(2.0 * chords.sum() / _STEP_M, 50, _MOST_STEPS))
         u = np.linspace(0.0, knots[-1], steps + 1)
         first = spline(u, 1)
@@ -76,7 +75,7 @@ class CurveProfile:
         self.distance_m, self.duration_s = float(along_m[-1]), float(times_s[-1])
         self._tabulate(spline, u, along_m, speeds, times_s)
 
-    def _tabulate(self, spline: CubicSpline, u: Floats, along_m: Floats, speeds: Floats, times_s: Floats) -> None:
+    def _tabulate(self, spline: "_Spline", u: Floats, along_m: Floats, speeds: Floats, times_s: Floats) -> None:
         """Motion at equal steps of time; within a step of the curve the speed changes evenly."""
         count = int(np.ceil(self.duration_s / _TABLE_STEP_S)) + 1
         t = np.minimum(np.arange(count) * _TABLE_STEP_S, self.duration_s)
@@ -93,6 +92,33 @@ class CurveProfile:
         velocity = tangent * speed[:, None]
         acceleration = tangent * change[:, None] + bend * speed[:, None] ** 2
         self._table = list(zip(_tuples(spline(place)), _tuples(velocity), _tuples(acceleration), strict=True))
+
+
+class _Spline:
+    """The natural cubic spline through points (n, 3): its second derivative is continuous, and zero at both ends."""
+
+    def __init__(self, knots: Floats, points: Floats) -> None:
+        gaps = np.diff(knots)
+        slopes = np.diff(points, axis=0) / gaps[:, None]
+        # Of the derivatives at the knots: continuous second derivatives, one row for each knot.
+        first, last = np.append(1.0 / gaps, 0.0), np.insert(1.0 / gaps, 0, 0.0)
+        matrix = np.diag(2.0 * (first + last)) + np.diag(1.0 / gaps, 1) + np.diag(1.0 / gaps, -1)
+        weighed = 3.0 * slopes / gaps[:, None]
+        rates = np.linalg.solve(matrix, np.pad(weighed, ((0, 1), (0, 0))) + np.pad(weighed, ((1, 0), (0, 0))))
+        self._knots = knots
+        # Of each piece the coefficients of 1, u, u^2, u^3.
+        square = (3.0 * slopes - 2.0 * rates[:-1] - rates[1:]) / gaps[:, None]
+        cube = (rates[:-1] + rates[1:] - 2.0 * slopes) / gaps[:, None] ** 2
+        self._pieces = points[:-1], rates[:-1], square, cube
+
+    def __call__(self, u: Floats, derivative: int = 0) -> Floats:
+        """(m, 3): places, or their first or second derivatives."""
+        piece = np.clip(np.searchsorted(self._knots, u, side="right") - 1, 0, len(self._knots) - 2)
+        x = (u - self._knots[piece])[:, None]
+        a, b, c, d = (coefficients[piece] for coefficients in self._pieces)
+        if derivative == 0:
+            return np.asarray(a + x * (b + x * (c + x * d)))
+        return np.asarray(b + x * (2.0 * c + 3.0 * x * d) if derivative == 1 else 2.0 * c + 6.0 * x * d)
 
 
 def _curvature(tangents: Floats, pieces_m: Floats) -> Floats:

@@ -8,6 +8,7 @@ from pydantic import Field, field_validator, model_validator
 from companion.memory.stored import ObstaclesConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
+from companion.mission.itinerary import first_complaint
 from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, Resume
 from companion.mission.program import MissionItem
 from companion.recovery.interface import RecoveryConfig
@@ -76,9 +77,6 @@ class Mission(Written):
 
     @model_validator(mode="after")
     def _ways_inside_fence(self) -> Self:
-        # Curves need scipy, whose import is slow: only missions that are otherwise sound pay for it.
-        from companion.mission.itinerary import first_complaint
-
         complaint = first_complaint(self)
         if complaint is not None:
             raise ValueError(complaint)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from companion.flight.course import Pace, way_of
 from companion.flight.curve import CurveProfile
@@ -47,6 +48,17 @@ def test_a_curve_passes_through_its_points_and_does_not_stop_there():
         place, velocity, _ = min(samples, key=lambda sample: math.dist(sample[0], point))
         assert math.dist(place, point) < 0.01
         assert math.hypot(*velocity) > 0.7
+
+
+def test_a_curve_is_a_natural_cubic_spline():
+    """As scipy's, over its own knots."""
+    points = np.array(ZIGZAG)
+    knots = np.concatenate([[0.0], np.cumsum(np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1)))])
+    spline = CubicSpline(knots, points, bc_type="natural")
+    looked_at = spline(np.linspace(0.0, knots[-1], 20_000))
+    way = CurveProfile(ZIGZAG, 3.0, 2.0)
+    for t in np.linspace(0.0, way.duration_s, 50):
+        assert np.linalg.norm(looked_at - np.array(way.at(t)[0]), axis=1).min() < 1e-3
 
 
 def test_a_curve_is_slow_where_it_bends_and_fast_where_it_does_not():
