@@ -66,12 +66,13 @@ RULES = (
         lambda arguments, found: arguments[0].threshold_m_s2,
     ),
     Rule(
-        "second sample", "a weak force on a shaking vehicle needs two", _DETECTION + "force_signs:pushes_on", _says(True)
+        "second sample",
+        "a weak force on a shaking vehicle comes twice",
+        _DETECTION + "force_signs:pushes_on",
+        _says(True),
     ),
     Rule("leaning", "a lean that moves nothing is a hit", _FLIGHT + "leaning:Leaning.step", _says(None)),
-    Rule(
-        "leaning after a touch", "the same, at once after a touch", _FLIGHT + "leaning:Leaning._pressed", _says(None)
-    ),
+    Rule("leaning after a touch", "the same, at once after a touch", _FLIGHT + "leaning:Leaning._pressed", _says(None)),
     Rule("pressing", "thrust that lifts nothing is a hit", _FLIGHT + "pressing:Pressing.step", _says(None)),
     Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
     Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
