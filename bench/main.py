@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from bench.ablation.arguments import add_ablation
 from bench.campaign_report.arguments import add_campaign
 from bench.corpus.arguments import add_corpus
 from bench.detectors_report.arguments import add_detectors
@@ -27,6 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_detectors(commands)
     add_campaign(commands)
     add_corpus(commands)
+    add_ablation(commands)
     add_kills(commands)
     add_faults(commands)
     return parser

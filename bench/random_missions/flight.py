@@ -40,14 +40,19 @@ class JudgedFlight:
 
 def fly(case: MissionCase, drawn: RandomMission) -> JudgedFlight:
     """From take-off to the end, through the whole wire; nothing is kept but what is returned."""
+    with tempfile.TemporaryDirectory() as name:
+        return fly_in(Path(name), case, drawn)
+
+
+def fly_in(folder: Path, case: MissionCase, drawn: RandomMission) -> JudgedFlight:
+    """The same; log and events are left in the folder."""
     mission, scene = Mission.model_validate(drawn.data), Scene.model_validate(drawn.data["sim"])
     airframe = airframe_of(case)
-    with tempfile.TemporaryDirectory() as name:
-        recorder = FlightRecorder(Path(name))
-        try:
-            flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
-        finally:
-            recorder.close()
+    recorder = FlightRecorder(folder)
+    try:
+        flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())
+    finally:
+        recorder.close()
     assert flown.truth is not None, "a lockstep flight has its truth"
     frame = airframe.geometry
     parts = frame.foot_depth_m, frame.motor_radius_m, frame.guard_radius_m

@@ -1,0 +1,29 @@
+"""The arguments of `bench ablation`."""
+
+from pathlib import Path
+
+from bench.ablation.rules import RULES
+from rebound_cli.arguments import Commands, add_workers, count, runs
+
+
+def add_ablation(commands: Commands) -> None:
+    ablation = commands.add_parser(
+        "ablation",
+        help="fly drawn vehicles with and without each special rule of the companion, and write what each is worth",
+        description="Where a rule first matters in a flight, a copy of the flight goes on without it; by the truth.",
+    )
+    ablation.add_argument("--missions", type=count, default=100, metavar="N", help="of each kind (default 100)")
+    ablation.add_argument("--first-seed", type=count, default=1, metavar="SEED", help="of the first (default 1)")
+    names = tuple(rule.name for rule in RULES)
+    ablation.add_argument(
+        "--rule", action="append", choices=names, metavar="NAME", help=f"one of: {', '.join(names)} (default: all)"
+    )
+    ablation.add_argument(
+        "--out",
+        type=Path,
+        default=Path("bench/notes/ablation.md"),
+        metavar="FILE",
+        help="default: bench/notes/ablation.md",
+    )
+    add_workers(ablation)
+    ablation.set_defaults(run=runs("bench.ablation.command:run_ablation"))

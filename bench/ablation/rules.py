@@ -1,0 +1,112 @@
+"""The special rules of the companion, each a function whose answer can be left out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from companion.recovery.height import NO_BRAKING
+from companion.recovery.interface import Moving
+from companion.recovery.way import REST
+
+Arguments = tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A function of the companion, and what it would answer if the rule did not exist.
+
+    `place` is "module:function" or "module:Class.method"; a property is a method, too. `without` gets the arguments and
+    the true answer. `forget` takes back what the true call has remembered.
+    """
+
+    name: str
+    does: str
+    place: str
+    without: Callable[[Arguments, Any], Any]
+    forget: Callable[[Arguments], None] = lambda arguments: None
+
+
+def _says(answer: Any) -> Callable[[Arguments, Any], Any]:
+    return lambda arguments, found: answer
+
+
+def _argument(number: int) -> Callable[[Arguments, Any], Any]:
+    return lambda arguments, found: arguments[number]
+
+
+def _as_told(arguments: Arguments, found: Moving | None) -> Moving:
+    sample = arguments[0]
+    return found or Moving(sample.position_ned_m, sample.velocity_ned_m_s)
+
+
+def _lets_hang(arguments: Arguments) -> None:
+    arguments[0].since_us, arguments[0].is_leant = None, False
+
+
+_DETECTION, _ESTIMATE, _RECOVERY, _FLIGHT = (
+    f"companion.{room}." for room in ("detection", "estimate", "recovery", "flight")
+)
+
+RULES = (
+    Rule("jolt", "half a force with rates that jump is a hit", _DETECTION + "force_signs:is_jolt", _says(False)),
+    Rule("spun", "rates that no motor makes are a hit", _DETECTION + "hidden_signs:spun", _says(None)),
+    Rule("kicked", "rates that come within one sample are a hit", _DETECTION + "hidden_signs:kicked", _says(None)),
+    Rule("dipped", "thrust that is gone for one sample is a hit", _DETECTION + "hidden_signs:dipped", _says(None)),
+    Rule(
+        "velocity jump",
+        "a velocity that the accelerometer does not explain is a hit",
+        _DETECTION + "hidden_signs:velocity_jump",
+        _says(None),
+    ),
+    Rule("hand", "a soft force on a hovering vehicle waits", _DETECTION + "soft:SoftTouch.may_be_hand", _says(False)),
+    Rule(
+        "turning drag",
+        "a turning vehicle needs more force for a hit",
+        _DETECTION + "force_signs:side_threshold_m_s2",
+        lambda arguments, found: arguments[0].threshold_m_s2,
+    ),
+    Rule(
+        "second sample",
+        "a weak force on a shaking vehicle comes twice",
+        _DETECTION + "force_signs:pushes_on",
+        _says(True),
+    ),
+    Rule("leaning", "a lean that moves nothing is a hit", _FLIGHT + "leaning:Leaning.step", _says(None)),
+    Rule("leaning after a touch", "the same, at once after a touch", _FLIGHT + "leaning:Leaning._pressed", _says(None)),
+    Rule("pressing", "thrust that lifts nothing is a hit", _FLIGHT + "pressing:Pressing.step", _says(None)),
+    Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
+    Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
+    Rule("unnoticed contact", "t_c before an unnoticed contact", _ESTIMATE + "approach:free_until", _argument(1)),
+    Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
+    Rule("attitude by rates", "no clipped attitude", _ESTIMATE + "trust:Trust.is_attitude_right", _says(True)),
+    Rule("trust", "no velocity jump while an estimate swings", _ESTIMATE + "trust:Trust.is_trusted", _says(True)),
+    Rule("agreed normal", "the normal by the change of velocity", _FLIGHT + "rebound:agreed_normal", _argument(0)),
+    Rule("half way", "the first normal half way to the way back", _FLIGHT + "doubt:half_way", _argument(0)),
+    Rule("doubt", "leans alone until an estimate is believed", _FLIGHT + "doubt:is_believed", _says(True)),
+    Rule("inherited doubt", "a second hit keeps the first's doubt", _FLIGHT + "recovering:_doubted", _says(None)),
+    Rule("believable motion", "no motion that no hit explains", _FLIGHT + "rebound:believable", _as_told),
+    Rule("lean left", "a way begins with the present lean", _FLIGHT + "rebound:lean_left", _says(REST)),
+    Rule("still touching", "a new way when the contact is over", _FLIGHT + "rebound:is_free", _says(True)),
+    Rule("overtaken", "what comes after the vehicle is behind it", _FLIGHT + "carried:overtaken", _says(None)),
+    Rule("carried", "a new way while something pushes", _FLIGHT + "carried:is_carried", _says(False)),
+    Rule("hanging", "lets go of what it hangs on", _FLIGHT + "pinned:Hanging.step", _says(False), _lets_hang),
+    Rule("spinning", "gentle steering while it spins", _FLIGHT + "spinning:is_spinning", _says(False)),
+    Rule("earlier surfaces", "keeps off what it hit before", _FLIGHT + "recovering:_surfaces", _says([])),
+    Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "remembering:remembered_surfaces", _says([])),
+    Rule("climb", "brakes a climb that no estimate knows", _RECOVERY + "climb:Climb.is_reckoned", _says(False)),
+    Rule("throw", "the climb by how it was turned", _RECOVERY + "thrown:thrown", _says(None)),
+    Rule(
+        "climb put right",
+        "the climb by how the estimate is put right",
+        _RECOVERY + "unseen:Unseen.speed_m_s",
+        lambda arguments, found: arguments[0].expected_m_s,
+    ),
+    Rule("extra setpoint", "a brake's setpoint at once", _RECOVERY + "climb:Climb.is_pressing", _says(False)),
+    Rule("brake", "brakes a climb that the estimate knows", _RECOVERY + "height:brake", _says(NO_BRAKING)),
+    Rule(
+        "stronger brakes",
+        "asks for a tenth more than the way",
+        _RECOVERY + "way:damped",
+        lambda arguments, found: arguments[0].acceleration_ned_m_s2,
+    ),
+)
