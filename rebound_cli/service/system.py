@@ -11,7 +11,7 @@ from pathlib import Path
 
 import rebound_cli
 from companion.errors import ReboundError
-from rebound_cli.run_folder import write_whole
+from companion.shell.files import write_whole
 
 # ProtectHome= hides these from the service.
 _HIDDEN = ("/home", "/root", "/run/user")
