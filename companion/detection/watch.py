@@ -89,7 +89,8 @@ NOTHING_SEEN = Seen((), (), ())
 
 def start_watch(config: CompanionConfig, now_us: int) -> Watch:
     """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
-    prepare()
+    if config.estimate.fits_arms:
+        prepare()
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
     detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
     return Watch(config, detector, detector.initial(), ImpactEstimator(config.estimate), Sight(now_us, now_us), now_us)
@@ -159,7 +160,7 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
     if not watch.losses_told and watch.state.phase is Phase.ARMED and now_us - watch.started_us >= HEARD_US:
         watch.losses_told = True
-        if watch.config.estimate.fits_normal and not watch.estimator.fits_normal:
+        if watch.config.estimate.fits_arms and not watch.estimator.fits_normal:
             text = "an obstacle's normal comes from its push alone: install px4-rebound[fit]"
             notices.append(Notice("loss", text, {}))
         for message, loss in watch.detector.losses.items():

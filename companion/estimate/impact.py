@@ -98,8 +98,8 @@ class ImpactEstimator:
 
     @property
     def fits_normal(self) -> bool:
-        """Whether a touch is fitted for its normal: where it is wanted, and the extra [fit] is installed."""
-        return self.config.fits_normal and IS_AVAILABLE
+        """Whether a touch is fitted for its normal: where arms fold, and the extra [fit] is installed."""
+        return self.config.fits_arms and IS_AVAILABLE
 
     def hear(self, sample: Sample) -> None:
         """Take one sample of any kind."""

@@ -76,7 +76,7 @@ def findings(survey: Survey) -> list[Finding]:
 def _frame(survey: Survey) -> Iterator[Finding]:
     """HEARTBEAT tells how many arms there are, not where: a quadrotor is taken for an X."""
     kind = "" if survey.identity is None else survey.identity.vehicle_type
-    if kind != "quadrotor" and survey.config.estimate.fits_normal:
+    if kind != "quadrotor" and survey.config.estimate.fits_arms:
         remedy = "companion.estimate.fits_normal: false in the mission: the normal is the push's direction then"
         yield Finding("frame", Verdict.DOUBTFUL, f"{kind}: a hit's normal is fitted for a quad-x", remedy)
     else:

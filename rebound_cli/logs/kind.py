@@ -39,15 +39,15 @@ def _said(topics: Topics) -> Iterable[int]:
     yield _VTOL if vtol is not None and vtol.all() else 0
 
 
-def other_arms(name: str, rotors: Iterable[tuple[float, float]] = ()) -> Iterable[str]:
-    """One sentence where the arms are not those of a quad-x, for which a hit's normal is fitted.
+def other_arms(name: str, rotors: Iterable[tuple[float, float]] = ()) -> str | None:
+    """The vehicle in a word, where its arms are not those of a quad-x.
 
     `rotors`: metres ahead and aside of each, where they are known.
     """
+    if name != "quadrotor":
+        return name
     is_plus = any(min(abs(x), abs(y)) < _LEAST_DIAGONAL * max(abs(x), abs(y)) for x, y in rotors)
-    if name != "quadrotor" or is_plus:
-        kind = "quadrotor whose arms are no X" if name == "quadrotor" else name
-        yield f"a {kind}: a hit's normal is fitted for the four arms of a quad-x (companion.estimate.fits_normal)"
+    return "quadrotor whose arms are no X" if is_plus else None
 
 
 def rotors(topics: Topics) -> list[tuple[float, float]]:

@@ -43,6 +43,7 @@ class Log:
     `hover_thrust_fraction` is the vehicle's own estimate or parameter, where the log has it.
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
+    `other_arms`: what kind of vehicle it is, where its arms are not those of a quad-x.
     """
 
     path: Path
@@ -53,6 +54,7 @@ class Log:
     hover_thrust_fraction: float | None = None
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
+    other_arms: str | None = None
 
     def imu(self) -> list[tuple[int, ImuSample]]:
         """All IMU samples with the time each was heard at."""

@@ -41,8 +41,7 @@ def read_telemetry(path: Path) -> Log:
             continue
         heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
     kinds = {message_id_of(packet) for _, packet in packets if source_of(packet) == source}
-    losses = [*other_arms(vehicle.vehicle_type)]
-    losses += [f"{MessageId(number).name} is not in it" for number in _WANTED if number not in kinds]
+    losses = [f"{MessageId(number).name} is not in it" for number in _WANTED if number not in kinds]
     if others:
         losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
     if MessageId.HIGHRES_IMU not in kinds:
@@ -51,7 +50,9 @@ def read_telemetry(path: Path) -> Log:
             "asked (MAV_x_MODE, or SET_MESSAGE_INTERVAL 105)."
         )
     name = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}"
-    return checked(Log(path, name, packets[0][0], tuple(heard), tuple(losses)))
+    return checked(
+        Log(path, name, packets[0][0], tuple(heard), tuple(losses), other_arms=other_arms(vehicle.vehicle_type))
+    )
 
 
 _WANTED = (

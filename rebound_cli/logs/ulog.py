@@ -71,10 +71,11 @@ def read_ulog(path: Path) -> Log:
             vehicle=f"PX4{version}{hardware}",
             started_at_us=topics.started_us,
             heard=tuple(heard),
-            losses=(*other_arms(MULTICOPTERS[kind], rotors(topics)), *_losses(topics, imu)),
+            losses=tuple(_losses(topics, imu)),
             hover_thrust_fraction=_hover_thrust(topics),
             clipped_at_us=clipped_at_us(imu),
             averaging_us=averaging_us(imu),
+            other_arms=other_arms(MULTICOPTERS[kind], rotors(topics)),
         )
     )
 

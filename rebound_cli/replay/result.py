@@ -74,6 +74,8 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
         for message, loss in detector.losses.items()
         if message in _SAMPLES and _SAMPLES[message] not in kinds
     ]
+    if log.other_arms is not None and config.estimate.fits_arms:
+        missing.append(f"a {log.other_arms}: a hit's normal is fitted for the four arms of a quad-x")
     return (*log.losses, *missing)
 
 

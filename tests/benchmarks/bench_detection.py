@@ -65,7 +65,7 @@ def pieces_us(interval_us: int) -> list[float]:
         samples.append(ImuSample(t, force, (0.0, 0.0, 0.5 + 120.0 * since_s)))
         attitudes.append(Attitude(t, (1.0, 0.0, 0.0, 30.0 * since_s**2), (0.0, 0.0, 120.0 * since_s)))
     begun = time.process_time()
-    search = begin(Touch((0.0, 0.0, -9.81), samples, attitudes), (2.0, 0.0, 0.0), GuardsConfig(), 0.005)
+    search = begin(Touch((0.0, 0.0, -9.81), samples, attitudes), (2.0, 0.0, 0.0), GuardsConfig(travel_m=0.03), 0.005)
     pieces = [time.process_time() - begun]
     while not search.is_over:
         begun = time.process_time()

@@ -6,13 +6,16 @@ import pickle
 import pytest
 
 from bench.baselines.config import BaselineConfig
+from companion.detection import watch as watching
 from companion.detection.interface import Phase, Situation
 from companion.detection.watch import advance, start_watch
+from companion.estimate import impact
 from companion.messages import Attitude, ImuSample, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
 
 INTERVAL_US = 4_000
 WANTED = Situation()
+SPRING_ARMS = {"guards": {"travel_m": 0.03}}
 
 
 def lateral(**changes):
@@ -56,7 +59,7 @@ def test_an_impact_comes_at_its_first_sample_and_its_final_estimate_when_the_con
 def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_recovery_asks_for_it():
     """Given a hit of 20 ms, when samples come at 250 Hz, then its normal is there within 80 ms, and final with it; and
     the same if a watch in the middle of the search is copied."""
-    watch, told = start_watch(lateral(), 0), []
+    watch, told = start_watch(lateral(estimate=SPRING_ARMS), 0), []
     fly(watch, 1_000_000)
     for t in range(1_000_000, 1_200_000, INTERVAL_US):
         if t == 1_032_000:
@@ -70,8 +73,24 @@ def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_
     assert final.normal_ned == normal_ned
 
 
-def test_a_second_hit_before_a_search_is_over_has_it_ended_and_the_first_estimate_told():
+def test_of_a_frame_that_does_not_fold_the_normal_is_the_pushs(monkeypatch):
+    """Given a hit that friction turns the vehicle with, when no arm folds, then nothing is compiled or searched."""
+    monkeypatch.setattr(watching, "prepare", lambda: pytest.fail("compiled for no arm"))
     watch = start_watch(lateral(), 0)
+    (final,) = fly(watch, 1_200_000, hit)[1]
+    assert watch.estimator.search is None
+    assert final.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize("estimate", [{}, SPRING_ARMS], ids=["stiff frame", "spring arms"])
+def test_only_a_vehicle_with_spring_arms_is_told_to_install_the_fit(estimate, monkeypatch):
+    monkeypatch.setattr(impact, "IS_AVAILABLE", False)
+    _, _, notices = fly(start_watch(lateral(estimate=estimate), 0), 8_000_000)
+    assert any("px4-rebound[fit]" in notice.text for notice in notices) == bool(estimate)
+
+
+def test_a_second_hit_before_a_search_is_over_has_it_ended_and_the_first_estimate_told():
+    watch = start_watch(lateral(estimate=SPRING_ARMS), 0)
     fly(watch, 1_000_000, hit)
     fly(watch, 1_024_000, hit, start_us=1_000_000)
     # Three bare samples in 60 ms: over, and no search has come to its end.

@@ -55,7 +55,7 @@ def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
     assert velocity_at([], CONTACT_US, (0.0, 0.0, 0.0), CONFIG) is None
 
 
-GUARDS = GuardsConfig()
+GUARDS = GuardsConfig(travel_m=0.03)
 WINDOW_S = 0.004
 FREE = (0.0, 0.0, -9.80665)
 
@@ -271,8 +271,7 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
 
 def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_counts_to_heart():
     """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms; the sensor says a second later it clipped."""
-    # A push that is the same all the time is no spring arm's: nothing to fit.
-    watch = start_watch(CompanionConfig(detector="fused", estimate={"fits_normal": False}), 0)
+    watch = start_watch(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     finished, hit_us = [], 3_002_000
     for t in range(4_000, 4_400_000, 4_000):

@@ -130,9 +130,11 @@ def test_arms_that_are_no_quad_x_are_worth_a_look_where_the_normal_is_fitted_to_
         advance(survey, [Heartbeat(1, 1, kind, 12, False, 0, 3)], 0)
         return verdicts(survey)["frame"]
 
-    assert frame(2) is Verdict.GOOD
-    assert frame(13) is Verdict.DOUBTFUL
-    assert frame(13, fits_normal=False) is Verdict.GOOD
+    arms = {"travel_m": 0.03}
+    assert frame(2, guards=arms) is Verdict.GOOD
+    assert frame(13, guards=arms) is Verdict.DOUBTFUL
+    assert frame(13, guards=arms, fits_normal=False) is Verdict.GOOD
+    assert frame(13) is Verdict.GOOD, "no arm folds"
 
 
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():
