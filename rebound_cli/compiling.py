@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rebound_cli.console import Console
 
 if TYPE_CHECKING:
+    from companion.mission.config import CompanionConfig
     from rebound_cli.inputs import SimulatedWorld
 
 _ROOMS = ("companion", "sim_vehicle")
@@ -15,8 +16,10 @@ ONCE = "once for this machine"
 COMPILED = "Compiled code"
 
 
-def prepare_companion(console: Console) -> None:
-    """What the companion calls in the first hundredths of a second of a hit; nothing without the extra [fit]."""
+def prepare_companion(console: Console, config: "CompanionConfig") -> None:
+    """What the companion calls after a hit; nothing where no arm folds, or without the extra [fit]."""
+    if not config.estimate.fits_arms:
+        return
     from companion.estimate.normal import prepare
 
     with compiling_shown(console, f"Compiling the fit of a touch, {ONCE}"):

@@ -60,18 +60,18 @@ def run_fly(options: Namespace) -> int:
         apply_override(
             document, Override(f"--obstacles {options.obstacles}", ("obstacles", "file"), str(options.obstacles))
         )
-    mission = mission_from(document)
+    world = world_from(document) if is_simulated else None
+    mission = mission_from(document, world)
     if options.resume is not None:
         apply_override(
             document, Override(f"--resume {options.resume}", ("resume",), resume_of(options.resume, mission))
         )
         if options.obstacles is None:
             remember_from(options.resume, document)
-        mission = mission_from(document)
-    world = world_from(document) if is_simulated else None
+        mission = mission_from(document, world)
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
-        prepare_companion(console)
+        prepare_companion(console, mission.companion)
         if world is not None and options.lockstep:
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.

@@ -1,6 +1,7 @@
 """From a mission file and the command line's options to validated models."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,12 +79,40 @@ def _apply_options(document: Document, sets: Sequence[str], airframe: str | None
 
 
 # A mission's models take a fifth of a simulated vehicle's start: imported where there is a mission.
-def mission_from(document: Document) -> "Mission":
-    """Raises DocumentError, also for a file of known obstacles that cannot be read."""
+def mission_from(document: Document, world: SimulatedWorld | None = None) -> "Mission":
+    """`world`: the simulated vehicle that flies it, where there is one. Raises DocumentError, also for a file of known
+    obstacles that cannot be read.
+    """
     from companion.mission.model import Mission
 
     read_obstacles(document)
-    return validated(Mission, document, document.data)
+    data = document.data if world is None else with_guards(document.data, world.airframe)
+    return validated(Mission, document, data)
+
+
+def with_guards(data: Mapping[str, Any], airframe: Airframe) -> Mapping[str, Any]:
+    """A mission, with the airframe's guards where it names none of its own."""
+    companion = data.get("companion", {})
+    estimate = companion.get("estimate", {}) if isinstance(companion, dict) else None
+    if not isinstance(estimate, dict) or "guards" in estimate:
+        return data
+    return {**data, "companion": {**companion, "estimate": {**estimate, "guards": guards_of(airframe)}}}
+
+
+def guards_of(airframe: Airframe) -> dict[str, Any]:
+    """What its owner writes into `companion.estimate.guards`, from a ruler and a scale: to a tenth of a millimetre."""
+    arms, frame = airframe.arms, airframe.geometry
+    guards = {
+        "centre_m": round(frame.motor_radius_m, 4),
+        "radius_m": frame.guard_radius_m,
+        "height_m": frame.guard_height_m,
+        "gyration_frd_m": [round(math.sqrt(inertia / airframe.mass_kg), 4) for inertia in airframe.inertia_kg_m2],
+    }
+    if not arms.fold_max_m or not arms.stiffness_per_s2:
+        return guards
+    # An airframe's are two arms'.
+    springs = {"stiffness_per_s2": arms.stiffness_per_s2 / 2.0, "damping_per_s": arms.damping_per_s / 2.0}
+    return {**guards, **springs, "travel_m": arms.fold_max_m}
 
 
 def read_obstacles(document: Document) -> None:

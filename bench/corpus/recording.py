@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bench.random_missions.generator import MissionCase, airframe_of, random_mission
 from companion.mission.model import Mission
-from rebound_cli.inputs import SimulatedWorld, resolved
+from rebound_cli.inputs import SimulatedWorld, resolved, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import EPOCH_US, fly_mission_lockstep
 from rebound_cli.run_folder import RESOLVED_NAME, TRUTH_NAME, FlightRecorder, write_yaml
@@ -19,8 +19,8 @@ def record(place: tuple[Path, MissionCase]) -> None:
     if folder.exists():
         return
     drawn = random_mission(case)
-    mission = Mission.model_validate(drawn.data)
     world = SimulatedWorld(Scene.model_validate(drawn.data["sim"]), airframe_of(case))
+    mission = Mission.model_validate(with_guards(drawn.data, world.airframe))
     unfinished = folder.with_suffix(".unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
     unfinished.mkdir(parents=True)

@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 from bench.random_missions.vehicle import companion_settings, drawn_vehicle
+from rebound_cli.inputs import guards_of
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 
 AIRFRAMES = ("foldable", "rigid")
@@ -25,6 +26,7 @@ def vehicle_of(kind: str, seed: int | None = None) -> BenchVehicle:
     Reading an airframe's file takes longer than flying a hit with it.
     """
     if seed is None:
-        return BenchVehicle(load_built_in(kind))
+        airframe = load_built_in(kind)
+        return BenchVehicle(airframe, {"estimate": {"guards": guards_of(airframe)}})
     data = drawn_vehicle(seed, kind)
     return BenchVehicle(Airframe.model_validate(with_base(data)), companion_settings(data))

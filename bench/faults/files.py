@@ -67,8 +67,7 @@ def tried(fault: FileFault, seed: int) -> Json:
 
 def _mission(path: Path) -> None:
     document = load_mission_document(path, [])
-    mission_from(document)
-    world_from(document)
+    mission_from(document, world_from(document))
 
 
 def _written(folder: Path, text: str | bytes, name: str = "mission.yaml") -> Path:

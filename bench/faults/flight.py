@@ -25,7 +25,7 @@ from companion.mission.model import Mission
 from companion.shell.tlog import is_packet, read_tlog
 from rebound_cli import run_folder
 from rebound_cli.background import Background
-from rebound_cli.inputs import resolved
+from rebound_cli.inputs import resolved, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import EPOCH_US
 from rebound_cli.realtime import ConfirmAtOnce, FlightFaultError, fly_realtime
@@ -108,7 +108,7 @@ def mission_of(number: int) -> Mission:
         "companion": {"streams": {"window_s": 0.5}},
         "sim": {"walls": [wall], "airframe": AIRFRAMES[number % 2], "seed": 1 + number},
     }
-    return Mission.model_validate(data)
+    return Mission.model_validate(with_guards(data, load_built_in(AIRFRAMES[number % 2])))
 
 
 def fly(number: int, fault: Fault) -> Json:

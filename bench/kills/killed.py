@@ -12,6 +12,7 @@ from bench.campaign.plan import Campaign, Json
 from bench.recoveries.hits import AIRFRAMES, into_a_wall
 from companion.companion import Companion
 from companion.mission.model import Mission
+from rebound_cli.inputs import with_guards
 from rebound_cli.lockstep import EPOCH_US, virtual_time_limit_s
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.scene import Scene
@@ -75,8 +76,8 @@ class Flight:
     """The mission beside the simulated vehicle, interval by interval."""
 
     def __init__(self, case: Case) -> None:
-        self.mission = Mission.model_validate(mission_data(case))
         airframe: Airframe = load_built_in(case.airframe)
+        self.mission = Mission.model_validate(with_guards(mission_data(case), airframe))
         scene = Scene.model_validate({**(self.mission.sim or {}), "airframe": case.airframe, "seed": case.seed})
         self.standing_m = airframe.geometry.foot_depth_m
         self.companion, self.vehicle = Companion(self.mission), SimulatedVehicle(airframe, scene, case.seed)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bench.baselines.config import BaselineMission
 from rebound_cli.flight_log import FlightLog, read_flight_log
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
@@ -156,9 +156,9 @@ class StudyResult:
 
 def fly(flight: StudyFlight) -> StudyResult:
     """Fly it in lockstep, all MAVLink bytes and the log on."""
-    mission = BaselineMission.model_validate(dict(flight.mission))
-    scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
     airframe = Airframe.model_validate(with_base({"based_on": flight.airframe, "estimate": ESTIMATE, **flight.changes}))
+    mission = BaselineMission.model_validate(with_guards(flight.mission, airframe))
+    scene = Scene.model_validate({**(mission.sim or {}), "airframe": flight.airframe, "seed": flight.seed})
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:

@@ -16,7 +16,7 @@ from bench.sensitivity import stop_sensitivity_text
 from rebound_cli import __version__
 from rebound_cli.documents import Document, validated
 from rebound_cli.flight_log import read_flight_log
-from rebound_cli.inputs import load_mission_document, world_from
+from rebound_cli.inputs import load_mission_document, with_guards, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import TLOG_NAME, FlightRecorder, make_place
@@ -96,7 +96,8 @@ def case_document(case: ResultsCase) -> Document:
 def fly_case(case: ResultsCase) -> CaseFigures:
     """One lockstep flight with its log on, in a folder of its own that is removed afterwards."""
     document = case_document(case)
-    mission, world = validated(BaselineMission, document, document.data), world_from(document)
+    world = world_from(document)
+    mission = validated(BaselineMission, document, with_guards(document.data, world.airframe))
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:

@@ -8,7 +8,7 @@ from pathlib import Path
 from bench.random_missions.generator import MissionCase, RandomMission, airframe_of
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
@@ -46,8 +46,9 @@ def fly(case: MissionCase, drawn: RandomMission) -> JudgedFlight:
 
 def fly_in(folder: Path, case: MissionCase, drawn: RandomMission) -> JudgedFlight:
     """The same; log and events are left in the folder."""
-    mission, scene = Mission.model_validate(drawn.data), Scene.model_validate(drawn.data["sim"])
     airframe = airframe_of(case)
+    mission = Mission.model_validate(with_guards(drawn.data, airframe))
+    scene = Scene.model_validate(drawn.data["sim"])
     recorder = FlightRecorder(folder)
     try:
         flown, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, airframe), recorder, Interrupts())

@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 from bench.random_missions.draw import Draw
+from rebound_cli.inputs import guards_of
 from sim_vehicle.airframe import Airframe, with_base
 
 Part = dict[str, Any]
@@ -172,23 +173,10 @@ def _arms(draw: Draw, kind: str, arm_m: float, guard_m: float, yaw_kg_m2: float)
 def companion_settings(data: Part) -> Part:
     """What its owner writes into `companion:`, from a ruler, a scale and the IMU's data sheet."""
     airframe = Airframe.model_validate(with_base(data))
-    arms, frame = airframe.arms, airframe.geometry
-    folding: Part = {
-        "stiffness_per_s2": arms.stiffness_per_s2 / 2.0,
-        "damping_per_s": arms.damping_per_s / 2.0,
-        "travel_m": arms.fold_max_m,
-    }
-    guards: Part = {
-        "centre_m": frame.motor_radius_m,
-        "radius_m": frame.guard_radius_m,
-        "height_m": frame.guard_height_m,
-        "gyration_frd_m": [round(math.sqrt(inertia / airframe.mass_kg), 4) for inertia in airframe.inertia_kg_m2],
-        **(folding if arms.fold_max_m > 0.0 else {"travel_m": 0.0}),
-    }
     return {
         "estimate": {
             "imu_averaging_interval_s": airframe.imu.integration_interval_us * 1e-6,
             "accelerometer_range_m_s2": airframe.imu.accelerometer_range_m_s2,
-            "guards": guards,
+            "guards": guards_of(airframe),
         }
     }

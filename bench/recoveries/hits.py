@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.campaign.plan import Campaign, Json
 from companion.mission.model import Mission
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
@@ -89,12 +89,13 @@ def into_a_wall(name: str, speed_m_s: float, slant_deg: float, height_m: float) 
 
 def work_out(case: RecoveryCase) -> Json:
     """Fly it in lockstep; what happened after the first hit, by the simulator's truth. SI units."""
-    mission = Mission.model_validate(mission_data(case))
+    airframe = load_built_in(case.airframe)
+    mission = Mission.model_validate(with_guards(mission_data(case), airframe))
     scene = Scene.model_validate({**(mission.sim or {}), "airframe": case.airframe, "seed": case.seed})
     with tempfile.TemporaryDirectory() as name:
         recorder = FlightRecorder(Path(name))
         try:
-            world = SimulatedWorld(scene, load_built_in(case.airframe))
+            world = SimulatedWorld(scene, airframe)
             flown, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
         finally:
             recorder.close()

@@ -34,7 +34,8 @@ def run_check(options: Namespace) -> int:
 
 def _check(path: Path, options: Namespace) -> None:
     document = load_mission_document(path, options.set)
-    mission, world = mission_from(document), world_from(document)
+    world = world_from(document)
+    mission = mission_from(document, world)
     ways = planned_ways(mission, world)
     print(mission_text(mission, ways))
     if options.no_picture:

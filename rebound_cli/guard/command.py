@@ -30,7 +30,7 @@ def run_guard(options: Namespace) -> int:
 
 
 def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
-    prepare_companion(console)
+    prepare_companion(console, config.companion)
     # The address is tried before anything is written: a wrong one leaves no empty folder behind.
     connection = open_signed(options)
     folder = run_folder.create_run_folder(options.out, "guard")

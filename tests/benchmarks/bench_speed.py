@@ -28,9 +28,10 @@ SIM_SECONDS = 20
 def lockstep_factor() -> float:
     """Virtual time over wall clock of one whole flight with its log."""
     document = load_mission_document(MISSION, [], None, None)
+    world = world_from(document)
     with tempfile.TemporaryDirectory() as folder:
         recorder = FlightRecorder(Path(folder))
-        flown, _ = fly_mission_lockstep(mission_from(document), world_from(document), recorder, Interrupts())
+        flown, _ = fly_mission_lockstep(mission_from(document, world), world, recorder, Interrupts())
         recorder.close()
     return (flown.report.ended_at_us - flown.report.started_at_us) * 1e-6 / flown.wall_clock_s
 
@@ -39,7 +40,7 @@ def parts_us() -> tuple[float, float, float]:
     """Mean microseconds per interval: vehicle, companion; and IMU samples per second of flight."""
     document = load_mission_document(MISSION, [], None, None)
     world = world_from(document)
-    companion = Companion(mission_from(document))
+    companion = Companion(mission_from(document, world))
     vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     companion.confirm_plan()
     pending, intervals, vehicle_s, companion_s = b"", 0, 0.0, 0.0

@@ -9,7 +9,7 @@ from bench.random_missions.campaign import MissionCase, work_out_mission
 from companion.flight.leaning import HELD_M_S2, Leaning, lean_of
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
@@ -140,17 +140,16 @@ def test_a_gust_after_a_soft_touch_is_no_wall():
 
 def flown(folder, items, **sim):
     """In lockstep: the flight, and what its timeline says of things in the way."""
-    mission = Mission.model_validate(
-        {
-            "name": "slow",
-            "items": [{"takeoff": {"height_m": 1.5}}, *items, {"land": {}}],
-            "on_collision": {"then": "hold", "hold_s": 1},
-            "fence": {"radius_m": 10, "max_height_m": 5},
-            "sim": sim,
-        }
-    )
+    data = {
+        "name": "slow",
+        "items": [{"takeoff": {"height_m": 1.5}}, *items, {"land": {}}],
+        "on_collision": {"then": "hold", "hold_s": 1},
+        "fence": {"radius_m": 10, "max_height_m": 5},
+        "sim": sim,
+    }
     recorder = FlightRecorder(folder)
     world = SimulatedWorld(Scene.model_validate({**sim, "seed": 1}), load_built_in("foldable"))
+    mission = Mission.model_validate(with_guards(data, world.airframe))
     flight, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
     recorder.close()
     told = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]

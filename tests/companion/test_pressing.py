@@ -8,7 +8,7 @@ from companion.flight.leaning import HELD_M_S2
 from companion.flight.pressing import STILL_US, Pressing
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
@@ -69,18 +69,17 @@ def test_without_the_thrust_asked_for_nothing_is_said():
 
 def flown(folder, items, airframe="foldable", **sim):
     """In lockstep, at PX4's default 50 Hz: the flight, and what its timeline says of things in the way."""
-    mission = Mission.model_validate(
-        {
-            "name": "slow",
-            "companion": {"streams": {"highres_imu_hz": 50}},
-            "items": [{"takeoff": {"height_m": 1.3}}, *items, {"land": {}}],
-            "on_collision": {"then": "hold", "hold_s": 1},
-            "fence": {"radius_m": 10, "max_height_m": 6},
-            "sim": sim,
-        }
-    )
+    data = {
+        "name": "slow",
+        "companion": {"streams": {"highres_imu_hz": 50}},
+        "items": [{"takeoff": {"height_m": 1.3}}, *items, {"land": {}}],
+        "on_collision": {"then": "hold", "hold_s": 1},
+        "fence": {"radius_m": 10, "max_height_m": 6},
+        "sim": sim,
+    }
     recorder = FlightRecorder(folder)
     world = SimulatedWorld(Scene.model_validate({**sim, "seed": 1}), load_built_in(airframe))
+    mission = Mission.model_validate(with_guards(data, world.airframe))
     flight, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
     recorder.close()
     told = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]

@@ -62,8 +62,8 @@ def fly_detour(folder: Path, wall: Wall, speed_m_s: float, airframe: str, seed: 
         "fence": {"radius_m": 10, "max_height_m": 2.5},
         "sim": {"airframe": airframe, "seed": seed, "walls": [screen]},
     }
-    recorder = FlightRecorder(folder)
-    flown, _ = fly_mission_lockstep(mission_from(document), world_from(document), recorder, Interrupts())
+    recorder, world = FlightRecorder(folder), world_from(document)
+    flown, _ = fly_mission_lockstep(mission_from(document, world), world, recorder, Interrupts())
     recorder.close()
     path = flown.truth.series["position_ned_m"]
     nearest_m = min(math.dist(place, GOAL_NED_M) for place in path[::50].tolist())

@@ -41,7 +41,7 @@ class Air:
         document = parse_document(MISSION, "forged.yaml")
         apply_overrides(document, self.sets)
         world = world_from(document)
-        self.companion = Companion(mission_from(document))
+        self.companion = Companion(mission_from(document, world))
         self.companion.confirm_plan()
         self.vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
 

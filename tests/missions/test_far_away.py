@@ -20,8 +20,9 @@ def flown(fault):
     """The companion after square.yaml, its events, and whether the vehicle was ever armed."""
     document = load_document(FOLDER / "square.yaml")
     document.data["sim"]["faults"] = [fault] if fault else []
-    mission, world = mission_from(document), world_from(document)
-    companion, vehicle = Companion(mission), SimulatedVehicle(world.airframe, world.scene, world.seed)
+    world = world_from(document)
+    companion = Companion(mission_from(document, world))
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     companion.confirm_plan()
     pending, events, was_armed = b"", [], False
     while not companion.finished:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.mission.model import Mission
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
@@ -15,18 +15,17 @@ pytestmark = pytest.mark.flight
 
 
 def flown(folder, obstacles, **more):
-    mission = Mission.model_validate(
-        {
-            "name": "down",
-            "items": [{"takeoff": {"height_m": 2.5}}, {"land": {}}],
-            "fence": {"radius_m": 10, "max_height_m": 5},
-            "sim": obstacles,
-            **more,
-        }
-    )
-    scene = Scene.model_validate({**obstacles, "seed": 1})
+    data = {
+        "name": "down",
+        "items": [{"takeoff": {"height_m": 2.5}}, {"land": {}}],
+        "fence": {"radius_m": 10, "max_height_m": 5},
+        "sim": obstacles,
+        **more,
+    }
+    world = SimulatedWorld(Scene.model_validate({**obstacles, "seed": 1}), load_built_in("foldable"))
+    mission = Mission.model_validate(with_guards(data, world.airframe))
     recorder = FlightRecorder(folder)
-    flight, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, load_built_in("foldable")), recorder, Interrupts())
+    flight, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
     recorder.close()
     return flight
 

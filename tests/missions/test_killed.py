@@ -16,8 +16,9 @@ INTERVALS_A_SECOND = 250
 
 def killed_after(document, kept_s):
     """The vehicle, flown on for 12 s after the companion was killed so long after the hit; and when that was."""
-    mission, world = mission_from(document), world_from(document)
-    companion, vehicle = Companion(mission), SimulatedVehicle(world.airframe, world.scene, world.seed)
+    world = world_from(document)
+    companion = Companion(mission_from(document, world))
+    vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     companion.confirm_plan()
     pending, hit_at_us = b"", None
     while hit_at_us is None or vehicle.time_boot_us < hit_at_us + kept_s * 1e6:

@@ -6,7 +6,7 @@ import pytest
 from bench.random_missions.campaign import MissionCase, work_out_mission
 from bench.random_missions.crashes import tilts_deg
 from companion.mission.model import Mission
-from rebound_cli.inputs import SimulatedWorld
+from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
 from rebound_cli.run_folder import FlightRecorder
@@ -20,17 +20,16 @@ FAST = {"go_to": {"position_ned_m": [9, 0, -3], "speed_m_s": 4.0, "acceleration_
 
 
 def flown(folder, *items, **sim):
-    mission = Mission.model_validate(
-        {
-            "name": "lean",
-            "items": [{"takeoff": {"height_m": 3}}, *items, {"land": {}}],
-            "on_collision": {"then": "land"},
-            "fence": {"radius_m": 12, "max_height_m": 6},
-        }
-    )
-    scene = Scene.model_validate({**sim, "seed": 1})
+    data = {
+        "name": "lean",
+        "items": [{"takeoff": {"height_m": 3}}, *items, {"land": {}}],
+        "on_collision": {"then": "land"},
+        "fence": {"radius_m": 12, "max_height_m": 6},
+    }
+    world = SimulatedWorld(Scene.model_validate({**sim, "seed": 1}), load_built_in("foldable"))
+    mission = Mission.model_validate(with_guards(data, world.airframe))
     recorder = FlightRecorder(folder)
-    flight, _ = fly_mission_lockstep(mission, SimulatedWorld(scene, load_built_in("foldable")), recorder, Interrupts())
+    flight, _ = fly_mission_lockstep(mission, world, recorder, Interrupts())
     recorder.close()
     return flight
 

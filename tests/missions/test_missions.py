@@ -21,7 +21,8 @@ CONTACT_REACH_M = 0.145 * math.cos(math.pi / 4) + 0.08
 
 def load(name):
     document = load_document(FOLDER / f"{name}.yaml")
-    return mission_from(document), world_from(document)
+    world = world_from(document)
+    return mission_from(document, world), world
 
 
 def test_the_document_lists_all_and_says_which_a_real_vehicle_can_fly():

@@ -157,7 +157,8 @@ class EverySecond:
 def fly(folder, stream=sys.stderr, confirm=None, computer=None):
     """A hop in virtual time through the loop of real flights."""
     document = load_mission_document(SQUARE, HOP_SETS)
-    mission, scene = mission_from(document), world_from(document)
+    scene = world_from(document)
+    mission = mission_from(document, scene)
     companion = Companion(mission)
     world: Any = World(scene)
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))

@@ -2,6 +2,7 @@
 
 import pytest
 
+from companion.mission.config import GuardsConfig
 from companion.mission.model import Mission
 from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from, resolved, world_from
@@ -149,9 +150,30 @@ def test_a_wrong_set_names_itself_and_the_remedy(given, said):
     assert text.startswith(f"--set {given}: ") and said in text
 
 
+def test_a_simulated_flight_takes_the_guards_of_its_airframe_where_the_mission_names_none():
+    def guards(airframe, *sets, is_simulated=True):
+        given = document(sets=[f"sim.airframe={airframe}", *sets])
+        return mission_from(given, world_from(given) if is_simulated else None).companion.estimate.guards
+
+    paper = {"stiffness_per_s2": 250.0, "damping_per_s": 15.0, "travel_m": 0.03}
+    assert guards("foldable") == GuardsConfig(**paper), "to the last digit, or no flight comes again"
+    assert guards("rigid") == GuardsConfig()
+    # The mission's own are all that it flies with, and a real vehicle is none of `sim:`
+    assert guards("foldable", "companion.estimate.guards={centre_m: 0.2}") == GuardsConfig(centre_m=0.2)
+    assert guards("foldable", is_simulated=False) == GuardsConfig()
+    assert guards("foldable", "companion.estimate={fits_normal: false}").travel_m == 0.03
+
+
+@pytest.mark.parametrize("wrong", ["companion=3", "companion.estimate=3", "companion.estimate=null"])
+def test_a_companion_part_that_is_none_is_refused_beside_a_simulated_vehicle_too(wrong):
+    given = document(sets=[wrong])
+    assert complaint(mission_from, given, world_from(given)) == complaint(mission_from, given)
+
+
 def test_the_resolved_mission_is_a_mission_that_means_the_same():
     given = document(sets=["sim.seed=7"])
-    mission, world = mission_from(given), world_from(given)
+    world = world_from(given)
+    mission = mission_from(given, world)
     written = resolved(mission, world)
     again = Mission.model_validate(written)
     assert [item.action for item in again.items] == [item.action for item in mission.items]

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+import yaml
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import development as dialect
 
@@ -108,6 +109,9 @@ def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
     assert result.stderr == ""
     assert "detection" in result.stdout and "Hit a wall at 1.9" in result.stdout and "landed safely" in result.stdout
     assert "rigid airframe, seed 1" in result.stdout and str(tmp_path / "run") in result.stdout
+    assert (
+        yaml.safe_load((tmp_path / "run/resolved.yaml").read_text())["companion"]["estimate"]["guards"]["travel_m"] == 0
+    )
     # And nobody says what the rigid frame bears
     assert "not known" not in result.stdout and "broken" not in result.stdout
 
@@ -115,7 +119,8 @@ def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
 def test_a_flight_that_hangs_is_ended(tmp_path):
     # Given a flight and less virtual time than it needs
     document = load_document(SQUARE)
-    mission, world = mission_from(document), world_from(document)
+    world = world_from(document)
+    mission = mission_from(document, world)
     vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     recorder = FlightRecorder(tmp_path)
     # When it runs, then it is given up
@@ -127,8 +132,9 @@ def test_a_flight_that_hangs_is_ended(tmp_path):
 def test_a_vehicle_that_reboots_before_the_flight_is_flown_on_its_new_clock(tmp_path):
     # Given a companion that waits for its plan to be confirmed
     document = load_document(WALL)
-    vehicle = SimulatedVehicle(world_from(document).airframe, world_from(document).scene, 1)
-    companion, told_us = Companion(mission_from(document)), []
+    world = world_from(document)
+    vehicle = SimulatedVehicle(world.airframe, world.scene, 1)
+    companion, told_us = Companion(mission_from(document, world)), []
 
     def exchange(seconds: float, pending: bytes = b"") -> None:
         for _ in range(round(250 * seconds)):

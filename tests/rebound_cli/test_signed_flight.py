@@ -70,7 +70,8 @@ class SignedWorld(World):
 
 def fly(folder: Path, forges: bool) -> Any:
     document = load_mission_document(SQUARE, [word for word in HOP if word != "--set"])
-    mission, scene = mission_from(document), world_from(document)
+    scene = world_from(document)
+    mission = mission_from(document, scene)
     world: Any = SignedWorld(scene, forges)
     folder.mkdir()
     run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, scene))

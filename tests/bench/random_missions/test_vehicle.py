@@ -81,4 +81,4 @@ def test_a_mission_with_a_drawn_vehicle_says_of_it_what_its_owner_can_measure():
     assert {**named, "companion": 0} == {**random_mission(case).data, "companion": 0}
     # A frame that does not fold has no spring to tell of
     rigid = companion_settings(drawn_vehicle(9, "rigid"))["estimate"]["guards"]
-    assert rigid["travel_m"] == 0.0 and "stiffness_per_s2" not in rigid
+    assert "travel_m" not in rigid and "stiffness_per_s2" not in rigid

@@ -24,8 +24,8 @@ MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))
 
 def planned(text: str):
     document = parse_document(text, "t.yaml")
-    mission = mission_from(document)
-    return planned_ways(mission, world_from(document))
+    world = world_from(document)
+    return planned_ways(mission_from(document, world), world)
 
 
 def test_each_step_has_its_place_in_time():
