@@ -89,8 +89,8 @@ class EstimateConfig(Written):
 
     @property
     def fits_arms(self) -> bool:
-        """Whether a touch is fitted for its normal. The fit knows spring arms; of a stiff frame it says less than the
-        push's direction does."""
+        """Whether a touch is fitted for its normal. The fit knows spring arms; of a stiff frame it says no more than
+        the direction of the push."""
         return self.fits_normal and self.guards.travel_m > 0.0
 
     @property
