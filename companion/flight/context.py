@@ -205,6 +205,14 @@ class FlightContext:
         latest, origin = self.vehicle.history.latest(), self.origin_ned_m
         return None if latest is None or origin is None else origin[2] - latest.position_ned_m[2]
 
+    def under_way(
+        self, place_ned_m: Vector3, yaw_rad: float | None, velocity_ned_m_s: Vector3, acceleration_ned_m_s2: Vector3
+    ) -> Target:
+        """A place on a way, local NED. While the way stands still, its speed would lead the vehicle past the place."""
+        if not self.is_heard:
+            return Target(place_ned_m, yaw_rad)
+        return Target(place_ned_m, yaw_rad, velocity_ned_m_s, acceleration_ned_m_s2)
+
     def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
