@@ -14,6 +14,7 @@ from companion.shell.peer import Peer
 MOST_DATAGRAMS = 300
 # More than the longest MAVLink packet (280 bytes) and more than one UDP datagram can hold.
 READ_SIZE = 65_536
+ANY_HOST = "0.0.0.0"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,17 +101,22 @@ def udp_out(host: str, port: int) -> UdpConnection:
     return UdpConnection(socket.socket(family, socket.SOCK_DGRAM), Peer(address[:2]), address)
 
 
-def resolve(kind: socket.SocketKind, host: str, port: int) -> tuple[socket.AddressFamily, Any]:
+def resolve(
+    kind: socket.SocketKind, host: str, port: int, family: socket.AddressFamily = socket.AF_UNSPEC
+) -> tuple[socket.AddressFamily, Any]:
+    """Family and address of a host. On a socket of IPv6 one that has only IPv4 is seen by its mapped address."""
+    mapped = socket.AI_V4MAPPED if family == socket.AF_INET6 else 0
     try:
-        family, _, _, _, address = socket.getaddrinfo(host.strip("[]"), port, type=kind)[0]
+        found = socket.getaddrinfo(host.strip("[]"), port, family, kind, flags=mapped)
     except (OSError, UnicodeError) as error:
         # Python turns a name into bytes first, which one with an empty part, or a part of more than 63 letters, fails.
         raise ConnectionSetupError(f"Host {host!r} is unknown: {plain(error)}.") from error
+    family, _, _, _, address = found[0]
     return family, address
 
 
 def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:
-    family, address = resolve(kind, host or "0.0.0.0", port)
+    family, address = resolve(kind, host or ANY_HOST, port)
     bound = socket.socket(family, kind)
     if kind == socket.SOCK_STREAM:
         # A server restarted at once must not wait for the old connection's TIME_WAIT.

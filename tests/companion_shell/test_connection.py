@@ -57,6 +57,34 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
     connection.close()
 
 
+def test_a_peers_name_means_its_address_in_the_family_of_the_socket(peer, monkeypatch):
+    # Given a name that has both addresses, IPv6 first
+    lookup = socket.getaddrinfo
+
+    def both(host, port, family=0, *more, **flags):
+        if host != "vehicle":
+            return lookup(host, port, family, *more, **flags)
+        return [
+            (socket.AF_INET6, socket.SOCK_DGRAM, 17, "", ("::1", port, 0, 0)),
+            (socket.AF_INET, socket.SOCK_DGRAM, 17, "", (LOCAL, port)),
+        ][family == socket.AF_INET :]
+
+    monkeypatch.setattr(socket, "getaddrinfo", both)
+    # When it is the peer on a socket of IPv4
+    connection = open_connection(f"udpin://{LOCAL}:0", "vehicle")
+    # Then it is heard
+    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+    assert connection.receive(2.0) == HEARTBEAT
+    connection.close()
+
+
+def test_a_peer_of_ipv4_is_heard_on_a_socket_of_both_families(peer):
+    connection = open_connection("udpin://[::]:0", LOCAL)
+    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+    assert connection.receive(2.0) == HEARTBEAT
+    connection.close()
+
+
 @pytest.mark.parametrize(
     ("url", "named"),
     [
@@ -64,6 +92,7 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
         ("udp://127.0.0.1:9", "127.0.0.1"),
         ("serial:///dev/null:57600", "127.0.0.1"),
         ("udpin://127.0.0.1:0", "no such"),
+        ("udpin://127.0.0.1:0", "::1"),
     ],
 )
 def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named):
