@@ -147,6 +147,7 @@ class FlightContext:
     is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
     stepped_us: int | None = None  # when the step before was
+    unheard_us: int = 0  # since the last position: what late steps took, in which nobody listened
     way_us: int = 0  # a clock that stands still while no position comes: nobody flies on who does not hear the vehicle
     is_heard: bool = True  # a position has come within as long as the detector may be without a sample
     yaw_rad: float | None = None
@@ -225,6 +226,12 @@ class FlightContext:
     def silent_s(self, now_us: int) -> float:
         """How long nothing has been heard of the vehicle."""
         return (now_us - self.vehicle.last_heard_us) * 1e-6
+
+    @property
+    def position_silent_s(self) -> float:
+        """How long the vehicle was heard, and no position. What a late step took says nothing of the vehicle."""
+        heard_us = self.vehicle.last_position_us
+        return 0.0 if heard_us is None else (self.vehicle.last_heard_us - heard_us - self.unheard_us) * 1e-6
 
     def is_silent(self, now_us: int) -> bool:
         """Whether a vehicle that is known has not been heard for longer than a silent link is put up with."""

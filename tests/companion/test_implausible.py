@@ -213,6 +213,21 @@ def test_a_step_that_comes_late_catches_up_with_nothing():
     assert setpoint(after).x - setpoint(before).x < 2.0 * 0.05
 
 
+def test_a_clock_that_jumps_is_no_silence_of_the_positions():
+    f = flight_in("mission")
+    f.run_for(0.7)
+    # When the clock jumps, as of a suspended computer, and an IMU sample is the first that comes
+    f.run_until(lambda: f.vehicle.ticks % 5 == 1)
+    f.now_us += 5_000_000
+    f.run_for(0.5)
+    # Then the flight goes on
+    assert f.state == "mission" and f.setpoints_since(f.now_us - 50_000)
+    # And positions that do not come end it, as ever
+    f.vehicle.no_positions = True
+    f.run_to("aborted", 1.2)
+    assert "no LOCAL_POSITION_NED for 1.0 s, though the link is alive" in " ".join(f.texts())
+
+
 def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
     f = flight_in("recovering")
     began_us = f.now_us
