@@ -10,7 +10,7 @@ from companion.companion import Companion
 from companion.errors import ConfigurationError
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
-from companion.shell.connection import Connection, UdpInConnection
+from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
 from rebound_cli import run_folder
 from rebound_cli.background import Background
@@ -110,7 +110,7 @@ def _connection_for(options: Namespace) -> Connection | None:
     """To a vehicle that is not ours to start; None for one that is."""
     if options.connect is not None:
         return open_signed(options)
-    return UdpInConnection("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
+    return udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
 
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
@@ -146,7 +146,7 @@ def _fly_connected(
 
 
 def _fly_beside_vehicle(flight: Flight) -> Flown:
-    connection = UdpInConnection("127.0.0.1", 0)
+    connection = udp_in("127.0.0.1", 0)
     # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
     options = ["--port", "0", "--remote", f"127.0.0.1:{connection.local_port}", "--speed", "1"]
     with VehicleProcess(flight.folder, options) as vehicle:

@@ -17,7 +17,7 @@ import yaml
 from companion.errors import ReboundError
 from companion.memory.stored import file_data
 from companion.shell.files import write_whole
-from companion.shell.tlog import TlogWriter, is_packet
+from companion.shell.tlog import TlogWriter, may_be_logged
 from rebound_cli import __version__
 from rebound_cli.background import Background, at_once
 
@@ -157,8 +157,8 @@ class FlightRecorder:
         # What is small first: a log that may grow no more costs no event.
         for event in result.events:
             self._events_file.write(event_line(event))
-        # Foreign bytes and broken packets could hide a good one from whoever reads the log.
-        received = [frame for frame in result.received_frames if is_packet(frame)]
+        # Foreign bytes and broken packets could hide a good one from whoever reads the log; a key is nobody's to read.
+        received = [frame for frame in result.received_frames if may_be_logged(frame)]
         if not result.sent_frames and not received:
             self._inputs_file.write(f'{{"time_us": {now_us}, "kind": "step"}}\n')
         if self._make_room is not None:

@@ -22,7 +22,7 @@ from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.generator import AIRFRAMES
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
-from companion.shell.tlog import is_packet, read_tlog
+from companion.shell.tlog import may_be_logged, read_tlog
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.inputs import resolved, with_guards
@@ -69,7 +69,7 @@ class Noting(FlightRecorder):
 
     def record(self, now_us: int, result: StepResult) -> None:
         self.told_s += [self._air.now_s] * len(result.events)
-        self.counted += sum(map(is_packet, result.received_frames)) + len(result.sent_frames)
+        self.counted += sum(map(may_be_logged, result.received_frames)) + len(result.sent_frames)
         super().record(now_us, result)
 
     def move_to(self, folder: Path, writer: Background | None) -> None:

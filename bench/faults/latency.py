@@ -22,7 +22,7 @@ from bench.faults.packets import SETPOINT, decoded
 from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
-from companion.shell.connection import UdpOutConnection
+from companion.shell.connection import udp_out
 from rebound_cli.background import Background
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
@@ -124,7 +124,7 @@ def _timed(flight: Recorded, times: int) -> Iterator[float | None]:
 
 def _fly_on(companion: Companion, now_us: int, port: int, folder: Path) -> None:
     """The child: the loop of real flights, log and all."""
-    connection = UdpOutConnection("127.0.0.1", port)
+    connection = udp_out("127.0.0.1", port)
     recorder = FlightRecorder(folder, Background("log"))
     clock = Going(now_us)
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())

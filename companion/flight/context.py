@@ -147,6 +147,7 @@ class FlightContext:
     is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
     stepped_us: int | None = None  # when the step before was
+    unheard_us: int = 0  # since the last position: what late steps took, in which nobody listened
     way_us: int = 0  # a clock that stands still while no position comes: nobody flies on who does not hear the vehicle
     is_heard: bool = True  # a position has come within as long as the detector may be without a sample
     yaw_rad: float | None = None
@@ -205,6 +206,14 @@ class FlightContext:
         latest, origin = self.vehicle.history.latest(), self.origin_ned_m
         return None if latest is None or origin is None else origin[2] - latest.position_ned_m[2]
 
+    def under_way(
+        self, place_ned_m: Vector3, yaw_rad: float | None, velocity_ned_m_s: Vector3, acceleration_ned_m_s2: Vector3
+    ) -> Target:
+        """A place on a way, local NED. While the way stands still, its speed would lead the vehicle past the place."""
+        if not self.is_heard:
+            return Target(place_ned_m, yaw_rad)
+        return Target(place_ned_m, yaw_rad, velocity_ned_m_s, acceleration_ned_m_s2)
+
     def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
@@ -217,6 +226,12 @@ class FlightContext:
     def silent_s(self, now_us: int) -> float:
         """How long nothing has been heard of the vehicle."""
         return (now_us - self.vehicle.last_heard_us) * 1e-6
+
+    @property
+    def position_silent_s(self) -> float:
+        """How long the vehicle was heard, and no position. What a late step took says nothing of the vehicle."""
+        heard_us = self.vehicle.last_position_us
+        return 0.0 if heard_us is None else (self.vehicle.last_heard_us - heard_us - self.unheard_us) * 1e-6
 
     def is_silent(self, now_us: int) -> bool:
         """Whether a vehicle that is known has not been heard for longer than a silent link is put up with."""

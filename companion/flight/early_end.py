@@ -26,7 +26,7 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
         or _refused(inputs)
         or _stopped(state, inputs)
         or _link_silent(flight, state, now_us)
-        or _position_silent(flight, state, now_us)
+        or _position_silent(flight, state)
         or _abort_condition(flight, state, inputs, now_us)
     )
 
@@ -96,12 +96,9 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | Non
     return Move(Trigger.INTERRUPTED, text, hand_over=not landing)
 
 
-def _position_silent(flight: FlightContext, state: State, now_us: int) -> Move | None:
-    heard_us = flight.vehicle.last_position_us
-    if state not in ON_SETPOINTS or heard_us is None:
-        return None
-    silent_s = (flight.vehicle.last_heard_us - heard_us) * 1e-6
-    if silent_s <= flight.mission.companion.link.position_silence_s:
+def _position_silent(flight: FlightContext, state: State) -> Move | None:
+    silent_s = flight.position_silent_s
+    if state not in ON_SETPOINTS or silent_s <= flight.mission.companion.link.position_silence_s:
         return None
     text = f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive"
     return Move(Trigger.INTERRUPTED, text, hand_over=True)

@@ -72,6 +72,8 @@ def _let_ways_go_on(flight: FlightContext, now_us: int) -> None:
     before_us, heard_us = flight.stepped_us, flight.vehicle.last_position_us
     flight.stepped_us = now_us
     longest_us = flight.mission.companion.sight.silence_s * 1e6
+    late_us = 0 if before_us is None else max(0, now_us - before_us - round(longest_us))
+    flight.unheard_us = 0 if heard_us == now_us else flight.unheard_us + late_us
     flight.is_heard = heard_us is not None and now_us - heard_us <= longest_us
     if before_us is not None and flight.is_heard and now_us - before_us <= longest_us:
         flight.way_us += now_us - before_us

@@ -110,10 +110,10 @@ class FlyItems:
         position, velocity, acceleration = self._way.at(elapsed_s)
         yaw_rad = self._heading.turn(position, velocity, now_us)
         place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s or not self._flight.is_heard:
+        if elapsed_s >= self._way.duration_s:
             return Target(place, yaw_rad)
         # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
-        return Target(place, yaw_rad, velocity, acceleration)
+        return self._flight.under_way(place, yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         while True:

@@ -41,9 +41,9 @@ class FlyHome:
         elapsed_s = self._elapsed_s
         position, velocity, acceleration = self._way.at(elapsed_s)
         place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s or not self._flight.is_heard:
+        if elapsed_s >= self._way.duration_s:
             return Target(place, self._flight.yaw_rad)
-        return Target(place, self._flight.yaw_rad, velocity, acceleration)
+        return self._flight.under_way(place, self._flight.yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if self._is_cut_off:

@@ -35,7 +35,7 @@ class TakeOff:
     """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
 
     def __init__(self, flight: FlightContext, item: TakeoffItem, now_us: int) -> None:
-        self._item = item
+        self._flight, self._item = flight, item
         self._step = Step.LEAD
         self._started_us = now_us
         self._profile: LineProfile | None = None
@@ -51,7 +51,7 @@ class TakeOff:
         if self._profile is None:
             return Target(self._ground_ned_m, self._yaw_rad)
         position, velocity, acceleration = self._profile.at(self._climbing_s)
-        return Target(position, self._yaw_rad, velocity, acceleration)
+        return self._flight.under_way(position, self._yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         match self._step:

@@ -161,10 +161,7 @@ class GuardMachine:
         return Move(Trigger.STREAMS_GONE, HEARD_AGAIN)
 
     def _position_silent(self) -> Move | None:
-        vehicle = self.guard.flight.vehicle
-        if vehicle.last_position_us is None:
-            return None
-        silent_s = (vehicle.last_heard_us - vehicle.last_position_us) * 1e-6
+        silent_s = self.guard.flight.position_silent_s
         if silent_s <= self.guard.config.companion.link.position_silence_s:
             return None
         return Move(Trigger.BLIND, f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive")

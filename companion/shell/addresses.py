@@ -1,7 +1,7 @@
 """Connection addresses, in MAVSDK's convention, turned into connections.
 
 udpin://0.0.0.0:14540            listen, and answer the vehicle that speaks there (see peer.py)
-udpout://192.168.1.20:14580      send first, to this address
+udpout://192.168.1.20:14580      send first, to this address, and hear nobody else
 tcpout://127.0.0.1:5760          connect to a server
 tcpin://0.0.0.0:5760             wait for one client
 serial:///dev/ttyAMA0:921600     serial port and baud rate
@@ -13,7 +13,7 @@ import socket
 from collections.abc import Callable
 
 from companion.errors import AddressError, ConnectionSetupError
-from companion.shell.connection import Connection, UdpInConnection, UdpOutConnection
+from companion.shell.connection import ANY_HOST, Connection, resolve, udp_in, udp_out
 from companion.shell.peer import Peer
 from companion.shell.streams import TcpInConnection, serial_port, tcp_out
 
@@ -40,9 +40,9 @@ def open_connection(
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
     if scheme == "udpin":
-        return UdpInConnection(host, port, Peer(None if peer is None else _peer(peer), is_genuine))
+        return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), is_genuine))
     if scheme == "udpout":
-        return UdpOutConnection(host, port)
+        return udp_out(host, port)
     if scheme == "tcpout":
         return tcp_out(host, port)
     return TcpInConnection(host, port)
@@ -85,14 +85,18 @@ def _meant(text: str) -> str | None:
     return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
 
 
-def _peer(text: str) -> tuple[str, int | None]:
-    """The number of a host, and its port where one is given."""
+def _peer(text: str, listening: str) -> tuple[str, int | None]:
+    """The number of a host, as the socket that listens there sees it, and its port where one is given."""
     host, _, port = text.rpartition(":") if _HOST_PORT.match(text) else (text, "", "")
+    family, _ = resolve(socket.SOCK_DGRAM, listening or ANY_HOST, 0)
     try:
-        found = socket.getaddrinfo(host.strip("[]"), None, type=socket.SOCK_DGRAM)[0][4][0]
-    except (OSError, UnicodeError) as error:
-        raise ConnectionSetupError(f"--peer {text}: this host is unknown; give HOST or HOST:PORT.") from error
-    return str(found), int(port) if port else None
+        _, address = resolve(socket.SOCK_DGRAM, host, 0, family)
+    except ConnectionSetupError as error:
+        version = "IPv6" if family == socket.AF_INET6 else "IPv4"
+        raise ConnectionSetupError(
+            f"--peer {text}: this host is unknown over {version}; give HOST or HOST:PORT."
+        ) from error
+    return str(address[0]), int(port) if port else None
 
 
 def _device_and_baud(url: str, rest: str) -> tuple[str, int]:

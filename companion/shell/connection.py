@@ -14,6 +14,7 @@ from companion.shell.peer import Peer
 MOST_DATAGRAMS = 300
 # More than the longest MAVLink packet (280 bytes) and more than one UDP datagram can hold.
 READ_SIZE = 65_536
+ANY_HOST = "0.0.0.0"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +47,13 @@ class Connection(Protocol):
     def close(self) -> None: ...
 
 
-class UdpInConnection:
-    """Listens on a local port to one peer (see `peer`) and answers it."""
+class UdpConnection:
+    """A UDP socket on which one peer is heard (see `peer`) and answered."""
 
-    def __init__(self, host: str, port: int, peer: Peer | None = None) -> None:
-        self._socket = bound_socket(socket.SOCK_DGRAM, host, port)
+    def __init__(self, opened: socket.socket, peer: Peer, remote: Any = None) -> None:
+        """`remote` is where to send before anybody has spoken; None: nowhere."""
+        self._socket, self._peer, self._remote = opened, peer, remote
         self._socket.setblocking(False)
-        self._peer = peer or Peer()
 
     @property
     def local_port(self) -> int:
@@ -71,8 +72,9 @@ class UdpInConnection:
         return b""
 
     def send(self, frame: bytes) -> None:
-        if self._peer.answered is not None:
-            _send_datagram(self._socket, frame, self._peer.answered)
+        remote = self._remote or self._peer.answered
+        if remote is not None:
+            _send_datagram(self._socket, frame, remote)
 
     def news(self) -> str | None:
         return self._peer.news()
@@ -85,48 +87,36 @@ class UdpInConnection:
         self._socket.close()
 
 
-class UdpOutConnection:
-    """Sends to one remote address from a port of its own."""
-
-    def __init__(self, host: str, port: int) -> None:
-        family, address = _resolve(socket.SOCK_DGRAM, host, port)
-        self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._remote = address
-
-    def receive(self, timeout_s: float) -> bytes:
-        if not readable(self._socket, timeout_s):
-            return b""
-        try:
-            return self._socket.recv(READ_SIZE)
-        except OSError:
-            return b""
-
-    def send(self, frame: bytes) -> None:
-        _send_datagram(self._socket, frame, self._remote)
-
-    def news(self) -> str | None:
-        return None
-
-    @property
-    def counts(self) -> LinkCounts:
-        return LinkCounts()
-
-    def close(self) -> None:
-        self._socket.close()
+def udp_in(host: str, port: int, peer: Peer | None = None) -> UdpConnection:
+    """Listens on a local port."""
+    return UdpConnection(bound_socket(socket.SOCK_DGRAM, host, port), peer or Peer())
 
 
-def _resolve(kind: socket.SocketKind, host: str, port: int) -> tuple[socket.AddressFamily, Any]:
+def udp_out(host: str, port: int) -> UdpConnection:
+    """Sends to one remote address from a port of its own, and hears that address alone.
+
+    Whoever listens there with one socket, as PX4, mavlink-router, MAVSDK and mavutil do, answers from that port.
+    """
+    family, address = resolve(socket.SOCK_DGRAM, host, port)
+    return UdpConnection(socket.socket(family, socket.SOCK_DGRAM), Peer(address[:2]), address)
+
+
+def resolve(
+    kind: socket.SocketKind, host: str, port: int, family: socket.AddressFamily = socket.AF_UNSPEC
+) -> tuple[socket.AddressFamily, Any]:
+    """Family and address of a host. On a socket of IPv6 one that has only IPv4 is seen by its mapped address."""
+    mapped = socket.AI_V4MAPPED if family == socket.AF_INET6 else 0
     try:
-        family, _, _, _, address = socket.getaddrinfo(host.strip("[]"), port, type=kind)[0]
+        found = socket.getaddrinfo(host.strip("[]"), port, family, kind, flags=mapped)
     except (OSError, UnicodeError) as error:
         # Python turns a name into bytes first, which one with an empty part, or a part of more than 63 letters, fails.
         raise ConnectionSetupError(f"Host {host!r} is unknown: {plain(error)}.") from error
+    family, _, _, _, address = found[0]
     return family, address
 
 
 def bound_socket(kind: socket.SocketKind, host: str, port: int) -> socket.socket:
-    family, address = _resolve(kind, host or "0.0.0.0", port)
+    family, address = resolve(kind, host or ANY_HOST, port)
     bound = socket.socket(family, kind)
     if kind == socket.SOCK_STREAM:
         # A server restarted at once must not wait for the old connection's TIME_WAIT.

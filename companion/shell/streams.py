@@ -12,6 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Protocol
@@ -125,7 +126,9 @@ class StreamConnection:
 
     def _reopen(self, old: Stream | None) -> None:
         if old is not None:
-            old.close()
+            # A driver may refuse to close a port whose device has gone: it is opened anew all the same.
+            with suppress(OSError):
+                old.close()
         while not self._closed.is_set():
             try:
                 self._found.put(self._open_anew())

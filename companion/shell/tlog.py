@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from companion.mavlink.decode import checksum_holds
-from companion.mavlink.packet import packet_length
+from companion.mavlink.packet import message_id_of, packet_length
 
 _STAMP = struct.Struct(">Q")
+# It carries the secret key: MAVLink asks to leave it out of logs (mavlink.io, "Message Signing", "Logging").
+SETUP_SIGNING = 256
 
 # A killed process must leave a log complete to its last second; half of that leaves room for a slow disk.
 FLUSH_INTERVAL_US = 500_000
@@ -86,9 +88,14 @@ def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
         position = start + length
 
 
-def is_packet(frame: bytes) -> bool:
-    """Whether bytes are a packet by their header and their checksum: what is not could hide others from a reader."""
-    return len(frame) > 0 and packet_length(frame) == len(frame) and checksum_holds(frame, 0, len(frame))
+def may_be_logged(frame: bytes) -> bool:
+    """Whether bytes are a packet by their header and their checksum: what is not could hide others from a reader.
+
+    One that carries a key is in no log.
+    """
+    if len(frame) == 0 or packet_length(frame) != len(frame) or not checksum_holds(frame, 0, len(frame)):
+        return False
+    return message_id_of(frame) != SETUP_SIGNING
 
 
 def _plausible(stamp_us: int, last_us: int | None) -> bool:

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as mav
 from companion.errors import ConnectionSetupError
 from companion.shell import addresses
 from companion.shell.addresses import open_connection
-from companion.shell.connection import UdpInConnection
+from companion.shell.connection import udp_in
 from companion.shell.streams import Stream
 
 LOCAL = "127.0.0.1"
@@ -28,7 +28,7 @@ def peer():
 
 def test_udpin_answers_the_vehicle_one_packet_a_datagram_whoever_else_sends(peer):
     # Given a listening connection and a vehicle that sent first
-    connection = UdpInConnection(LOCAL, 0)
+    connection = udp_in(LOCAL, 0)
     peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
     assert connection.receive(2.0) == HEARTBEAT
     # When two packets are sent
@@ -57,6 +57,34 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
     connection.close()
 
 
+def test_a_peers_name_means_its_address_in_the_family_of_the_socket(peer, monkeypatch):
+    # Given a name that has both addresses, IPv6 first
+    lookup = socket.getaddrinfo
+
+    def both(host, port, family=0, *more, **flags):
+        if host != "vehicle":
+            return lookup(host, port, family, *more, **flags)
+        return [
+            (socket.AF_INET6, socket.SOCK_DGRAM, 17, "", ("::1", port, 0, 0)),
+            (socket.AF_INET, socket.SOCK_DGRAM, 17, "", (LOCAL, port)),
+        ][family == socket.AF_INET :]
+
+    monkeypatch.setattr(socket, "getaddrinfo", both)
+    # When it is the peer on a socket of IPv4
+    connection = open_connection(f"udpin://{LOCAL}:0", "vehicle")
+    # Then it is heard
+    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+    assert connection.receive(2.0) == HEARTBEAT
+    connection.close()
+
+
+def test_a_peer_of_ipv4_is_heard_on_a_socket_of_both_families(peer):
+    connection = open_connection("udpin://[::]:0", LOCAL)
+    peer.sendto(HEARTBEAT, (LOCAL, connection.local_port))
+    assert connection.receive(2.0) == HEARTBEAT
+    connection.close()
+
+
 @pytest.mark.parametrize(
     ("url", "named"),
     [
@@ -64,6 +92,7 @@ def test_udpin_with_a_peer_named_hears_that_one_alone(peer):
         ("udp://127.0.0.1:9", "127.0.0.1"),
         ("serial:///dev/null:57600", "127.0.0.1"),
         ("udpin://127.0.0.1:0", "no such"),
+        ("udpin://127.0.0.1:0", "::1"),
     ],
 )
 def test_a_peer_that_means_nothing_is_refused_in_one_sentence(url, named):
@@ -91,12 +120,12 @@ def test_other_programs_habits_are_answered_with_what_was_meant(habit, meant):
 
 @pytest.mark.parametrize("host", ["", "0.0.0.0", "[::]"])
 def test_the_older_form_listens_where_it_names_no_host(monkeypatch, host):
-    monkeypatch.setattr(addresses, "UdpInConnection", lambda host, port, _: (host, port))
+    monkeypatch.setattr(addresses, "udp_in", lambda host, port, _: (host, port))
     assert open_connection(f"udp://{host}:14540") == (host, 14540)
 
 
 def test_udpin_drops_what_nobody_is_there_to_take():
-    connection = UdpInConnection(LOCAL, 0)
+    connection = udp_in(LOCAL, 0)
     connection.send(b"nobody")
     assert connection.receive(0.0) == b""
     connection.close()
@@ -110,6 +139,25 @@ def test_udpout_sends_first(peer, scheme):
     assert content == b"first"
     peer.sendto(b"answer", address)
     assert connection.receive(2.0) == b"answer"
+    connection.close()
+
+
+def test_udpout_hears_only_the_address_it_speaks_to(peer):
+    connection = open_connection(f"udpout://{LOCAL}:{peer.getsockname()[1]}")
+    connection.send(b"first")
+    _, address = peer.recvfrom(100)
+    # When somebody else finds its port, on the same host and with a vehicle's heartbeat
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.sendto(HEARTBEAT, address)
+        # Then that is not heard, but told and counted
+        assert connection.receive(2.0) == b""
+        assert f"{LOCAL}:{other.getsockname()[1]} sends to this port, too" in connection.news()
+    assert connection.counts.stranger_datagrams == 1
+    # And diverts nothing
+    connection.send(b"second")
+    assert peer.recv(100) == b"second"
+    peer.sendto(HEARTBEAT, address)
+    assert connection.receive(2.0) == HEARTBEAT
     connection.close()
 
 

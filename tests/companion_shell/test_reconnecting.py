@@ -1,5 +1,6 @@
 """A stream that ended is there again within a second of the other end's return, and nothing waits for it meanwhile."""
 
+import errno
 import os
 import pty
 import socket
@@ -126,6 +127,26 @@ def test_a_serial_device_without_a_link_is_looked_for_at_its_path(tmp_path, by_i
     line.close()
     until_told(connection, "lost")
     again = closing(Line(path))
+    until_told(connection, "again")
+    again.say(b"after")
+    assert until_heard(connection) == b"after"
+
+
+def test_a_port_that_cannot_be_closed_is_opened_anew_all_the_same(by_id, closing, monkeypatch):
+    link = by_id / "vehicle"
+    line = closing(Line(link))
+    connection = closing(open_connection(f"serial://{link}:115200"))
+
+    # Given a driver that fails to close the port of a device that has gone
+    def fails():
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(connection._stream, "close", fails)
+    line.close()
+    until_told(connection, "lost")
+    # When the device comes back
+    again = closing(Line(link))
+    # Then it is opened
     until_told(connection, "again")
     again.say(b"after")
     assert until_heard(connection) == b"after"

@@ -6,7 +6,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.shell.clock import Clock, round_down_to_stamp_us
-from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, is_packet, read_tlog
+from companion.shell.tlog import FLUSH_INTERVAL_US, TlogWriter, may_be_logged, read_tlog
 
 EPOCH_US = 1_600_000_000_000_000
 
@@ -96,5 +96,12 @@ def test_the_clock_gives_stamps_that_never_go_back():
 def test_a_packet_is_what_its_header_and_its_checksum_say():
     (packet,) = heartbeats(1)
     broken = packet[:12] + bytes([packet[12] ^ 1]) + packet[13:]
-    assert is_packet(packet)
-    assert not any(map(is_packet, (broken, packet[:-1], packet + b"\0", b"", b"\xfd")))
+    assert may_be_logged(packet)
+    assert not any(map(may_be_logged, (broken, packet[:-1], packet + b"\0", b"", b"\xfd")))
+
+
+def test_a_packet_with_a_key_is_in_no_log():
+    link = dialect.MAVLink(None, 255, 190)
+    with_key = dialect.MAVLink_setup_signing_message(1, 1, list(range(32)), 1).pack(link)
+    assert not may_be_logged(bytes(with_key))
+    assert may_be_logged(bytes(dialect.MAVLink_system_time_message(1, 1).pack(link)))
