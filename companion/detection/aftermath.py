@@ -7,8 +7,10 @@ that fails turns the vehicle too.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from companion.estimate.delay import Delay
 from companion.estimate.strapdown import LONGEST_DELAY_US, ZERO, Strapdown
 from companion.messages import Vector3
 
@@ -49,20 +51,22 @@ class Aftermath:
     spun_rad_s: float = 0.0
     """By how much the rates stepped at the previous sample, if the newest one keeps it: the lesser of the two steps."""
     newest_rate_step_rad_s: float = 0.0
-    rate_step_before_rad_s: float = math.inf
-    """The one before the newest; without bound where that is not known."""
-    kick_rad_s: float = -math.inf
-    """By how much the rates stepped at the previous sample more than before and after it."""
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
     velocity_ned_m_s: Vector3 | None = None
-    residuals: list[tuple[int, float, float, float]] = field(default_factory=list)
+    residuals: list[tuple[int, Vector3, Vector3]] = field(default_factory=list)
+    """Time, velocity less sum, mean acceleration since the one before."""
+    delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
     known: int = 0
     unseen_share: float = 0.0
     """Of the time, by the samples' distances and the length of their windows."""
-    unlearnt: Vector3 | None = None
+    summed: tuple[int, Vector3] | None = None
+    """The accelerometer's sum at the velocity before."""
+    newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
+    """Of the newest step: velocity less sum with its delay in it, and the change of the acceleration."""
+    unlearnt: tuple[Vector3, Vector3, Vector3] | None = None
     slow_boot_us: int = 0
     """Of the last velocity that came longer than `LONGEST_STEP_US` after the one before."""
     is_slow: bool = False
@@ -80,15 +84,12 @@ class Aftermath:
             self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
             before = self.newest_rate_step_rad_s
             step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
-            self.kick_rad_s = before - self.rate_step_before_rad_s - step
-            self.rate_step_before_rad_s = before if before > 0.0 else math.inf
             self.spun_rad_s = min(before, math.dist(w, self.earlier_rates_rad_s)) if before > 0.0 else 0.0
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         else:
             self.newest_rate_step_rad_s = self.spun_rad_s = 0.0
-            self.rate_step_before_rad_s, self.kick_rad_s = math.inf, -math.inf
             self.forget()
         self.earlier_imu_us, self.previous_imu_us = self.previous_imu_us, before_us
         self.earlier_rates_rad_s = (p_0, q_0, r_0)
@@ -115,16 +116,27 @@ class Aftermath:
         u = self.strapdown.sum_at(time_us)
         if u is None:
             return None
-        v = velocity_ned_m_s
-        n, e, d = v[0] - u[0], v[1] - u[1], v[2] - u[2]
-        step = None
+        residual, acceleration = _less(velocity_ned_m_s, u), self._accelerated(time_us, u)
+        found = None
         if len(residuals) == COMPARED:
-            (_, n_0, e_0, d_0), (_, n_1, e_1, d_1), (_, n_2, e_2, d_2) = residuals
             self.is_slow = residuals[0][0] < self.slow_boot_us
-            step = (n - (n_0 + n_1 + n_2) / 3, e - (e_0 + e_1 + e_2) / 3, d - (d_0 + d_1 + d_2) / 3)
+            _, before, led = zip(*residuals, strict=True)
+            step, change = _less(residual, _mean(before)), _less(acceleration, _mean(led))
+            late_s = self.delay.delay_s(self.variance_m2_s2)
+            found = (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
+            self.newest = (step, change)
             del residuals[0]
-        residuals.append((time_us, n, e, d))
-        return step
+        residuals.append((time_us, residual, acceleration))
+        return found
+
+    def _accelerated(self, time_us: int, sum_ned_m_s: Vector3) -> Vector3:
+        """In the mean since the velocity before; what shakes is gone from it."""
+        before, self.summed = self.summed, (time_us, sum_ned_m_s)
+        if not self.residuals or before is None:
+            return self.strapdown.acceleration_ned_m_s2
+        per_s = 1e6 / (time_us - before[0])
+        n, e, d = _less(sum_ned_m_s, before[1])
+        return (per_s * n, per_s * e, per_s * d)
 
     def learn(self, step: Vector3) -> None:
         """Take in the step before this one; the newest must not hide its own successor.
@@ -132,9 +144,11 @@ class Aftermath:
         Hits are learnt, too: a vehicle whose estimate jumps again and again gets a spread that knows it. It rises fast
         and falls slowly (see `floor`).
         """
-        learnt, self.unlearnt = self.unlearnt, step
-        if learnt is None:
+        unlearnt, self.unlearnt = self.unlearnt, (step, *self.newest)
+        if unlearnt is None:
             return
+        learnt, late, change_m_s2 = unlearnt
+        self.delay.learn(late, change_m_s2)
         square = (learnt[0] * learnt[0] + learnt[1] * learnt[1] + learnt[2] * learnt[2]) / 3.0
         self.known = min(self.known + 1, MEMORY)
         change = square - self.variance_m2_s2
@@ -165,3 +179,12 @@ class Aftermath:
             return self.rate_step_from_us
         before = self.residuals[-2][0] if len(self.residuals) > 1 else velocity_us
         return before - LONGEST_DELAY_US
+
+
+def _less(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _mean(vectors: Sequence[Vector3]) -> Vector3:
+    (a, b, c), (d, e, f), (x, y, z) = vectors
+    return ((a + d + x) / COMPARED, (b + e + y) / COMPARED, (c + f + z) / COMPARED)

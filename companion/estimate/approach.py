@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from companion.estimate.delay import DELAY_S, DELAY_SPREAD_S
 from companion.estimate.kalman import Floats, KalmanFilter
 from companion.estimate.strapdown import LONGEST_DELAY_US
 from companion.messages import LocalPosition, Vector3
@@ -37,8 +38,6 @@ SUM_DENSITY_M2_S3 = 0.25**2 * 0.05
 # change little from one to the next), 1.0 for one with three times its noise. Beyond this, attitude or accelerometer
 # do not belong to the velocities.
 SURPRISE = 1.5
-# PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
-DELAY_S, DELAY_SPREAD_S = 0.01, 0.01
 # A hit that nothing showed is in the velocities before it is found: by what the vehicle's own sensor saw of it at once,
 # by what clipping hid from that a tenth of a second later (see `trust`). Of 300 simulated hits of a rigid vehicle at 50
 # and 100 Hz, the latest was found after 0.26 s.

@@ -1,0 +1,35 @@
+"""How late the vehicle's own velocity is, learnt from its flight.
+
+A velocity that is late by d is, by the accelerometer's sum, off by -d a. So a change of the acceleration a shows as a
+step of velocity less sum: s = -d a + noise. d is the least squares of all steps so far, beginning with what is common.
+"""
+
+from dataclasses import dataclass
+
+from companion.messages import Vector3
+
+# PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
+DELAY_S, DELAY_SPREAD_S = 0.01, 0.01
+# PX4's EKF2_DELAY_MAX is 0.2 s, of which its output predictor takes all but the sensors' own errors of time.
+LATEST_S = 0.1
+
+
+@dataclass(slots=True)
+class Delay:
+    """Changed only by `learn`. Velocities in m/s, accelerations in m/s^2, local NED."""
+
+    _against: float = 0.0
+    _square: float = 0.0
+
+    def learn(self, step_m_s: Vector3, change_m_s2: Vector3) -> None:
+        """Take one step of velocity less sum, and by how much the acceleration changed with it."""
+        (a, b, c), (x, y, z) = step_m_s, change_m_s2
+        self._against -= a * x + b * y + c * z
+        self._square += x * x + y * y + z * z
+
+    def delay_s(self, variance_m2_s2: float) -> float:
+        """By steps that scatter by so much on an axis where the acceleration stays as it is."""
+        weight = variance_m2_s2 / DELAY_SPREAD_S**2
+        total = weight + self._square
+        found_s = (weight * DELAY_S + self._against) / total if total > 0.0 else DELAY_S
+        return min(max(found_s, 0.0), LATEST_S)
