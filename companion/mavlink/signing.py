@@ -82,10 +82,15 @@ class Signing:
         """The genuine packets that are complete by now, without their signatures, and no other byte."""
         self._keep_up(now_us)
         genuine: list[bytes] = []
-        for packet, _ in self._framer.feed(received):
+        waiting = [packet for packet, _ in reversed(self._framer.feed(received))]
+        while waiting:
+            packet = waiting.pop()
             if packet_length(packet) != len(packet):
                 continue
             reason = self._refusal(packet)
+            if reason is not None and message_id_of(packet) not in dialect.mavlink_map:
+                # No checksum can tell whether it is one packet or stray bytes round genuine ones.
+                waiting += [inner for inner, _ in reversed(Decoder({}).feed(packet[1:]))]
             if reason is None:
                 stamp = self._streams[_stream(packet)] = _stamp(packet)
                 self.stamp = max(self.stamp, stamp)

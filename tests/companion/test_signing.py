@@ -190,6 +190,14 @@ def test_a_message_that_is_not_in_the_dialect_keeps_its_signature(signing):
     assert signing.refused == {}
 
 
+def test_stray_bytes_that_look_like_the_beginning_of_an_unknown_message_swallow_no_genuine_packet(signing):
+    genuine = b"".join(packed(end=vehicle(stamp=NOW + number)) for number in range(3))
+    # Given MAVLink 1's first bytes, of a message that no dialect knows, whose length ends where another packet begins
+    stray = bytes((0xFE, len(genuine) - 2, 0, 0, 0, 0xF0))
+    received = stray + genuine + packed(end=vehicle(stamp=NOW + 3))
+    assert signing.opened(received, NOW_US) == 4 * plain()
+
+
 @settings(max_examples=300, deadline=None)
 @given(
     st.lists(
