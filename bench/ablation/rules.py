@@ -48,9 +48,7 @@ _DETECTION, _ESTIMATE, _RECOVERY, _FLIGHT = (
 )
 
 RULES = (
-    Rule("jolt", "half a force with rates that jump is a hit", _DETECTION + "force_signs:is_jolt", _says(False)),
     Rule("spun", "rates that no motor makes are a hit", _DETECTION + "hidden_signs:spun", _says(None)),
-    Rule("kicked", "rates that come within one sample are a hit", _DETECTION + "hidden_signs:kicked", _says(None)),
     Rule("dipped", "thrust that is gone for one sample is a hit", _DETECTION + "hidden_signs:dipped", _says(None)),
     Rule(
         "velocity jump",
@@ -75,7 +73,6 @@ RULES = (
     Rule("leaning after a touch", "the same, at once after a touch", _FLIGHT + "leaning:Leaning._pressed", _says(None)),
     Rule("pressing", "thrust that lifts nothing is a hit", _FLIGHT + "pressing:Pressing.step", _says(None)),
     Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
-    Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
     Rule("unnoticed contact", "t_c before an unnoticed contact", _ESTIMATE + "approach:free_until", _argument(1)),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule("attitude by rates", "no clipped attitude", _ESTIMATE + "trust:Trust.is_attitude_right", _says(True)),
@@ -83,12 +80,10 @@ RULES = (
     Rule("agreed normal", "the normal by the change of velocity", _FLIGHT + "rebound:agreed_normal", _argument(0)),
     Rule("half way", "the first normal half way to the way back", _FLIGHT + "doubt:half_way", _argument(0)),
     Rule("doubt", "leans alone until an estimate is believed", _FLIGHT + "doubt:is_believed", _says(True)),
-    Rule("inherited doubt", "a second hit keeps the first's doubt", _FLIGHT + "recovering:_doubted", _says(None)),
-    Rule("believable motion", "no motion that no hit explains", _FLIGHT + "rebound:believable", _as_told),
     Rule("lean left", "a way begins with the present lean", _FLIGHT + "rebound:lean_left", _says(REST)),
-    Rule("still touching", "a new way when the contact is over", _FLIGHT + "rebound:is_free", _says(True)),
-    Rule("overtaken", "what comes after the vehicle is behind it", _FLIGHT + "carried:overtaken", _says(None)),
     Rule("carried", "a new way while something pushes", _FLIGHT + "carried:is_carried", _says(False)),
+    Rule("overtaken", "what comes after the vehicle is behind it", _FLIGHT + "carried:overtaken", _says(None)),
+    Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
     Rule("hanging", "lets go of what it hangs on", _FLIGHT + "pinned:Hanging.step", _says(False), _lets_hang),
     Rule("spinning", "gentle steering while it spins", _FLIGHT + "spinning:is_spinning", _says(False)),
     Rule("earlier surfaces", "keeps off what it hit before", _FLIGHT + "recovering:_surfaces", _says([])),
@@ -101,7 +96,6 @@ RULES = (
         _RECOVERY + "unseen:Unseen.speed_m_s",
         lambda arguments, found: arguments[0].expected_m_s,
     ),
-    Rule("extra setpoint", "a brake's setpoint at once", _RECOVERY + "climb:Climb.is_pressing", _says(False)),
     Rule("brake", "brakes a climb that the estimate knows", _RECOVERY + "height:brake", _says(NO_BRAKING)),
     Rule(
         "stronger brakes",
