@@ -1,9 +1,10 @@
 """Number types for files a person writes: finite, never a string or a truth value in disguise."""
 
+import warnings
 from collections.abc import Container
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0)]
@@ -17,6 +18,18 @@ class Written(BaseModel):
     """Base of everything a person writes: unknown keys are errors, values never change afterwards."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, use_attribute_docstrings=True)
+
+    retired: ClassVar[frozenset[str]] = frozenset()
+    """Keys of earlier versions: files that have them are taken, with a warning."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_retired(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or cls.retired.isdisjoint(data):
+            return data
+        for key in sorted(cls.retired.intersection(data)):
+            warnings.warn(f"the key {key} has no effect any more: it can be left out", stacklevel=2)
+        return {key: value for key, value in data.items() if key not in cls.retired}
 
 
 def with_bare_keys(data: object, keys: Container[str]) -> object:

@@ -4,6 +4,7 @@ import argparse
 import errno
 import itertools
 import sys
+import warnings
 from collections.abc import Sequence
 
 from companion.errors import ConfigurationError, ReboundError
@@ -56,6 +57,7 @@ def run(options: argparse.Namespace, program: str) -> int:
     """What was asked for; an expected error is one sentence on stderr."""
     from sim_vehicle.errors import SimulationError
 
+    warnings.formatwarning = lambda message, *_: f"{program}: {message}.\n"
     try:
         return int(options.run(options))
     except (ReboundError, SimulationError) as error:

@@ -1,4 +1,4 @@
-"""What one sample of the accelerometer shows of a contact: a push sideways, along the thrust, or a jolt.
+"""What one sample of the accelerometer shows of a contact: a push sideways or along the thrust.
 
 Each against what this vehicle shows in its own flight (see `fused`); the state is only read.
 """
@@ -29,27 +29,8 @@ def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
     return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
 
 
-def push_of(s: FusedState, side_m_s2: float, f_z: float, room_m_s2: float) -> float:
-    """How hard a sample was pushed: sideways in thresholds, or half of that along the thrust against its mean."""
-    side, along = side_m_s2 / s.threshold_m_s2, 0.5 * abs(f_z - s.floor.z) / room_m_s2
-    return side if side > along else along
-
-
 def pushes_on(s: FusedState, force_frd_m_s2: Vector3) -> bool:
     """Whether the sample before was pushed the same way, as by a contact; what shakes goes to and fro."""
     x, y, z = s.soft.last
     f_x, f_y, f_z = force_frd_m_s2
     return (x - s.floor.x) * f_x + (y - s.floor.y) * f_y + (z - s.floor.z) * f_z > 0.0
-
-
-def is_jolt(s: FusedState, config: FusedConfig) -> bool:
-    """Turned by more than motors and its own shaking can, and pushed, or pushed in the sample before: its window may
-    have ended in the middle of the contact."""
-    turned_rad_s = s.aftermath.newest_rate_step_rad_s
-    if turned_rad_s <= config.jolt_rad_s:
-        return False
-    elapsed_s = (s.aftermath.strapdown.time_boot_us - s.aftermath.previous_imu_us) * 1e-6
-    turned_rad_s = turned_rad_s * config.side_threshold_m_s2 / s.threshold_m_s2
-    if turned_rad_s < config.jolt_rad_s + config.jolt_rad_s2 * elapsed_s:
-        return False
-    return max(s.push, s.push_before) > 0.5

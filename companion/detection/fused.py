@@ -24,15 +24,13 @@ from companion.detection.classify import kind_of
 from companion.detection.floor import SETTLED_US
 from companion.detection.force_signs import (
     CLEAR,
-    is_jolt,
-    push_of,
     pushes_on,
     side_threshold_m_s2,
     vertical_threshold_m_s2,
 )
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
-from companion.detection.hidden_signs import Hidden, dipped, kicked, spun, velocity_jump
+from companion.detection.hidden_signs import Hidden, dipped, spun, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
 from companion.estimate.history import ODOMETRY_KEPT_US
@@ -113,14 +111,13 @@ class FusedDetector:
         x, y = f_x - s.floor.x, f_y - s.floor.y
         side = math.sqrt(x * x + y * y)
         room = vertical_threshold_m_s2(s, config)
-        s.push_before, s.push = s.push, push_of(s, side, f_z, room)
         most = s.thrust.most_m_s2(now_us)
         is_within = side < s.threshold_m_s2 and -most - room < f_z < room
-        if is_within and off is None and s.phase is Phase.ARMED and not is_jolt(s, config):
+        if is_within and off is None and s.phase is Phase.ARMED:
             # Nearly every sample ends here.
             s.soft.since_boot_us = None
             self._learn(s, f, before_us)
-            hidden = spun(s, config) or kicked(s, config) or dipped(s, f_z, room)
+            hidden = spun(s, config) or dipped(s, f_z, room)
             return None if hidden is None else self._fire_hidden(s, now_us, situation, hidden)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
@@ -128,13 +125,12 @@ class FusedDetector:
             return None
         below, above = f_z - room, -f_z - most - room
         threshold = side_threshold_m_s2(s, config, w)
-        jolted = s.phase is Phase.ARMED and is_jolt(s, config)
-        if side < threshold and below < 0.0 and above < 0.0 and not jolted:
+        if side < threshold and below < 0.0 and above < 0.0:
             self._quiet(s, f, before_us)
             return None
         force = (x, y, f_z - s.thrust.expected_m_s2(now_us, s.floor.z))
         size = math.sqrt(x * x + y * y + force[2] * force[2])
-        ratio = CLEAR if jolted else max(side / threshold, 1.0 + max(below, above) / room)
+        ratio = max(side / threshold, 1.0 + max(below, above) / room)
         return self._loud(s, sample, situation, force, size, ratio)
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:

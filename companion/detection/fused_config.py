@@ -6,6 +6,8 @@ from companion.written import NotNegative, Positive, Written
 class FusedConfig(Written):
     """Settings of the detector `fused`."""
 
+    retired = frozenset({"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push"})
+
     # A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its spread reads half too much, to be safe); a gust
     # of 5 m/s adds 1.1 m/s^2 of drag at most. Eq. 2 begins with b_s v_c = 15 m/s^2 at 0.5 m/s.
     side_threshold_m_s2: Positive = 1.75
@@ -28,20 +30,11 @@ class FusedConfig(Written):
     # Thrust that turns at 1 rad/s changes the acceleration by 0.6 m/s^2 in 60 ms; the estimate's 20 ms of delay make
     # 0.012 m/s of that. Turning about the thrust itself changes nothing.
     velocity_per_rate_m: NotNegative = 0.01
-    # A jolt: rates that step from one sample to the next by more than motors can, 200 rad/s^2 at full moment. With half
-    # of a force threshold, on z against the mean, it is a contact that grazes; alone it is no hit.
-    jolt_rad_s: Positive = 0.4
-    jolt_rad_s2: Positive = 200.0
-    # Spun: the same without any force in the samples, kept by the next one; twice of what motors can, so that a nimbler
-    # vehicle's flips are none. A rigid vehicle that meets a leaning wall at 2 m/s steps by 15 rad/s and more.
+    # Spun: rates that step from one sample to the next without any force in them, kept by the next one. Motors at full
+    # moment make 200 rad/s^2; twice that, so that a nimbler vehicle's flips are none. A rigid vehicle that meets a
+    # leaning wall at 2 m/s steps by 15 rad/s and more.
     spin_rad_s: Positive = 2.0
     spin_rad_s2: Positive = 400.0
-    # A kick: rates that step between two samples and neither before nor after, as motors that lag do not make them:
-    # four public logs' healthy flights show 0.16 rad/s at most, simulated ones 0.2. It is a contact with a push in the
-    # two samples beside it, together this many thresholds: noise alone makes 0.4, in one of 200 such pairs 0.7.
-    kick_rad_s: Positive = 0.4
-    kick_rad_s2: Positive = 40.0
-    kick_push: Positive = 0.7
     # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
     rearm_quiet_s: Positive = 0.04
     # Longer loud than this is no contact but a new way to shake, and is learnt.

@@ -23,7 +23,4 @@ class FusedState(DetectorState):
     contact_began_boot_us: int = 0
     hit_boot_us: int | None = None
     """Of the latest impact that was no hand's."""
-    push: float = 0.0
-    """Of the newest sample: the larger of its push sideways, in thresholds, and half of that along the thrust."""
-    push_before: float = 0.0
     soft: SoftTouch = field(default_factory=SoftTouch)

@@ -40,21 +40,6 @@ def spun(s: FusedState, config: FusedConfig) -> Hidden | None:
     return _from_ahead(s, over_s)
 
 
-def kicked(s: FusedState, config: FusedConfig) -> Hidden | None:
-    """Turned between two samples and neither before nor after, as motors that lag cannot, and pushed a little; or by
-    more than motors could that do not lag."""
-    a = s.aftermath
-    kick_rad_s = a.kick_rad_s * config.side_threshold_m_s2 / s.threshold_m_s2
-    if kick_rad_s < config.kick_rad_s:
-        return None
-    over_s = 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
-    if kick_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * over_s:
-        return _from_ahead(s, over_s)
-    if kick_rad_s < config.kick_rad_s + config.kick_rad_s2 * over_s or s.push_before + s.push < config.kick_push:
-        return None
-    return _from_ahead(s, over_s)
-
-
 def dipped(s: FusedState, f_z: float, room_m_s2: float) -> Hidden | None:
     """Thrust that was gone, or pushed back, in the sample before and is there again: a ceiling touched. Thrust cannot
     go and come back from one sample to the next. `room_m_s2` is what f_z may depart by (see `force_signs`)."""
@@ -107,7 +92,7 @@ def _step_asked_for_m_s(s: FusedState, config: FusedConfig, time_us: int, spread
     p, q, _ = aftermath.strapdown.rates_frd_rad_s
     shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
     noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
-    if turned and turned_rad_s >= config.jolt_rad_s + config.jolt_rad_s2 * aftermath.rate_step_s:
+    if turned and turned_rad_s >= config.spin_rad_s + config.spin_rad_s2 * aftermath.rate_step_s:
         # No motor did that, and the thrust has not turned for long: two signs, half as clear.
         noise_m_s, room = 0.5 * noise_m_s, 0.0
     room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))

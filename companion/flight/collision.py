@@ -45,12 +45,9 @@ class CollisionRecord:
     normal_ned: Vector3
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
-    impulse_m_s: float
     climb: Climb
-    doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
-    inherits_doubt: bool = False  # from an earlier hit
-    is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
     may_be_clipped: bool = True
+    is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
     is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
@@ -62,19 +59,17 @@ class CollisionRecord:
     level_leans_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
-    def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
-        """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
+    def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> None:
+        """What accelerometer, gyroscopes and estimate show while that is not believed."""
         if isinstance(self.claim, Claim):
             self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         self.level_leans_m_s2 = strapdown.level_leans_m_s2
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
-        if self.is_believed or self.is_over or not self.may_be_clipped or told is None:
-            return False
-        pushed_us = self.contact_ended_boot_us - self.sample_time_boot_us
-        self.climb.hear(strapdown, turns, pushed_us, self.normal_ned, told)
-        return self.climb.is_pressing
+        if self.may_be_clipped and not self.is_believed and not self.is_over and told is not None:
+            pushed_us = self.contact_ended_boot_us - self.sample_time_boot_us
+            self.climb.hear(strapdown, turns, pushed_us, self.normal_ned, told)
 
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
@@ -93,8 +88,7 @@ class CollisionRecord:
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         if not self.is_behind:
             self.normal_ned = away_from(estimate.normal_ned)
-        self.impulse_m_s = estimate.impulse_m_s
-        self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
+        self.may_be_clipped = estimate.may_be_clipped
         self.is_clipped = estimate.is_lower_bound
 
     def _is_seen_again(self, state: DetectorState, claim: Claim | Leap) -> bool:

@@ -144,7 +144,6 @@ class FlightContext:
     outbox: list[Outgoing] = field(default_factory=list)
     was_silent: bool = False  # since the streams were asked for; if it was restarted meanwhile it has forgotten them
     target: Target | None = None  # as last streamed
-    is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
     stepped_us: int | None = None  # when the step before was
     unheard_us: int = 0  # since the last position: what late steps took, in which nobody listened

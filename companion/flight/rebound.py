@@ -7,19 +7,14 @@ from companion.detection.classify import HOVER_M_S
 from companion.estimate.approach import VelocityFix
 from companion.flight.collision import horizontal_unit
 from companion.flight.context import FlightContext
-from companion.messages import LocalPosition, Vector3
+from companion.messages import Vector3
 from companion.recovery.climb import Climb
-from companion.recovery.direction import away_from, plus, split
-from companion.recovery.interface import Contact, Moving, RecoveryLaw
+from companion.recovery.direction import away_from
+from companion.recovery.interface import Contact, RecoveryLaw
 from companion.recovery.way import REST
 
-# A rebound that is further than this from what the impact explains is an estimate that the hit has upset.
-REBOUND_SLACK_M_S = 0.5
-REBOUND_SLACK_M = 0.2
-# Slow contacts go on for up to 0.2 s. A contact's last push, up to 0.02 s of it unheard, is in the estimate after this.
+# Long enough for two velocities of the slowest stream.
 LEFT_US = 50_000
-# What still leans on an obstacle, too softly to be felt, comes nearer by less: arms give way by 5 cm.
-SLID_OFF_M_S = 0.3
 # A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
 TELLING_CHANGE_M_S = 1.0
 # Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
@@ -49,13 +44,6 @@ def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: V
     return moved
 
 
-def is_free(sample: LocalPosition, contact: Contact, ended_boot_us: int) -> bool:
-    """Whether nothing pushes any more: the vehicle leaves the obstacle, or has slid off it and flies on."""
-    off_m_s = split(sample.velocity_ned_m_s, contact.normal_ned)[0]
-    moves = off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S
-    return moves and sample.time_boot_us - ended_boot_us >= LEFT_US
-
-
 def lean_left(fixes: Sequence[VelocityFix], boot_us: int) -> Vector3:
     """The horizontal acceleration of a vehicle that nothing pushes, of the last moments before a time; NED, m/s^2."""
     recent = [fix for fix in fixes if boot_us - LEFT_US <= fix.time_boot_us <= boot_us]
@@ -65,27 +53,6 @@ def lean_left(fixes: Sequence[VelocityFix], boot_us: int) -> Vector3:
     per_s = 1e6 / (last.time_boot_us - first.time_boot_us)
     (n, e, _), (u, v, _) = first.sum_ned_m_s, last.sum_ned_m_s
     return (per_s * (u - n), per_s * (v - e), 0.0)
-
-
-def believable(
-    sample: LocalPosition, contact: Contact, impulse_m_s: float, since_s: float, lean_ned_m_s2: Vector3 | None = None
-) -> Moving | None:
-    """The motion measured after a contact; None where the hit cannot have caused it. With the lean of a vehicle that is
-    free of the obstacle it may be one past it.
-
-    A contact changes the velocity by its impulse (of which a clipped sensor shows a part), and where the obstacle
-    stands still by no more than twice the speed of the approach. What estimators say after a stiff hit can be anything.
-    """
-    change_m_s = math.dist(sample.velocity_ned_m_s, contact.velocity_ned_m_s)
-    most_m_s = max(2.0 * math.hypot(*contact.velocity_ned_m_s), impulse_m_s) + REBOUND_SLACK_M_S
-    most_m = (math.hypot(*contact.velocity_ned_m_s) + most_m_s) * since_s + REBOUND_SLACK_M
-    if change_m_s > most_m_s or math.dist(sample.position_ned_m, contact.position_ned_m) > most_m:
-        return None
-    if lean_ned_m_s2 is not None:
-        return Moving(sample.position_ned_m, sample.velocity_ned_m_s, lean_ned_m_s2)
-    off_m_s, along = split(sample.velocity_ned_m_s, contact.normal_ned)
-    # Still in contact, or the estimate is late: towards the obstacle is never asked for.
-    return Moving(sample.position_ned_m, plus(along, max(0.0, off_m_s), contact.normal_ned))
 
 
 def climb_of(

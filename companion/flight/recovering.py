@@ -14,7 +14,7 @@ from companion.flight.confirming import Claim, Leap, claim_of
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
 from companion.flight.doubt import half_way, is_believed
 from companion.flight.pinned import Hanging, has_room_below, let_go
-from companion.flight.rebound import agreed_normal, believable, climb_of, is_free, lean_left, way_back
+from companion.flight.rebound import agreed_normal, climb_of, lean_left, way_back
 from companion.flight.remembering import remembered_surfaces
 from companion.flight.spinning import Steering, coming_to_rest, is_spinning
 from companion.flight.telling import tell_detection
@@ -50,9 +50,7 @@ class Recover:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
         self._is_refined = not self._law.is_refined
-        self._after_ned_m_s: Vector3 | None = None  # the first velocity after the contact
         self._refined_boot_us = self._record.sample_time_boot_us
-        self._leaves = True  # at the last refinement the contact was over
         self._braking = NO_BRAKING
         self._is_believed = not self._law.is_refined
         self._spins = False
@@ -79,7 +77,7 @@ class Recover:
         if not self._is_believed:
             climb = self._record.climb
             braking = climb.braking_m_s2() if climb.is_reckoned else 0.0
-            is_new = now_us - self._started_us < BRAKED_US and not self._record.inherits_doubt
+            is_new = now_us - self._started_us < BRAKED_US
             motion = level(motion, self._record.setpoint_ned_m[2], braking)
             a, b, _ = motion.acceleration_ned_m_s2 or REST
             besides = REST if self._spins else self._record.level_leans_m_s2
@@ -142,7 +140,7 @@ class Recover:
             return True
         if record.may_be_clipped:
             self._spins = is_spinning(flight)
-            since_us = sample.time_boot_us - record.doubted_since_boot_us
+            since_us = sample.time_boot_us - record.sample_time_boot_us
             normals = (self._contact.normal_ned, record.normal_ned)
             record.is_believed = since_us >= HEIGHT_KNOWN_US and is_believed(
                 sample, self._contact.velocity_ned_m_s, normals, record.fixes, since_us
@@ -151,72 +149,57 @@ class Recover:
         return self._is_believed
 
     def _refine(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """With the motion after the contact, and again when it is over; while something pushes for long, ten times a
-        second."""
-        record = self._record
+        """With the motion after the contact, and again where that has gone on since or while it is carried."""
+        record, contact = self._record, self._contact
         since_us = sample.time_boot_us - record.sample_time_boot_us
-        if self._after_ned_m_s is None and since_us >= REBOUND_KNOWN_US:
-            u, v, w = sample.velocity_ned_m_s
-            self._after_ned_m_s = (u, v, w if since_us <= REBOUND_LATEST_US else record.contact.velocity_ned_m_s[2])
-        if self._law.is_refined and self._after_ned_m_s is not None:
-            normal = agreed_normal(record.normal_ned, record.contact.velocity_ned_m_s, self._after_ned_m_s)
-            self._contact = replace(self._contact, normal_ned=normal)
-        carried = self._is_refined and self._is_carried(flight, sample, now_us)
-        leaves = is_free(sample, self._contact, record.contact_ended_boot_us)
-        if self._law.is_refined and since_us >= REBOUND_KNOWN_US and self._steers(flight, sample, since_us, now_us):
+        if not self._law.is_refined or since_us < REBOUND_KNOWN_US:
+            return
+        if self._steers(flight, sample):
             self._is_refined = False
             return
-        self._leaves &= record.contact_ended_boot_us <= self._refined_boot_us  # or it has been touched again since
-        if carried:
-            self._contact = replace(self._contact, position_ned_m=sample.position_ned_m)
-        elif since_us < REBOUND_KNOWN_US or (self._is_refined and (self._leaves or not leaves)):
+        carried = self._is_refined and self._is_carried(flight, sample, now_us)
+        if self._is_refined and not carried and record.contact_ended_boot_us <= self._refined_boot_us:
             return
-        lean = lean_left(record.fixes, sample.time_boot_us) if leaves else None
-        motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6, lean)
-        if motion is None:
-            return
-        self._is_refined, self._refined_boot_us, self._leaves = True, sample.time_boot_us, leaves or carried
-        if carried:
-            # From what pushes it along a vehicle comes clear only if it flies faster.
-            faster = plus(motion.velocity_ned_m_s, CLEAR_M_S, self._contact.normal_ned)
-            motion = replace(motion, velocity_ned_m_s=faster)
-        record.setpoint_ned_m = _setpoint(flight, self._law, self._contact, motion, flight.collisions[:-1])
+        u, v, w = sample.velocity_ned_m_s
+        after = (u, v, w if since_us <= REBOUND_LATEST_US else contact.velocity_ned_m_s[2])
+        normal = agreed_normal(record.normal_ned, contact.velocity_ned_m_s, after)
+        place = sample.position_ned_m if carried else contact.position_ned_m
+        self._contact = contact = replace(contact, position_ned_m=place, normal_ned=normal)
+        self._is_refined, self._refined_boot_us = True, sample.time_boot_us
+        lean = lean_left(record.fixes, sample.time_boot_us)
+        # From what pushes it along a vehicle comes clear only if it flies faster.
+        velocity = plus(sample.velocity_ned_m_s, CLEAR_M_S if carried else 0.0, normal)
+        motion = Moving(sample.position_ned_m, velocity, lean)
+        record.setpoint_ned_m = _setpoint(flight, self._law, contact, motion, flight.collisions[:-1])
         record.overshoot_m = 0.0  # that past the setpoint expected is none
         self._take(flight, motion, now_us)
-        off_m_s, place = split(motion.velocity_ned_m_s, self._contact.normal_ned)[0], record.setpoint_ned_m
+        off_m_s, place = split(motion.velocity_ned_m_s, normal)[0], record.setpoint_ned_m
         text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
         flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
 
     def _is_carried(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> bool:
-        if not self._law.is_refined or sample.time_boot_us - self._refined_boot_us < CARRIED_EVERY_US:
+        if sample.time_boot_us - self._refined_boot_us < CARRIED_EVERY_US:
             return False
         asked = self._way.at((now_us - self._way_began_us) * 1e-6)
         return is_carried(flight, self._record, self._contact.normal_ned, sample, asked)
 
     def _hold_height(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
         """From the first estimate on that can show what the hit did; the accelerometer, which it clips, cannot."""
-        record = self._record
-        since_us = sample.time_boot_us - record.sample_time_boot_us
-        if not HEIGHT_KNOWN_US <= since_us <= BRAKED_US:
-            return
-        if believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6) is not None:
+        since_us = sample.time_boot_us - self._record.sample_time_boot_us
+        if HEIGHT_KNOWN_US <= since_us <= BRAKED_US:
             most_m_s2 = flight.mission.recovery.vertical_acceleration_m_s2
             self._braking = brake(sample.velocity_ned_m_s[2], most_m_s2, now_us)
 
-    def _steers(self, flight: FlightContext, sample: LocalPosition, since_us: int, now_us: int) -> bool:
+    def _steers(self, flight: FlightContext, sample: LocalPosition) -> bool:
         """Gently to rest while the vehicle spins."""
         attitude, record = flight.vehicle.attitude, self._record
         if attitude is None or not is_spinning(flight):
             self._steering = None
             return False
         if self._steering is None:
-            motion = believable(sample, self._contact, record.impulse_m_s, since_us * 1e-6)
-            if motion is None:
-                return False
-            rest = coming_to_rest(motion.position_ned_m, motion.velocity_ned_m_s, self._contact.position_ned_m[2])
+            rest = coming_to_rest(sample.position_ned_m, sample.velocity_ned_m_s, self._contact.position_ned_m[2])
             record.setpoint_ned_m = _allowed(flight, self._law, self._contact, rest, flight.collisions[:-1])
             self._steering = Steering(record.setpoint_ned_m)
-            self._take(flight, motion, now_us)
         self._steering.step(sample, attitude)
         return True
 
@@ -224,24 +207,13 @@ class Recover:
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """A new collision: what was known just before it, and from that the setpoint."""
     mission, impact = flight.mission, estimate.impact
-    normal = away_from(estimate.normal_ned)
+    behind = overtaken(flight, impact.specific_force_frd_m_s2, estimate.velocity_ned_m_s)
+    normal = behind or away_from(estimate.normal_ned)
     law = _law(flight)
     contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
-    doubted, behind = _doubted(flight), overtaken(flight, impact.specific_force_frd_m_s2, estimate.velocity_ned_m_s)
-    if behind is not None:
-        normal = behind
-    if law.is_refined:
-        believed = behind or half_way(normal, way_back(contact.velocity_ned_m_s))
-        contact = replace(contact, normal_ned=believed)
-        if doubted is not None:
-            # Place and velocity now are as wrong as the estimate.
-            contact = replace(doubted.contact, time_boot_us=estimate.time_boot_us)
+    if law.is_refined and behind is None:
+        contact = replace(contact, normal_ned=half_way(normal, way_back(contact.velocity_ned_m_s)))
     hit_boot_us = impact.sample_time_boot_us
-    if doubted is None:
-        climb = climb_of(flight, law, contact, hit_boot_us, estimate.time_boot_us - estimate.time_error_us)
-    else:
-        climb = doubted.climb
-        climb.struck_again(hit_boot_us)
     record = CollisionRecord(
         detected_at_us=now_us,
         sample_time_boot_us=hit_boot_us,
@@ -250,12 +222,9 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         setpoint_ned_m=_setpoint(flight, law, contact, law.expected(contact), flight.collisions),
         normal_ned=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
-        contact_ended_boot_us=impact.sample_time_boot_us,
-        impulse_m_s=estimate.impulse_m_s,
+        contact_ended_boot_us=hit_boot_us,
         may_be_clipped=not estimate.is_final or estimate.may_be_clipped,
-        doubted_since_boot_us=impact.sample_time_boot_us if doubted is None else doubted.doubted_since_boot_us,
-        inherits_doubt=doubted is not None,
-        climb=climb,
+        climb=climb_of(flight, law, contact, hit_boot_us, estimate.time_boot_us - estimate.time_error_us),
         is_behind=behind is not None,
         claim=_claim(flight, estimate),
     )
@@ -271,14 +240,6 @@ def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | Leap | No
     force_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
     config = flight.mission.companion.estimate
     return claim_of(estimate, force_ned, config.imu_averaging_interval_s, config.guards)
-
-
-def _doubted(flight: FlightContext) -> CollisionRecord | None:
-    """The hit before, where the vehicle still recovers from it and its estimate is not to be believed."""
-    if not flight.collisions:
-        return None
-    before = flight.collisions[-1]
-    return before if before.may_be_clipped and not before.is_believed and not before.is_over else None
 
 
 def _law(flight: FlightContext) -> RecoveryLaw:

@@ -39,8 +39,9 @@ class AdaptiveLaw:
         self._config = config
 
     def expected(self, contact: Contact) -> Moving:
-        into_m_s, tangential = split(contact.velocity_ned_m_s, contact.normal_ned)
-        velocity = plus(tangential, -self._config.restitution * min(0.0, into_m_s), contact.normal_ned)
+        off_m_s, tangential = split(contact.velocity_ned_m_s, contact.normal_ned)
+        # What leaves already goes on to; what comes in comes back with the share that is given back.
+        velocity = plus(tangential, max(off_m_s, -self._config.restitution * off_m_s), contact.normal_ned)
         return Moving(contact.position_ned_m, velocity)
 
     def goal_ned_m(self, contact: Contact, motion: Moving) -> Vector3:
@@ -48,7 +49,7 @@ class AdaptiveLaw:
         off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
         off_m = split(_difference(motion.position_ned_m, contact.position_ned_m), normal)[0]
         into_m_s, _ = split(contact.velocity_ned_m_s, normal)
-        harder_m, along_m_s = config.clearance_s * abs(into_m_s), math.hypot(*tangential)
+        harder_m, along_m_s = config.clearance_s * max(0.0, -into_m_s), math.hypot(*tangential)
         if normal[2] == 0.0:
             tangential = (tangential[0], tangential[1], 0.0)
         leant = self._leant(motion)

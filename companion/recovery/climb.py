@@ -8,7 +8,6 @@ from companion.estimate.rotation import turned
 from companion.estimate.strapdown import Strapdown
 from companion.messages import Attitude, LocalPosition, Vector3
 from companion.mission.config import GuardsConfig
-from companion.recovery.height import BRAKED_US, LEAST_M_S
 from companion.recovery.thrown import FOLDED_RESTITUTION, FOLDS_US, STIFF_RESTITUTION, Approach, Throw, thrown
 from companion.recovery.unseen import Unseen
 from companion.recovery.way import REST
@@ -32,8 +31,6 @@ LAG_S = 0.03
 WITHIN_S, AT_FIRST_US, LATER_WITHIN_S = 0.03, 120_000, 0.1
 # As PX4's MPC_Z_P.
 HEIGHT_PER_S = 1.0
-# Setpoints leave at their rate; a brake that is wrong by this costs 2 cm/s in half an interval.
-PRESSING_M_S2 = 2.0
 
 
 @dataclass(slots=True)
@@ -55,7 +52,6 @@ class Climb:
     fallen_m: float = 0.0
     asked_m_s2: float = 0.0
     coming_m_s: float = 0.0  # of what was asked, what has not come about yet
-    is_held: bool = False  # something else is asked for
     was_loud: bool = True  # the sample before
     time_boot_us: int = 0
     sum_m_s: float = 0.0
@@ -80,13 +76,6 @@ class Climb:
     @property
     def is_reckoned(self) -> bool:
         return self.upwards_m_s2 > 0.0
-
-    @property
-    def is_pressing(self) -> bool:
-        """Whether what was asked last is so wrong that the next setpoint's turn is too late."""
-        is_new = self.time_boot_us - self.hit_boot_us <= BRAKED_US
-        is_thrown = self.is_reckoned and abs(self.throw.down_m_s) >= LEAST_M_S
-        return is_new and is_thrown and not self.is_held and abs(self._wanted_m_s2() - self.asked_m_s2) >= PRESSING_M_S2
 
     def hear(
         self, strapdown: Strapdown, turns: Sequence[Attitude], pushed_us: int, normal_ned: Vector3, told: LocalPosition
@@ -169,16 +158,9 @@ class Climb:
 
     def braking_m_s2(self) -> float:
         """The acceleration to ask for now, which ends the climb and brings the height back."""
-        self.asked_m_s2, self.is_held = self._wanted_m_s2(), False
+        self.asked_m_s2 = self._wanted_m_s2()
         return self.asked_m_s2
 
     def hold(self, asked_m_s2: float) -> None:
         """Another acceleration is asked for."""
-        self.asked_m_s2, self.is_held = asked_m_s2, True
-
-    def struck_again(self, hit_boot_us: int) -> None:
-        """By a further touch, of which little is known: what is told from now on is of after it."""
-        self.hit_boot_us, self.height_down_m, self._approach = hit_boot_us, None, None
-        self._summed_m_s = self._summed_m = 0.0
-        self.was_loud, self.throw = True, UNTURNED
-        self._begin()
+        self.asked_m_s2 = asked_m_s2

@@ -171,22 +171,10 @@ def test_a_throw_that_clipping_hid_is_braked_as_hard_as_a_vehicle_falls_and_no_l
     assert asked[-1] == pytest.approx(0.0, abs=0.5)
 
 
-def test_a_brake_cannot_wait_for_the_next_setpoints_turn():
-    climb = climbing()
-    heard(climb, lambda _: 0.0, until_us=4_000)
-    climb.hold(0.0)
-    assert not climb.is_pressing, "something else is asked for"
-    climb.braking_m_s2()
-    assert not climb.is_pressing
-    climb.asked_m_s2 = 0.0
-    assert climb.is_pressing
-
-
 def test_a_climb_that_is_not_to_be_braked_is_not():
     climb = climbing(upwards_m_s2=0.0)
     heard(climb, lambda _: 0.0, until_us=12_000)
     assert not climb.is_reckoned
-    assert not climb.is_pressing
 
 
 def test_half_a_second_later_the_estimate_counts():
@@ -197,22 +185,6 @@ def test_half_a_second_later_the_estimate_counts():
     heard(again := climbing(), lambda _: 0.0, until_us=600_000, told_m_s=lambda _: 0.0)
     assert reckoned_m_s < -0.2
     assert abs(again.speed_m_s) < 0.2 * abs(reckoned_m_s)
-
-
-def test_after_a_further_touch_nothing_is_known_but_what_is_told():
-    # Given a climb that was reckoned
-    climb = climbing()
-    heard(climb, lambda _: 0.0, until_us=200_000)
-    before_m = climb.fallen_m
-    # When something is touched again, of which the estimate hides nothing
-    climb.struck_again(1_200_000)
-    strapdown = Strapdown(time_boot_us=1_204_000, acceleration_ned_m_s2=(-3.0, 0.0, 0.0))
-    for step in range(1, 100):
-        strapdown.time_boot_us = 1_200_000 + 4000 * step
-        climb.hear(strapdown, [], 0, SOUTH, LocalPosition(strapdown.time_boot_us, ZERO, (0.0, 0.0, 0.4)))
-    # Then it falls as it is told, on from where it was
-    assert climb.speed_m_s == pytest.approx(0.4, abs=0.08)
-    assert before_m < climb.fallen_m < before_m + 0.4 * 0.4
 
 
 def test_height_is_the_only_thing_that_levelling_changes():

@@ -52,9 +52,7 @@ def test_little_thrust_away_from_the_wall_is_asked_for_and_its_height_of_what_do
     # Given a hit that the estimate does not know, and that has made the vehicle fall with 0.05 m/s
     climb = Climb(1_000_000, 998_000, (2.0, 0.0, 0.0), GuardsConfig(), 3.0, speed_m_s=0.05)
     contact = Contact(1_000_000, (3.0, 0.0, -2.0), (2.0, 0.0, 0.0), WALL_IN_THE_NORTH)
-    record = CollisionRecord(
-        0, 1_000_000, "d", contact, (2.0, 0.0, -2.0), WALL_IN_THE_NORTH, 9.0, 1_000_000, 2.0, climb
-    )
+    record = CollisionRecord(0, 1_000_000, "d", contact, (2.0, 0.0, -2.0), WALL_IN_THE_NORTH, 9.0, 1_000_000, climb)
     wanted = [(falls, reckons) for falls in (True, False) for reckons in (True, False)]
     asked = {each: let_go(record, WALL_IN_THE_NORTH, None, *each) for each in wanted}
     assert all(target.acceleration_ned_m_s2[0] < -3.0 and target.leans_only for target in asked.values())

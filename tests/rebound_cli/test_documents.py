@@ -57,6 +57,13 @@ def test_an_unknown_key_suggests_the_close_one_and_lists_all():
     assert "position_ned_m, speed_m_s, acceleration_m_s2, yaw_deg" in text
 
 
+def test_a_key_of_an_earlier_version_is_taken_with_a_warning():
+    earlier = "companion: {fused: {kick_rad_s: 0.4, spin_rad_s: 3.0}}\nsim:"
+    with pytest.warns(UserWarning, match="kick_rad_s has no effect any more"):
+        mission = mission_from(document("sim:", earlier))
+    assert mission.companion.fused.spin_rad_s == 3.0
+
+
 def test_a_missing_key_is_named_at_the_part_that_lacks_it():
     text = complaint(mission_from, document("      position_ned_m: [1, 0, -1.5]\n"))
     assert text == "demo.yaml:4: items.1.go_to.position_ned_m: is missing; add it."
