@@ -25,5 +25,14 @@ def add_ablation(commands: Commands) -> None:
         metavar="FILE",
         help="default: bench/notes/ablation.md",
     )
+    ablation.add_argument(
+        "--hits",
+        type=count,
+        metavar="N",
+        help="drawn hits for the detector alone, with hands and flights",
+    )
+    ablation.add_argument(
+        "--data", type=Path, metavar="DIR", help="with --hits: recorded flights and impacts, as `detectors` has them"
+    )
     add_workers(ablation)
     ablation.set_defaults(run=runs("bench.ablation.command:run_ablation"))

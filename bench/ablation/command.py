@@ -1,9 +1,11 @@
 """`bench ablation`: a table of what each special rule is worth, written into a note."""
 
+import math
 import statistics
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 
+from bench.ablation.detections import detections_campaign
 from bench.ablation.flights import ablation_campaign
 from bench.ablation.rules import RULES, Rule
 from bench.campaign.plan import Campaign, Json
@@ -21,16 +23,52 @@ def run_ablation(options: Namespace) -> int:
     checked_text(options.out, PART, TITLE)
     names = tuple(options.rule or (rule.name for rule in RULES))
     campaign = ablation_campaign(options.missions, options.first_seed, names)
-    results = run_campaign(campaign, Workers(options.jobs, options.scheduler))
-    write_part(options.out, PART, table(campaign, results), TITLE)
+    workers = Workers(options.jobs, options.scheduler)
+    results = run_campaign(campaign, workers)
+    text, failed = table(campaign, results), bool(results.failures)
+    if options.hits is not None:
+        heard = detections_campaign(options.hits, options.first_seed, names, options.data)
+        detections = run_campaign(heard, workers)
+        text += detections_table(heard, detections)
+        failed |= bool(detections.failures)
+    write_part(options.out, PART, text, TITLE)
     print(f"Written to {options.out}.")
-    return 1 if results.failures else 0
+    return 1 if failed else 0
 
 
 def table(campaign: Campaign, results: Results) -> str:
     """What stands between the note's marks."""
     lines = _lines(list(results.results.values()), campaign)
     return "\n".join([*lines, failures_text(campaign, results), ""])
+
+
+def detections_table(campaign: Campaign, results: Results) -> str:
+    """The same of the detector alone."""
+    lines = _detection_lines(list(results.results.values()), campaign)
+    return "\n".join(["", *lines, failures_text(campaign, results), ""])
+
+
+def _detection_lines(heard: Sequence[Json], campaign: Campaign) -> Iterator[str]:
+    kinds = sorted({case["kind"] for case in heard})
+    counted = ", ".join(f"{sum(case['kind'] == kind for case in heard)} {kind}" for kind in kinds)
+    yield f"The detector alone, at each rate (`--hits {campaign.parameters['hits']}`): {counted}."
+    yield "`found`: hits found, with the rule less without; `alarms`: of false ones, or of hands taken for hits;"
+    yield "`sooner`: hits told earlier with it."
+    yield ""
+    yield "| rule | mattered | found | alarms | sooner |"
+    yield "|---|---|---|---|---|"
+    for rule in RULES:
+        pairs = [(case["with"], case["without"][rule.name]) for case in heard if rule.name in case["without"]]
+        if pairs:
+            yield _detection_row(rule, pairs)
+
+
+def _detection_row(rule: Rule, pairs: Sequence[tuple[Json, Json]]) -> str:
+    rates = [(kept[rate], left[rate]) for kept, left in pairs if "failure" not in left for rate in kept]
+    found = sum(kept.get("found", 0) - left.get("found", 0) for kept, left in rates)
+    alarms = sum(kept["false"] - left["false"] for kept, left in rates)
+    sooner = sum((left.get("ms") or 0.0) > (kept.get("ms") or math.inf) for kept, left in rates)
+    return f"| {rule.name} | {len(pairs)} | {found:+d} | {alarms:+d} | {sooner} |"
 
 
 def _lines(flights: Sequence[Json], campaign: Campaign) -> Iterator[str]:

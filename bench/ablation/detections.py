@@ -13,7 +13,7 @@ from bench.ablation.switching import switched
 from bench.campaign.plan import Campaign, Json
 from bench.detectors.campaigns import healthy_campaign, injected_campaign
 from bench.detectors.flights import FlightCase, work_out_flight
-from bench.detectors.hands import draw_hand, work_out_hand
+from bench.detectors.hands import HandCase, draw_hand, work_out_hand
 from bench.detectors.hits import HitCase, draw_case, work_out_hit
 from bench.detectors.links import JITTERY
 from bench.detectors.mishaps import FAMILIES
@@ -40,7 +40,7 @@ class Heard:
     """Something to hear, and the rules that are looked at."""
 
     kind: str
-    case: HitCase | FlightCase | HealthyCase | InjectedCase | Any
+    case: HitCase | HandCase | FlightCase | HealthyCase | InjectedCase
     names: tuple[str, ...]
 
 
@@ -78,23 +78,20 @@ def work_out(heard: Heard) -> Json:
 
 def _said(heard: Heard) -> Json:
     """By rate: hits found and when, and alarms that were none."""
-    work: Callable[[Any], Json] = _WORK.get(type(heard.case), work_out_hand)
-    rates = work(heard.case)["rates"]
-    return {rate: _of_rate(heard.kind, found.get("detectors", found)[FLOWN_WITH[0]]) for rate, found in rates.items()}
+    rates = _WORK[type(heard.case)](heard.case)["rates"]
+    return {rate: _of_rate(found.get("detectors", found)[FLOWN_WITH[0]]) for rate, found in rates.items()}
 
 
-def _of_rate(kind: str, entry: Json) -> Json:
-    if kind == "hand":
-        return {"false": len(entry["collisions"])}
-    if "alarms" in entry:
-        return {"false": len(entry["alarms"])}
-    if "latency_ms" not in entry and "false" not in entry:
-        return {"false": len(entry["collisions"])}
+def _of_rate(entry: Json) -> Json:
+    """Of a hit, which has `false`; of a healthy flight or a hand, in which every alarm is one."""
+    if "false" not in entry:
+        return {"false": len(entry["alarms"] if "alarms" in entry else entry["collisions"])}
     return {"found": "latency_ms" in entry, "ms": entry.get("latency_ms"), "false": entry["false"]}
 
 
 _WORK: dict[type, Callable[[Any], Json]] = {
     HitCase: work_out_hit,
+    HandCase: work_out_hand,
     FlightCase: work_out_flight,
     HealthyCase: work_out_healthy,
     InjectedCase: work_out_injected,
