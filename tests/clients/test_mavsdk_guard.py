@@ -67,12 +67,13 @@ def test_not_one_setpoint_of_the_program_reaches_the_vehicle_while_the_guard_hol
         return inner(*arguments)
 
     monkeypatch.setattr(normal, "_improved", improved)
+    folds = GuardConfig.model_validate({"companion": {"estimate": {"guards": {"travel_m": 0.03}}}})
     record, port = tmp_path / "wire", free_port()
     with (
         simulator(*WALL) as simulated,
         tapped(record, simulated.companion_port, port),
         connected(simulated, port) as (mavsdk, system),
-        CollisionGuard(mavsdk, system) as guard,
+        CollisionGuard(mavsdk, system, folds) as guard,
     ):
         _, telemetry = in_hold(guard, system)
         offboard = Offboard(system)
