@@ -3,7 +3,7 @@
 import math
 import statistics
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from bench.ablation.detections import detections_campaign
 from bench.ablation.flights import ablation_campaign
@@ -114,12 +114,7 @@ def _is_recovered(hit: Json) -> bool:
 
 
 def _change(pairs: Sequence[tuple[Json, Json]], name: str, times: float, digits: int) -> str:
-    found: Callable[[Json], float | None] = lambda hit: hit.get(name)  # noqa: E731
-    changes = [
-        times * (found(a) - found(b))  # type: ignore[operator]
-        for kept, left in pairs
-        if len(kept["hits"]) == len(left["hits"])
-        for a, b in zip(kept["hits"], left["hits"], strict=True)
-        if found(a) is not None and found(b) is not None
-    ]
+    same = [(kept["hits"], left["hits"]) for kept, left in pairs if len(kept["hits"]) == len(left["hits"])]
+    figures = [(a.get(name), b.get(name)) for kept, left in same for a, b in zip(kept, left, strict=True)]
+    changes = [times * (a - b) for a, b in figures if a is not None and b is not None]
     return f"{statistics.median(changes):+.{digits}f}" if changes else "–"

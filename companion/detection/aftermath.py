@@ -55,15 +55,13 @@ class Aftermath:
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
     velocity_ned_m_s: Vector3 | None = None
-    residuals: list[tuple[int, Vector3, Vector3]] = field(default_factory=list)
-    """Time, velocity less sum, mean acceleration since the one before."""
+    residuals: list[tuple[int, Vector3, Vector3, Vector3]] = field(default_factory=list)
+    """Time, velocity less sum, mean acceleration since the one before, sum."""
     delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
     known: int = 0
     unseen_share: float = 0.0
     """Of the time, by the samples' distances and the length of their windows."""
-    summed: tuple[int, Vector3] | None = None
-    """The accelerometer's sum at the velocity before."""
     newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
     """Of the newest step: velocity less sum with its delay in it, and the change of the acceleration."""
     unlearnt: tuple[Vector3, Vector3, Vector3] | None = None
@@ -120,22 +118,22 @@ class Aftermath:
         found = None
         if len(residuals) == COMPARED:
             self.is_slow = residuals[0][0] < self.slow_boot_us
-            _, before, led = zip(*residuals, strict=True)
+            _, before, led, _ = zip(*residuals, strict=True)
             step, change = _less(residual, _mean(before)), _less(acceleration, _mean(led))
             late_s = self.delay.delay_s(self.variance_m2_s2)
             found = (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
             self.newest = (step, change)
             del residuals[0]
-        residuals.append((time_us, residual, acceleration))
+        residuals.append((time_us, residual, acceleration, u))
         return found
 
     def _accelerated(self, time_us: int, sum_ned_m_s: Vector3) -> Vector3:
         """In the mean since the velocity before; what shakes is gone from it."""
-        before, self.summed = self.summed, (time_us, sum_ned_m_s)
-        if not self.residuals or before is None:
+        if not self.residuals:
             return self.strapdown.acceleration_ned_m_s2
-        per_s = 1e6 / (time_us - before[0])
-        n, e, d = _less(sum_ned_m_s, before[1])
+        before_us, _, _, before = self.residuals[-1]
+        per_s = 1e6 / (time_us - before_us)
+        n, e, d = _less(sum_ned_m_s, before)
         return (per_s * n, per_s * e, per_s * d)
 
     def learn(self, step: Vector3) -> None:

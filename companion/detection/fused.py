@@ -22,12 +22,7 @@ from typing import ClassVar
 from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
 from companion.detection.floor import SETTLED_US
-from companion.detection.force_signs import (
-    CLEAR,
-    pushes_on,
-    side_threshold_m_s2,
-    vertical_threshold_m_s2,
-)
+from companion.detection.force_signs import CLEAR, pushes_on, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.hidden_signs import Hidden, dipped, spun, velocity_jump

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from companion.estimate.history import STAMP_RESOLUTION_US
-from companion.estimate.kalman import KalmanFilter
+from companion.estimate.kalman import Floats, KalmanFilter
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
 
@@ -20,7 +19,6 @@ BATCH_US = 500_000
 # Before the first sample nothing is known of the acceleration but the vehicle's limits (about 0.3 g).
 INITIAL_ACCELERATION_M_S2 = 3.0
 
-Floats = npt.NDArray[np.float64]
 _MEASURED: Floats = np.eye(6, 9)
 
 
@@ -78,5 +76,5 @@ def _predict(kalman: KalmanFilter, dt_s: float, jerk_density_m2_s5: float) -> No
     kalman.predict(F=_on_each_axis(transition), Q=_on_each_axis(noise))
 
 
-def _on_each_axis(block: npt.NDArray[np.float64]) -> Floats:
+def _on_each_axis(block: Floats) -> Floats:
     return np.kron(block, np.eye(3)).astype(np.float64, copy=False)

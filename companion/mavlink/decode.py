@@ -208,8 +208,13 @@ class Decoder:
     Until `listen_to` names the vehicle only heartbeats are converted; then only what that component sent.
     """
 
-    def __init__(self, converters: Mapping[int, Callable[[Any], Sample | None]] = CONVERTERS) -> None:
-        self._converters = converters
+    def __init__(
+        self,
+        converters: Mapping[int, Callable[[Any], Sample | None]] = CONVERTERS,
+        is_packet: Callable[[bytes, int, int], bool] | None = None,
+    ) -> None:
+        """`is_packet`: whether bytes, from a start on and of a length, are a packet; by default the checksum tells."""
+        self._converters, self._is_packet = converters, is_packet or checksum_holds
         self._mavlink = dialect.MAVLink(None)
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
@@ -227,7 +232,7 @@ class Decoder:
         end = len(data)
         while start < end:
             length = packet_length(data, start)
-            if length == 0 or (start + length <= end and not checksum_holds(data, start, length)):
+            if length == 0 or (start + length <= end and not self._is_packet(data, start, length)):
                 start += 1
                 continue
             if start + length > end:

@@ -11,7 +11,7 @@ from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.link.refusals import Refusals
-from companion.mavlink.decode import Decoder
+from companion.mavlink.decode import Decoder, checksum_holds
 from companion.mavlink.packet import (
     FLAG_SIGNED,
     HEADER_V2,
@@ -63,7 +63,7 @@ class Signing:
     def __init__(self, key: bytes, stamp: int) -> None:
         """`stamp` is later than all that this key was used for before."""
         self._key = key
-        self._framer = Decoder({})
+        self._framer = Decoder({}, self._is_packet)
         self._streams: dict[tuple[int, int, int], int] = {}  # newest stamp by link, system and component
         self._refusals = Refusals()
         self._news: dict[str, str] = {}  # by reason
@@ -82,15 +82,10 @@ class Signing:
         """The genuine packets that are complete by now, without their signatures, and no other byte."""
         self._keep_up(now_us)
         genuine: list[bytes] = []
-        waiting = [packet for packet, _ in reversed(self._framer.feed(received))]
-        while waiting:
-            packet = waiting.pop()
+        for packet, _ in self._framer.feed(received):
             if packet_length(packet) != len(packet):
                 continue
             reason = self._refusal(packet)
-            if reason is not None and message_id_of(packet) not in dialect.mavlink_map:
-                # No checksum can tell whether it is one packet or stray bytes round genuine ones.
-                waiting += [inner for inner, _ in reversed(Decoder({}).feed(packet[1:]))]
             if reason is None:
                 stamp = self._streams[_stream(packet)] = _stamp(packet)
                 self.stamp = max(self.stamp, stamp)
@@ -113,11 +108,23 @@ class Signing:
     def _keep_up(self, now_us: int) -> None:
         self.stamp = max(self.stamp, stamp_at(now_us))
 
+    def _is_packet(self, data: bytes, start: int, length: int) -> bool:
+        """Of a message that the dialect does not have the signature alone tells; without it, it may be stray bytes
+        round genuine packets."""
+        if not checksum_holds(data, start, length):
+            return False
+        packet = data[start : start + length]
+        return message_id_of(packet) in dialect.mavlink_map or self._is_signed(packet)
+
+    def _is_signed(self, packet: bytes) -> bool:
+        has_signature = packet[0] == MAGIC_V2 and packet[2] & FLAG_SIGNED
+        return bool(has_signature) and hmac.compare_digest(self._hash(packet[:-_HASH]), packet[-_HASH:])
+
     def _refusal(self, packet: bytes) -> str | None:
         if packet[0] != MAGIC_V2 or not packet[2] & FLAG_SIGNED:
             return UNSIGNED
         # Signature first: the stamp of a forged packet means nothing.
-        if not hmac.compare_digest(self._hash(packet[:-_HASH]), packet[-_HASH:]):
+        if not self._is_signed(packet):
             return FORGED
         stamp, newest = _stamp(packet), self._streams.get(_stream(packet))
         if newest is None:

@@ -60,16 +60,11 @@ class Climb:
     _approach: Approach | None = None
     _turned_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
     _normal_ned: Vector3 = (0.0, 0.0, 0.0)
-    _begun_m: float = field(init=False)
     _summed_m_s: float = 0.0
     _summed_m: float = 0.0
     _told_boot_us: int = 0
 
     def __post_init__(self) -> None:
-        self._begin()
-
-    def _begin(self) -> None:
-        self._begun_m = self.fallen_m
         self.unseen = Unseen(self.speed_m_s, self.speed_m_s, LEAST_SPREAD_M_S)
         self._expect()
 
@@ -97,7 +92,7 @@ class Climb:
         self._take(told, time_us, 0.0 if is_loud else strapdown.acceleration_ned_m_s2[2])
         after_m_s = self.unseen.speed_m_s
         self.speed_m_s = after_m_s + self._summed_m_s
-        self.fallen_m = self._begun_m + 1e-6 * (time_us - self.hit_boot_us) * after_m_s + self._summed_m
+        self.fallen_m = 1e-6 * (time_us - self.hit_boot_us) * after_m_s + self._summed_m
         self.coming_m_s += elapsed_s * (self.asked_m_s2 - self.coming_m_s / LAG_S)
         self.time_boot_us, self.sum_m_s = time_us, sum_m_s
 
