@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from companion.estimate.facing import normal_by
+from companion.estimate.push import unit
 from companion.recovery.height import NO_BRAKING
 from companion.recovery.interface import Moving
 from companion.recovery.way import REST
@@ -84,6 +86,14 @@ RULES = (
     Rule("carried", "a new way while something pushes", _FLIGHT + "carried:is_carried", _says(False)),
     Rule("overtaken", "what comes after the vehicle is behind it", _FLIGHT + "carried:overtaken", _says(None)),
     Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
+    Rule(
+        "blurred push",
+        "the last normal half way to the way back",
+        _ESTIMATE + "facing:whole_normal",
+        lambda arguments, found: normal_by(
+            arguments[0], arguments[1] or unit(arguments[0].impulse_ned_m_s), arguments[2]
+        ),
+    ),
     Rule("hanging", "lets go of what it hangs on", _FLIGHT + "pinned:Hanging.step", _says(False), _lets_hang),
     Rule("spinning", "gentle steering while it spins", _FLIGHT + "spinning:is_spinning", _says(False)),
     Rule("earlier surfaces", "keeps off what it hit before", _FLIGHT + "recovering:_surfaces", _says([])),

@@ -14,6 +14,14 @@ GLANCING = 0.26
 FAINT_M_S2 = 3.0
 
 
+def whole_normal(push: Push, found_ned: Vector3 | None, velocity_ned_m_s: Vector3) -> Vector3:
+    """When the contact is over: as a search found it or it pushed; half way to the way back where that is blurred."""
+    normal, back = found_ned or unit(push.impulse_ned_m_s), _back(velocity_ned_m_s)
+    if not push.is_blurred or _is_along(normal, back):
+        return normal_by(push, normal, velocity_ned_m_s)
+    return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
+
+
 def normal_by(push: Push | None, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
     """The normal; the way back where a push went along the obstacle that clipped, each axis by itself, or that fell
     between the samples."""

@@ -10,7 +10,7 @@ from companion.detection.interface import DetectorState, Evidence, Impact, Impac
 from companion.estimate.approach import BATCH_US, VelocityFix, free_until, position_at, velocity_at
 from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
 from companion.estimate.collision import ContactMotion, motion_before_contact
-from companion.estimate.facing import normal_by
+from companion.estimate.facing import normal_by, whole_normal
 from companion.estimate.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US, MotionHistory
 from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
 from companion.estimate.push import Push, unit
@@ -270,8 +270,11 @@ class ImpactEstimator:
         return self.estimate
 
     def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
-        """As a search found it, or as it pushed."""
         found = None if self.search is None else self.search.normal_ned
+        explains_alone = found is not None and not push.clipped_at_once
+        if self.is_over and not explains_alone:
+            return whole_normal(push, found, velocity_ned_m_s)
+        # What explains forces and turning before anything clipped is not averaged with the way back.
         return normal_by(push, found or unit(push.impulse_ned_m_s), velocity_ned_m_s)
 
     def _refined(self, estimate: ImpactEstimate, push: Push) -> ImpactEstimate:

@@ -148,6 +148,11 @@ class Push:
         """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
         return not self.clipping.may_hide and self.samples > SHORT
 
+    @property
+    def is_blurred(self) -> bool:
+        """Whether the push's direction is that of a few clipped axes."""
+        return self.clipped and self.samples <= SHORT
+
     def turn_rad_s(self) -> float:
         """How much the contact has changed the rates by since its first sample."""
         w, first = self.rates_frd_rad_s, self.first_rates_frd_rad_s
