@@ -11,6 +11,7 @@ from companion.detection.interface import ImpactKind, Situation
 from companion.detection.watch import advance, start_watch
 from companion.estimate import guards, normal
 from companion.estimate.approach import VelocityFix, free_until, velocity_at
+from companion.estimate.facing import whole_normal
 from companion.estimate.normal import normal_of
 from companion.estimate.push import Push
 from companion.estimate.suppositions import Touch
@@ -237,6 +238,20 @@ def test_the_impulse_is_the_sum_of_the_loud_samples_and_of_what_lies_between_the
     push = pushed([(-20.0, True), (-40.0, True), (-1.0, False), (-10.0, True), (-5.0, False)])
     assert push.impulse_ned_m_s == pytest.approx((-0.284, 0.0, 0.0))
     assert push.peak_m_s2 == pytest.approx(40.0)
+
+
+def test_of_a_few_clipped_axes_the_normal_lies_half_way_to_where_the_vehicle_came_from():
+    # Given a push of two axes at the sensor's end, 45 degrees off the way that a vehicle came
+    push = Push((0.0, 0.0, -9.81), LEVEL, 5_000, 156.9, 1_000_000)
+    for number in (1, 2):
+        push.add(replace(imu(1_000_000 + 4_000 * number, 0.0), specific_force_frd_m_s2=(-156.9, -156.9, -9.81)), True)
+    off_rad = math.radians(22.5)
+    assert whole_normal(push, None, (2.0, 0.0, 0.0)) == pytest.approx((-math.cos(off_rad), -math.sin(off_rad), 0.0))
+    # Of one that hardly moved, and of a push that was measured, it is the push's own
+    own = (-math.sqrt(0.5), -math.sqrt(0.5), 0.0)
+    assert whole_normal(push, None, (0.1, 0.0, 0.0)) == pytest.approx(own)
+    measured = pushed([(-10.0, True), (-25.0, True), (-30.0, True), (-22.0, True), (-8.0, True)])
+    assert whole_normal(measured, own, (2.0, 0.0, 0.0)) == own
 
 
 def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():

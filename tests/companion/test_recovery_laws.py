@@ -84,6 +84,13 @@ def test_adaptive_keeps_the_guards_clear_by_the_distance_asked_for(speed):
     )
 
 
+def test_what_overtook_the_vehicle_needs_no_more_clearance_the_faster_the_vehicle_left():
+    # Given something that came from behind while the vehicle flew away from it at 2 m/s
+    touched = Contact(0, AT, (2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    goal, _ = adaptive(touched, Moving(AT, (0.0, 0.0, 0.0)))
+    assert off_m(touched, goal) == pytest.approx(RecoveryConfig().clearance_m)
+
+
 @pytest.mark.parametrize("speed", ALL_SPEEDS)
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.9])
 def test_adaptive_stays_within_the_vehicles_acceleration_and_is_continuous(speed, restitution):
