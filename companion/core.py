@@ -147,11 +147,10 @@ def fly(
 
 def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
     """The one place setpoints leave from: at their rate, and at once when the flight has moved on."""
-    at_once = moved or core.flight.is_pressing
-    if not at_once and now_us < core.setpoint_due_us:
+    if not moved and now_us < core.setpoint_due_us:
         return
     due_us = core.setpoint_due_us + core.setpoint_interval_us
-    core.setpoint_due_us = due_us if not at_once and due_us > now_us else now_us + core.setpoint_interval_us
+    core.setpoint_due_us = due_us if not moved and due_us > now_us else now_us + core.setpoint_interval_us
     if not core.flight.vehicle.is_mode_known:
         return
     try:

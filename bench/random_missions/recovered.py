@@ -12,7 +12,7 @@ from bench.random_missions.crashes import tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.phases import phases_of
 from companion.flight.collision import LEAST_WAY_M
-from companion.recovery.direction import away_from
+from companion.reflex.halfspace import away_from
 from companion.report import CollisionReport
 from rebound_cli.summary import LONGEST_RECOVERY_S
 from rebound_cli.truth_match import Vector3

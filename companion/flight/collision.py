@@ -9,10 +9,10 @@ from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import DECIDED_US, Claim, Leap
-from companion.messages import Attitude, LocalPosition, Vector3
-from companion.recovery.climb import Climb
-from companion.recovery.direction import away_from
-from companion.recovery.interface import Contact
+from companion.messages import LocalPosition, Vector3
+from companion.reflex.halfspace import away_from
+from companion.reflex.laws import Contact
+from companion.reflex.reckoning import Reckoning
 from companion.report import CollisionReport
 
 # The estimate lags a few tens of milliseconds behind the end of the contact; later than this the speed back is
@@ -44,12 +44,8 @@ class CollisionRecord:
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     impulse_m_s: float
-    climb: Climb
-    doubted_since_boot_us: int = 0  # the hit of which clipping may have hidden a part from the vehicle's estimate
-    inherits_doubt: bool = False  # from an earlier hit
+    reckoning: Reckoning
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
-    may_be_clipped: bool = True
-    is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
     claim: Claim | Leap | None = None  # of the first sample or velocity, until something else shows the hit, too
@@ -59,18 +55,14 @@ class CollisionRecord:
     estimated_down_m_s: float = 0.0  # by the vehicle's own estimate at this moment, be it right or wrong
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
-    def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> bool:
-        """What accelerometer, gyroscopes and estimate show while that is not believed; whether to brake it at once."""
+    def follow_motion(self, strapdown: Strapdown) -> None:
+        """What accelerometer and gyroscopes show with each sample."""
         if isinstance(self.claim, Claim):
             self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
-        if self.is_believed or self.is_over or not self.may_be_clipped or told is None:
-            return False
-        pushed_us = self.contact_ended_boot_us - self.sample_time_boot_us
-        self.climb.hear(strapdown, turns, pushed_us, self.normal_ned, told)
-        return self.climb.is_pressing
+        self.reckoning.imu(strapdown)
 
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
@@ -90,7 +82,7 @@ class CollisionRecord:
         if not self.is_behind:
             self.normal_ned = away_from(estimate.normal_ned)
         self.impulse_m_s = estimate.impulse_m_s
-        self.may_be_clipped = self.inherits_doubt or estimate.may_be_clipped
+        self.reckoning.tell(not estimate.may_be_clipped)
         self.is_clipped = estimate.is_lower_bound
 
     def _is_seen_again(self, state: DetectorState, claim: Claim | Leap) -> bool:

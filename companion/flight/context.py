@@ -22,7 +22,7 @@ from companion.mission.items import ReturnItem
 from companion.mission.itinerary import steps_to_fly
 from companion.mission.model import Mission
 from companion.mission.program import Step
-from companion.recovery.interface import Moving
+from companion.reflex.planner import Moving
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -142,7 +142,6 @@ class FlightContext:
     events: list[Event] = field(default_factory=list)
     outbox: list[Outgoing] = field(default_factory=list)
     target: Target | None = None  # as last streamed
-    is_pressing: bool = False  # the next one cannot wait for its turn
     origin_ned_m: Vector3 | None = None
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold

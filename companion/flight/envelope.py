@@ -16,9 +16,8 @@ from companion.flight.held import HELD_S, PLACE_PER_S, VELOCITY_PER_S, Known, he
 from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
-from companion.recovery.direction import plus, split
-from companion.recovery.interface import Moving
-from companion.recovery.room import Surface
+from companion.reflex.halfspace import Surface, plus, split
+from companion.reflex.planner import Moving
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5

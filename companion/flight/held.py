@@ -15,9 +15,9 @@ from companion.flight.context import Target
 from companion.memory.patch import Patch
 from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
-from companion.recovery.direction import plus
-from companion.recovery.interface import Moving
-from companion.recovery.room import BEHIND_M, Surface
+from companion.reflex.config import BEHIND_M
+from companion.reflex.halfspace import Surface, plus
+from companion.reflex.planner import Moving
 
 # PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
 HELD_S = 1.0

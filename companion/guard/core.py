@@ -165,7 +165,7 @@ def act(
 
 def stream_setpoint(core: GuardCore, moved: bool, now_us: int) -> None:
     """The one place setpoints leave from: at their rate, and at once when the guard has moved on."""
-    if not (moved or core.flight.is_pressing) and now_us < core.setpoint_due_us:
+    if not moved and now_us < core.setpoint_due_us:
         return
     config, is_ours = core.guard.config, core.machine.holds
     rate_hz = config.companion.flight.setpoint_hz if is_ours else config.lead_hz

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import Field, model_validator
 
 from companion.memory.patch import REACHES_M, Patch
-from companion.recovery.direction import STEEP, away_from
+from companion.reflex.config import STEEP
+from companion.reflex.halfspace import away_from
 from companion.written import NotNegative, PositionNed, Positive, Written
 
 OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]

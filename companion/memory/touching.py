@@ -4,7 +4,7 @@ import math
 
 from companion.memory.patch import REACHES_M, Touch
 from companion.messages import Vector3
-from companion.recovery.direction import away_from
+from companion.reflex.halfspace import away_from
 
 # Of the normals that one whole contact gives, 61 % are within 10 degrees and 94 % within 20 (docs/detection.md).
 ERROR_RAD = math.radians(15.0)

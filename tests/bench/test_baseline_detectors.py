@@ -9,7 +9,7 @@ from bench.baselines.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
 from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
-from companion.recovery.direction import plus
+from companion.reflex.halfspace import plus
 
 TICK_US = 4_000
 HIT_US = 4_000_000

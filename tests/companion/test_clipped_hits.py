@@ -15,7 +15,7 @@ from companion.messages import LocalPosition
 from companion.mission.config import GuardsConfig
 from companion.mission.model import Mission
 from companion.recovery.climb import Climb
-from companion.recovery.interface import Contact
+from companion.reflex.laws import Contact
 
 NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
 ZERO = (0.0, 0.0, 0.0)

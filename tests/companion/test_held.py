@@ -10,7 +10,7 @@ from companion.flight.held import HELD_S, NOTICED_S, Known, held_way, touched, u
 from companion.memory.patch import Patch
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
-from companion.recovery.interface import Moving
+from companion.reflex.planner import Moving
 
 ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)

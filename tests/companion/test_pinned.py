@@ -12,7 +12,7 @@ from companion.messages import Attitude, Heartbeat, LocalPosition
 from companion.mission.config import GuardsConfig
 from companion.mission.model import Mission
 from companion.recovery.climb import Climb
-from companion.recovery.interface import Contact
+from companion.reflex.laws import Contact
 
 WALL_IN_THE_NORTH = (-1.0, 0.0, 0.0)
 

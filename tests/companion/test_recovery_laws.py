@@ -9,12 +9,12 @@ from companion.flight.rebound import agreed_normal, believable, is_free, lean_le
 from companion.messages import LocalPosition
 from companion.mission.fence import Fence
 from companion.recovery.adaptive import AdaptiveLaw
-from companion.recovery.direction import away_from
-from companion.recovery.envelope import Envelope
+from companion.reflex.halfspace import away_from
+from companion.reflex.halfspace import Envelope
 from companion.recovery.interface import Contact, Moving, RecoveryConfig
 from companion.recovery.normal import NormalLaw
-from companion.recovery.registry import RECOVERY_LAWS
-from companion.recovery.room import Room, Surface
+from companion.reflex.laws import RECOVERY_LAWS
+from companion.reflex.halfspace import Room, Surface
 from companion.recovery.way import SHORTEST_S, Glide, damped, glide
 
 AT = (4.0, -2.0, -1.5)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from companion.mission.fence import Fence
-from companion.recovery.envelope import Envelope
+from companion.reflex.halfspace import Envelope
 from companion.recovery.interface import Contact, RecoveryConfig
 from companion.recovery.paper import PaperLaw
 
