@@ -57,6 +57,7 @@ class Recover:
     def target(self, now_us: int) -> Target | None:
         goal, most_m_s2 = self._record.setpoint_ned_m, self._config.vertical_acceleration_m_s2
         state, is_level = self._state(), self._contact.normal_ned[2] == 0.0
+        leant = replace(self._record.reckoning.motion, acceleration_ned_m_s2=self._record.reckoning.lean_m_s2)
         if self._is_known and not self._is_spinning:
             if not self._law.follows:
                 return Target(goal, self._yaw_rad)
@@ -64,7 +65,7 @@ class Recover:
             if self._plan is not None:
                 motion = self._plan.at(1e-6 * (now_us - self._plan_began_us))
             (n, e, d), (u, v, w) = motion.position_ned_m, motion.velocity_ned_m_s
-            a, b, c = kept_off(motion.acceleration_ned_m_s2, state, self._surfaces)
+            a, b, c = kept_off(motion.acceleration_ned_m_s2, leant, self._surfaces, self._limits)
             if is_level:
                 d, w, c = goal[2], 0.0, climb_ends(state, goal[2], most_m_s2, CLIMB_GAIN_PER_S)
             return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
@@ -74,10 +75,10 @@ class Recover:
         if is_level:
             c = climb_ends(state, goal[2], most_m_s2, 0.0 if is_free else CLIMB_GAIN_PER_S)
         north, east = self._record.reckoning.wind_m_s2
-        leant = kept_off((a + north, b + east, c), state, self._surfaces)
+        asked = kept_off((a + north, b + east, c), leant, self._surfaces, self._limits)
         velocity = (0.0, 0.0, self._record.estimated_down_m_s) if is_free else REST
         expected = None if self._is_known else Moving(state.position_ned_m, state.velocity_ned_m_s)
-        return Target(goal, self._yaw_rad, velocity, leant, True, is_free, expected)
+        return Target(goal, self._yaw_rad, velocity, asked, True, is_free, expected)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record, attitude = self._record, flight.vehicle.attitude

@@ -59,6 +59,8 @@ ROUNDS = 5
 SMOOTHED_S = 0.05
 # The vehicle's estimate beside the accelerometer's sum: its noise lasts longer, its delay is shorter.
 CORRECTED_S = 0.1
+# Cosine of 60 degrees: further over no thrust carries the vehicle.
+MOST_LEANT = 0.5
 # Wind and drag: slower than the steering, faster than the drift they cause.
 WIND_S = 1.0
 # A contact pushes still, or what it did is not yet in the estimate, for so long after its last push.

@@ -130,20 +130,23 @@ def _longest_s(state: Moving, goal_ned_m: Vector3) -> float:
     return max(HARDEST_S, 2.0 * ahead / (0.5 * speed2 + math.sqrt(stops2))) if stops2 >= 0.0 else math.inf
 
 
-def kept_off(acceleration_ned_m_s2: Vector3, state: Moving, surfaces: Sequence[Surface]) -> Vector3:
-    """Without what leads into a surface nearer than its clearance.
+def kept_off(
+    acceleration_ned_m_s2: Vector3, state: Moving, surfaces: Sequence[Surface], limits: Limits
+) -> Vector3:
+    """Without what leads into a surface nearer than its clearance; `state` with the acceleration of its lean.
 
-    What only brakes a vehicle that leaves it does not: not before a lean could be taken back again.
+    Before a lean can be taken back the vehicle is to be no slower than at rest, so what only brakes one that leaves is
+    not taken away, and one that leans into the surface, or flies there, is asked to lean away.
     """
     for surface in surfaces:
-        off_m = surface.off_m(state.position_ned_m)
-        if off_m >= surface.distance_m:
+        if surface.off_m(state.position_ned_m) >= surface.distance_m:
             continue
-        leaving_m_s = max(0.0, split(state.velocity_ned_m_s, surface.normal_ned)[0])
-        into_m_s2 = split(acceleration_ned_m_s2, surface.normal_ned)[0]
-        short_m_s2 = -leaving_m_s / (2.0 * LEAD_S) - into_m_s2
+        normal, most_m_s2 = surface.normal_ned, HARDER * limits.acceleration_m_s2
+        leaving_m_s = split(plus(state.velocity_ned_m_s, LEAD_S, state.acceleration_ned_m_s2), normal)[0]
+        least_m_s2 = min(-leaving_m_s / LEAD_S, most_m_s2)
+        short_m_s2 = least_m_s2 - split(acceleration_ned_m_s2, normal)[0]
         if short_m_s2 > 0.0:
-            acceleration_ned_m_s2 = plus(acceleration_ned_m_s2, short_m_s2, surface.normal_ned)
+            acceleration_ned_m_s2 = plus(acceleration_ned_m_s2, short_m_s2, normal)
     return acceleration_ned_m_s2
 
 

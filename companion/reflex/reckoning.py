@@ -16,7 +16,9 @@ from companion.messages import LocalPosition, Vector3
 from companion.reflex.config import (
     BEGUN_US,
     CORRECTED_S,
+    LEAD_S,
     LEAST_REBOUND,
+    MOST_LEANT,
     OVER_US,
     SMOOTHED_S,
     STEADY_M_S,
@@ -43,6 +45,7 @@ class Reckoning:
     motion: Moving = field(init=False)
     is_whole: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
     is_right: bool = False  # the estimate has been found so
+    lean_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # what the lean does in vain, north and east
     _time_boot_us: int = 0
     _corrected_boot_us: int = 0
@@ -67,11 +70,10 @@ class Reckoning:
         mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = Moving(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
+        self.lean_m_s2 = lean_ahead(strapdown)
         if pushed is not REST:
-            n, e, d = body_to_ned(strapdown.attitude_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
-            (a, b), share = self.wind_m_s2, elapsed_s / (WIND_S + elapsed_s)
-            upright = max(-d / GRAVITY_M_S2, 0.5)
-            self.wind_m_s2 = (a + share * (n / upright - pushed[0] - a), b + share * (e / upright - pushed[1] - b))
+            (a, b), (n, e, _), share = self.wind_m_s2, self.lean_m_s2, elapsed_s / (WIND_S + elapsed_s)
+            self.wind_m_s2 = (a + share * (n - pushed[0] - a), b + share * (e - pushed[1] - b))
 
     def correct(self, sample: LocalPosition) -> None:
         """By an estimate that is right: at once by the first, then by so much as is not its noise."""
@@ -111,6 +113,15 @@ class Reckoning:
         most_m = (speed_m_s + most_m_s) * since_s + UPSET_M
         is_upset = math.dist(sample.velocity_ned_m_s, before.velocity_ned_m_s) > most_m_s
         return not is_upset and math.dist(sample.position_ned_m, before.position_ned_m) <= most_m
+
+
+def lean_ahead(strapdown: Strapdown) -> Vector3:
+    """The level acceleration of a thrust that carries the vehicle, leant as it will lean once what is asked now acts."""
+    n, e, d = body_to_ned(strapdown.attitude_wxyz, (0.0, 0.0, -1.0))
+    p, q, r = body_to_ned(strapdown.attitude_wxyz, strapdown.rates_frd_rad_s)
+    n, e, d = n + LEAD_S * (q * d - r * e), e + LEAD_S * (r * n - p * d), d + LEAD_S * (p * e - q * n)
+    carrying_m_s2 = GRAVITY_M_S2 / max(-d, MOST_LEANT)
+    return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)
 
 
 def is_steady(fixes: Sequence[VelocityFix], boot_us: int) -> bool:
