@@ -134,6 +134,8 @@ class Recover:
         as far as a plan may ask for it. Level where the height is held by itself."""
         motion, normal = self._record.reckoning.motion, self._contact.normal_ned
         velocity, acceleration, place = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2, motion.position_ned_m
+        if self._is_spinning:
+            acceleration = REST  # what a gyroscope leans to is not where it will lean next
         if not self._has_left:
             off_m_s, along = split(velocity, normal)
             velocity, acceleration = plus(along, max(0.0, off_m_s), normal), REST

@@ -50,9 +50,8 @@ class Limits:
     shortest_s: float = SHORTEST_S
 
     def spinning(self, spin_rad_s: float) -> "Limits":
-        """Of a vehicle that turns about the vertical: a gyroscope leans later, so all of it takes longer."""
-        slower = math.hypot(1.0, spin_rad_s / ATTITUDE_RAD_S)
-        return Limits(self.acceleration_m_s2 / slower, self.shortest_s * slower)
+        """Of a vehicle that turns about the vertical: a gyroscope leans later, so all of it takes longer, and less."""
+        return Limits(self.acceleration_m_s2, self.shortest_s * math.hypot(1.0, spin_rad_s / ATTITUDE_RAD_S))
 
 
 @dataclass(frozen=True, slots=True)

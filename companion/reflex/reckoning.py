@@ -40,7 +40,7 @@ class Reckoning:
 
     contact: Contact
     hit_boot_us: int  # its first sample
-    start: Moving  # as expected
+    start: Moving  # after it, as expected
     inherits_doubt: bool = False  # from an earlier hit
     motion: Moving = field(init=False)
     is_whole: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
