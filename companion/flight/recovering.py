@@ -19,7 +19,6 @@ from companion.reflex.config import (
     CLIMB_GAIN_PER_S,
     DAMPED,
     KNOWN_US,
-    LEAD_S,
     LEAVING_M_S,
     LEFT_US,
     SLID_OFF_M_S,
@@ -209,8 +208,8 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     normal = behind or normal
     believed, inherits = normal, False
     if law.follows:
-        inherits = before is not None and not (before.reckoning.is_right or before.reckoning.is_whole)
-        if inherits:
+        if before is not None and not (before.reckoning.is_right or before.reckoning.is_whole):
+            inherits = True
             # Place and velocity now are as wrong as the estimate.
             place, velocity = before.reckoning.motion.position_ned_m, before.reckoning.motion.velocity_ned_m_s
         believed = behind or half_way(normal, velocity)

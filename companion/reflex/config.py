@@ -67,8 +67,8 @@ WIND_S = 1.0
 LEFT_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
 KNOWN_US = 80_000
-# A real PX4 puts an estimate right from 0.14 s after a clipped hit on (docs/px4.md): until then what shows a rebound has
-# seen it; of an estimate that missed the hit nothing does.
+# A real PX4 puts an estimate right from 0.14 s after a clipped hit on (docs/px4.md): until then what shows a rebound
+# has seen it; of an estimate that missed the hit nothing does.
 UNCORRECTED_US = 140_000
 # What goes along with the accelerometer for so long, to four times a good velocity's noise, is not being put right; and
 # is right so long after a hit, when every estimator has begun with it. Its swing is over by the last.

@@ -72,7 +72,9 @@ class Plan:
 
     def _axes(self, s: float, ahead: float) -> list[tuple[float, float, float]]:
         start, total_s = self.start, self.duration_s
-        ends = zip(start.position_ned_m, start.velocity_ned_m_s, start.acceleration_ned_m_s2, self.goal_ned_m, strict=True)
+        ends = zip(
+            start.position_ned_m, start.velocity_ned_m_s, start.acceleration_ned_m_s2, self.goal_ned_m, strict=True
+        )
         return [_axis(x_0, v_0, a_0, x_1, total_s, s, ahead) for x_0, v_0, a_0, x_1 in ends]
 
     def most_m_s2(self) -> float:
@@ -129,9 +131,7 @@ def _longest_s(state: Moving, goal_ned_m: Vector3) -> float:
     return max(HARDEST_S, 2.0 * ahead / (0.5 * speed2 + math.sqrt(stops2))) if stops2 >= 0.0 else math.inf
 
 
-def kept_off(
-    acceleration_ned_m_s2: Vector3, state: Moving, surfaces: Sequence[Surface], limits: Limits
-) -> Vector3:
+def kept_off(acceleration_ned_m_s2: Vector3, state: Moving, surfaces: Sequence[Surface], limits: Limits) -> Vector3:
     """Without what leads into a surface nearer than its clearance; `state` with the acceleration of its lean.
 
     Before a lean can be taken back the vehicle is to be no slower than at rest, so what only brakes one that leaves is

@@ -1,8 +1,8 @@
 """Where a vehicle is after a hit, and how it moves: by the accelerometer, put right by its estimate once that is right.
 
-What clipping hides of a hit is missing in the vehicle's own velocity and then in its place: a real PX4 that bounced back
-at 1.6 m/s said +2 m/s, into the wall, for 0.14 s, and was right again a second later (docs/px4.md). Until then the motion
-is what the hit is expected to leave, and what the accelerometer has added since.
+What clipping hides of a hit is missing in the vehicle's own velocity and then in its place: a real PX4 that bounced
+back at 1.6 m/s said +2 m/s, into the wall, for 0.14 s, and was right again a second later (docs/px4.md). Until then
+the motion is what the hit is expected to leave, and what the accelerometer has added since.
 """
 
 import math
@@ -87,7 +87,7 @@ class Reckoning:
     def judge(
         self, sample: LocalPosition, normals: Sequence[Vector3], fixes: Sequence[VelocityFix], impulse_m_s: float
     ) -> bool:
-        """Whether the estimate may be believed: it is told whole, shows a rebound, or goes along with the accelerometer.
+        """Whether the estimate may be believed: it knows the hit, shows a rebound or goes along with the sensor.
 
         What no hit explains is not believed before its swing is over.
         """
@@ -116,7 +116,7 @@ class Reckoning:
 
 
 def lean_ahead(strapdown: Strapdown) -> Vector3:
-    """The level acceleration of a thrust that carries the vehicle, leant as it will lean once what is asked now acts."""
+    """The level acceleration of a thrust that carries the vehicle, leant as once what is asked now acts."""
     n, e, d = body_to_ned(strapdown.attitude_wxyz, (0.0, 0.0, -1.0))
     p, q, r = body_to_ned(strapdown.attitude_wxyz, strapdown.rates_frd_rad_s)
     n, e, d = n + LEAD_S * (q * d - r * e), e + LEAD_S * (r * n - p * d), d + LEAD_S * (p * e - q * n)

@@ -66,7 +66,12 @@ def test_a_plan_from_any_motion_is_finite_bounded_and_ends_at_rest_at_its_goal()
     for state in some_motions(300):
         found = plan(state, (2.5, -1.0, -1.5), [Surface(AT, SOUTH, 0.35)], LIMITS)
         motions = motions_of(found)
-        values = [value for m in motions for v in (m.position_ned_m, m.velocity_ned_m_s, m.acceleration_ned_m_s2) for value in v]
+        values = [
+            value
+            for m in motions
+            for v in (m.position_ned_m, m.velocity_ned_m_s, m.acceleration_ned_m_s2)
+            for value in v
+        ]
         assert all(map(math.isfinite, values))
         assert found.duration_s < 10.0
         end = found.at(found.duration_s - 1e-9)
@@ -147,8 +152,8 @@ def test_brakes_off_a_wall_are_let_through_for_as_long_as_they_only_brake():
 def flown(state, goal, surfaces=(), drift_m_s2=0.0, velocity_p=1.8, lag_rad_s=12.0, seconds=6.0):
     """Places of a vehicle with PX4's gains that follows plans made anew where it leaves them.
 
-    Its thrust turns by a critically damped loop, its estimate and link are 35 ms late, and a wind that it is not trimmed
-    for carries it off.
+    Its thrust turns by a critically damped loop, its estimate and link are 35 ms late, and a wind that it is not
+    trimmed for carries it off.
     """
     step_s, position_p, velocity_i, velocity_d = 0.005, 0.95, 0.4, 0.2
     found, began_s = plan(state, goal, surfaces, LIMITS), 0.0
@@ -164,7 +169,9 @@ def flown(state, goal, surfaces=(), drift_m_s2=0.0, velocity_p=1.8, lag_rad_s=12
         asked = found.at(now_s - began_s)
         wanted_m_s = asked.velocity_ned_m_s[0] + position_p * (asked.position_ned_m[0] - x)
         integral += velocity_i * (wanted_m_s - v) * step_s
-        late.append(1.1 * asked.acceleration_ned_m_s2[0] + velocity_p * (wanted_m_s - v) + integral - velocity_d * acceleration)
+        late.append(
+            1.1 * asked.acceleration_ned_m_s2[0] + velocity_p * (wanted_m_s - v) + integral - velocity_d * acceleration
+        )
         turning += step_s * (lag_rad_s**2 * (late.pop(0) - lean) - 2.0 * lag_rad_s * turning)
         lean += step_s * turning
         acceleration = lean + drift_m_s2

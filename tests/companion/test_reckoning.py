@@ -1,4 +1,4 @@
-"""The motion after a hit that the accelerometer could not show whole: what is reckoned, and when the estimate counts."""
+"""The motion after a hit that the accelerometer could not show whole: what is reckoned, when the estimate counts."""
 
 import math
 
