@@ -16,14 +16,15 @@ from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
 from companion.reflex.config import (
     AGREEING,
-    CLIMB_GAIN_PER_S,
     DAMPED,
     KNOWN_US,
+    LEANS_M_S2,
     LEAVING_M_S,
     LEFT_US,
     SLID_OFF_M_S,
     SPINNING_RAD_S,
     TELLING_M_S,
+    TOUCHES_M,
 )
 from companion.reflex.halfspace import Envelope, Room, Surface, away_from, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
@@ -54,30 +55,46 @@ class Recover:
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
-        goal, most_m_s2 = self._record.setpoint_ned_m, self._config.vertical_acceleration_m_s2
-        state, is_level = self._state(), self._contact.normal_ned[2] == 0.0
-        leant = replace(self._record.reckoning.motion, acceleration_ned_m_s2=self._record.reckoning.lean_m_s2)
-        if self._is_known and not self._is_spinning:
-            if not self._law.follows:
-                return Target(goal, self._yaw_rad)
+        goal, state, record = self._record.setpoint_ned_m, self._state(), self._record
+        is_level = self._contact.normal_ned[2] == 0.0
+        down_m_s = state.velocity_ned_m_s[2] if self._is_known else record.estimated_down_m_s
+        climb_m_s2 = climb_ends(down_m_s, self._config.vertical_acceleration_m_s2)
+        if not self._law.follows:
+            return Target(goal, self._yaw_rad)
+        if self._is_known and not self._is_spinning and not self._presses():
             motion = Moving(goal, REST)
             if self._plan is not None:
                 motion = self._plan.at(1e-6 * (now_us - self._plan_began_us))
             (n, e, d), (u, v, w) = motion.position_ned_m, motion.velocity_ned_m_s
-            a, b, c = kept_off(motion.acceleration_ned_m_s2, leant, self._surfaces, self._limits)
+            a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
             if is_level:
-                d, w, c = goal[2], 0.0, climb_ends(state, goal[2], most_m_s2, CLIMB_GAIN_PER_S)
+                d, w, c = goal[2], 0.0, climb_m_s2
             return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
         limits = self._limits.spinning(self._spin_rad_s)
         a, b, c = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
-        is_free = not self._is_known and most_m_s2 > 0.0
-        if is_level:
-            c = climb_ends(state, goal[2], most_m_s2, 0.0 if is_free else CLIMB_GAIN_PER_S)
-        north, east = self._record.reckoning.wind_m_s2
-        asked = kept_off((a + north, b + east, c), leant, self._surfaces, self._limits)
-        velocity = (0.0, 0.0, self._record.estimated_down_m_s) if is_free else REST
+        north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
+        asked = self._kept_off((a + north, b + east, climb_m_s2 if is_level else c))
         expected = None if self._is_known else Moving(state.position_ned_m, state.velocity_ned_m_s)
-        return Target(goal, self._yaw_rad, velocity, asked, True, is_free, expected)
+        return Target(goal, self._yaw_rad, REST, asked, leans_only=True, expected=expected)
+
+    def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
+        return kept_off(acceleration_ned_m_s2, self._leant, self._surfaces, self._limits)
+
+    @property
+    def _leant(self) -> Moving:
+        """The motion that there is, with the acceleration that the lean is about to give."""
+        return replace(self._record.reckoning.motion, acceleration_ned_m_s2=self._record.reckoning.lean_m_s2)
+
+    def _presses(self) -> bool:
+        """Whether the vehicle leans into the surface that it touches.
+
+        What PX4's loops add to that against a wind, or have added up against the surface itself, is not to be had.
+        """
+        return any(
+            surface.off_m(self._leant.position_ned_m) < TOUCHES_M
+            and split(self._leant.acceleration_ned_m_s2, surface.normal_ned)[0] < -LEANS_M_S2
+            for surface in self._surfaces[:1]
+        )
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         record, attitude = self._record, flight.vehicle.attitude

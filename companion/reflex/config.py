@@ -29,13 +29,11 @@ STEP = 1.05
 DAMPED = 1.1
 # PX4's MPC_Z_VEL_P_ACC: what its own loop does against a climb, 1/s. As much again is asked for beside it.
 CLIMB_GAIN_PER_S = 4.0
-# PX4's MPC_Z_P, 1/s.
-HEIGHT_GAIN_PER_S = 1.0
-# Where nothing but the plan holds the height a climb ends within this: three times motors, link and position loop.
-CLIMB_ENDS_S = 0.1
 # What PX4's loops leave between a plan and the vehicle that follows it: LEAD_S behind 3 m/s^2, and its integral.
 OFF_PLAN_M_S = 0.45
 OFF_PLAN_M = 0.3
+# A lean of 9 degrees: arms that press on a wall carry a vehicle that leans by 15, from 22 on it is tipped over.
+LEANS_M_S2 = 1.5
 # rad/s. From here on a lean that lags by LEAD_S points half a right angle and more beside what PX4's own loops ask for.
 SPINNING_RAD_S = 6.0
 

@@ -15,10 +15,9 @@ from companion.messages import Vector3
 from companion.reflex.config import (
     AHEAD,
     ATTITUDE_RAD_S,
-    CLIMB_ENDS_S,
+    CLIMB_GAIN_PER_S,
     HARDER,
     HARDEST_S,
-    HEIGHT_GAIN_PER_S,
     LEAD_S,
     OFF_PLAN_M,
     OFF_PLAN_M_S,
@@ -134,14 +133,14 @@ def _longest_s(state: Moving, goal_ned_m: Vector3) -> float:
 def kept_off(acceleration_ned_m_s2: Vector3, state: Moving, surfaces: Sequence[Surface], limits: Limits) -> Vector3:
     """Without what leads into a surface nearer than its clearance; `state` with the acceleration of its lean.
 
-    Before a lean can be taken back the vehicle is to be no slower than at rest, so what only brakes one that leaves is
-    not taken away, and one that leans into the surface, or flies there, is asked to lean away.
+    By when a lean is taken back, which turns it twice, the vehicle is to be no slower than at rest. So what only brakes
+    one that leaves is not taken away, and one that leans into the surface, or flies there, is asked to lean away.
     """
     for surface in surfaces:
         if surface.off_m(state.position_ned_m) >= surface.distance_m:
             continue
         normal, most_m_s2 = surface.normal_ned, HARDER * limits.acceleration_m_s2
-        leaving_m_s = split(plus(state.velocity_ned_m_s, LEAD_S, state.acceleration_ned_m_s2), normal)[0]
+        leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * LEAD_S, state.acceleration_ned_m_s2), normal)[0]
         least_m_s2 = min(-leaving_m_s / LEAD_S, most_m_s2)
         short_m_s2 = least_m_s2 - split(acceleration_ned_m_s2, normal)[0]
         if short_m_s2 > 0.0:
@@ -149,13 +148,6 @@ def kept_off(acceleration_ned_m_s2: Vector3, state: Moving, surfaces: Sequence[S
     return acceleration_ned_m_s2
 
 
-def climb_ends(state: Moving, goal_down_m: float, most_m_s2: float, beside_gain_per_s: float = 0.0) -> float:
-    """The height's axis needs no lean: what ends the climb and brings the height back, down positive.
-
-    `beside_gain_per_s`: PX4's own loop does the rest, and as much again is asked for.
-    """
-    down_m_s = state.velocity_ned_m_s[2]
-    wanted_m_s2 = -beside_gain_per_s * down_m_s
-    if not beside_gain_per_s:
-        wanted_m_s2 = -(down_m_s + HEIGHT_GAIN_PER_S * (state.position_ned_m[2] - goal_down_m)) / CLIMB_ENDS_S
-    return min(max(wanted_m_s2, -most_m_s2), most_m_s2)
+def climb_ends(down_m_s: float, most_m_s2: float) -> float:
+    """The height's axis needs no lean: against a climb as much again as PX4's own loop asks for, down positive."""
+    return min(max(-CLIMB_GAIN_PER_S * down_m_s, -most_m_s2), most_m_s2)
