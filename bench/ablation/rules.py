@@ -6,9 +6,6 @@ from typing import Any
 
 from companion.estimate.facing import normal_by
 from companion.estimate.push import unit
-from companion.recovery.height import NO_BRAKING
-from companion.recovery.interface import Moving
-from companion.recovery.way import REST
 
 Arguments = tuple[Any, ...]
 
@@ -36,17 +33,8 @@ def _argument(number: int) -> Callable[[Arguments, Any], Any]:
     return lambda arguments, found: arguments[number]
 
 
-def _as_told(arguments: Arguments, found: Moving | None) -> Moving:
-    sample = arguments[0]
-    return found or Moving(sample.position_ned_m, sample.velocity_ned_m_s)
-
-
-def _lets_hang(arguments: Arguments) -> None:
-    arguments[0].since_us, arguments[0].is_leant = None, False
-
-
-_DETECTION, _ESTIMATE, _RECOVERY, _FLIGHT = (
-    f"companion.{room}." for room in ("detection", "estimate", "recovery", "flight")
+_DETECTION, _ESTIMATE, _REFLEX, _FLIGHT = (
+    f"companion.{room}." for room in ("detection", "estimate", "reflex", "flight")
 )
 
 RULES = (
@@ -79,12 +67,19 @@ RULES = (
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule("attitude by rates", "no clipped attitude", _ESTIMATE + "trust:Trust.is_attitude_right", _says(True)),
     Rule("trust", "no velocity jump while an estimate swings", _ESTIMATE + "trust:Trust.is_trusted", _says(True)),
-    Rule("agreed normal", "the normal by the change of velocity", _FLIGHT + "rebound:agreed_normal", _argument(0)),
-    Rule("half way", "the first normal half way to the way back", _FLIGHT + "doubt:half_way", _argument(0)),
-    Rule("doubt", "leans alone until an estimate is believed", _FLIGHT + "doubt:is_believed", _says(True)),
-    Rule("lean left", "a way begins with the present lean", _FLIGHT + "rebound:lean_left", _says(REST)),
-    Rule("carried", "a new way while something pushes", _FLIGHT + "carried:is_carried", _says(False)),
-    Rule("overtaken", "what comes after the vehicle is behind it", _FLIGHT + "carried:overtaken", _says(None)),
+    Rule("agreed normal", "the normal by the change of velocity", _FLIGHT + "recovering:agreed_normal", _argument(0)),
+    Rule("half way", "the first normal half way to the way back", _REFLEX + "reckoning:half_way", _argument(0)),
+    Rule("comes after", "what comes after the vehicle is behind it", _FLIGHT + "recovering:_comes_after", _says(None)),
+    Rule(
+        "pressing on",
+        "accelerations alone for one that leans on",
+        _FLIGHT + "recovering:Recover._presses",
+        _says(False),
+    ),
+    Rule("kept off", "no acceleration into what is near", _REFLEX + "planner:kept_off", _argument(0)),
+    Rule("harder", "brakes harder before a surface", _REFLEX + "planner:Plan.enters", _says(False)),
+    Rule("replanned", "a new plan for one that is off it", _REFLEX + "planner:Plan.holds", _says(True)),
+    Rule("spinning", "gentle steering while it spins", _FLIGHT + "recovering:Recover._is_spinning", _says(False)),
     Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
     Rule(
         "blurred push",
@@ -94,23 +89,6 @@ RULES = (
             arguments[0], arguments[1] or unit(arguments[0].impulse_ned_m_s), arguments[2]
         ),
     ),
-    Rule("hanging", "lets go of what it hangs on", _FLIGHT + "pinned:Hanging.step", _says(False), _lets_hang),
-    Rule("spinning", "gentle steering while it spins", _FLIGHT + "spinning:is_spinning", _says(False)),
-    Rule("earlier surfaces", "keeps off what it hit before", _FLIGHT + "recovering:_surfaces", _says([])),
     Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "remembering:remembered_surfaces", _says([])),
-    Rule("climb", "brakes a climb that no estimate knows", _RECOVERY + "climb:Climb.is_reckoned", _says(False)),
-    Rule("throw", "the climb by how it was turned", _RECOVERY + "thrown:thrown", _says(None)),
-    Rule(
-        "climb put right",
-        "the climb by how the estimate is put right",
-        _RECOVERY + "unseen:Unseen.speed_m_s",
-        lambda arguments, found: arguments[0].expected_m_s,
-    ),
-    Rule("brake", "brakes a climb that the estimate knows", _RECOVERY + "height:brake", _says(NO_BRAKING)),
-    Rule(
-        "stronger brakes",
-        "asks for a tenth more than the way",
-        _RECOVERY + "way:damped",
-        lambda arguments, found: arguments[0].acceleration_ned_m_s2,
-    ),
+    Rule("climb", "brakes a climb", _REFLEX + "planner:height_held", _says(0.0)),
 )

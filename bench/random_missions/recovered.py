@@ -12,7 +12,7 @@ from bench.random_missions.crashes import tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.phases import phases_of
 from companion.flight.collision import LEAST_WAY_M
-from companion.recovery.direction import away_from
+from companion.reflex.halfspace import away_from
 from companion.report import CollisionReport
 from rebound_cli.summary import LONGEST_RECOVERY_S
 from rebound_cli.truth_match import Vector3
@@ -85,8 +85,14 @@ def _recovery(flight: JudgedFlight, contact: JudgedContact, episode: Sequence[Ju
     past_m = _past_m(hit, collision, series["position_ned_m"][during])
     resting = (since_s >= until_s - RESTING_S) & (since_s <= until_s)
     clear_m = None if settled_s is None else _clear_m(flight, episode, np.flatnonzero(resting))
-    height_m = hit.contact_position_ned_m[2] - series["position_ned_m"][during, 2]
-    risen_m, lost_m = (float(height_m.max()), -float(height_m.min())) if during.any() else (0.0, 0.0)
+    down_m = series["position_ned_m"][during, 2]
+    # From the contact to the setpoint, which lies below a ceiling and above a floor, height is wanted.
+    top_m, bottom_m = sorted(
+        (hit.contact_position_ned_m[2], collision.recovery_setpoint_ned_m[2] - hit.frame_offset_ned_m[2])
+    )
+    if away_from(hit.normal_ned)[2] == 0.0:
+        top_m = bottom_m = hit.contact_position_ned_m[2]
+    risen_m, lost_m = (top_m - float(down_m.min()), float(down_m.max()) - bottom_m) if during.any() else (0.0, 0.0)
     return {
         "settled_s": None if settled_s is None else round(settled_s, _DIGITS),
         "past_m": round(past_m, _DIGITS),

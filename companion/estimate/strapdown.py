@@ -54,8 +54,16 @@ class Strapdown:
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> bool:
         """Add one sample (body FRD); False where a hole in the stream made the sum begin anew."""
         elapsed_us = time_us - self.time_boot_us
+        whole, half_s = 0 < elapsed_us < LONGEST_GAP_US, 0.5e-6 * elapsed_us
         behind_s = (time_us - self.attitude_boot_us) * 1e-6
-        if -ATTITUDE_KEPT_S < behind_s < ATTITUDE_KEPT_S:
+        attitude_wxyz = self.attitude_wxyz
+        if not whole:
+            self.by_rates_wxyz = None
+        elif self.by_rates_wxyz is not None:
+            self.by_rates_wxyz = turned(turned(self.by_rates_wxyz, self.rates_frd_rad_s, half_s), w, half_s)
+        if self.by_rates_wxyz is not None:
+            attitude_wxyz = self.by_rates_wxyz
+        elif -ATTITUDE_KEPT_S < behind_s < ATTITUDE_KEPT_S:
             # Turned on by its own rates since the attitude was told: f + dt w x f.
             f_x, f_y, f_z = f
             p, q, r = w
@@ -64,18 +72,12 @@ class Strapdown:
                 f_y + behind_s * (r * f_x - p * f_z),
                 f_z + behind_s * (p * f_y - q * f_x),
             )
-        a_n, a_e, a_d = body_to_ned(self.attitude_wxyz, f)
+        a_n, a_e, a_d = body_to_ned(attitude_wxyz, f)
         a_d += GRAVITY_M_S2
-        whole = 0 < elapsed_us < LONGEST_GAP_US
         if whole:
             b_n, b_e, b_d = self.acceleration_ned_m_s2
             n, e, d = self.sum_ned_m_s
-            half_s = 0.5e-6 * elapsed_us
             self.sum_ned_m_s = (n + half_s * (a_n + b_n), e + half_s * (a_e + b_e), d + half_s * (a_d + b_d))
-            if self.by_rates_wxyz is not None:
-                self.by_rates_wxyz = turned(turned(self.by_rates_wxyz, self.rates_frd_rad_s, half_s), w, half_s)
-        else:
-            self.by_rates_wxyz = None
         self.acceleration_ned_m_s2 = (a_n, a_e, a_d)
         self.rates_frd_rad_s = w
         self.time_boot_us = time_us

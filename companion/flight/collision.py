@@ -11,10 +11,10 @@ from companion.estimate.history import MotionHistory
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import DECIDED_US, Claim, Leap
-from companion.messages import Attitude, LocalPosition, Vector3
-from companion.recovery.climb import Climb
-from companion.recovery.direction import away_from
-from companion.recovery.interface import Contact
+from companion.messages import LocalPosition, Vector3
+from companion.reflex.halfspace import away_from
+from companion.reflex.laws import Contact
+from companion.reflex.reckoning import Reckoning
 from companion.report import CollisionReport
 
 # The estimate lags a few tens of milliseconds behind the end of the contact; later than this the speed back is
@@ -45,10 +45,8 @@ class CollisionRecord:
     normal_ned: Vector3
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
-    climb: Climb
-    may_be_clipped: bool = True
+    reckoning: Reckoning
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
-    is_believed: bool = False  # the estimate has been found right since
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
     claim: Claim | Leap | None = None  # of the first sample or velocity, until something else shows the hit, too
@@ -59,17 +57,15 @@ class CollisionRecord:
     level_leans_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
-    def follow_climb(self, strapdown: Strapdown, turns: Sequence[Attitude], told: LocalPosition | None) -> None:
-        """What accelerometer, gyroscopes and estimate show while that is not believed."""
+    def follow_motion(self, strapdown: Strapdown) -> None:
+        """What accelerometer and gyroscopes show with each sample."""
         if isinstance(self.claim, Claim):
             self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         self.level_leans_m_s2 = strapdown.level_leans_m_s2
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
-        if self.may_be_clipped and not self.is_believed and not self.is_over and told is not None:
-            pushed_us = self.contact_ended_boot_us - self.sample_time_boot_us
-            self.climb.hear(strapdown, turns, pushed_us, self.normal_ned, told)
+        self.reckoning.imu(strapdown)
 
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
@@ -88,7 +84,7 @@ class CollisionRecord:
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         if not self.is_behind:
             self.normal_ned = away_from(estimate.normal_ned)
-        self.may_be_clipped = estimate.may_be_clipped
+        self.reckoning.tell(not estimate.may_be_clipped, self.contact_ended_boot_us)
         self.is_clipped = estimate.is_lower_bound
 
     def _is_seen_again(self, state: DetectorState, claim: Claim | Leap) -> bool:

@@ -22,7 +22,7 @@ from companion.mission.items import ReturnItem
 from companion.mission.itinerary import steps_to_fly
 from companion.mission.model import Mission
 from companion.mission.program import Step
-from companion.recovery.interface import Moving
+from companion.reflex.planner import Moving
 from companion.report import Event, JsonValue, Outcome
 
 

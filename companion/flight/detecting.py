@@ -95,8 +95,7 @@ def follow_contact(flight: FlightContext, watching: Watch) -> None:
     if flight.collisions:
         record, estimator = flight.collisions[-1], watching.estimator
         record.follow_contact(watching.state, watching.estimate, estimator.fixes)
-        told = flight.vehicle.history.latest()
-        record.follow_climb(estimator.strapdown, estimator.attitudes, told)
+        record.follow_motion(estimator.strapdown)
 
 
 def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -16,12 +16,9 @@ from companion.flight.held import HELD_S, Known, held_way
 from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
-from companion.recovery.climb import HEIGHT_PER_S
-from companion.recovery.direction import plus, split
-from companion.recovery.height import VELOCITY_GAIN_PER_S
-from companion.recovery.interface import Moving
-from companion.recovery.room import Surface
-from companion.recovery.way import REST
+from companion.reflex.config import CLIMB_GAIN_PER_S, HEIGHT_PER_S
+from companion.reflex.halfspace import Surface, plus, split
+from companion.reflex.planner import REST, Moving
 
 # A place is moved only by more than what rounding to MAVLink's single precision would.
 _ROUNDING_M = 1e-5
@@ -229,7 +226,7 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
     most_m_s = max(0.0, (floor_m - start_down_m) / leads_s)
     down_m_s = 0.0 if velocity is None else velocity[2]
     down_m_s2 = 0.0 if acceleration is None else acceleration[2]
-    leads_m_s = down_m_s + down_m_s2 / VELOCITY_GAIN_PER_S
+    leads_m_s = down_m_s + down_m_s2 / CLIMB_GAIN_PER_S
     if least_m_s <= leads_m_s <= most_m_s:
         return target
     reasons.append("leads below the floor" if leads_m_s > most_m_s else "leads out of the top")
@@ -237,7 +234,7 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
         down_m_s = min(max(down_m_s, least_m_s), most_m_s)
         velocity = (velocity[0], velocity[1], down_m_s)
     if acceleration is not None:
-        room = (VELOCITY_GAIN_PER_S * (least_m_s - down_m_s), VELOCITY_GAIN_PER_S * (most_m_s - down_m_s))
+        room = (CLIMB_GAIN_PER_S * (least_m_s - down_m_s), CLIMB_GAIN_PER_S * (most_m_s - down_m_s))
         acceleration = (acceleration[0], acceleration[1], min(max(down_m_s2, room[0]), room[1]))
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
 

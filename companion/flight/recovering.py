@@ -1,4 +1,4 @@
-"""State recovering: from the hit to rest at the recovery setpoint."""
+"""State recovering: from the hit to rest behind what was touched, by a plan that follows the motion that there is."""
 
 import math
 from collections.abc import Sequence
@@ -8,104 +8,127 @@ from companion.estimate.impact import ImpactEstimate
 from companion.estimate.rotation import body_to_ned
 from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards, take_back
-from companion.flight.carried import CARRIED_EVERY_US, CLEAR_M_S, is_carried, overtaken
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.confirming import Claim, Leap, claim_of
 from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
-from companion.flight.doubt import half_way, is_believed
-from companion.flight.pinned import Hanging, has_room_below, let_go
-from companion.flight.rebound import agreed_normal, climb_of, lean_left, way_back
 from companion.flight.remembering import remembered_surfaces
-from companion.flight.spinning import Steering, coming_to_rest, is_spinning
 from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
-from companion.recovery.direction import away_from, plus, split
-from companion.recovery.envelope import Envelope
-from companion.recovery.height import BRAKED_US, NO_BRAKING, as_it_moves, brake, level
-from companion.recovery.interface import Contact, Moving, RecoveryLaw
-from companion.recovery.registry import RECOVERY_LAWS
-from companion.recovery.room import Room, Surface
-from companion.recovery.way import REST, Way, damped
-
-# The motion after the contact is read this long after the hit's first sample. Head-on, spring arms push for 15 ms at
-# 5 m/s, 50 ms at 3 m/s and 0.12 s at 1 m/s, most of it at the beginning, and the vehicle's estimate is some 20 ms late.
-# Waiting for 120 ms made no better recoveries.
-REBOUND_KNOWN_US = 80_000
-# Where it is believed later than this, the vehicle has fallen meanwhile: of the hit only the level part is left.
-REBOUND_LATEST_US = 200_000
-# A vehicle's estimate is up to 0.02 s late (see estimate.approach).
-HEIGHT_KNOWN_US = 15_000
+from companion.reflex.config import (
+    AGREEING,
+    DAMPED,
+    FALLS_M_S2,
+    HANGS_M_S2,
+    KNOWN_US,
+    LEANS_M_S2,
+    LEAVING_M_S,
+    LEFT_BELOW_M,
+    LEFT_US,
+    SLID_OFF_M_S,
+    SPINNING_RAD_S,
+    STOPPING_M_S2,
+    TELLING_M_S,
+    TOUCHES_M,
+)
+from companion.reflex.halfspace import Envelope, Room, Surface, away_from, plus, split
+from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
+from companion.reflex.planner import REST, Limits, Moving, Plan, height_held, kept_off, plan
+from companion.reflex.reckoning import Reckoning, half_way
 
 
 class Recover:
-    """Glide to the newest collision's setpoint, which is final once the rebound is known, and wait for rest there."""
+    """Fly to rest behind the newest collision's surface, and wait for rest there."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        self._record = flight.collisions[-1]
+        self._record = record = flight.collisions[-1]
+        self._law, self._config = _law(flight), flight.mission.recovery
+        self._contact = record.contact
+        self._limits = Limits(self._config.acceleration_m_s2)
         self._first_hit_us = in_one_recovery(flight.collisions)[-1].detected_at_us
-        self._law = _law(flight)
-        self._started_us = now_us
-        self._contact = self._record.contact
         if flight.target is not None:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
-        self._is_refined = not self._law.is_refined
-        self._refined_boot_us = self._record.sample_time_boot_us
-        self._braking = NO_BRAKING
-        self._is_believed = not self._law.is_refined
-        self._spins = False
-        self._steering: Steering | None = None  # while it spins
-        self._hanging, self._may_fall = Hanging(), True
-        self._take(flight, self._law.expected(self._contact), now_us)
-
-    def _take(self, flight: FlightContext, motion: Moving, now_us: int) -> None:
-        """The way from this motion to the record's setpoint."""
-        goal = self._record.setpoint_ned_m
-        self._way: Way = self._law.way(motion, goal)
-        self._way_began_us = now_us
-        self._monitor = SettlingMonitor(goal, flight.mission.companion.settled)
+        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
+        self._spin_rad_s = 0.0
+        self._is_known = not self._law.follows  # the motion after the hit
+        self._has_left, self._may_fall = False, False
+        self._agreed: Vector3 | None = None  # the normal by the velocities before and after
+        self._planned_for: object = None  # what was known of the contact
+        self._plan: Plan | None = None  # while the vehicle follows one; else it is asked for accelerations alone
+        self._plan_began_us = now_us
+        self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
-        if self._hanging.since_us is not None:
-            falls, reckons = self._may_fall and self._hanging.is_leant, not self._is_believed
-            return let_go(self._record, self._contact.normal_ned, self._yaw_rad, falls, reckons)
-        if self._steering is not None:
-            a, b = self._steering.acceleration_m_s2
-            leant = (a, b, self._braking.at(now_us))
-            return Target(self._record.setpoint_ned_m, self._yaw_rad, REST, leant, leans_only=True)
-        motion = self._way.at((now_us - self._way_began_us) * 1e-6)
-        if not self._is_believed:
-            climb = self._record.climb
-            braking = climb.braking_m_s2() if climb.is_reckoned else 0.0
-            is_new = now_us - self._started_us < BRAKED_US
-            motion = level(motion, self._record.setpoint_ned_m[2], braking)
-            a, b, _ = motion.acceleration_ned_m_s2 or REST
-            besides = REST if self._spins else self._record.level_leans_m_s2
-            expected = Moving(motion.position_ned_m, motion.velocity_ned_m_s or REST, besides)
-            leant = (0.0, 0.0, braking) if self._spins else (a, b, braking)
-            is_free = is_new or climb.is_reckoned
-            velocity = as_it_moves(self._record.estimated_down_m_s) if is_free else REST
-            return Target(motion.position_ned_m, self._yaw_rad, velocity, leant, True, is_free, expected)
-        if self._law.holds_height and self._contact.normal_ned[2] == 0.0:
-            motion = level(motion, self._record.setpoint_ned_m[2], self._braking.at(now_us))
-        return Target(motion.position_ned_m, self._yaw_rad, motion.velocity_ned_m_s, damped(motion))
+        goal, state, record = self._record.setpoint_ned_m, self._state(), self._record
+        is_level = self._contact.normal_ned[2] == 0.0
+        most_m_s2 = self._config.vertical_acceleration_m_s2
+        climb_m_s2 = height_held(state, goal[2], 1.0, most_m_s2)
+        if not self._law.follows:
+            return Target(goal, self._yaw_rad)
+        if self._is_known and not self._is_spinning and not self._presses():
+            motion = Moving(goal, REST)
+            if self._plan is not None:
+                motion = self._plan.at(1e-6 * (now_us - self._plan_began_us))
+            (n, e, d), (u, v, w) = motion.position_ned_m, motion.velocity_ned_m_s
+            a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
+            if is_level:
+                d, w, c = goal[2], 0.0, climb_m_s2
+            return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
+        limits = self._limits.spinning(self._spin_rad_s)
+        a, b, c = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
+        north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
+        asked = self._kept_off((a + north, b + east, climb_m_s2 if is_level else c))
+        expected = Moving(state.position_ned_m, state.velocity_ned_m_s, record.level_leans_m_s2)
+        if is_level and self._may_fall and self._presses(HANGS_M_S2):
+            velocity, asked = (0.0, 0.0, record.estimated_down_m_s), (asked[0], asked[1], FALLS_M_S2)
+            return Target(goal, self._yaw_rad, velocity, asked, True, True, None if self._is_known else expected)
+        if self._is_known:
+            return Target(goal, self._yaw_rad, REST, asked, leans_only=True)
+        if not is_level:
+            return Target(goal, self._yaw_rad, REST, asked, leans_only=True, expected=expected)
+        velocity = (0.0, 0.0, record.estimated_down_m_s)  # which leaves PX4's own loop nothing to ask for
+        asked = (asked[0], asked[1], height_held(state, goal[2], 2.0, most_m_s2))
+        return Target(goal, self._yaw_rad, velocity, asked, True, True, expected)
+
+    def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
+        spread = self._record.reckoning.spread_m_s
+        return kept_off(acceleration_ned_m_s2, self._leant, spread, self._surfaces, self._limits)
+
+    @property
+    def _leant(self) -> Moving:
+        """The motion that there is, with the acceleration that the lean is about to give."""
+        return replace(self._record.reckoning.motion, acceleration_ned_m_s2=self._record.reckoning.lean_m_s2)
+
+    def _presses(self, least_m_s2: float = LEANS_M_S2) -> bool:
+        """Whether the vehicle leans into the surface that it touches.
+
+        What PX4's loops add to that against a wind, or have added up against the surface itself, is not to be had.
+        """
+        return any(
+            surface.off_m(self._leant.position_ned_m) < TOUCHES_M
+            and split(self._leant.acceleration_ned_m_s2, surface.normal_ned)[0] < -least_m_s2
+            for surface in self._surfaces[:1]
+        )
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        record = self._record
-        self._hang(flight, now_us)
+        record, attitude = self._record, flight.vehicle.attitude
+        if attitude is not None and attitude.angular_velocity_frd_rad_s is not None:
+            self._spin_rad_s = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)[2]
+        self._may_fall = _has_room_below(flight)
         for sample in inputs.positions:
             noise_m = flight.mission.companion.estimate.position_noise_m
             if record.is_contradicted(sample.time_boot_us, flight.vehicle.history, noise_m):
                 move = take_back(flight, now_us)
                 if move is not None:
                     return move
-            if not self._believes(flight, sample):
+            record.reckoning.hear(sample)
+            is_known = self._knows(sample)
+            self._follow(flight, sample, now_us)
+            if not is_known:
                 continue
             record.follow_recovery(sample)
-            self._hold_height(flight, sample, now_us)
-            self._refine(flight, sample, now_us)
             since_us = self._monitor.settled_since(sample)
-            if since_us is not None and self._steering is None:
+            if since_us is not None and not self._is_spinning:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.tell(now_us, "recovered", record.recovered_text(), **figures)
@@ -118,118 +141,153 @@ class Recover:
             return self._leave(flight)
         return None
 
-    def _hang(self, flight: FlightContext, now_us: int) -> None:
-        """While the vehicle hangs on what it hit, it has not left it: the way off it begins after that."""
-        attitude, normal = flight.vehicle.attitude, self._contact.normal_ned
-        if attitude is None or not self._law.is_refined or normal[2] != 0.0:
-            return
-        self._may_fall = has_room_below(flight)
-        was_us, since_us = self._hanging.since_us, now_us - self._record.detected_at_us
-        if not self._hanging.step(attitude, normal, since_us, now_us) and was_us is not None:
-            self._way_began_us += now_us - max(was_us, self._way_began_us)
+    @property
+    def _is_spinning(self) -> bool:
+        return self._law.follows and abs(self._spin_rad_s) > SPINNING_RAD_S
 
     def _leave(self, flight: FlightContext) -> Move:
         """What follows begins at rest at the setpoint."""
         flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
         return afterwards(flight)
 
-    def _believes(self, flight: FlightContext, sample: LocalPosition) -> bool:
-        """Whether the estimate is the vehicle's again; until then the motion expected is flown by its lean alone."""
-        record = self._record
-        if not self._law.is_refined or record.is_believed:
+    def _knows(self, sample: LocalPosition) -> bool:
+        """Whether the estimate shows the motion after the hit; until then the motion reckoned is planned from."""
+        if self._is_known:
             return True
-        if record.may_be_clipped:
-            self._spins = is_spinning(flight)
-            since_us = sample.time_boot_us - record.sample_time_boot_us
-            normals = (self._contact.normal_ned, record.normal_ned)
-            record.is_believed = since_us >= HEIGHT_KNOWN_US and is_believed(
-                sample, self._contact.velocity_ned_m_s, normals, record.fixes, since_us
-            )
-        self._is_believed = record.is_believed or not record.may_be_clipped
-        return self._is_believed
-
-    def _refine(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """With the motion after the contact, and again where that has gone on since or while it is carried."""
-        record, contact = self._record, self._contact
+        record = self._record
         since_us = sample.time_boot_us - record.sample_time_boot_us
-        if not self._law.is_refined or since_us < REBOUND_KNOWN_US:
-            return
-        if self._steers(flight, sample):
-            self._is_refined = False
-            return
-        carried = self._is_refined and self._is_carried(flight, sample, now_us)
-        if self._is_refined and not carried and record.contact_ended_boot_us <= self._refined_boot_us:
-            return
-        u, v, w = sample.velocity_ned_m_s
-        after = (u, v, w if since_us <= REBOUND_LATEST_US else contact.velocity_ned_m_s[2])
-        normal = agreed_normal(record.normal_ned, contact.velocity_ned_m_s, after)
-        place = sample.position_ned_m if carried else contact.position_ned_m
-        self._contact = contact = replace(contact, position_ned_m=place, normal_ned=normal)
-        self._is_refined, self._refined_boot_us = True, sample.time_boot_us
-        lean = lean_left(record.fixes, sample.time_boot_us)
-        # From what pushes it along a vehicle comes clear only if it flies faster.
-        velocity = plus(sample.velocity_ned_m_s, CLEAR_M_S if carried else 0.0, normal)
-        motion = Moving(sample.position_ned_m, velocity, lean)
-        record.setpoint_ned_m = _setpoint(flight, self._law, contact, motion, flight.collisions[:-1])
-        record.overshoot_m = 0.0  # that past the setpoint expected is none
-        self._take(flight, motion, now_us)
-        off_m_s, place = split(motion.velocity_ned_m_s, normal)[0], record.setpoint_ned_m
-        text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
-        flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+        self._is_known = record.reckoning.is_right and since_us >= KNOWN_US
+        if self._is_known:
+            v, w = record.contact.velocity_ned_m_s, sample.velocity_ned_m_s
+            self._agreed = agreed_normal(record.normal_ned, v, w)
+        return self._is_known
 
-    def _is_carried(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> bool:
-        if sample.time_boot_us - self._refined_boot_us < CARRIED_EVERY_US:
-            return False
-        asked = self._way.at((now_us - self._way_began_us) * 1e-6)
-        return is_carried(flight, self._record, self._contact.normal_ned, sample, asked)
+    def _state(self) -> Moving:
+        """The present motion as a plan begins with it: towards what pushes still is never asked for, and a lean counts
+        as far as a plan may ask for it. Level where the height is held by itself."""
+        motion, normal = self._record.reckoning.motion, self._contact.normal_ned
+        velocity, acceleration, place = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2, motion.position_ned_m
+        if self._is_spinning:
+            acceleration = REST  # what a gyroscope leans to is not where it will lean next
+        if not self._has_left:
+            off_m_s, along = split(velocity, normal)
+            velocity, acceleration = plus(along, max(0.0, off_m_s), normal), REST
+        size, most_m_s2 = math.hypot(*acceleration), self._limits.acceleration_m_s2
+        if size > most_m_s2:
+            acceleration = plus(REST, most_m_s2 / size, acceleration)
+        return Moving(place, velocity, acceleration)
 
-    def _hold_height(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """From the first estimate on that can show what the hit did; the accelerometer, which it clips, cannot."""
-        since_us = sample.time_boot_us - self._record.sample_time_boot_us
-        if HEIGHT_KNOWN_US <= since_us <= BRAKED_US:
-            most_m_s2 = flight.mission.recovery.vertical_acceleration_m_s2
-            self._braking = brake(sample.velocity_ned_m_s[2], most_m_s2, now_us)
+    def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
+        """Goal and plan as they follow from what is known by now; the plan alone where the vehicle is not on it."""
+        record, law = self._record, self._law
+        if not law.follows:
+            return
+        self._touch(sample)
+        state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
+        known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left)
+        if known != self._planned_for or not self._is_known:
+            self._planned_for, self._plan = known, None
+            self._aim(flight, state, now_us)
+        if self._is_spinning or not law.plans or not self._is_known:
+            self._plan = None
+        elif self._plan is None or not self._plan.holds(elapsed_s, state):
+            self._plan, self._plan_began_us = plan(state, record.setpoint_ned_m, self._surfaces, self._limits), now_us
 
-    def _steers(self, flight: FlightContext, sample: LocalPosition) -> bool:
-        """Gently to rest while the vehicle spins."""
-        attitude, record = flight.vehicle.attitude, self._record
-        if attitude is None or not is_spinning(flight):
-            self._steering = None
-            return False
-        if self._steering is None:
-            rest = coming_to_rest(sample.position_ned_m, sample.velocity_ned_m_s, self._contact.position_ned_m[2])
-            record.setpoint_ned_m = _allowed(flight, self._law, self._contact, rest, flight.collisions[:-1])
-            self._steering = Steering(record.setpoint_ned_m)
-        self._steering.step(sample, attitude)
-        return True
+    def _touch(self, sample: LocalPosition) -> None:
+        """The surface as it is known by now: what still pushes is where the vehicle is, and moves along with it."""
+        record, contact = self._record, self._contact
+        pushes = sample.time_boot_us - record.contact_ended_boot_us < LEFT_US
+        off_m_s = split(sample.velocity_ned_m_s, contact.normal_ned)[0]
+        self._has_left = not pushes and (self._has_left or off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S)
+        place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
+        if pushes and Surface(place, normal, 0.0).off_m(sample.position_ned_m) > 0.0:
+            place = sample.position_ned_m
+        self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
+
+    def _aim(self, flight: FlightContext, state: Moving, now_us: int) -> None:
+        """The recovery setpoint anew."""
+        record, before = self._record, self._record.setpoint_ned_m
+        limits = self._limits.spinning(self._spin_rad_s)
+        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
+        record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, limits, self._surfaces)
+        self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
+        if math.dist(place, before) > flight.mission.companion.settled.distance_m:
+            record.overshoot_m = 0.0  # that past the setpoint expected is none
+            off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
+            text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
+            flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+
+def _has_room_below(flight: FlightContext) -> bool:
+    """Whether a fall can still be stopped above the ground."""
+    latest, height_m = flight.vehicle.history.latest(), flight.height_m
+    if latest is None or height_m is None:
+        return False
+    down_m_s = max(0.0, latest.velocity_ned_m_s[2])
+    return height_m > LEFT_BELOW_M + 0.5 * down_m_s**2 / STOPPING_M_S2
+
+
+def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
+    """The normal by the push, or by what it did to the velocity where the two do not agree; level as the push's is.
+
+    The push of a contact of a millisecond is one sample, shaken and clipped; the change of velocity is all of it.
+    """
+    n, e, d = plus(after_ned_m_s, -1.0, before_ned_m_s)
+    change = (n, e, d if pushed_ned[2] != 0.0 else 0.0)
+    moved = away_from(change)
+    if math.hypot(*change) < TELLING_M_S or split(pushed_ned, moved)[0] > AGREEING:
+        return pushed_ned
+    return moved
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """A new collision: what was known just before it, and from that the setpoint."""
-    mission, impact = flight.mission, estimate.impact
-    behind = overtaken(flight, impact.specific_force_frd_m_s2, estimate.velocity_ned_m_s)
-    normal = behind or away_from(estimate.normal_ned)
-    law = _law(flight)
-    contact = Contact(estimate.time_boot_us, estimate.position_ned_m, estimate.velocity_ned_m_s, normal)
-    if law.is_refined and behind is None:
-        contact = replace(contact, normal_ned=half_way(normal, way_back(contact.velocity_ned_m_s)))
-    hit_boot_us = impact.sample_time_boot_us
+    mission, impact, law = flight.mission, estimate.impact, _law(flight)
+    normal = away_from(estimate.normal_ned)
+    place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
+    before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
+    behind = None if before is None else _comes_after(flight, before, impact.specific_force_frd_m_s2, velocity)
+    normal = behind or normal
+    believed, earlier = normal, None
+    if law.follows:
+        if before is not None and not (before.reckoning.is_right or before.reckoning.is_whole):
+            # Place and velocity now are as wrong as the estimate.
+            earlier = before.reckoning
+            place, velocity = before.reckoning.motion.position_ned_m, before.reckoning.motion.velocity_ned_m_s
+        believed = behind or half_way(normal, velocity)
+    contact = Contact(estimate.time_boot_us, place, velocity, believed)
+    expected = contact.rebound(mission.recovery.restitution)
+    limits = Limits(mission.recovery.acceleration_m_s2)
     record = CollisionRecord(
         detected_at_us=now_us,
-        sample_time_boot_us=hit_boot_us,
+        sample_time_boot_us=impact.sample_time_boot_us,
         detector=mission.companion.detector,
         contact=contact,
-        setpoint_ned_m=_setpoint(flight, law, contact, law.expected(contact), flight.collisions),
+        setpoint_ned_m=_setpoint(flight, contact, expected, limits, _surfaces(flight, contact, flight.collisions)),
         normal_ned=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
-        contact_ended_boot_us=hit_boot_us,
-        may_be_clipped=not estimate.is_final or estimate.may_be_clipped,
-        climb=climb_of(flight, law, contact, hit_boot_us, estimate.time_boot_us - estimate.time_error_us),
+        contact_ended_boot_us=impact.sample_time_boot_us,
+        reckoning=Reckoning(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, earlier),
         is_behind=behind is not None,
         claim=_claim(flight, estimate),
     )
+    record.reckoning.tell(estimate.is_final and not estimate.may_be_clipped, impact.sample_time_boot_us)
     flight.collisions.append(record)
     tell_detection(flight, record, now_us)
+
+
+def _comes_after(
+    flight: FlightContext, before: CollisionRecord, push_frd_m_s2: Vector3, velocity_ned_m_s: Vector3
+) -> Vector3 | None:
+    """The normal of the hit before, where what was hit has come after a vehicle that still recovers from it.
+
+    What pushes a vehicle on in the direction in which it leaves is behind it, whatever an estimate makes of a push.
+    """
+    if flight.vehicle.attitude is None:
+        return None
+    normal, push = before.contact.normal_ned, body_to_ned(flight.vehicle.attitude.attitude_wxyz, push_frd_m_s2)
+    leaves_m_s, pushed_m_s2 = split(velocity_ned_m_s, normal)[0], split(push, normal)[0]
+    return normal if leaves_m_s > LEAVING_M_S and pushed_m_s2 > AGREEING * math.hypot(*push) else None
 
 
 def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | Leap | None:
@@ -242,33 +300,27 @@ def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | Leap | No
     return claim_of(estimate, force_ned, config.imu_averaging_interval_s, config.guards)
 
 
-def _law(flight: FlightContext) -> RecoveryLaw:
-    return RECOVERY_LAWS[flight.mission.recovery.law](flight.mission.recovery)
+def _law(flight: FlightContext) -> Law:
+    return RECOVERY_LAWS[flight.mission.recovery.law]
 
 
 def _setpoint(
-    flight: FlightContext, law: RecoveryLaw, contact: Contact, motion: Moving, earlier: Sequence[CollisionRecord]
+    flight: FlightContext, contact: Contact, motion: Moving, limits: Limits, surfaces: Sequence[Surface]
 ) -> Vector3:
-    return _allowed(flight, law, contact, law.goal_ned_m(contact, motion), earlier)
-
-
-def _allowed(
-    flight: FlightContext, law: RecoveryLaw, contact: Contact, goal: Vector3, earlier: Sequence[CollisionRecord]
-) -> Vector3:
-    """The goal, as what is around lets it be."""
+    """The law's goal, as what is around lets it be."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    surfaces = [*_surfaces(law, earlier), *remembered_surfaces(flight, contact)]
-    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), surfaces)
+    goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion, limits)
+    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), surfaces[1:])
     return room.goal(contact.position_ned_m, contact.normal_ned, goal)
 
 
-def _surfaces(law: RecoveryLaw, earlier: Sequence[CollisionRecord]) -> list[Surface]:
-    """What was hit before in the same recovery, each with the distance that its own recovery wants."""
-    surfaces: list[Surface] = []
-    for record in in_one_recovery(earlier):
-        contact = replace(record.contact, normal_ned=record.normal_ned)
-        touched = Surface(contact.position_ned_m, contact.normal_ned, 0.0)
-        wanted = law.goal_ned_m(contact, law.expected(contact))
-        distance_m = max(0.0, touched.off_m(wanted), touched.off_m(record.setpoint_ned_m))
-        surfaces.append(replace(touched, distance_m=distance_m))
-    return surfaces
+def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[CollisionRecord]) -> list[Surface]:
+    """What was just hit first, then what was hit before in the same recovery and what is remembered."""
+    surfaces = [Surface(contact.position_ned_m, contact.normal_ned, flight.mission.recovery.clearance_m)]
+    for record in reversed(records):
+        if record.is_over:
+            break
+        if record.contact.time_boot_us < contact.time_boot_us:
+            touched = Surface(record.contact.position_ned_m, record.normal_ned, 0.0)
+            surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))
+    return surfaces + remembered_surfaces(flight, contact)

@@ -12,9 +12,8 @@ from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import Surroundings
 from companion.memory.touching import touch_of
 from companion.messages import Vector3
-from companion.recovery.direction import plus
-from companion.recovery.interface import Contact
-from companion.recovery.room import Surface
+from companion.reflex.halfspace import Surface, plus
+from companion.reflex.laws import Contact
 
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:

@@ -11,8 +11,8 @@ from companion.mission.model import Mission
 from companion.mission.policy import Limits
 from companion.mission.program import MissionItem
 from companion.px4_mode import MODE_NAMES
-from companion.recovery.interface import RecoveryConfig
-from companion.recovery.registry import RECOVERY_LAWS, check_known_law
+from companion.reflex.config import RecoveryConfig
+from companion.reflex.laws import RECOVERY_LAWS, check_known_law
 from companion.written import Positive, Written
 
 # Modes in which PX4 itself holds a position or a height. Not AUTO.LAND: its end is a hit on the ground. Not the modes

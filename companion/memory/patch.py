@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.recovery.direction import STEEP
+from companion.reflex.config import STEEP
 
 # One touch shows one place. Half a metre to every side is believed: the way round then passes a metre beside the touch,
 # clear of a pole, a post or the leaf of a door, and a surface that goes on costs one hit more.

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import Field, model_validator
 
 from companion.memory.patch import REACHES_M, Patch
-from companion.recovery.direction import STEEP, away_from
+from companion.reflex.config import STEEP
+from companion.reflex.halfspace import away_from
 from companion.written import NotNegative, PositionNed, Positive, Written
 
 OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]
@@ -22,7 +23,7 @@ class KnownPatch(Written):
     touches_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1)]
     """Places on the surface; of a wall two near its ends."""
     normal_ned: PositionNed
-    """Of any length; a wall's counts as horizontal, see recovery.direction."""
+    """Of any length; a wall's counts as horizontal, see halfspace.away_from."""
     normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
     """One standard deviation; the normal of one whole contact."""
     reaches_m: NotNegative = REACHES_M

@@ -4,7 +4,7 @@ import math
 
 from companion.memory.patch import REACHES_M, Touch
 from companion.messages import Vector3
-from companion.recovery.direction import away_from
+from companion.reflex.halfspace import away_from
 
 # Of the normals that one whole contact gives, 61 % are within 10 degrees and 94 % within 20 (docs/detection.md).
 ERROR_RAD = math.radians(15.0)
@@ -36,7 +36,7 @@ def touch_of(
 ) -> Touch | None:
     """The touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
 
-    ``normal_ned`` is horizontal, steep or zero (see recovery.direction). ``reach_m``: centre to the guards' rim.
+    ``normal_ned`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
     ``is_behind``: what was hit is known to have come after the vehicle.
     """
     n, e, d = velocity_ned_m_s

@@ -11,8 +11,8 @@ from companion.mission.fence import Fence
 from companion.mission.itinerary import first_complaint
 from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, Resume
 from companion.mission.program import MissionItem
-from companion.recovery.interface import RecoveryConfig
-from companion.recovery.registry import RECOVERY_LAWS, check_known_law
+from companion.reflex.config import RecoveryConfig
+from companion.reflex.laws import RECOVERY_LAWS, check_known_law
 from companion.written import Written
 
 

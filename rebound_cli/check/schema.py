@@ -4,7 +4,7 @@ from typing import Any
 
 from companion.detection.registry import DETECTORS
 from companion.mission.model import Mission
-from companion.recovery.registry import RECOVERY_LAWS
+from companion.reflex.laws import RECOVERY_LAWS
 from sim_vehicle.scene import Scene
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

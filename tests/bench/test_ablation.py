@@ -10,15 +10,15 @@ from bench.ablation.flights import ablation_campaign
 from bench.ablation.rules import RULES, Rule
 from bench.ablation.switching import switched
 from bench.campaign.run import Results
-from companion.recovery import direction, room
+from companion.reflex import halfspace, planner
 
-RULE = Rule("away", "away from what was hit", "companion.recovery.direction:plus", lambda arguments, found: (9, 9, 9))
+RULE = Rule("away", "away from what was hit", "companion.reflex.halfspace:plus", lambda arguments, found: (9, 9, 9))
 RECOVERED = {"past_m": 0.02, "lost_m": 0.03, "risen_m": 0.0, "returned": 0, "rest_s": 1.2, "normal_deg": 5.0}
 
 
 def flown(copies):
     """Three steps, of which the second is the rule's."""
-    steps = [("first",), direction.plus((0, 0, 0), 1.0, (1, 0, 0)), room.plus((1, 0, 0), 1.0, (1, 0, 0))]
+    steps = [("first",), halfspace.plus((0, 0, 0), 1.0, (1, 0, 0)), planner.plus((1, 0, 0), 1.0, (1, 0, 0))]
     copies.leave(lambda: {"steps": steps})
     return steps
 
@@ -32,17 +32,17 @@ def test_a_copy_goes_on_without_the_rule_and_the_first_flight_with_it():
 
 
 def test_where_a_rule_changes_nothing_there_is_no_copy():
-    same = Rule("same", "", "companion.recovery.direction:plus", lambda arguments, found: found)
+    same = Rule("same", "", "companion.reflex.halfspace:plus", lambda arguments, found: found)
     with switched([same]) as copies:
         flown(copies)
     assert copies.found == {}
 
 
 def test_afterwards_the_companion_is_as_it_was():
-    before = direction.plus, room.plus
+    before = halfspace.plus, planner.plus
     with switched([RULE]):
-        assert direction.plus is not before[0] and room.plus is not before[1]
-    assert (direction.plus, room.plus) == before
+        assert halfspace.plus is not before[0] and planner.plus is not before[1]
+    assert (halfspace.plus, planner.plus) == before
 
 
 def test_a_copy_that_fails_is_told():
@@ -50,7 +50,7 @@ def test_a_copy_that_fails_is_told():
         raise ValueError
 
     with switched([RULE]) as copies:
-        direction.plus((0, 0, 0), 1.0, (1, 0, 0))
+        halfspace.plus((0, 0, 0), 1.0, (1, 0, 0))
         copies.leave(failing)
     assert copies.found == {"away": {"failure": "the copy died"}}
 

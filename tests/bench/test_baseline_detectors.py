@@ -10,7 +10,7 @@ from companion.detection.interface import Situation
 from companion.detection.registry import BASELINES, DETECTORS
 from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
-from companion.recovery.direction import plus
+from companion.reflex.halfspace import plus
 
 TICK_US = 4_000
 HIT_US = 4_000_000

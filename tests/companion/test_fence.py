@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from companion.mission.fence import Fence
-from companion.recovery.envelope import Envelope
+from companion.reflex.halfspace import Envelope
 
 # An L: the room to the north-east is not ours.
 ROOM = Fence(polygon_ne_m=[[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]], max_height_m=3)

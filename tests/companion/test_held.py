@@ -17,7 +17,7 @@ from companion.memory.patch import Patch
 from companion.mission.fence import Fence
 from companion.mission.model import Mission
 from companion.mission.policy import Limits
-from companion.recovery.interface import Moving
+from companion.reflex.planner import Moving
 from tests.companion.hostile import flight_in
 
 DOCS = Path(__file__).parents[2] / "docs" / "px4.md"

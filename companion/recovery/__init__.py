@@ -1,1 +1,0 @@
-"""Recovery laws, one file each, behind one interface and selected by name."""

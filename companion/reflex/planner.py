@@ -1,0 +1,162 @@
+"""From the motion that there is to rest: the minimum-jerk stop, within limits and off the surfaces around.
+
+    x(s T) = x_0 + v_0 T (s - s^3 + s^4 / 2) + a_0 T^2 (s^2 / 2 - 2 s^3 / 3 + s^4 / 4)
+             + e (10 s^3 - 15 s^4 + 6 s^5),          e = x_1 - x_0 - v_0 T / 2 - a_0 T^2 / 12
+
+The first part only brakes, the second takes back the lean there is; the last covers the rest of the way. T is the
+shortest that asks for no more than the limits allow. Planned anew from any motion on it, the plan is the same.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from companion.messages import Vector3
+from companion.reflex.config import (
+    AHEAD,
+    ATTITUDE_RAD_S,
+    CLIMB_GAIN_PER_S,
+    HARDER,
+    HARDEST_S,
+    HEIGHT_PER_S,
+    LEAD_S,
+    OFF_PLAN_M,
+    OFF_PLAN_M_S,
+    SHORTEST_S,
+    STEP,
+    TOUCHES_M,
+)
+from companion.reflex.halfspace import Surface, plus, split
+
+REST: Vector3 = (0.0, 0.0, 0.0)
+# Where a plan is looked at: its first part's acceleration is greatest at s = 1/2, the second's at 0.21 and 0.79.
+_LOOKED_AT = (0.21, 0.3, 0.4, 0.5, 0.6, 0.7, 0.79)
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """Where the vehicle is and how it moves, local NED; the acceleration where nothing but its own thrust makes it."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3 = REST
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Of a plan: its acceleration, and how soon the vehicle can lean both ways."""
+
+    acceleration_m_s2: float
+    shortest_s: float = SHORTEST_S
+
+    def spinning(self, spin_rad_s: float) -> "Limits":
+        """Of a vehicle that turns about the vertical: a gyroscope leans later, so all of it takes longer, and less."""
+        return Limits(self.acceleration_m_s2, self.shortest_s * math.hypot(1.0, spin_rad_s / ATTITUDE_RAD_S))
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """From a motion to rest at the goal within a duration."""
+
+    start: Moving
+    goal_ned_m: Vector3
+    duration_s: float
+
+    def at(self, elapsed_s: float, lead_s: float = LEAD_S) -> Moving:
+        """The motion after so long, with the acceleration of a little later, as thrust follows late."""
+        if elapsed_s >= self.duration_s:
+            return Moving(self.goal_ned_m, REST)
+        s = max(0.0, elapsed_s) / self.duration_s
+        (x, u, a), (y, v, b), (z, w, c) = self._axes(s, min(1.0, s + lead_s / self.duration_s))
+        return Moving((x, y, z), (u, v, w), (a, b, c))
+
+    def _axes(self, s: float, ahead: float) -> list[tuple[float, float, float]]:
+        start, total_s = self.start, self.duration_s
+        ends = zip(
+            start.position_ned_m, start.velocity_ned_m_s, start.acceleration_ned_m_s2, self.goal_ned_m, strict=True
+        )
+        return [_axis(x_0, v_0, a_0, x_1, total_s, s, ahead) for x_0, v_0, a_0, x_1 in ends]
+
+    def most_m_s2(self) -> float:
+        """Its largest acceleration."""
+        return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in _LOOKED_AT)
+
+    def enters(self, surface: Surface) -> bool:
+        """Whether it goes into the surface; where it begins or ends behind it, nothing is in the way."""
+        if min(surface.off_m(self.start.position_ned_m), surface.off_m(self.goal_ned_m)) < -TOUCHES_M:
+            return False
+        return any(surface.off_m(self.at(s * self.duration_s).position_ned_m) < -TOUCHES_M for s in _LOOKED_AT)
+
+    def holds(self, elapsed_s: float, motion: Moving) -> bool:
+        """Whether the vehicle is where it is to be by now, as far as PX4's loops bring it there."""
+        planned = self.at(elapsed_s)
+        off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
+        return off_m_s <= OFF_PLAN_M_S and math.dist(planned.position_ned_m, motion.position_ned_m) <= OFF_PLAN_M
+
+
+def _axis(
+    x_0: float, v_0: float, a_0: float, x_1: float, total_s: float, s: float, ahead: float
+) -> tuple[float, float, float]:
+    """Position and velocity at s, acceleration ahead of it."""
+    drift, lean = v_0 * total_s, a_0 * total_s**2
+    rest = x_1 - x_0 - 0.5 * drift - lean / 12.0
+    x = x_0 + s * drift * (1.0 + s * s * (0.5 * s - 1.0)) + rest * s**3 * (10.0 + s * (6.0 * s - 15.0))
+    x += lean * s * s * (0.5 + s * (0.25 * s - 2.0 / 3.0))
+    v = drift * (1.0 + s * s * (2.0 * s - 3.0)) + (lean * s + 30.0 * rest * s * s) * (1.0 - s) ** 2
+    a = ahead * (ahead - 1.0) * (6.0 * drift + 60.0 * rest * (2.0 * ahead - 1.0))
+    return x, v / total_s, (a + lean * (1.0 - ahead) * (1.0 - 3.0 * ahead)) / total_s**2
+
+
+def plan(state: Moving, goal_ned_m: Vector3, surfaces: Sequence[Surface], limits: Limits) -> Plan:
+    """The shortest plan within the limits; with harder brakes where it would run past its goal or into a surface."""
+    found = Plan(state, goal_ned_m, limits.shortest_s)
+    longest_s = _longest_s(state, goal_ned_m)
+    while found.duration_s < longest_s and found.most_m_s2() > limits.acceleration_m_s2:
+        found = Plan(state, goal_ned_m, found.duration_s * STEP)
+    found = Plan(state, goal_ned_m, min(found.duration_s, longest_s))
+    harder = found
+    while harder.most_m_s2() <= HARDER * limits.acceleration_m_s2 and any(harder.enters(each) for each in surfaces):
+        found, harder = harder, Plan(state, goal_ned_m, harder.duration_s / STEP)
+    return found
+
+
+def _longest_s(state: Moving, goal_ned_m: Vector3) -> float:
+    """e >= 0 along the velocity keeps the speed above zero: longer, and the plan would run past a goal ahead."""
+    n, e, d = (goal - start for goal, start in zip(goal_ned_m, state.position_ned_m, strict=True))
+    (u, v, w), (a, b, c) = state.velocity_ned_m_s, state.acceleration_ned_m_s2
+    ahead, speed2 = n * u + e * v + d * w, u * u + v * v + w * w
+    if ahead <= AHEAD * math.sqrt(speed2 * (n * n + e * e + d * d)):
+        return math.inf
+    stops2 = 0.25 * speed2**2 + ahead * (a * u + b * v + c * w) / 3.0
+    return max(HARDEST_S, 2.0 * ahead / (0.5 * speed2 + math.sqrt(stops2))) if stops2 >= 0.0 else math.inf
+
+
+def kept_off(
+    acceleration_ned_m_s2: Vector3, state: Moving, spread_m_s: Vector3, surfaces: Sequence[Surface], limits: Limits
+) -> Vector3:
+    """Without what leads into a surface nearer than its clearance; `state` with the acceleration of its lean.
+
+    One that leaves by no more than its velocity's spread does not brake.
+
+    By when a lean is taken back, which turns it twice, the vehicle is to be no slower than at rest. So what only brakes
+    one that leaves is not taken away, and one that leans into the surface, or flies there, is asked to lean away.
+    """
+    for surface in surfaces:
+        if surface.off_m(state.position_ned_m) >= surface.distance_m:
+            continue
+        normal, most_m_s2 = surface.normal_ned, HARDER * limits.acceleration_m_s2
+        leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * LEAD_S, state.acceleration_ned_m_s2), normal)[0]
+        least_m_s2 = min(-leaving_m_s / LEAD_S, most_m_s2)
+        if leaving_m_s < math.hypot(*(s * n for s, n in zip(spread_m_s, normal, strict=True))):
+            least_m_s2 = max(least_m_s2, 0.0)
+        short_m_s2 = least_m_s2 - split(acceleration_ned_m_s2, normal)[0]
+        if short_m_s2 > 0.0:
+            acceleration_ned_m_s2 = plus(acceleration_ned_m_s2, short_m_s2, normal)
+    return acceleration_ned_m_s2
+
+
+def height_held(state: Moving, down_m: float, loops: float, most_m_s2: float) -> float:
+    """What brings the vehicle back to a height, down positive: so many times what PX4's own loops ask for."""
+    wanted_m_s = HEIGHT_PER_S * (down_m - state.position_ned_m[2])
+    asked = loops * CLIMB_GAIN_PER_S * (wanted_m_s - state.velocity_ned_m_s[2])
+    return min(max(asked, -most_m_s2), most_m_s2)

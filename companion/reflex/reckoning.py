@@ -1,0 +1,294 @@
+"""Where a vehicle is after a hit, and how it moves, although its own estimate may lack a part of the hit.
+
+What clipping hides of a hit is missing in the vehicle's own velocity, and then in its place. Other sensors put both
+right, as an estimator of second order does. So t after the hit the vehicle tells, of its velocity v and its place x,
+
+    v(t) + e g(t),    x(t) + e G(t)
+
+with e what is missing at first. The accelerometer carries x and v from one told place to the next, and a Kalman filter
+finds x, v and e on each axis. How soon and how fast an estimator puts itself right differs: a bank of filters supposes
+several ways, one of them that nothing was missing, and each counts by how well it foretells what is told (Magill 1965).
+At the hit v is the rebound that is expected, with a wide spread.
+"""
+
+import copy
+import math
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.estimate.delay import DELAY_S
+from companion.estimate.rotation import body_to_ned
+from companion.estimate.strapdown import GRAVITY_M_S2, Strapdown
+from companion.messages import LocalPosition, Vector3
+from companion.mission.config import EstimateConfig
+from companion.reflex.config import (
+    CORRECTED_S,
+    DRIFT_M2_S3,
+    FRICTION_SPREAD,
+    HIDDEN_SHARE,
+    LEAD_S,
+    LEAST_SPREAD_M_S,
+    MISFIT,
+    MOST_LEANT,
+    OVER_US,
+    PLACE_SPREAD_M,
+    PUT_RIGHT_AFTER_S,
+    PUT_RIGHT_DAMPING,
+    PUT_RIGHT_RAD_S,
+    REBOUND_SPREAD,
+    RIGHT_M_S,
+    SMOOTHED_S,
+    THROWN_SHARE,
+    WIND_S,
+)
+from companion.reflex.halfspace import away_from, plus, split
+from companion.reflex.laws import Contact
+from companion.reflex.planner import REST, Moving
+
+Floats = npt.NDArray[np.float64]
+
+# The ways in which an estimate may be put right: after how long, with which frequency and damping.
+_WAYS = np.array(list(product(PUT_RIGHT_AFTER_S, PUT_RIGHT_RAD_S, PUT_RIGHT_DAMPING)))
+
+
+@dataclass(slots=True)
+class Bank:
+    """Filters of x, v, e: a state (ways, axes, 3) and its covariance (ways, axes, 3, 3) each; the last way is none
+    missing. Local NED, SI. Changed only by its methods."""
+
+    start: Moving
+    spread_m_s: Vector3
+    missing_m_s: Vector3
+    hides_m_s: Vector3
+    state: Floats = field(init=False)
+    covariance: Floats = field(init=False)
+    likely: Floats = field(init=False)  # twice the logarithm of each way's likelihood
+
+    def __post_init__(self) -> None:
+        ways = len(_WAYS) + 1
+        state = np.stack([self.start.position_ned_m, self.start.velocity_ned_m_s, self.missing_m_s], axis=1)
+        spread = np.stack([np.full(3, PLACE_SPREAD_M), self.spread_m_s, self.hides_m_s], axis=1)
+        self.state = np.tile(state, (ways, 1, 1))
+        self.covariance = np.tile(np.einsum("ai,ij->aij", spread**2, np.eye(3)), (ways, 1, 1, 1))
+        self.likely = np.zeros(ways)
+        self.likely[-1] = 2.0 * math.log(len(_WAYS))  # as likely as all others together
+
+    def struck(self, faster_m_s: Vector3, spread_m_s: Vector3, hides_m_s: Vector3) -> "Bank":
+        """Another hit, while what the first one hid is being put right."""
+        bank = copy.copy(self)
+        bank.state, bank.covariance = self.state.copy(), self.covariance.copy()
+        bank.state[:, :, 1] += np.array(faster_m_s)
+        bank.covariance[:, :, 1, 1] += np.array(spread_m_s) ** 2
+        bank.covariance[:, :, 2, 2] += np.array(hides_m_s) ** 2
+        return bank
+
+    def move(self, elapsed_s: float, faster_m_s: Vector3) -> None:
+        """By the accelerometer's sum over a time; its attitude may be a little off."""
+        leads = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        self.state = self.state @ leads.T
+        added = np.array(faster_m_s)
+        self.state[:, :, 0] += 0.5 * elapsed_s * added
+        self.state[:, :, 1] += added
+        self.covariance = leads @ self.covariance @ leads.T
+        self.covariance[:, :, 1, 1] += DRIFT_M2_S3 * elapsed_s
+
+    def hear(
+        self, since_s: float, velocity_m_s: Vector3, place_m: Vector3, spread_m_s: float, spread_m: float, colour: float
+    ) -> None:
+        """What the vehicle tells of itself so long after the hit.
+
+        No estimator is put right in quite one of these ways: it is off by a share of what was hidden. ``colour``: in so
+        many samples the same error shows.
+        """
+        g, way_s, _ = missing(since_s)
+        off2 = (MISFIT * np.array(self.missing_m_s)) ** 2
+        self._take(0, way_s, place_m, colour * (spread_m**2 + since_s**2 * off2))
+        self._take(1, g, velocity_m_s, colour * (spread_m_s**2 + off2))
+
+    def _take(self, which: int, of_e: Floats, told: Vector3, variance: Floats) -> None:
+        """One measurement on each axis: the place (0) or the velocity (1) with so much of e in it."""
+        share = of_e[:, None]
+        missed = np.array(told) - self.state[:, :, which] - share * self.state[:, :, 2]
+        with_it = self.covariance[..., which] + share[..., None] * self.covariance[..., 2]
+        size = with_it[..., which] + share * with_it[..., 2] + variance
+        self.state = self.state + with_it * (missed / size)[..., None]
+        self.covariance = self.covariance - with_it[..., :, None] * with_it[..., None, :] / size[..., None, None]
+        self.likely = self.likely - (missed**2 / size + np.log(size)).sum(axis=1)
+
+    def found(self, since_s: float) -> tuple[Moving, Vector3, Vector3, float]:
+        """The motion and its velocity's spread, by what the told velocity is off now, and by how much it may be off in
+        all from now on."""
+        share = np.exp(0.5 * (self.likely - self.likely.max()))
+        share /= share.sum()
+        g, _, left = missing(since_s)
+        (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
+        spread2 = self.covariance[..., 1, 1] + (self.state[..., 1] - [u, v, w]) ** 2
+        (p, q, r), (a, b, c) = np.sqrt(share @ spread2).tolist(), ((share * g) @ self.state[..., 2]).tolist()
+        left2 = left**2 * (self.covariance[..., 2, 2] + self.state[..., 2] ** 2).sum(axis=1)
+        return Moving((x, y, z), (u, v, w)), (p, q, r), (a, b, c), math.sqrt(share @ left2)
+
+
+def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
+    """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and the most that
+    will ever be missing again."""
+    late_s, rad_s, damping = _WAYS.T
+    slowing, turning = damping * rad_s, rad_s * np.sqrt(1.0 - damping**2)
+    x = np.maximum(since_s - late_s, 0.0)
+    # The place's error p: p' = u - 2 d f p, u' = -f^2 p, from p = late_s, u = 1.
+    rate = (1.0 - slowing * late_s) / turning
+    cos, sin, left = np.cos(turning * x), np.sin(turning * x), np.exp(-slowing * x)
+    place = left * (late_s * cos + rate * sin)
+    slope = left * (turning * (rate * cos - late_s * sin)) - slowing * place
+    is_late = since_s <= late_s
+    g = np.where(is_late, 1.0, slope + 2.0 * slowing * place)
+    way_s = np.where(is_late, since_s, place)
+    return np.append(g, 0.0), np.append(way_s, 0.0), np.append(left, 0.0)
+
+
+@dataclass(slots=True)
+class Reckoning:
+    """Local NED, SI, the vehicle's boot clock. Changed only by its methods."""
+
+    contact: Contact
+    hit_boot_us: int  # its first sample
+    start: Moving  # after it, as expected
+    config: EstimateConfig
+    earlier: "Reckoning | None" = None  # of a hit before, of which the estimate still lacks a part
+    motion: Moving = field(init=False)
+    is_whole: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
+    is_right: bool = False  # the estimate has been found so
+    lean_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
+    wind_m_s2: tuple[float, float] = (0.0, 0.0)  # what the lean does in vain, north and east
+    spread_m_s: Vector3 = REST  # of the motion's velocity
+    off_m_s: Vector3 = REST  # by what the vehicle's estimate is wrong about its velocity
+    _bank: Bank = field(init=False)
+    _summed_m_s: Vector3 = REST
+    _acceleration: Vector3 = REST
+    _at_boot_us: int = 0  # of the bank
+    _moved_m_s: Vector3 = REST  # the sum up to there
+    _time_boot_us: int = 0
+    _told_boot_us: int = 0
+    _pushed_boot_us: int = 0
+    _is_put_right: bool = False
+    _is_shown: bool = False
+    _clock_boot_us: int = 0  # from which on what was hidden is put right
+
+    def __post_init__(self) -> None:
+        self.motion = self.start
+        self._begin()
+
+    def _begin(self) -> None:
+        before, after = self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s
+        into_m_s = max(0.0, -split(before, self.contact.normal_ned)[0])
+        speed_m_s = math.hypot(*before)
+        flat_m_s = LEAST_SPREAD_M_S + REBOUND_SPREAD * into_m_s + FRICTION_SPREAD * speed_m_s
+        spread = (flat_m_s, flat_m_s, LEAST_SPREAD_M_S + THROWN_SHARE * speed_m_s)
+        if self.contact.normal_ned[2] != 0.0:
+            spread = (flat_m_s, flat_m_s, flat_m_s)
+        lost = plus(before, -1.0, after)
+        self.spread_m_s = REST if self.is_whole else spread
+        half = plus(REST, HIDDEN_SHARE, lost)
+        n, e, d = (abs(each) + one for each, one in zip(half, spread, strict=True))
+        self._clock_boot_us = self._at_boot_us = self.hit_boot_us
+        self._bank, self._moved_m_s = Bank(self.start, spread, half, (n, e, d)), REST
+        if self.earlier is not None:
+            self._clock_boot_us, self._at_boot_us = self.earlier._clock_boot_us, self.earlier._at_boot_us
+            self._bank = self.earlier._bank.struck(
+                plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
+            )
+        self._told_boot_us, self.is_right, self._is_put_right = 0, False, False
+
+    def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
+        """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
+        self._is_shown, self.is_whole = is_whole, is_whole and self.earlier is None
+        if pushed_boot_us != self._pushed_boot_us:
+            self._pushed_boot_us = pushed_boot_us
+            self._begin()
+
+    def imu(self, strapdown: Strapdown) -> None:
+        """Take the newest sample. More than gravity is a contact's push, of which the start says what it leaves."""
+        time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
+        first, self._time_boot_us = self._time_boot_us == 0, time_us
+        if first or not 0.0 < elapsed_s < 0.1:
+            return
+        pushed = strapdown.acceleration_ned_m_s2
+        if math.hypot(*pushed) >= GRAVITY_M_S2:
+            pushed = REST
+        was, weight = self.motion, elapsed_s / (SMOOTHED_S + elapsed_s)
+        mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
+        place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
+        self.motion = Moving(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
+        self._summed_m_s, self._acceleration = plus(self._summed_m_s, elapsed_s, pushed), pushed
+        self.lean_m_s2 = lean_ahead(strapdown)
+        if pushed is not REST:
+            (a, b), (n, e, _), share = self.wind_m_s2, self.lean_m_s2, elapsed_s / (WIND_S + elapsed_s)
+            self.wind_m_s2 = (a + share * (n - pushed[0] - a), b + share * (e - pushed[1] - b))
+
+    def hear(self, sample: LocalPosition) -> None:
+        """Take what the vehicle says of its place and velocity."""
+        since_us = sample.time_boot_us - round(1e6 * DELAY_S) - self._clock_boot_us
+        if (
+            sample.time_boot_us - round(1e6 * DELAY_S) <= self.hit_boot_us
+            or sample.time_boot_us <= self._pushed_boot_us
+        ):
+            return
+        if not self.is_right:
+            if not self.is_whole:
+                self._reckon(sample, 1e-6 * since_us)
+            self.is_right = self.is_whole or self._is_put_right or since_us >= OVER_US
+        if self.is_right:
+            self._correct(sample)
+
+    def _reckon(self, sample: LocalPosition, since_s: float) -> None:
+        config, bank, before_us = self.config, self._bank, self._told_boot_us
+        self._told_boot_us = sample.time_boot_us
+        every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
+        # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
+        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
+        at_us = self._clock_boot_us + round(1e6 * since_s)
+        behind_s = 1e-6 * (self._time_boot_us - at_us)
+        summed = plus(self._summed_m_s, -behind_s, self._acceleration)
+        bank.move(1e-6 * (at_us - self._at_boot_us), plus(summed, -1.0, self._moved_m_s))
+        self._at_boot_us, self._moved_m_s = at_us, summed
+        v, x = sample.velocity_ned_m_s, sample.position_ned_m
+        bank.hear(since_s, v, x, config.velocity_noise_m_s, config.position_noise_m, colour)
+        found, self.spread_m_s, self.off_m_s, left_m_s = bank.found(since_s)
+        velocity = plus(found.velocity_ned_m_s, behind_s, self._acceleration)
+        place = plus(found.position_ned_m, behind_s, velocity)
+        self.motion = Moving(place, velocity, self.motion.acceleration_ned_m_s2)
+        self._is_put_right = left_m_s <= RIGHT_M_S
+
+    def _correct(self, sample: LocalPosition) -> None:
+        """By an estimate that is right: at once by the first, then by so much as is not its noise."""
+        elapsed_s = 1e-6 * (sample.time_boot_us - self._told_boot_us)
+        share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
+        was, self._told_boot_us = self.motion, sample.time_boot_us
+        place = plus(was.position_ned_m, share, plus(sample.position_ned_m, -1.0, was.position_ned_m))
+        velocity = plus(was.velocity_ned_m_s, share, plus(sample.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
+        self.motion = Moving(place, velocity, was.acceleration_ned_m_s2)
+        self.off_m_s = self.spread_m_s = REST
+
+
+def lean_ahead(strapdown: Strapdown) -> Vector3:
+    """The level acceleration of a thrust that carries the vehicle, leant as once what is asked now acts."""
+    n, e, d = body_to_ned(strapdown.attitude_wxyz, (0.0, 0.0, -1.0))
+    p, q, r = body_to_ned(strapdown.attitude_wxyz, strapdown.rates_frd_rad_s)
+    n, e, d = n + LEAD_S * (q * d - r * e), e + LEAD_S * (r * n - p * d), d + LEAD_S * (p * e - q * n)
+    carrying_m_s2 = GRAVITY_M_S2 / max(-d, MOST_LEANT)
+    return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)
+
+
+def half_way(pushed_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+    """Away from an obstacle of which only a clipped push is known, each axis clipped alone; unit vectors.
+
+    Back is where the vehicle came from, and free: half way between the two, or back where they are 60 degrees apart.
+    """
+    n, e, _ = velocity_ned_m_s
+    back = away_from((-n, -e, 0.0)) if math.hypot(n, e) >= LEAST_SPREAD_M_S else REST
+    if back == REST:
+        return pushed_ned
+    together = split(pushed_ned, back)[0]
+    return back if together < 0.5 else away_from(plus(pushed_ned, 1.0, back))

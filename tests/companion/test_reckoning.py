@@ -1,0 +1,255 @@
+"""The motion after a hit that the accelerometer could not show whole: what is reckoned, when the estimate counts."""
+
+import math
+import random
+
+import pytest
+
+from companion.estimate.strapdown import Strapdown
+from companion.flight.collision import CollisionRecord
+from companion.flight.context import FlightContext, Inputs
+from companion.flight.recovering import Recover, agreed_normal
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
+from companion.messages import LocalPosition
+from companion.mission.config import EstimateConfig
+from companion.mission.model import Mission
+from companion.reflex.config import OVER_US, RIGHT_M_S
+from companion.reflex.laws import Contact
+from companion.reflex.planner import Moving
+from companion.reflex.reckoning import Reckoning, half_way, lean_ahead
+
+NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
+ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+HIT_US = 1_000_000
+AT = (3.0, 0.0, -2.0)
+# A real PX4's, and others: after how long what was hidden is put right, with which frequency and damping.
+PX4, WAYS = (0.12, 4.45, 0.59), [(0.12, 4.45, 0.59), (0.08, 7.5, 0.9), (0.22, 3.0, 0.45)]
+
+
+def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, earlier=None, hit_us=HIT_US):
+    contact = Contact(hit_us, AT, velocity, normal)
+    return Reckoning(contact, hit_us, contact.rebound(restitution), EstimateConfig(), earlier)
+
+
+def said(north_m_s, since_us=60_000, position=AT):
+    return LocalPosition(HIT_US + since_us, position, (north_m_s, 0.0, 0.0))
+
+
+def missing(since_s, late_s, rad_s, damping):
+    """Of what was hidden, what is missing in the velocity, by small steps of the estimator's own equations."""
+    velocity, place, step_s = 1.0, min(since_s, late_s), 1e-4
+    for _ in range(round(max(0.0, since_s - late_s) / step_s)):
+        velocity, place = (
+            velocity - step_s * rad_s**2 * place,
+            place + step_s * (velocity - 2 * damping * rad_s * place),
+        )
+    return velocity, place
+
+
+def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1):
+    """Since the hit, s; true velocity; reckoning: after each velocity that a vehicle tells of itself, noise included."""
+    draw = random.Random(seed)
+    after_m_s = -restitution * speed_m_s
+    hidden_m_s = hides * (speed_m_s - after_m_s)
+    found = reckoned((speed_m_s, 0.0, 0.0), restitution=0.45)
+    strapdown, noise = Strapdown(), [0.0, 0.0]
+    for tick in range(1, round(until_s / 0.004)):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            since_s = 0.004 * tick
+            noise = [0.935 * each + 0.354 * draw.gauss(0.0, 0.03) for each in noise]
+            lacks_m_s, lacks_m = missing(since_s, *way)
+            velocity = (after_m_s + hidden_m_s * lacks_m_s + noise[0], noise[1], 0.0)
+            place = (AT[0] + after_m_s * since_s + hidden_m_s * lacks_m + draw.gauss(0.0, 0.01), 0.0, AT[2])
+            found.hear(LocalPosition(strapdown.time_boot_us, place, velocity))
+            yield since_s, after_m_s, velocity[0], found
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("speed_m_s", "restitution"), [(1.0, 0.2), (2.0, 0.8), (4.0, 0.85), (3.0, 0.0)])
+def test_the_motion_is_found_long_before_the_estimate_is_right_again(way, speed_m_s, restitution):
+    # Given a hit of which the vehicle's own estimate knows nothing
+    for since_s, true_m_s, told_m_s, found in followed(way, speed_m_s, restitution):
+        off_m_s = found.motion.velocity_ned_m_s[0] - true_m_s
+        # Then it is never taken for right while it is wrong by more than a few times its noise
+        assert not found.is_right or abs(told_m_s - true_m_s) < 2.0 * RIGHT_M_S
+        # and the motion is known to half of what was hidden at any time, and to a tenth after a second
+        hidden_m_s = (1.0 + restitution) * speed_m_s
+        assert abs(off_m_s) < (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 3.0])
+def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
+    within = [
+        abs(found.motion.velocity_ned_m_s[0] - true_m_s) <= 2.0 * found.spread_m_s[0] + 0.1
+        for restitution in (0.0, 0.3, 0.6, 0.9)
+        for _, true_m_s, _, found in followed(PX4, speed_m_s, restitution)
+    ]
+    assert sum(within) >= 0.95 * len(within)
+
+
+def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into_the_wall_is_not():
+    right_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, hides=0.0) if found.is_right)
+    assert right_s < 0.5
+    lost_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, until_s=2.0) if found.is_right)
+    assert lost_s > 0.9
+
+
+def test_part_of_a_hit_that_is_missing_is_found_too():
+    # Given arms that met their stops, of which 0.7 m/s of 2.4 m/s are missing
+    *_, (_, true_m_s, _, found) = followed(PX4, 2.0, 0.2, hides=0.3, until_s=1.0)
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(true_m_s, abs=0.15)
+
+
+def test_what_the_accelerometer_has_shown_whole_the_estimate_knows_at_once():
+    whole = reckoned()
+    whole.tell(True, HIT_US)
+    whole.hear(said(-0.6, 60_000, (2.9, 0.0, -2.0)))
+    assert whole.is_right and whole.motion == Moving((2.9, 0.0, -2.0), (-0.6, 0.0, 0.0))
+    whole.hear(said(-0.5, 80_000, (2.9, 0.0, -2.0)))
+    assert -0.6 < whole.motion.velocity_ned_m_s[0] < -0.55, "noise counts little"
+
+
+def test_it_is_believed_in_the_end_whatever_it_says():
+    found = reckoned()
+    for since_us in range(20_000, OVER_US + 40_000, 20_000):
+        found.hear(said(2.0 - 9e-6 * since_us, since_us))
+    assert found.is_right
+
+
+def test_another_hit_while_the_estimate_is_put_right_leaves_it_wrong():
+    # Given a clipped hit on a wall, then a soft one on another whose force was shown whole
+    *_, (_, _, told_m_s, first) = followed(PX4, 2.0, 0.5, until_s=0.16)
+    again = reckoned((-1.0, 0.0, 0.0), NORTH, 0.0, first, HIT_US + 160_000)
+    again.tell(True, HIT_US + 160_000)
+    again.hear(said(told_m_s, 180_000))
+    assert told_m_s > 1.0 and not again.is_right
+    assert again.motion.velocity_ned_m_s[0] < 0.5 * told_m_s
+
+
+def heard(reckoning, acceleration, until_us=400_000, attitude=LEVEL):
+    strapdown = Strapdown(attitude_wxyz=attitude)
+    for since_us in range(4_000, until_us + 1, 4_000):
+        strapdown.time_boot_us = HIT_US + since_us
+        strapdown.acceleration_ned_m_s2 = acceleration(since_us)
+        reckoning.imu(strapdown)
+    return reckoning.motion
+
+
+def test_until_then_the_motion_is_the_expected_one_and_what_the_accelerometer_adds():
+    # Given a push of 15 g that is clipped, and a vehicle that then brakes with 1 m/s^2
+    motion = heard(reckoned(), lambda since_us: (-150.0 if since_us < 10_000 else 1.0, 0.0, 0.0))
+    assert motion.velocity_ned_m_s == pytest.approx((0.0, 0.0, 0.0), abs=0.02), "0.4 m/s off the wall, for 0.4 s"
+    assert motion.position_ned_m == pytest.approx((2.92, 0.0, -2.0), abs=0.01)
+    assert motion.acceleration_ned_m_s2 == pytest.approx((1.0, 0.0, 0.0), abs=0.01)
+
+
+def test_the_lean_in_vain_is_the_wind():
+    # Given a vehicle that leans south by 6 degrees and does not move
+    lean_rad = math.radians(6.0)
+    found = reckoned()
+    heard(found, lambda _: ZERO, 4_000_000, (math.cos(0.5 * lean_rad), 0.0, math.sin(0.5 * lean_rad), 0.0))
+    assert found.wind_m_s2 == pytest.approx((-9.81 * math.tan(lean_rad), 0.0), abs=0.05)
+
+
+def test_a_lean_is_known_ahead_by_the_rates():
+    level = Strapdown(rates_frd_rad_s=(0.0, -2.0, 0.0))
+    assert lean_ahead(Strapdown()) == pytest.approx(ZERO)
+    assert lean_ahead(level)[0] == pytest.approx(9.81 * 0.15 * 2.0, abs=0.05), "nose down leans north"
+
+
+def test_the_way_out_lies_between_a_clipped_push_and_the_way_back():
+    turned = (-math.cos(0.5), -math.sin(0.5), 0.0)
+    n, e, d = half_way(turned, (1.5, 0.0, 0.2))
+    assert (n, e, d) == pytest.approx((-math.cos(0.25), -math.sin(0.25), 0.0))
+    assert half_way((-0.17, 0.985, 0.0), NORTH) == SOUTH, "80 degrees off: the push is wrong"
+    assert half_way(turned, ZERO) == turned, "a vehicle that hovered has no way back"
+
+
+@pytest.mark.parametrize(
+    ("pushed", "after", "normal"),
+    [
+        ((-0.94, 0.34, 0.0), (-0.5, 0.0, 0.0), (-0.94, 0.34, 0.0)),  # 20 degrees beside the change: may be friction
+        ((0.0, 1.0, 0.0), (-0.5, 0.0, 0.0), (-1.0, 0.0, 0.0)),  # a sample gone wrong
+        ((0.0, 1.0, 0.0), (1.9, 0.3, 0.0), (0.0, 1.0, 0.0)),  # a graze: the change says little
+        ((0.0, 1.0, 0.0), (-0.5, 0.0, 3.5), (-1.0, 0.0, 0.0)),  # a fall since makes no ceiling of a wall
+    ],
+)
+def test_the_normal_is_the_pushs_unless_the_velocity_says_otherwise(pushed, after, normal):
+    assert agreed_normal(pushed, (2.0, 0.0, 0.0), after) == pytest.approx(normal)
+
+
+def recovering(**hit):
+    mission = Mission.model_validate({"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
+    flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
+    flight.origin_ned_m = ZERO
+    reckoning = reckoned(**hit)
+    record = CollisionRecord(0, HIT_US, "fused", reckoning.contact, (2.6, 0.0, -2.0), SOUTH, 20.0, HIT_US, reckoning)
+    flight.collisions.append(record)
+    return flight, record, Recover(flight, 0)
+
+
+def test_the_plan_begins_anew_when_a_slow_contact_is_over():
+    # Given arms that push for 0.15 s, while which the vehicle still flies in
+    flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
+    record.reckoning.tell(True, HIT_US)
+
+    def hears(at_us, north_m, north_m_s):
+        sample = LocalPosition(HIT_US + at_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
+        recover.step(flight, Inputs(positions=[sample]), at_us)
+        return recover.target(at_us)
+
+    record.contact_ended_boot_us = HIT_US + 80_000
+    first = hears(80_000, 3.05, 0.2)
+    assert first.velocity_ned_m_s[0] == 0.0, "towards the wall is never asked for"
+    assert first.acceleration_ned_m_s2[0] < 0.0
+    # When nothing pushes any more, and the vehicle leaves
+    record.contact_ended_boot_us = HIT_US + 150_000
+    hears(160_000, 3.02, -0.3)
+    anew = hears(300_000, 2.99, -0.5)
+    # Then the plan goes on from there
+    assert anew.position_ned_m[0] == pytest.approx(2.99, abs=0.02)
+    assert anew.velocity_ned_m_s[0] == pytest.approx(-0.35, abs=0.15)
+    assert record.setpoint_ned_m[0] < 2.7
+
+
+def test_what_pushes_a_vehicle_along_takes_its_surface_and_its_goal_with_it():
+    # Given a screen that carries a vehicle south with 0.8 m/s
+    flight, record, recover = recovering(velocity=ZERO)
+    record.reckoning.tell(True, HIT_US)
+    goals = []
+    for at_us in range(100_000, 1_500_000, 20_000):
+        record.contact_ended_boot_us = HIT_US + at_us
+        sample = LocalPosition(HIT_US + at_us, (3.0 - 0.8e-6 * at_us, 0.0, -2.0), (-0.8, 0.0, 0.0))
+        recover.step(flight, Inputs(positions=[sample]), at_us)
+        asked = recover.target(at_us)
+        goals.append(record.setpoint_ned_m[0])
+        assert asked.acceleration_ned_m_s2[0] < 2.8, "it brakes no harder than it can take back"
+    # Then the goal is ahead of it all the time
+    assert goals[0] - goals[-1] > 1.0
+    assert goals[-1] < 3.0 - 0.8 * 1.48 - 0.34
+
+
+def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
+    # Given a clipped hit square into a wall, whose estimate is believed only when it must be
+    flight, record, recover = recovering()
+    # When the vehicle has by then fallen 1.5 m
+    late = LocalPosition(HIT_US + OVER_US + 20_000, (2.8, 0.0, -0.5), (-0.4, 0.0, 3.5))
+    recover.step(flight, Inputs(positions=[late]), OVER_US + 20_000)
+    # Then the way out is still away from the wall, and back up to where it was
+    assert record.reckoning.is_right
+    n, e, d = record.setpoint_ned_m
+    assert n < 2.7 and abs(e) < 0.1 and d == pytest.approx(-2.0)
+    # And of the speed off the wall nothing is said: no velocity of that time was believed
+    assert record.report().rebound_speed_m_s is None
+
+
+def test_in_doubt_accelerations_alone_are_asked_for():
+    flight, record, recover = recovering()
+    recover.step(flight, Inputs(positions=[said(2.0, 100_000, (3.1, 0.0, -2.0))]), 100_000)
+    asked = recover.target(100_000)
+    assert asked.leans_only and asked.is_height_free
+    assert asked.acceleration_ned_m_s2[0] < 0.5, "0.4 m/s off the wall: braked gently, never towards it harder"
+    assert asked.expected == Moving(record.reckoning.motion.position_ned_m, record.reckoning.motion.velocity_ned_m_s)
