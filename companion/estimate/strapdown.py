@@ -83,6 +83,11 @@ class Strapdown:
         self.time_boot_us = time_us
         return whole
 
+    @property
+    def right_wxyz(self) -> Quaternion:
+        """The attitude by which the sum goes on."""
+        return self.by_rates_wxyz or self.attitude_wxyz
+
     def sum_at(self, time_us: int) -> Vector3 | None:
         """The sum at a time near the newest sample; None where it is not near."""
         ahead_us = time_us - self.time_boot_us

@@ -16,15 +16,16 @@ from companion.flight.context import Target
 from companion.memory.patch import Patch
 from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
-from companion.reflex.config import BEHIND_M, CLIMB_GAIN_PER_S, HEIGHT_PER_S
+from companion.reflex import config
+from companion.reflex.config import BEHIND_M
 from companion.reflex.halfspace import Surface, plus
 from companion.reflex.planner import Moving
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
 # PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
 HELD_S = 1.0
-PLACE_PER_S = (0.95, 0.95, HEIGHT_PER_S)
-VELOCITY_PER_S = (1.8, 1.8, CLIMB_GAIN_PER_S)
+PLACE_PER_S = (config.PLACE_PER_S, config.PLACE_PER_S, config.HEIGHT_PER_S)
+VELOCITY_PER_S = (config.VELOCITY_PER_S, config.VELOCITY_PER_S, config.CLIMB_GAIN_PER_S)
 # PX4 notices the silence late: with 1 s set, a real one went into hold after 1.04 to 1.13 s (docs/px4.md).
 NOTICED_S = 0.13
 # PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.

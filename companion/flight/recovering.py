@@ -32,7 +32,7 @@ from companion.reflex.config import (
 )
 from companion.reflex.halfspace import Envelope, Room, Surface, away_from, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
-from companion.reflex.planner import REST, Limits, Moving, Plan, height_held, kept_off, plan
+from companion.reflex.planner import REST, Limits, Moving, Plan, height_held, kept_off, plan, safe_to_hold
 from companion.reflex.reckoning import Reckoning, half_way
 
 
@@ -51,7 +51,7 @@ class Recover:
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         self._spin_rad_s = 0.0
         self._is_known = not self._law.follows  # the motion after the hit
-        self._has_left, self._may_fall = False, False
+        self._has_left, self._may_fall, self._comes_m_s = False, False, 0.0
         self._agreed: Vector3 | None = None  # the normal by the velocities before and after
         self._planned_for: object = None  # what was known of the contact
         self._plan: Plan | None = None  # while the vehicle follows one; else it is asked for accelerations alone
@@ -74,9 +74,13 @@ class Recover:
             if is_level:
                 d, w, c = goal[2], 0.0, climb_m_s2
             return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
-        limits = self._limits.spinning(self._spin_rad_s)
-        a, b, c = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
+        if self._plan is not None and not self._presses():
+            a, b, c = self._plan.led_back(1e-6 * (now_us - self._plan_began_us), state)
+        else:
+            limits = self._limits.spinning(self._spin_rad_s)
+            a, b, c = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
         north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
+        a, b, c = safe_to_hold((a, b, c), self._leant.velocity_ned_m_s)
         asked = self._kept_off((a + north, b + east, climb_m_s2 if is_level else c))
         expected = Moving(state.position_ned_m, state.velocity_ned_m_s, record.level_leans_m_s2)
         if is_level and self._may_fall and self._presses(HANGS_M_S2):
@@ -92,7 +96,8 @@ class Recover:
 
     def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
         spread = self._record.reckoning.spread_m_s
-        return kept_off(acceleration_ned_m_s2, self._leant, spread, self._surfaces, self._limits)
+        surfaces = [replace(self._surfaces[0], comes_m_s=self._comes_m_s), *self._surfaces[1:]]
+        return kept_off(acceleration_ned_m_s2, self._leant, spread, surfaces, self._limits)
 
     @property
     def _leant(self) -> Moving:
@@ -100,14 +105,14 @@ class Recover:
         return replace(self._record.reckoning.motion, acceleration_ned_m_s2=self._record.reckoning.lean_m_s2)
 
     def _presses(self, least_m_s2: float = LEANS_M_S2) -> bool:
-        """Whether the vehicle leans into the surface that it touches.
+        """Whether the vehicle leans into a surface that it touches.
 
         What PX4's loops add to that against a wind, or have added up against the surface itself, is not to be had.
         """
         return any(
             surface.off_m(self._leant.position_ned_m) < TOUCHES_M
             and split(self._leant.acceleration_ned_m_s2, surface.normal_ned)[0] < -least_m_s2
-            for surface in self._surfaces[:1]
+            for surface in self._surfaces
         )
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
@@ -184,24 +189,29 @@ class Recover:
             return
         self._touch(sample)
         state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
-        known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left)
-        if known != self._planned_for or not self._is_known:
-            self._planned_for, self._plan = known, None
-            self._aim(flight, state, now_us)
-        if self._is_spinning or not law.plans or not self._is_known:
+        known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
+        if self._is_spinning or not law.plans:
             self._plan = None
-        elif self._plan is None or not self._plan.holds(elapsed_s, state):
+        elif self._plan is not None and self._plan.holds(elapsed_s, state) and known == self._planned_for:
+            return
+        if self._plan is not None or known != self._planned_for:
+            self._planned_for = known
+            self._aim(flight, state, now_us)
+        if law.plans and not self._is_spinning:
             self._plan, self._plan_began_us = plan(state, record.setpoint_ned_m, self._surfaces, self._limits), now_us
 
     def _touch(self, sample: LocalPosition) -> None:
         """The surface as it is known by now: what still pushes is where the vehicle is, and moves along with it."""
         record, contact = self._record, self._contact
+        motion = record.reckoning.motion
         pushes = sample.time_boot_us - record.contact_ended_boot_us < LEFT_US
-        off_m_s = split(sample.velocity_ned_m_s, contact.normal_ned)[0]
+        pushes |= self._is_known and split(record.reckoning.push_m_s2, contact.normal_ned)[0] > LEANS_M_S2
+        off_m_s = split(motion.velocity_ned_m_s, contact.normal_ned)[0]
+        self._comes_m_s = max(0.0, off_m_s) if pushes else 0.0
         self._has_left = not pushes and (self._has_left or off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S)
         place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
-        if pushes and Surface(place, normal, 0.0).off_m(sample.position_ned_m) > 0.0:
-            place = sample.position_ned_m
+        if pushes and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
+            place = motion.position_ned_m
         self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
 
     def _aim(self, flight: FlightContext, state: Moving, now_us: int) -> None:

@@ -29,8 +29,8 @@ STEP = 1.05
 DAMPED = 1.1
 # PX4's MPC_Z_VEL_P_ACC: what its own loop does against a climb, 1/s. As much again is asked for beside it.
 CLIMB_GAIN_PER_S = 4.0
-# PX4's MPC_Z_P, 1/s.
-HEIGHT_PER_S = 1.0
+# PX4's MPC_Z_P, and level MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
+HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
 # What PX4's loops leave between a plan and the vehicle that follows it: LEAD_S behind 3 m/s^2, and its integral.
 OFF_PLAN_M_S = 0.45
 OFF_PLAN_M = 0.3
@@ -45,6 +45,11 @@ FALLS_M_S2 = 4.9
 STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 # rad/s. From here on a lean that lags by LEAD_S points half a right angle and more beside what PX4's own loops ask for.
 SPINNING_RAD_S = 6.0
+
+# A setpoint that is the last is held for COM_OF_LOSS_T, 1 s by default, and what PX4 takes to notice (docs/px4.md).
+HELD_S = 1.13
+# A vehicle that does 1 m/s by then is at rest within 0.2 m with MPC_ACC_HOR.
+HELD_TO_M_S = 1.0
 
 # --- half-spaces
 # Sine of 10 degrees: as well as a normal is known after most hits (docs/detection.md).
@@ -70,6 +75,8 @@ CORRECTED_S = 0.1
 MOST_LEANT = 0.5
 # Wind and drag: slower than the steering, faster than the drift they cause.
 WIND_S = 1.0
+# What pushes on: slower than a lean follows, faster than it tips the vehicle.
+PUSHES_S = 0.2
 # A contact pushes still, or what it did is not yet in the estimate, for so long after its last push.
 LEFT_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.

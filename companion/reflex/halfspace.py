@@ -37,11 +37,13 @@ def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Where the vehicle's centre was when it touched, the unit normal out of the surface, and how far off to stay."""
+    """Where the vehicle's centre was when it touched, the unit normal out of the surface, how far off to stay, and how
+    fast the surface itself comes."""
 
     point_ned_m: Vector3
     normal_ned: Vector3
     distance_m: float
+    comes_m_s: float = 0.0
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """How far a place is from touching."""

@@ -19,12 +19,16 @@ from companion.reflex.config import (
     HARDER,
     HARDEST_S,
     HEIGHT_PER_S,
+    HELD_S,
+    HELD_TO_M_S,
     LEAD_S,
     OFF_PLAN_M,
     OFF_PLAN_M_S,
+    PLACE_PER_S,
     SHORTEST_S,
     STEP,
     TOUCHES_M,
+    VELOCITY_PER_S,
 )
 from companion.reflex.halfspace import Surface, plus, split
 
@@ -87,6 +91,13 @@ class Plan:
             return False
         return any(surface.off_m(self.at(s * self.duration_s).position_ned_m) < -TOUCHES_M for s in _LOOKED_AT)
 
+    def led_back(self, elapsed_s: float, motion: Moving) -> Vector3:
+        """The plan's acceleration, and what PX4's loops would add for a vehicle that is beside it."""
+        planned = self.at(elapsed_s)
+        slower = plus(planned.velocity_ned_m_s, -1.0, motion.velocity_ned_m_s)
+        short = plus(planned.position_ned_m, -1.0, motion.position_ned_m)
+        return plus(planned.acceleration_ned_m_s2, VELOCITY_PER_S, plus(slower, PLACE_PER_S, short))
+
     def holds(self, elapsed_s: float, motion: Moving) -> bool:
         """Whether the vehicle is where it is to be by now, as far as PX4's loops bring it there."""
         planned = self.at(elapsed_s)
@@ -146,6 +157,7 @@ def kept_off(
             continue
         normal, most_m_s2 = surface.normal_ned, HARDER * limits.acceleration_m_s2
         leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * LEAD_S, state.acceleration_ned_m_s2), normal)[0]
+        leaving_m_s -= surface.comes_m_s
         least_m_s2 = min(-leaving_m_s / LEAD_S, most_m_s2)
         if leaving_m_s < math.hypot(*(s * n for s, n in zip(spread_m_s, normal, strict=True))):
             least_m_s2 = max(least_m_s2, 0.0)
@@ -153,6 +165,17 @@ def kept_off(
         if short_m_s2 > 0.0:
             acceleration_ned_m_s2 = plus(acceleration_ned_m_s2, short_m_s2, normal)
     return acceleration_ned_m_s2
+
+
+def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+    """So much of a level acceleration as, asked for last and held until PX4 notices, makes no slow vehicle fast."""
+    (a, b, c), (u, v, _) = acceleration_ned_m_s2, velocity_ned_m_s
+    most_m_s, asked2 = max(math.hypot(u, v), HELD_TO_M_S), a * a + b * b
+    # |v + share a t| = most, of which the larger root.
+    along = (a * u + b * v) / max(asked2, 1e-9)
+    most_s = math.sqrt(max(0.0, along * along + (most_m_s**2 - u * u - v * v) / max(asked2, 1e-9))) - along
+    share = min(1.0, max(0.0, most_s) / HELD_S)
+    return (share * a, share * b, c)
 
 
 def height_held(state: Moving, down_m: float, loops: float, most_m_s2: float) -> float:

@@ -35,6 +35,7 @@ from companion.reflex.config import (
     MOST_LEANT,
     OVER_US,
     PLACE_SPREAD_M,
+    PUSHES_S,
     PUT_RIGHT_AFTER_S,
     PUT_RIGHT_DAMPING,
     PUT_RIGHT_RAD_S,
@@ -162,6 +163,7 @@ class Reckoning:
     is_right: bool = False  # the estimate has been found so
     lean_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # what the lean does in vain, north and east
+    push_m_s2: Vector3 = REST  # what moves the vehicle besides its lean, level: wind, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
     off_m_s: Vector3 = REST  # by what the vehicle's estimate is wrong about its velocity
     _bank: Bank = field(init=False)
@@ -222,8 +224,12 @@ class Reckoning:
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = Moving(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s, self._acceleration = plus(self._summed_m_s, elapsed_s, pushed), pushed
-        self.lean_m_s2 = lean_ahead(strapdown)
+        self.lean_m_s2 = lean_ahead(strapdown, LEAD_S)
         if pushed is not REST:
+            a, b, _ = plus(pushed, -1.0, lean_ahead(strapdown, 0.0))
+            self.push_m_s2 = plus(
+                self.push_m_s2, elapsed_s / (PUSHES_S + elapsed_s), plus((a, b, 0.0), -1.0, self.push_m_s2)
+            )
             (a, b), (n, e, _), share = self.wind_m_s2, self.lean_m_s2, elapsed_s / (WIND_S + elapsed_s)
             self.wind_m_s2 = (a + share * (n - pushed[0] - a), b + share * (e - pushed[1] - b))
 
@@ -272,11 +278,11 @@ class Reckoning:
         self.off_m_s = self.spread_m_s = REST
 
 
-def lean_ahead(strapdown: Strapdown) -> Vector3:
-    """The level acceleration of a thrust that carries the vehicle, leant as once what is asked now acts."""
-    n, e, d = body_to_ned(strapdown.attitude_wxyz, (0.0, 0.0, -1.0))
-    p, q, r = body_to_ned(strapdown.attitude_wxyz, strapdown.rates_frd_rad_s)
-    n, e, d = n + LEAD_S * (q * d - r * e), e + LEAD_S * (r * n - p * d), d + LEAD_S * (p * e - q * n)
+def lean_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
+    """The level acceleration of a thrust that carries the vehicle, leant as after so long."""
+    n, e, d = body_to_ned(strapdown.right_wxyz, (0.0, 0.0, -1.0))
+    p, q, r = body_to_ned(strapdown.right_wxyz, strapdown.rates_frd_rad_s)
+    n, e, d = n + lead_s * (q * d - r * e), e + lead_s * (r * n - p * d), d + lead_s * (p * e - q * n)
     carrying_m_s2 = GRAVITY_M_S2 / max(-d, MOST_LEANT)
     return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)
 

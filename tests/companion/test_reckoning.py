@@ -156,8 +156,8 @@ def test_the_lean_in_vain_is_the_wind():
 
 def test_a_lean_is_known_ahead_by_the_rates():
     level = Strapdown(rates_frd_rad_s=(0.0, -2.0, 0.0))
-    assert lean_ahead(Strapdown()) == pytest.approx(ZERO)
-    assert lean_ahead(level)[0] == pytest.approx(9.81 * 0.15 * 2.0, abs=0.05), "nose down leans north"
+    assert lean_ahead(Strapdown(), 0.15) == pytest.approx(ZERO)
+    assert lean_ahead(level, 0.15)[0] == pytest.approx(9.81 * 0.15 * 2.0, abs=0.05), "nose down leans north"
 
 
 def test_the_way_out_lies_between_a_clipped_push_and_the_way_back():
