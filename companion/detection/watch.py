@@ -61,7 +61,7 @@ class Watch:
     def estimate_trusted(self) -> bool:
         """False while the vehicle's velocity and position cannot be believed: part of a hit was not measured.
 
-        For the detector and the timeline; by what a recovery flies is decided in `flight.doubt`, which says why.
+        For the detector and the timeline; a recovery flies by `reflex.reckoning`.
         """
         return self.estimator.trust.is_trusted
 

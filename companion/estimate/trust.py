@@ -5,7 +5,7 @@ looks like another hit (measured on a real PX4: off by up to 3.6 m/s, unchanged 
 far on the other side after 0.9 s). While velocity and accelerometer contradict each other it is correcting itself.
 
 This judges for the detector, which must not take that swing for a second hit and loses little by waiting. A recovery
-has its own judge, `flight.doubt`: it needs a velocity sooner, and knows the normal and the rebound to expect.
+has its own estimate, `reflex.reckoning`: it needs a velocity sooner, and knows the normal and the rebound to expect.
 """
 
 from collections import deque

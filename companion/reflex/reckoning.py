@@ -133,8 +133,8 @@ class Bank:
 
 
 def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
-    """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and the most that
-    will ever be missing again."""
+    """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and the most
+    that will ever be missing again."""
     late_s, rad_s, damping = _WAYS.T
     slowing, turning = damping * rad_s, rad_s * np.sqrt(1.0 - damping**2)
     x = np.maximum(since_s - late_s, 0.0)

@@ -48,7 +48,7 @@ def missing(since_s, late_s, rad_s, damping):
 
 
 def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1):
-    """Since the hit, s; true velocity; reckoning: after each velocity that a vehicle tells of itself, noise included."""
+    """Since the hit, s; true velocity; told velocity; reckoning: after each that a vehicle tells, noise included."""
     draw = random.Random(seed)
     after_m_s = -restitution * speed_m_s
     hidden_m_s = hides * (speed_m_s - after_m_s)
