@@ -26,7 +26,7 @@ from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, FlightF
 from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
-from rebound_cli.status.server import StatusServer, served
+from rebound_cli.status import StatusServer, served
 from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth

@@ -8,24 +8,12 @@ import warnings
 from collections.abc import Sequence
 
 from companion.errors import ConfigurationError, ReboundError
-from rebound_cli import __version__, exit_codes
-from rebound_cli.airframe_arguments import add_airframe
-from rebound_cli.arguments import SIMULATED_AUTOPILOTS
+from rebound_cli import __version__, arguments, exit_codes
 from rebound_cli.check.arguments import add_check
-from rebound_cli.completion_arguments import add_completion
 from rebound_cli.extras import needed_text
-from rebound_cli.flights.arguments import add_doctor, add_logs
-from rebound_cli.fly_arguments import add_fly
-from rebound_cli.guard.arguments import add_guard
 from rebound_cli.identification.arguments import add_identify
-from rebound_cli.init_arguments import add_init
-from rebound_cli.key_arguments import add_key
 from rebound_cli.plan.arguments import add_plan
-from rebound_cli.preflight.arguments import add_preflight
 from rebound_cli.replay.arguments import add_replay
-from rebound_cli.service.arguments import add_service
-from rebound_cli.sim_arguments import add_sim
-from rebound_cli.status.arguments import add_status
 from rebound_cli.tune.arguments import add_tune
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
@@ -43,9 +31,9 @@ MOVED = {
 }
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    words = _with_plain_sim(sys.argv[1:] if arguments is None else arguments)
+    words = _with_plain_sim(sys.argv[1:] if words is None else words)
     if words and words[0] in MOVED:
         text = f"'rebound {words[0]}' is now 'python -m bench {MOVED[words[0]]}', run in a checkout of Rebound"
         print(f"rebound: {text}.", file=sys.stderr)
@@ -87,35 +75,23 @@ def run(options: argparse.Namespace, program: str) -> int:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="rebound",
-        description="Detects a collision of a PX4 multicopter in one IMU sample and recovers from it.",
-    )
+    text = "Detects a collision of a PX4 multicopter in one IMU sample and recovers from it."
+    parser = argparse.ArgumentParser(prog="rebound", description=text)
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    add_fly(commands)
-    add_guard(commands)
-    add_init(commands)
-    add_check(commands)
-    add_plan(commands)
-    add_sim(commands)
-    add_preflight(commands)
-    add_status(commands)
-    add_logs(commands)
-    add_doctor(commands)
-    add_replay(commands)
-    add_tune(commands)
-    add_airframe(commands)
-    add_identify(commands)
-    add_key(commands)
-    add_completion(commands)
-    add_service(commands)
+    for add in (
+        *(arguments.add_fly, arguments.add_guard, arguments.add_init, add_check, add_plan, arguments.add_sim),
+        *(arguments.add_preflight, arguments.add_status, arguments.add_logs, arguments.add_doctor),
+        *(add_replay, add_tune, arguments.add_airframe, add_identify),
+        *(arguments.add_key, arguments.add_completion, arguments.add_service),
+    ):
+        add(commands)
     return parser
 
 
-def _with_plain_sim(arguments: Sequence[str]) -> list[str]:
+def _with_plain_sim(words: Sequence[str]) -> list[str]:
     """`--sim` stands alone before a mission's name too, which argparse would take for its value."""
     return [
-        "--sim=builtin" if word == "--sim" and after not in SIMULATED_AUTOPILOTS else word
-        for word, after in itertools.zip_longest(arguments, arguments[1:])
+        "--sim=builtin" if word == "--sim" and after not in arguments.SIMULATED_AUTOPILOTS else word
+        for word, after in itertools.zip_longest(words, words[1:])
     ]

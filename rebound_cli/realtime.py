@@ -20,7 +20,7 @@ from rebound_cli.computer import Computer
 from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.status.server import StatusServer
+from rebound_cli.status import StatusServer
 from rebound_cli.timing import Heard, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.

@@ -13,7 +13,7 @@ from rebound_cli.flights.archive import Archive, add_flight
 from rebound_cli.flights.kept import kept_flights, runs_folder
 from rebound_cli.run_folder import read_text, versions
 from rebound_cli.service.settings import FOLDER
-from rebound_cli.status.asking import StatusError, ask
+from rebound_cli.status import StatusError, ask
 
 SETTINGS = Path("/", FOLDER)
 # What a service's unit and the rule of its device are called.

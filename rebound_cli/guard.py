@@ -18,7 +18,7 @@ from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
-from rebound_cli.status.server import served
+from rebound_cli.status import served
 
 
 def run_guard(options: Namespace) -> int:
