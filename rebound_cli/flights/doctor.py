@@ -12,7 +12,7 @@ from companion.errors import ConfigurationError
 from rebound_cli.flights.archive import Archive, add_flight
 from rebound_cli.flights.kept import kept_flights, runs_folder
 from rebound_cli.run_folder import read_text, versions
-from rebound_cli.service.settings import FOLDER
+from rebound_cli.service.files import FOLDER
 from rebound_cli.status import StatusError, ask
 
 SETTINGS = Path("/", FOLDER)
