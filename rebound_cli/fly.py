@@ -22,7 +22,7 @@ from rebound_cli.ending import ending_text
 from rebound_cli.flights.ring import room_for
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, FlightFaultError, fly_realtime
+from rebound_cli.realtime import AskPerson, ConfirmAtOnce, FlightFaultError, fly_realtime
 from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
@@ -30,7 +30,7 @@ from rebound_cli.status import StatusServer, served
 from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth
-from rebound_cli.vehicle_process import VehicleProcess
+from rebound_cli.vehicle_process import READY_WORDS, VehicleProcess
 
 # Where PX4's SITL sends its onboard streams unasked, plus its instance.
 PX4_COMPANION_PORT = 14540
@@ -93,10 +93,9 @@ def run_fly(options: Namespace) -> int:
 def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
     if options.lockstep:
         return _fly_lockstep(flight)
-    if connection is None:
-        return _fly_beside_vehicle(flight)
     if options.connect is None:
-        return _fly_beside_px4(flight, connection, options.instance)
+        return _fly_beside_vehicle(flight, connection, options.instance)
+    assert connection is not None, "--connect has one"
     confirmation = ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
     operator = flight.mission.companion.operator
     with (
@@ -125,7 +124,7 @@ def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: Sim
 def _fly_connected(
     flight: Flight,
     connection: Connection,
-    confirmation: Confirmation,
+    confirmation: ConfirmAtOnce | AskPerson,
     server: StatusServer | None = None,
     computer: Computer | None = None,
 ) -> Flown:
@@ -145,40 +144,31 @@ def _fly_connected(
     return Flown(companion.report(), duration_s, None, timing, refused, connection.counts, fault)
 
 
-def _fly_beside_vehicle(flight: Flight) -> Flown:
-    connection = udp_in("127.0.0.1", 0)
-    # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
-    options = ["--port", "0", "--remote", f"127.0.0.1:{connection.local_port}", "--speed", "1"]
-    with VehicleProcess(flight.folder, options) as vehicle:
-        vehicle.wait_until_ready(flight.interrupts, flight.console)
-        flown = _fly_connected(flight, connection, ConfirmAtOnce())
-        vehicle.check_running()
-    return _with_truth(flight, flown)
-
-
-def _fly_beside_px4(flight: Flight, connection: Connection, instance: int) -> Flown:
-    """The body of the simulated vehicle for a PX4 that the person starts."""
-    from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS
-    from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
-
-    port = PX4_SIMULATOR_PORT + instance
-    with VehicleProcess(flight.folder, ["--autopilot", "px4", "--port", str(port)], FIRST_ANSWER_WORDS) as vehicle:
-        flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
-        vehicle.wait_until_ready(flight.interrupts, flight.console)
-        # What PX4 said while it booted is old.
-        while connection.receive(0):
-            pass
-        flown = _fly_connected(flight, connection, ConfirmAtOnce())
-        vehicle.check_running()
-    return _with_truth(flight, flown)
-
-
-def _with_truth(flight: Flight, flown: Flown) -> Flown:
-    """The flight beside what the simulated vehicle's process wrote; without it if PX4 never flew."""
+def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -> Flown:
+    """A simulated vehicle of our own; or its body, for the PX4 that the person starts, at the connection `px4`."""
     from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
 
+    if px4 is None:
+        own, words = udp_in("127.0.0.1", 0), READY_WORDS
+        # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
+        options = ["--port", "0", "--remote", f"127.0.0.1:{own.local_port}", "--speed", "1"]
+    else:
+        from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS as words  # noqa: N811
+        from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
+
+        port = PX4_SIMULATOR_PORT + instance
+        options = ["--autopilot", "px4", "--port", str(port)]
+        flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
+    with VehicleProcess(flight.folder, options, words) as vehicle:
+        vehicle.wait_until_ready(flight.interrupts, flight.console)
+        # What PX4 said while it booted is old.
+        while px4 is not None and px4.receive(0):
+            pass
+        flown = _fly_connected(flight, px4 or own, ConfirmAtOnce())
+        vehicle.check_running()
     path = flight.folder / run_folder.TRUTH_NAME
     if not path.exists():
+        # PX4 never flew.
         return flown
     return replace(flown, truth=FlightTruth(*load_truth(path), load_faults(path), load_stalls(path)))
 

@@ -8,7 +8,6 @@ from argparse import Namespace
 from importlib.resources.abc import Traversable
 
 from companion.errors import ConfigurationError
-from rebound_cli.run_folder import make_place
 
 
 def run_init(options: Namespace) -> int:
@@ -25,7 +24,7 @@ def run_init(options: Namespace) -> int:
     text = re.sub(r"^# yaml-language-server:.*\n", "", text)
     name = json.dumps(re.sub("[^A-Za-z0-9._-]+", "-", options.file.stem))
     text = re.sub(rf"^name: {options.model}$", f"name: {name}", text, flags=re.MULTILINE)
-    make_place(options.file)
+    options.file.parent.mkdir(parents=True, exist_ok=True)
     options.file.write_text(text, encoding="utf-8")
     print(f"{options.file} is a copy of the mission '{options.model}'. Change it, then:")
     file = shlex.quote(str(options.file))

@@ -5,14 +5,12 @@ import os
 import select
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
-from companion.messages import ComputerStatus
-from companion.report import Status
 from companion.shell.clock import Clock
 from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
@@ -23,6 +21,9 @@ from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.status import StatusServer
 from rebound_cli.timing import Heard, Timing, undisturbed
 
+if TYPE_CHECKING:
+    from companion.guard.guard import Guard
+
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
 # Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
@@ -31,12 +32,6 @@ HANDING_OVER_US = 10_000_000
 
 class FlightFaultError(ReboundError):
     """Something around the flight failed; the vehicle has been handed over, as far as it could be reached."""
-
-
-class Confirmation(Protocol):
-    """Decides when the plan that the companion has ready may be flown."""
-
-    def poll(self, companion: Companion) -> None: ...
 
 
 class ConfirmAtOnce:
@@ -94,36 +89,11 @@ class AskPerson:
         return self._typed.split(b"\n")[0].decode(errors="replace").strip().lower()
 
 
-class Stepped(Protocol):
-    """The companion or the guard: bytes and time in, frames and events out."""
-
-    @property
-    def armed(self) -> bool | None: ...
-
-    @property
-    def finished(self) -> bool: ...
-
-    def next_deadline_us(self) -> int: ...
-
-    def step(self, received: bytes, now_us: int) -> StepResult: ...
-
-    def stop(self, reason: str) -> None: ...
-
-    def note(self, kind: str, text: str) -> None: ...
-
-    def status(self) -> Status: ...
-
-    def tell_computer(self, computer: ComputerStatus) -> None: ...
-
-
 def waiting(connection: Connection, timeout_s: float) -> bytes:
     """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
-    received = connection.receive(timeout_s)
-    if not received:
-        return received
-    pieces = [received]
-    while len(pieces) < MOST_DATAGRAMS and (received := connection.receive(0.0)):
-        pieces.append(received)
+    pieces = [connection.receive(timeout_s)]
+    while pieces[-1] and len(pieces) < MOST_DATAGRAMS:
+        pieces.append(connection.receive(0.0))
     return b"".join(pieces)
 
 
@@ -131,14 +101,14 @@ def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -
     """For a mission that waits for a file."""
     if companion.file_awaited is not None and Path(companion.file_awaited).exists():
         companion.file_is_there()
-        recorder.record_file(now_us)
+        recorder.record_input(now_us, "file")
 
 
 @dataclass(slots=True)
 class Loop:
     """Exchanges with a vehicle until what is stepped has finished."""
 
-    stepped: Stepped
+    stepped: "Companion | Guard"  # bytes and time in, frames and events out
     connection: Connection
     clock: Clock
     recorder: FlightRecorder
@@ -171,8 +141,7 @@ class Loop:
                 place = traceback.extract_tb(error.__traceback__)[-1]
                 reason = f"fault around the flight, please report it: {type(error).__name__} in {place.name}: {error}"
                 self._hand_over(reason)
-                text = f"{reason[:1].upper()}{reason[1:]}; the vehicle was handed over, as far as it answered."
-                raise FlightFaultError(text) from error
+                raise FlightFaultError(f"F{reason[1:]}; the vehicle was handed over, as far as it answered.") from error
 
     def exchange(self) -> tuple[int, StepResult]:
         """Wait for bytes or the next deadline, take one step, send and record; when it was and what came of it."""
@@ -223,7 +192,7 @@ class Loop:
         computer = None if self.computer is None else self.computer.status(now_us)
         if computer is not None:
             self.stepped.tell_computer(computer)
-            self.recorder.record_computer(now_us, computer)
+            self.recorder.record_input(now_us, "computer", status=asdict(computer))
         for writer in (self.recorder.writer, self.console.writer, self.manager):
             loss = None if writer is None else writer.news()
             if loss is not None:
@@ -231,7 +200,7 @@ class Loop:
 
     def _note(self, kind: str, text: str, now_us: int) -> None:
         self.stepped.note(kind, text)
-        self.recorder.record_note(now_us, kind, text)
+        self.recorder.record_input(now_us, "note", event=kind, text=text)
 
     def _stop(self, reason: str) -> None:
         self.stepped.stop(reason)
@@ -261,7 +230,7 @@ def fly_realtime(
     clock: Clock,
     recorder: FlightRecorder,
     console: Console,
-    confirmation: Confirmation,
+    confirmation: ConfirmAtOnce | AskPerson,
     interrupts: Interrupts,
     server: StatusServer | None = None,
     computer: Computer | None = None,

@@ -6,7 +6,6 @@ import re
 import tarfile
 import time
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import yaml
@@ -70,9 +69,7 @@ class Archive:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._tar.close()
         if kind is None:
             self._unfinished.replace(self._path)
