@@ -274,7 +274,7 @@ def add_key(commands: Commands) -> None:
 
 def add_completion(commands: Commands) -> None:
     text = 'Prints a script for a shell to read: eval "$(rebound completion bash)" completes its words.'
-    run = runs("rebound_cli.completion:run_completion")
+    run = runs("rebound_cli.main:run_completion")
     completion = _command(commands, "completion", run, "completion for a shell", text)
     completion.add_argument("shell", choices=("bash", "zsh"))
 

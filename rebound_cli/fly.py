@@ -15,14 +15,13 @@ from companion.shell.files import write_whole
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
-from rebound_cli.computer import Computer, watched
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
-from rebound_cli.flights.ring import room_for
+from rebound_cli.flights.kept import room_for
 from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import AskPerson, ConfirmAtOnce, FlightFaultError, fly_realtime
+from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, fly_realtime, watched
 from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets

@@ -10,12 +10,11 @@ from companion.shell.clock import Clock
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
-from rebound_cli.computer import watched
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
-from rebound_cli.flights.ring import room_for
+from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import Loop
+from rebound_cli.realtime import Loop, watched
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.status import served

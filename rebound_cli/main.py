@@ -6,6 +6,7 @@ import itertools
 import sys
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 
 from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, arguments, exit_codes
@@ -22,13 +23,8 @@ _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 COMMANDING = ("fly", "guard")
 
 # Studies that were commands of the drone's program once, and what they are in the laboratory.
-MOVED = {
-    "paper": "paper",
-    "results": "paper results",
-    "detectors": "detectors",
-    "campaign": "campaign",
-    "recoveries": "campaign recoveries",
-}
+MOVED = {name: name for name in ("paper", "detectors", "campaign")}
+MOVED |= {"results": "paper results", "recoveries": "campaign recoveries"}
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -46,32 +42,30 @@ def run(options: argparse.Namespace, program: str) -> int:
     from sim_vehicle.errors import SimulationError
 
     warnings.formatwarning = lambda message, *_: f"{program}: {message}.\n"
+    code = exit_codes.ERROR
     try:
         return int(options.run(options))
     except (ReboundError, SimulationError) as error:
-        print(f"{program}: {error}", file=sys.stderr)
-        is_permanent = isinstance(error, ConfigurationError) and options.command in COMMANDING
-        return exit_codes.CONFIGURATION if is_permanent else exit_codes.ERROR
+        said = str(error)
+        if isinstance(error, ConfigurationError) and options.command in COMMANDING:
+            code = exit_codes.CONFIGURATION
     except ModuleNotFoundError as error:
-        print(f"{program}: {needed_text(error)}", file=sys.stderr)
-        return exit_codes.ERROR
+        said = needed_text(error)
     except KeyboardInterrupt:
-        text = "ended at once"
+        said, code = "ended at once.", exit_codes.INTERRUPTED
         if options.command in COMMANDING:
-            text += "; a vehicle in the air does what its autopilot does when setpoints stop"
-        print(f"{program}: {text}.", file=sys.stderr)
-        return exit_codes.INTERRUPTED
+            said = "ended at once; a vehicle in the air does what its autopilot does when setpoints stop."
     except BrokenPipeError:
         # The reader of our output has gone (`rebound ... | head`): nobody is left to tell.
         sys.stderr.close()
-        return exit_codes.ERROR
+        return code
     except OSError as error:
         # A file or folder that cannot be had, or a disk that takes no more; any other error is a fault of ours.
         if error.filename is None and error.errno not in _DISK_ERRORS:
             raise
-        where = "" if error.filename is None else f"{error.filename}: "
-        print(f"{program}: {where}{error.strerror}.", file=sys.stderr)
-        return exit_codes.ERROR
+        said = f"{'' if error.filename is None else f'{error.filename}: '}{error.strerror}."
+    print(f"{program}: {said}", file=sys.stderr)
+    return code
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -95,3 +89,21 @@ def _with_plain_sim(words: Sequence[str]) -> list[str]:
         "--sim=builtin" if word == "--sim" and after not in arguments.SIMULATED_AUTOPILOTS else word
         for word, after in itertools.zip_longest(words, words[1:])
     ]
+
+
+def run_completion(options: argparse.Namespace) -> int:
+    """What a shell needs to complete commands, options, choices and files."""
+    import shtab
+
+    def complete_files(parser: argparse.ArgumentParser) -> None:
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for command in action.choices.values():
+                    complete_files(command)
+            elif action.type in (Path, arguments.mission_file):
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+
+    parser = build_parser()
+    complete_files(parser)
+    print(shtab.complete(parser, options.shell))
+    return 0

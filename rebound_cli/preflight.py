@@ -3,6 +3,7 @@
 import json
 import sys
 from argparse import Namespace
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from companion.errors import ConfigurationError
@@ -32,15 +33,14 @@ def run_preflight(options: Namespace) -> int:
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
         while not preflight.finished:
             _exchange(preflight, connection, clock)
-            news = connection.news()
-            if news is not None:
+            if (news := connection.news()) is not None:
                 console.print(news)
         if preflight.survey.refusal is not None:
             raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
         found = preflight.findings()
         _show(console, preflight, found)
         if options.json:
-            print(json.dumps([_plain(finding) for finding in found], indent=2))
+            print(json.dumps([asdict(finding) for finding in found], indent=2))
         if options.fix:
             found = _fix(console, preflight, connection, clock, found, options.yes)
     finally:
@@ -59,12 +59,16 @@ def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
     release = "" if version is None else " " + ".".join(map(str, version))
     kind = identity.vehicle_type if identity is not None else "vehicle"
     console.print(f"\nPX4{release}, {kind}")
-    for finding in found:
-        console.print(f"  {finding.verdict.value:4}  {finding.item:20} {finding.found}")
-        if finding.remedy:
-            console.print(f"        {'':20} -> {finding.remedy}")
+    show_findings(found, 20, console.print)
     counts = [sum(finding.verdict is verdict for finding in found) for verdict in Verdict]
     console.print(f"\n  {counts[0]} good, {counts[1]} worth a look, {counts[2]} in the way of a flight")
+
+
+def show_findings(found: Sequence[Finding], width: int, tell: Callable[[str], None]) -> None:
+    for finding in found:
+        tell(f"  {finding.verdict:4}  {finding.item:{width}} {finding.found}")
+        if finding.remedy:
+            tell(f"        {'':{width}} -> {finding.remedy}")
 
 
 def _fix(
@@ -93,7 +97,3 @@ def _agrees(console: Console, question: str) -> bool:
     """The end of input is a no."""
     console.ask(question)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
-
-
-def _plain(finding: Finding) -> dict[str, object]:
-    return {**asdict(finding), "verdict": finding.verdict.value}

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
+from companion.messages import ComputerStatus
 from companion.shell.clock import Clock
+from companion.shell.computer import ComputerReader
 from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
-from rebound_cli.computer import Computer
+from rebound_cli.background import Background
 from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 LONGEST_WAIT_S = 0.05
 # Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
 HANDING_OVER_US = 10_000_000
+# MAVLink's heartbeat goes as often, and a person watches no faster.
+COMPUTER_EVERY_US = 1_000_000
 
 
 class FlightFaultError(ReboundError):
@@ -102,6 +106,37 @@ def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -
     if companion.file_awaited is not None and Path(companion.file_awaited).exists():
         companion.file_is_there()
         recorder.record_input(now_us, "file")
+
+
+class Computer:
+    """Once a second its status of a second ago, read on a thread of its own: a disk that hangs answers nobody."""
+
+    def __init__(self, folder: Path) -> None:
+        self._reader = ComputerReader(folder)
+        self._background = Background("the computer's status")
+        self._latest: ComputerStatus | None = None
+        self._due_us = 0
+
+    def status(self, now_us: int) -> ComputerStatus | None:
+        """None as long as none is due, and where none could be read."""
+        if now_us < self._due_us:
+            return None
+        self._due_us = now_us + COMPUTER_EVERY_US
+        latest, self._latest = self._latest, None
+        self._background.give(self._read, now_us)
+        return latest
+
+    def _read(self, now_us: int) -> None:
+        self._latest = self._reader.read(now_us)
+
+    def close(self) -> None:
+        # A disk that hangs is not waited for.
+        self._background.close(0.1)
+
+
+def watched(folder: Path, is_wanted: bool) -> contextlib.AbstractContextManager[Computer | None]:
+    """The computer, and the disk that the folder is on; None where nobody wants to know."""
+    return contextlib.closing(Computer(folder)) if is_wanted else contextlib.nullcontext()
 
 
 @dataclass(slots=True)

@@ -44,13 +44,11 @@ def _serve(options: Namespace, world: SimulatedWorld, console: Console) -> None:
         signal.signal(number, lambda *_: stopped.set())
     if options.stop_with_stdin:
         threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
-    if options.autopilot == "px4":
-        _serve_px4(options, world, stopped, console)
-    else:
-        _serve_builtin(options, world, stopped, console)
+    serve_it = _serve_px4 if options.autopilot == "px4" else _serve_builtin
+    serve_it(options, world, stopped, console)
 
 
-def _tell_of(hit: Hit, console: Console) -> None:
+def _tell_of(console: Console, hit: Hit) -> None:
     text = f"{impact_text(hit.kind, hit.impact_velocity_ned_m_s)}, {hit.peak_force_n:.0f} N"
     console.event(hit.contact_at_boot_us / 1e6, "hit", text)
 
@@ -73,18 +71,16 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
         parameters={"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)},
         signing=signing,
     )
-    vehicle.truth.on_hit = partial(_tell_of, console=console)
+    vehicle.truth.on_hit = partial(_tell_of, console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
     ports += [open_port(vehicle, address) for address in options.link]
     host, port = remote
-    console.print(f"{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.")
-    console.print(
-        f"  QGroundControl  finds it by itself, at UDP port {GROUND_PORT}\n"
-        f"  MAVSDK          udpin://0.0.0.0:{port}\n"
-        f"  mavutil         udpin:0.0.0.0:{port}\n"
-        f"  Rebound         --connect udpin://0.0.0.0:{port}"
-    )
+    console.print(f"""{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.
+  QGroundControl  finds it by itself, at UDP port {GROUND_PORT}
+  MAVSDK          udpin://0.0.0.0:{port}
+  mavutil         udpin:0.0.0.0:{port}
+  Rebound         --connect udpin://0.0.0.0:{port}""")
     serve(vehicle, ports, options.truth, stopped.is_set, options.speed)
 
 
@@ -104,7 +100,7 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
 
     def new_vehicle() -> HilVehicle:
         vehicle = HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
-        vehicle.truth.on_hit = partial(_tell_of, console=console)
+        vehicle.truth.on_hit = partial(_tell_of, console)
         return vehicle
 
     # Compiled, or loaded from numba's cache, before PX4 waits for it.

@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from companion.errors import ConfigurationError
 from companion.preflight.checks import Finding, Verdict
+from rebound_cli.preflight import show_findings
 from rebound_cli.service.files import UNIT, UNIT_NAME, USER, PlannedFile, ServiceSettings
 from rebound_cli.service.system import System, answer, hidden_program
 
@@ -24,10 +25,7 @@ Plan: TypeAlias = Callable[[System], tuple[ServiceSettings, list[PlannedFile]]]
 def run_check(system: System, plan: Plan) -> int:
     """Print the findings; 0 when none of them is bad."""
     found = list(_findings(system, plan))
-    for finding in found:
-        print(f"  {finding.verdict.value:4}  {finding.item:10} {finding.found}")
-        if finding.remedy:
-            print(f"        {'':10} -> {finding.remedy}")
+    show_findings(found, 10, print)
     return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0
 
 
