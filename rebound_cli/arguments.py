@@ -7,6 +7,7 @@ import importlib.resources
 import math
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
@@ -60,12 +61,16 @@ def host_and_port(text: str) -> tuple[str, int]:
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
-    return lambda options: int(getattr(importlib.import_module(module), name)(options))
+    return partial(_run, module, name)
 
 
-def _command(commands: Commands, name: str, run: Run, summary: str, description: str) -> Parser:
+def _run(module: str, name: str, options: argparse.Namespace) -> int:
+    return int(getattr(importlib.import_module(module), name)(options))
+
+
+def _command(commands: Commands, name: str, function: str, summary: str, description: str) -> Parser:
     parser = commands.add_parser(name, help=summary, description=description)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=runs(f"rebound_cli.{function}"))
     return parser
 
 
@@ -101,8 +106,7 @@ def add_json(parser: Parser, what: str) -> None:
 
 
 def add_fly(commands: Commands) -> None:
-    run = runs("rebound_cli.fly:run_fly")
-    fly = _command(commands, "fly", run, "fly a mission", "Fly a mission from take-off to landing.")
+    fly = _command(commands, "fly", "fly:run_fly", "fly a mission", "Fly a mission from take-off to landing.")
     text = "mission file, or the name of one that ships: wall"
     fly.add_argument("mission", type=mission_file, metavar="MISSION", help=text)
     how = fly.add_mutually_exclusive_group()
@@ -130,8 +134,7 @@ def add_fly(commands: Commands) -> None:
 
 def add_guard(commands: Commands) -> None:
     text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/guard.md."
-    run = runs("rebound_cli.guard:run_guard")
-    guard = _command(commands, "guard", run, "protect a flight that something else commands", text)
+    guard = _command(commands, "guard", "guard:run_guard", "protect a flight that something else commands", text)
     _add_connect(guard, required=True)
     _add_peer_and_key(guard)
     guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/guard.md")
@@ -143,14 +146,14 @@ def add_guard(commands: Commands) -> None:
 
 def add_init(commands: Commands) -> None:
     text = "A copy, to be changed, of one of the missions that ship with the program; see docs/missions.md."
-    init = _command(commands, "init", runs("rebound_cli.init:run_init"), "write a mission to begin with", text)
+    init = _command(commands, "init", "init:run_init", "write a mission to begin with", text)
     init.add_argument("file", type=Path, metavar="FILE", help="the file to write, such as my-mission.yaml")
     init.add_argument("--from", dest="model", default="wall", metavar="MISSION", help="which one (default: wall)")
 
 
 def add_sim(commands: Commands) -> None:
     text = "A simulated PX4 quadrotor for any MAVLink client."
-    sim = _command(commands, "sim", runs("rebound_cli.sim:run_sim"), "run the simulated vehicle alone", text)
+    sim = _command(commands, "sim", "sim:run_sim", "run the simulated vehicle alone", text)
     sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
     _add_world_options(sim)
     text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/px4.md"
@@ -183,8 +186,8 @@ def add_sim(commands: Commands) -> None:
 
 def add_preflight(commands: Commands) -> None:
     text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/preflight.md."
-    run = runs("rebound_cli.preflight:run_preflight")
-    preflight = _command(commands, "preflight", run, "look at a connected vehicle before its first flight", text)
+    summary = "look at a connected vehicle before its first flight"
+    preflight = _command(commands, "preflight", "preflight:run_preflight", summary, text)
     _add_connect(preflight, required=True)
     _add_peer_and_key(preflight)
     add_companion(preflight)
@@ -195,8 +198,7 @@ def add_preflight(commands: Commands) -> None:
 
 def add_status(commands: Commands) -> None:
     text = "Asks a running `guard` or `fly --connect` on this machine; see docs/logs.md."
-    run = runs("rebound_cli.status:run_status")
-    status = _command(commands, "status", run, "what a running guard or flight is doing", text)
+    status = _command(commands, "status", "status:run_status", "what a running guard or flight is doing", text)
     text = "where to ask (default: this session, then the service)"
     status.add_argument("--socket", type=Path, metavar="PATH", help=text)
     add_json(status, "status")
@@ -206,12 +208,15 @@ def add_logs(commands: Commands) -> None:
     text = "Flights that `fly --connect` and `guard` have recorded; see docs/logs.md."
     logs = commands.add_parser("logs", help="recorded flights of real vehicles: list, show, export", description=text)
     whats = logs.add_subparsers(required=True, metavar="WHAT", dest="what")
-    run = runs("rebound_cli.flights.command:run_list")
-    listed = _command(whats, "list", run, "every flight, the oldest first", "Every flight.")
-    run = runs("rebound_cli.flights.command:run_show")
-    shown = _command(whats, "show", run, "what happened in a flight", "What happened in a flight.")
-    run = runs("rebound_cli.flights.command:run_export")
-    exported = _command(whats, "export", run, "one archive of a flight", "One archive of a flight.")
+    ways = {
+        "list": "every flight, the oldest first",
+        "show": "what happened in a flight",
+        "export": "one archive of a flight",
+    }
+    listed, shown, exported = (
+        _command(whats, name, f"flights.command:run_{name}", text, f"{text.capitalize()}.")
+        for name, text in ways.items()
+    )
     for parser in (shown, exported):
         text = "its name or folder (default: last)"
         parser.add_argument("flight", nargs="?", default="last", metavar="FLIGHT", help=text)
@@ -225,8 +230,8 @@ def add_logs(commands: Commands) -> None:
 
 def add_doctor(commands: Commands) -> None:
     text = "Configuration without keys, versions, machine, journal, last flights; see docs/logs.md."
-    run = runs("rebound_cli.flights.doctor:run_doctor")
-    doctor = _command(commands, "doctor", run, "one archive for whoever is asked for help", text)
+    summary = "one archive for whoever is asked for help"
+    doctor = _command(commands, "doctor", "flights.doctor:run_doctor", summary, text)
     out = Path("rebound-doctor.tar.gz")
     doctor.add_argument("--out", type=Path, default=out, metavar="FILE", help="the archive (default: %(default)s)")
     text = "settings beside those of /etc/rebound"
@@ -249,9 +254,7 @@ def _add_no_position(parser: Parser) -> None:
 
 def add_airframe(commands: Commands) -> None:
     text = "PX4's parameters for one of our airframes, on standard output."
-    airframe = _command(
-        commands, "airframe", runs("rebound_cli.airframe:run_airframe"), "print an airframe for PX4", text
-    )
+    airframe = _command(commands, "airframe", "airframe:run_airframe", "print an airframe for PX4", text)
     airframe.add_argument("target", choices=("px4",), help="for whom")
     airframe.add_argument("--airframe", default="foldable", metavar="NAME|FILE", help="default: foldable")
     text = "what PX4 flies by: motion capture, as indoors (default), an RTK GPS, or optical flow and a range finder"
@@ -262,7 +265,7 @@ def add_airframe(commands: Commands) -> None:
 
 def add_key(commands: Commands) -> None:
     text = "The key that a vehicle and those who may command it share; see docs/security.md."
-    key = _command(commands, "key", runs("rebound_cli.key:run_key"), "make a key for MAVLink's message signing", text)
+    key = _command(commands, "key", "key:run_key", "make a key for MAVLink's message signing", text)
     text = "new: make a key; px4: write it as the file that PX4 has on its SD card"
     key.add_argument("what", choices=("new", "px4"), help=text)
     key.add_argument("file", type=Path, metavar="FILE", help="the key's file")
@@ -274,15 +277,14 @@ def add_key(commands: Commands) -> None:
 
 def add_completion(commands: Commands) -> None:
     text = 'Prints a script for a shell to read: eval "$(rebound completion bash)" completes its words.'
-    run = runs("rebound_cli.main:run_completion")
-    completion = _command(commands, "completion", run, "completion for a shell", text)
+    completion = _command(commands, "completion", "main:run_completion", "completion for a shell", text)
     completion.add_argument("shell", choices=("bash", "zsh"))
 
 
 def add_service(commands: Commands) -> None:
     text = "Started at boot, watched, started again; see docs/companion-computer.md."
-    run = runs("rebound_cli.service.command:run_service")
-    service = _command(commands, "service", run, "install the guard, or a mission, as a service of systemd", text)
+    summary = "install the guard, or a mission, as a service of systemd"
+    service = _command(commands, "service", "service.command:run_service", summary, text)
     text = (
         "install: also after an upgrade, keeps all settings; status: as systemd sees it; "
         "check: whether all is as it should be; uninstall: keeps settings and flights"

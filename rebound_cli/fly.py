@@ -12,17 +12,15 @@ from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
-from rebound_cli import run_folder
+from rebound_cli import inputs, run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
 from rebound_cli.flights.kept import room_for
-from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, fly_realtime, watched
-from rebound_cli.resume import remember_from, resume_of
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.status import StatusServer, served
@@ -40,7 +38,7 @@ class Flight:
     """A flight about to begin."""
 
     mission: Mission
-    world: SimulatedWorld | None
+    world: inputs.SimulatedWorld | None
     folder: Path
     recorder: FlightRecorder
     console: Console
@@ -54,20 +52,17 @@ def run_fly(options: Namespace) -> int:
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     if is_simulated and options.signing_key is not None:
         raise ConfigurationError("--signing-key belongs to --connect: leave it out where the vehicle is simulated.")
-    document = load_mission_document(options.mission, options.set, options.airframe, options.seed, options.companion)
+    document = inputs.load_mission_document(
+        options.mission, options.set, options.airframe, options.seed, options.companion
+    )
     if options.obstacles is not None:
-        apply_override(
-            document, Override(f"--obstacles {options.obstacles}", ("obstacles", "file"), str(options.obstacles))
-        )
-    world = world_from(document) if is_simulated else None
-    mission = mission_from(document, world)
+        text = f"--obstacles {options.obstacles}"
+        apply_override(document, Override(text, ("obstacles", "file"), str(options.obstacles)))
+    world = inputs.world_from(document) if is_simulated else None
+    mission = inputs.mission_from(document, world)
     if options.resume is not None:
-        apply_override(
-            document, Override(f"--resume {options.resume}", ("resume",), resume_of(options.resume, mission))
-        )
-        if options.obstacles is None:
-            remember_from(options.resume, document)
-        mission = mission_from(document, world)
+        inputs.resume(document, options.resume, mission, knows_more=options.obstacles is None)
+        mission = inputs.mission_from(document, world)
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
         prepare_companion(console, mission.companion)
@@ -111,10 +106,10 @@ def _connection_for(options: Namespace) -> Connection | None:
     return udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
 
 
-def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
+def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inputs.SimulatedWorld | None) -> None:
     if mission_file.resolve() != (folder / run_folder.MISSION_NAME).resolve():
         write_whole(folder / run_folder.MISSION_NAME, mission_file.read_bytes())
-    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, world))
+    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, inputs.resolved(mission, world))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     if world is not None:
         run_folder.write_yaml(folder / run_folder.AIRFRAME_NAME, world.airframe.model_dump(mode="json"))
@@ -215,7 +210,7 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     return 0 if summary["outcome"] == "completed" else 1
 
 
-def _draw(flight: Flight, flown: Flown, world: SimulatedWorld) -> None:
+def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
     """The picture of the flight, beside and later where the person wants the prompt back."""
     from rebound_cli.figure.later import draw_later
 

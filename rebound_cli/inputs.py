@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from companion.errors import ConfigurationError
 from rebound_cli.documents import (
     Document,
     DocumentError,
+    DocumentPath,
     Override,
     apply_override,
     apply_overrides,
@@ -17,6 +19,7 @@ from rebound_cli.documents import (
     parse_override,
     validated,
 )
+from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.mavlink.restamp import check_messages
@@ -39,11 +42,7 @@ class SimulatedWorld:
 
 
 def load_mission_document(
-    path: Path,
-    sets: Sequence[str],
-    airframe: str | None = None,
-    seed: int | None = None,
-    companion: Path | None = None,
+    path: Path, sets: Sequence[str], airframe: str | None = None, seed: int | None = None, companion: Path | None = None
 ) -> Document:
     """The mission file with every --set, and --airframe and --seed, put in. Raises DocumentError.
 
@@ -179,6 +178,51 @@ def resolved(mission: "Mission", world: SimulatedWorld | None) -> dict[str, Any]
     if world is not None:
         data["sim"] = world.scene.model_dump(mode="json", exclude_none=True)
     return data
+
+
+class ResumeError(ConfigurationError):
+    """A flight with which there is nothing to go on, or that is not this mission's."""
+
+
+def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
+    """The mission's `resume:` part, of a flight that ended early or whose process was killed. Raises ResumeError."""
+    flown = mission_from(load_flown(run / RESOLVED_NAME))
+    if flown.items != mission.items:
+        raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
+    events = list(read_records(run / EVENTS_NAME, whole_lines(read_text(run / EVENTS_NAME))))
+    armed = _last(events, "armed")
+    item, end = _last(events, "item"), _last(events, "aborted")
+    if _last(events, "done") is not None:
+        raise ResumeError(f"{run} was flown to its end: there is nothing to resume.")
+    if armed is None or item is None:
+        raise ResumeError(f"{run} ended before its first item: fly it from the start.")
+    try:
+        at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
+        return {
+            "at_step": max(1, at_step),
+            "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
+            "armed_at_us": armed["time_us"],
+            "armed_boot_us": armed["data"]["time_boot_us"],
+            "hits": sum(event["kind"] == "detection" for event in events) + (flown.resume.hits if flown.resume else 0),
+        }
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ResumeError(f"{run / EVENTS_NAME}: not the events of a flight; the file is damaged.") from error
+
+
+def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) -> None:
+    """Go on where that flight was interrupted. With `knows_more` what it knew of its surroundings takes the place of
+    what the mission says is known. Raises ResumeError.
+    """
+    stored = run / OBSTACLES_NAME
+    given: dict[DocumentPath, Any] = {("resume",): resume_of(run, mission)}
+    if knows_more and stored.exists():
+        given |= {("obstacles", "known"): [], ("obstacles", "file"): str(stored)}
+    for path, value in given.items():
+        apply_override(document, Override(f"--resume {run}", path, value))
+
+
+def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:
+    return next((event for event in reversed(events) if event["kind"] == kind), None)
 
 
 def _sentence(error: Exception) -> str:

@@ -15,7 +15,6 @@ from rebound_cli.console import Console, console_for
 from rebound_cli.replay.settings import companion_settings
 from rebound_cli.signed_connection import open_signed
 
-EXIT_NOT_READY = 1
 LONGEST_WAIT_S = 0.05
 # PX4 answers a parameter within 50 ms; after a second it has not taken it.
 SETTING_TAKES_S = 1.0
@@ -45,12 +44,11 @@ def run_preflight(options: Namespace) -> int:
             found = _fix(console, preflight, connection, clock, found, options.yes)
     finally:
         connection.close()
-    return EXIT_NOT_READY if any(finding.verdict is Verdict.BAD for finding in found) else 0
+    return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0
 
 
 def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> None:
-    received = connection.receive(LONGEST_WAIT_S)
-    for frame in preflight.step(received, clock.now_us()):
+    for frame in preflight.step(connection.receive(LONGEST_WAIT_S), clock.now_us()):
         connection.send(frame)
 
 

@@ -47,9 +47,7 @@ OBSTACLES_NAME = "obstacles.json"
 HIT_KINDS = ("detection", "left_alone")
 
 # The packages whose version can change the bytes or the figures of a flight.
-_VERSIONED_PACKAGES = (
-    *("pymavlink", "fastcrc", "numpy", "numba", "filterpy", "shapely", "pydantic", "pyserial", "matplotlib"),
-)
+_VERSIONED = "pymavlink fastcrc numpy numba filterpy shapely pydantic pyserial matplotlib"
 
 
 class RunFolderError(ReboundError):
@@ -68,24 +66,20 @@ def check_place(out: Path | None) -> None:
 
 
 def create_run_folder(out: Path | None, mission_name: str) -> Path:
-    """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError."""
+    """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError, OSError."""
     check_place(out)
-    try:
-        if out is not None:
-            out.mkdir(parents=True, exist_ok=True)
-            return out
-        slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
-        stem = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}"
-        RUNS_FOLDER.mkdir(parents=True, exist_ok=True)
-        for attempt in range(1, 1000):
-            folder = RUNS_FOLDER / (stem if attempt == 1 else f"{stem}-{attempt}")
-            with suppress(FileExistsError):
-                folder.mkdir()
-                return folder
-    except OSError as error:
-        text = f"The run folder {out or RUNS_FOLDER} cannot be made: {error.strerror}."
-        raise RunFolderError(text) from error
-    raise RunFolderError(f"The run folder {RUNS_FOLDER / stem} cannot be made: too many have that name.")
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        return out
+    slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
+    stem, number = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}", 1
+    RUNS_FOLDER.mkdir(parents=True, exist_ok=True)
+    while True:
+        folder = RUNS_FOLDER / (stem if number == 1 else f"{stem}-{number}")
+        with suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+        number += 1
 
 
 class FlightRecorder:
@@ -220,7 +214,7 @@ def write_json(path: Path, data: Any) -> None:
 def versions() -> dict[str, str]:
     """What a replay needs to match: the program, Python, the machine and the packages."""
     found = {"px4-rebound": __version__, "python": platform.python_version(), "machine": platform.platform()}
-    for package in _VERSIONED_PACKAGES:
+    for package in _VERSIONED.split():
         with suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)
     return found

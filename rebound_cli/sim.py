@@ -86,10 +86,9 @@ def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading
 
 def _signing(options: Namespace) -> tuple[Signing, dict[str, float]]:
     """Of the vehicle, and MAV_SIGN_CFG where it is not the vehicle's default."""
-    is_px4_1_17 = options.signing == "px4-1.17"
-    if options.signing_key is not None:
-        return Signing(read_key(options.signing_key), is_px4_1_17), {"MAV_SIGN_CFG": 1}
-    return Signing(None, is_px4_1_17), {"MAV_SIGN_CFG": 0} if is_px4_1_17 else {}
+    is_px4_1_17, file = options.signing == "px4-1.17", options.signing_key
+    signing = Signing(None if file is None else read_key(file), is_px4_1_17)
+    return signing, {"MAV_SIGN_CFG": int(file is not None)} if is_px4_1_17 or file is not None else {}
 
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:

@@ -10,16 +10,9 @@ from typing import Any, Self
 
 import yaml
 
+from rebound_cli import run_folder
 from rebound_cli.flights.kept import KeptFlight
-from rebound_cli.run_folder import (
-    EVENTS_NAME,
-    GUARD_NAME,
-    INPUTS_NAME,
-    SUMMARY_NAME,
-    VERSIONS_NAME,
-    read_text,
-    whole_lines,
-)
+from rebound_cli.run_folder import read_text, whole_lines
 
 # The names of all quantities end in frame and unit: these are the places.
 _PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
@@ -86,9 +79,9 @@ def add_flight(archive: Archive, flight: KeptFlight, below: str) -> None:
         name = f"{below}{flight.name}/{file.name}"
         if not archive.no_position:
             archive.add_file(name, file)
-        elif file.name in (EVENTS_NAME, INPUTS_NAME):
+        elif file.name in (run_folder.EVENTS_NAME, run_folder.INPUTS_NAME):
             archive.add_data(name, whole_lines(read_text(file)))
-        elif file.name in (SUMMARY_NAME, GUARD_NAME, VERSIONS_NAME):
+        elif file.name in (run_folder.SUMMARY_NAME, run_folder.GUARD_NAME, run_folder.VERSIONS_NAME):
             archive.add_data(name, read_text(file))
 
 

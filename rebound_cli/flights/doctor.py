@@ -36,7 +36,7 @@ def run_doctor(options: Namespace) -> int:
         archive.add_text("machine.txt", _machine(runs))
         archive.add_text("journal.txt", _journal())
         archive.add_data("status.json", _status())
-        settings = [*options.config, *(sorted(SETTINGS.glob("*.yaml")) if SETTINGS.is_dir() else ())]
+        settings = [*options.config, *sorted(SETTINGS.glob("*.yaml"))]
         for number, file in enumerate(settings, start=1):
             archive.add_data(f"settings/{number}-{file.name}", read_text(file))
         for folder, pattern in _SYSTEM_FILES:
@@ -48,9 +48,7 @@ def run_doctor(options: Namespace) -> int:
         for flight in flights:
             add_flight(archive, flight, "flights/")
     size_mb = options.out.stat().st_size / 1e6
-    what = (
-        "coordinates are left out" if options.no_position else "the flights' coordinates are in it: see --no-position"
-    )
+    what = "coordinates are left out" if options.no_position else "flights' coordinates are in it: see --no-position"
     print(f"{options.out}: {size_mb:.1f} MB, {len(flights)} flights; keys are left out, {what}.")
     return 0
 

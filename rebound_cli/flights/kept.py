@@ -64,10 +64,8 @@ class KeptFlight:
         try:
             with (self.folder / EVENTS_NAME).open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
+        except OSError as error:
+            return isinstance(error, BlockingIOError)
         return False
 
     def event_lines(self) -> Sequence[str]:
@@ -131,10 +129,10 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
 def flight_named(runs: Path, name: str) -> KeptFlight:
     """`last`, a name in the folder of runs, or a path. Raises FlightError."""
     flights = kept_flights(runs)
-    if name == "last":
-        if not flights:
-            raise FlightError(f"No flight of a vehicle is in {runs}.")
+    if name == "last" and flights:
         return flights[-1]
+    if name == "last":
+        raise FlightError(f"No flight of a vehicle is in {runs}.")
     for folder in (runs / name, Path(name)):
         if (folder / TLOG_NAME).is_file():
             begun = _NAMED_BY_US.fullmatch(folder.name)
