@@ -75,7 +75,9 @@ def load_document(path: Path) -> Document:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise DocumentError(f"{path}: no such file{_similar_file(path)}") from None
+        match = nearest(path.name, [entry.name for entry in path.parent.glob("*.yaml")])
+        question = f"; did you mean {path.with_name(match)}?" if match else "."
+        raise DocumentError(f"{path}: no such file{question}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise DocumentError(f"{path}: cannot be read: {reason}.") from error
@@ -133,11 +135,6 @@ def _lines_below(node: yaml.Node, path: DocumentPath, name: str) -> Iterator[tup
         for index, item in enumerate(node.value):
             yield (*path, index), _line(item)
             yield from _lines_below(item, (*path, index), name)
-
-
-def _similar_file(path: Path) -> str:
-    match = nearest(path.name, [entry.name for entry in path.parent.glob("*.yaml")])
-    return f"; did you mean {path.with_name(match)}?" if match else "."
 
 
 def parse_override(text: str) -> Override:

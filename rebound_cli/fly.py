@@ -69,7 +69,9 @@ def run_fly(options: Namespace) -> int:
         if world is not None and options.lockstep:
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-        connection = _connection_for(options)
+        connection = open_signed(options) if options.connect is not None else None
+        if is_simulated and options.sim == "px4":
+            connection = udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance)
         folder = run_folder.create_run_folder(options.out, mission.name)
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
@@ -97,13 +99,6 @@ def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> F
         watched(flight.folder, operator.computer_status) as computer,
     ):
         return _fly_connected(flight, connection, confirmation, server, computer)
-
-
-def _connection_for(options: Namespace) -> Connection | None:
-    """To a vehicle that is not ours to start; None for one that is."""
-    if options.connect is not None:
-        return open_signed(options)
-    return udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
 
 
 def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inputs.SimulatedWorld | None) -> None:

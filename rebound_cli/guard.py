@@ -10,7 +10,7 @@ from companion.shell.clock import Clock
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
-from rebound_cli.console import Console, console_for
+from rebound_cli.console import console_for
 from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
@@ -25,46 +25,44 @@ def run_guard(options: Namespace) -> int:
     config = guard_config(options)
     run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
-        return _guard(options, config, console)
-
-
-def _guard(options: Namespace, config: GuardConfig, console: Console) -> int:
-    prepare_companion(console, config.companion)
-    # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-    connection = open_signed(options)
-    folder = run_folder.create_run_folder(options.out, "guard")
-    run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
-    run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
-    recorder = FlightRecorder(folder, Background("log"), room_for(folder, options.out, config.companion.disk))
-    guard = Guard(config)
-    try:
-        with (
-            served(console.print, command="guard", folder=str(folder.resolve())) as server,
-            watched(folder, config.companion.operator.computer_status) as computer,
-            Interrupts() as interrupts,
-        ):
-            clock = Clock()
-            started_us = clock.now_us()
-            loop = Loop(guard, connection, clock, recorder, console, interrupts, server, computer)
-            loop.run(lambda _, result: console.events(result.events, started_us))
-    finally:
-        connection.close()
-        recorder.close()
-        hits = [asdict(collision) for collision in guard.collisions()]
-        summary = {
-            "outcome": guard.outcome,
-            "collisions": hits,
-            "left_alone": guard.left_alone(),
-            "round_trip_ms": guard.round_trip().summary(),
-            **asdict(connection.counts),
-            "refused_packets": refused_packets(connection),
-        }
-        run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
-    left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
-    console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
-    if interrupts.reason is None:
-        raise ReboundError(guard.outcome[:1].upper() + guard.outcome[1:] + ("" if guard.outcome.endswith("?") else "."))
-    return 0
+        prepare_companion(console, config.companion)
+        # The address is tried before anything is written: a wrong one leaves no empty folder behind.
+        connection = open_signed(options)
+        folder = run_folder.create_run_folder(options.out, "guard")
+        run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
+        run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
+        recorder = FlightRecorder(folder, Background("log"), room_for(folder, options.out, config.companion.disk))
+        guard = Guard(config)
+        try:
+            with (
+                served(console.print, command="guard", folder=str(folder.resolve())) as server,
+                watched(folder, config.companion.operator.computer_status) as computer,
+                Interrupts() as interrupts,
+            ):
+                clock = Clock()
+                started_us = clock.now_us()
+                loop = Loop(guard, connection, clock, recorder, console, interrupts, server, computer)
+                loop.run(lambda _, result: console.events(result.events, started_us))
+        finally:
+            connection.close()
+            recorder.close()
+            hits = [asdict(collision) for collision in guard.collisions()]
+            summary = {
+                "outcome": guard.outcome,
+                "collisions": hits,
+                "left_alone": guard.left_alone(),
+                "round_trip_ms": guard.round_trip().summary(),
+                **asdict(connection.counts),
+                "refused_packets": refused_packets(connection),
+            }
+            run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
+        left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
+        console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
+        if interrupts.reason is None:
+            raise ReboundError(
+                guard.outcome[:1].upper() + guard.outcome[1:] + ("" if guard.outcome.endswith("?") else ".")
+            )
+        return 0
 
 
 def guard_config(options: Namespace) -> GuardConfig:

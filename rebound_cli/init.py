@@ -5,7 +5,6 @@ import json
 import re
 import shlex
 from argparse import Namespace
-from importlib.resources.abc import Traversable
 
 from companion.errors import ConfigurationError
 
@@ -14,11 +13,11 @@ def run_init(options: Namespace) -> int:
     """Raises ConfigurationError for a file that is there or a mission that is not."""
     if options.file.exists():
         raise ConfigurationError(f"{options.file} is there already: nothing was written.")
-    missions = _shipped()
+    files = importlib.resources.files("rebound_missions").iterdir()
+    missions = dict(sorted((file.name[:-5], file) for file in files if file.name.endswith(".yaml")))
     if options.model not in missions:
-        raise ConfigurationError(
-            f"No mission {options.model!r} ships with the program; there are {', '.join(missions)}."
-        )
+        there = ", ".join(missions)
+        raise ConfigurationError(f"No mission {options.model!r} ships with the program; there are {there}.")
     text = missions[options.model].read_text(encoding="utf-8")
     # The schema lies beside the original.
     text = re.sub(r"^# yaml-language-server:.*\n", "", text)
@@ -31,8 +30,3 @@ def run_init(options: Namespace) -> int:
     print(f"    rebound check {file}    # says and draws what it would do")
     print(f"    rebound fly {file}      # flies it with the simulated vehicle")
     return 0
-
-
-def _shipped() -> dict[str, Traversable]:
-    files = importlib.resources.files("rebound_missions").iterdir()
-    return dict(sorted((file.name.removesuffix(".yaml"), file) for file in files if file.name.endswith(".yaml")))

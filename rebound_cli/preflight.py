@@ -79,8 +79,11 @@ def _fix(
         if finding.fix is None:
             continue
         name, value = finding.fix
-        if not is_agreed and not _agrees(console, f"Set {name} = {value:g}? [y/N] "):
-            continue
+        if not is_agreed:
+            console.ask(f"Set {name} = {value:g}? [y/N] ")
+            # The end of input is a no.
+            if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+                continue
         for frame in preflight.set_parameter(name, value, clock.now_us()):
             connection.send(frame)
         until_us = clock.now_us() + round(SETTING_TAKES_S * 1e6)
@@ -89,9 +92,3 @@ def _fix(
         answer = preflight.parameter(name)
         console.print(f"  {name} is {'not told' if answer is None else format(answer, 'g')} now")
     return preflight.findings()
-
-
-def _agrees(console: Console, question: str) -> bool:
-    """The end of input is a no."""
-    console.ask(question)
-    return sys.stdin.readline().strip().lower() in ("y", "yes")

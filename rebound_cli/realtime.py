@@ -75,9 +75,7 @@ class AskPerson:
             self._is_asked = self._is_asked_again = True
             self._console.print(companion.plan_text())
             self._console.ask("Fly this plan? [y/N] ")
-            return
-        answer = self._read_answer()
-        if answer in ("y", "yes"):
+        elif (answer := self._read_answer()) in ("y", "yes"):
             companion.confirm_plan()
         elif answer is not None:
             companion.stop("the plan was not confirmed")
@@ -185,8 +183,7 @@ class Loop:
         now_us = self.clock.now_us()
         self.heard.take(len(received), now_us)
         result = self._step(received, now_us)
-        late = self.timing.stepped(deadline_us, now_us, self.clock.now_us())
-        if late is not None:
+        if (late := self.timing.stepped(deadline_us, now_us, self.clock.now_us())) is not None:
             self._note("late", late, now_us)
         return now_us, result
 
@@ -218,19 +215,16 @@ class Loop:
         if self.interrupts.reason is not None and not self.is_interrupted:
             self.is_interrupted = True
             self._stop(self.interrupts.reason)
-        news = self.connection.news()
-        if news is not None:
+        if (news := self.connection.news()) is not None:
             self._note("link", news, now_us)
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return
-        computer = None if self.computer is None else self.computer.status(now_us)
-        if computer is not None:
+        if self.computer is not None and (computer := self.computer.status(now_us)) is not None:
             self.stepped.tell_computer(computer)
             self.recorder.record_input(now_us, "computer", status=asdict(computer))
         for writer in (self.recorder.writer, self.console.writer, self.manager):
-            loss = None if writer is None else writer.news()
-            if loss is not None:
+            if writer is not None and (loss := writer.news()) is not None:
                 self._note("lost", loss, now_us)
 
     def _note(self, kind: str, text: str, now_us: int) -> None:

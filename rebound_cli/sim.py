@@ -26,6 +26,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 def run_sim(options: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or until stdin closes when the caller wants to be outlived by nobody."""
+    stopped = threading.Event()
     if options.truth is not None:
         _check_place(options.truth)
     world = load_world(options.mission, options.set, options.airframe, options.seed)
@@ -34,18 +35,13 @@ def run_sim(options: Namespace) -> int:
         # Before Ctrl-C means an end in good order: until then there is nothing to end.
         prepare_vehicle(console, world)
         console.still()
-        _serve(options, world, console)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, lambda *_: stopped.set())
+        if options.stop_with_stdin:
+            threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
+        serve_it = _serve_px4 if options.autopilot == "px4" else _serve_builtin
+        serve_it(options, world, stopped, console)
     return 0
-
-
-def _serve(options: Namespace, world: SimulatedWorld, console: Console) -> None:
-    stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: stopped.set())
-    if options.stop_with_stdin:
-        threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
-    serve_it = _serve_px4 if options.autopilot == "px4" else _serve_builtin
-    serve_it(options, world, stopped, console)
 
 
 def _tell_of(console: Console, hit: Hit) -> None:
@@ -63,13 +59,10 @@ def _check_place(truth: Path) -> None:
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
     signing, sign_cfg = _signing(options)
+    parameters = {"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)}
+    epoch_us = time.time_ns() // 1000
     vehicle = SimulatedVehicle(
-        world.airframe,
-        world.scene,
-        world.seed,
-        epoch_at_boot_us=time.time_ns() // 1000,
-        parameters={"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)},
-        signing=signing,
+        world.airframe, world.scene, world.seed, epoch_at_boot_us=epoch_us, parameters=parameters, signing=signing
     )
     vehicle.truth.on_hit = partial(_tell_of, console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)

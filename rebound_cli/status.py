@@ -115,8 +115,9 @@ def _listener(path: Path) -> socket.socket:
         try:
             listener.bind(str(path))
         except OSError as error:
-            if error.errno != errno.EADDRINUSE or _is_answered(path):
-                raise
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+                if error.errno != errno.EADDRINUSE or probe.connect_ex(str(path)) == 0:
+                    raise
             # What a program that was killed has left.
             path.unlink()
             listener.bind(str(path))
@@ -128,11 +129,6 @@ def _listener(path: Path) -> socket.socket:
         why = "another program answers there" if error.errno == errno.EADDRINUSE else error.strerror or str(error)
         raise StatusError(f"`rebound status` cannot ask this program at {path}: {why}.") from error
     return listener
-
-
-def _is_answered(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
-        return probe.connect_ex(str(path)) == 0
 
 
 def served(tell: Callable[[str], None], **about: Any) -> contextlib.AbstractContextManager[StatusServer | None]:

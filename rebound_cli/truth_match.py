@@ -77,11 +77,8 @@ def match_contacts(collisions: Sequence[CollisionReport], hits: "Sequence[Hit]",
     hit_of_collision: list[Hit | None] = []
     for collision in collisions:
         index = index_of_hit(collision.sample_time_boot_us, hits)
-        if index is None or index in collision_of_hit:
-            hit_of_collision.append(None)
-            continue
-        collision_of_hit[index] = collision
-        hit_of_collision.append(hits[index])
+        is_new = index is not None and collision_of_hit.setdefault(index, collision) is collision
+        hit_of_collision.append(hits[index] if index is not None and is_new else None)
     recontacts = sum(
         not _is_recovered(collision_of_hit.get(index - 1), hits[index].contact_at_boot_us, settled_duration_s)
         for index in range(1, len(hits))

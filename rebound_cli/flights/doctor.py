@@ -6,7 +6,9 @@ import platform
 import shutil
 import subprocess
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from companion.errors import ConfigurationError
 from rebound_cli.flights.archive import Archive, add_flight
@@ -35,7 +37,7 @@ def run_doctor(options: Namespace) -> int:
         archive.add_data("versions.json", json.dumps(versions(), indent=2) + "\n")
         archive.add_text("machine.txt", _machine(runs))
         archive.add_text("journal.txt", _journal())
-        archive.add_data("status.json", _status())
+        archive.add_data("status.json", json.dumps(_status(), indent=2) + "\n")
         settings = [*options.config, *sorted(SETTINGS.glob("*.yaml"))]
         for number, file in enumerate(settings, start=1):
             archive.add_data(f"settings/{number}-{file.name}", read_text(file))
@@ -78,8 +80,8 @@ def _journal() -> str:
     return (done.stdout + done.stderr).decode(errors="replace")
 
 
-def _status() -> str:
+def _status() -> Mapping[str, Any]:
     try:
-        return json.dumps(ask(None), indent=2) + "\n"
+        return ask(None)
     except StatusError as error:
-        return json.dumps({"error": str(error)}) + "\n"
+        return {"error": str(error)}
