@@ -69,7 +69,12 @@ class Console:
         self.writer = writer
         self._do = at_once if writer is None else writer.give
         self.is_terminal = stream.isatty()
-        self._display = _display(stream)
+        self._display: Plain | Terminal = Plain(stream)
+        if self.is_terminal:
+            # A companion that runs as a service has no terminal, and never loads what draws on one.
+            from rebound_cli import terminal
+
+            self._display = terminal.Terminal(stream)
         self._live_due_s = 0.0
         self.live_is_held = False  # while a question waits for its answer
 
@@ -116,15 +121,6 @@ class Console:
         self.writer.close(LAST_WAIT_S if kind is not None else None)
         if kind is None and self.writer.error is not None:
             raise self.writer.error
-
-
-def _display(stream: TextIO) -> "Plain | Terminal":
-    if not stream.isatty():
-        return Plain(stream)
-    # A companion that runs as a service has no terminal, and never loads what draws on one.
-    from rebound_cli.terminal import Terminal
-
-    return Terminal(stream)
 
 
 def console_for(json_on_stdout: bool, writer: Background | None = None) -> Console:

@@ -52,9 +52,8 @@ def run_fly(options: Namespace) -> int:
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     if is_simulated and options.signing_key is not None:
         raise ConfigurationError("--signing-key belongs to --connect: leave it out where the vehicle is simulated.")
-    document = inputs.load_mission_document(
-        options.mission, options.set, options.airframe, options.seed, options.companion
-    )
+    given = (options.airframe, options.seed, options.companion)
+    document = inputs.load_mission_document(options.mission, options.set, *given)
     if options.obstacles is not None:
         text = f"--obstacles {options.obstacles}"
         apply_override(document, Override(text, ("obstacles", "file"), str(options.obstacles)))
@@ -176,13 +175,9 @@ def _fly_lockstep(flight: Flight) -> Flown:
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     world = flight.world
-    facts = FlightFacts(
-        mission=flight.mission.name,
-        airframe=world.airframe.name if world else None,
-        seed=world.seed if world else None,
-        settled_duration_s=flight.mission.companion.settled.duration_s,
-    )
-    summary = build_summary(flown, facts)
+    airframe, seed = (world.airframe.name, world.seed) if world else (None, None)
+    settled_s = flight.mission.companion.settled.duration_s
+    summary = build_summary(flown, FlightFacts(flight.mission.name, airframe, seed, settled_s))
     console, writer = flight.console, flight.recorder.writer
     if flown.timing is None:
         # In real time each was printed as it happened.

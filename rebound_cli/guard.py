@@ -11,7 +11,7 @@ from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
 from rebound_cli.console import console_for
-from rebound_cli.documents import Override, apply_override, apply_overrides, empty_document, load_document, validated
+from rebound_cli.documents import Document, Override, apply_override, apply_overrides, load_document, validated
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import Loop, watched
@@ -67,7 +67,7 @@ def run_guard(options: Namespace) -> int:
 
 def guard_config(options: Namespace) -> GuardConfig:
     """The file's settings, then --set, --modes and --then. Raises DocumentError."""
-    document = load_document(options.config) if options.config is not None else empty_document("no file of settings")
+    document = load_document(options.config) if options.config is not None else Document("no file of settings")
     apply_overrides(document, options.set)
     if options.modes is not None:
         modes = [mode.strip().upper() for mode in options.modes.split(",")]

@@ -71,10 +71,8 @@ def run_lockstep(
     limit_s: float,
     look: Callable[[float], None],
 ) -> bool:
-    """Exchange bytes until the companion has finished. False when virtual time ran out first.
-
-    A packet of the companion reaches the vehicle one interval later. `look` is told the virtual time in
-    seconds now and then.
+    """Exchange bytes until the companion has finished, its packets one interval later; `look` is told the virtual time
+    in seconds now and then. False when virtual time ran out first.
     """
     is_confirmed = is_stopped = False
     limit_us = vehicle.time_boot_us + round(limit_s * 1e6)

@@ -1,7 +1,6 @@
-"""The state of a running program over a Unix socket, for whoever asks on this machine; `rebound status` asks.
+"""The state of a running program over a Unix socket, on a thread of its own; `rebound status` asks.
 
-Each client gets one line of JSON, and nothing is read from it. The flight's thread hands a snapshot over, ten times a
-second at most, and is done; a thread of its own answers.
+Each client gets one line of JSON, and nothing is read from it.
 """
 
 import contextlib

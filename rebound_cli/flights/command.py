@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rebound_cli.console import console_for
-from rebound_cli.flights.archive import Archive, add_flight
+from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
 from rebound_cli.run_folder import EVENTS_NAME, RunFolderError, read_records
 
@@ -45,7 +45,7 @@ def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError."""
     flight = flight_named(runs_folder(options.runs), options.flight)
     out = options.out or Path(f"{flight.name}.tar.gz")
-    with Archive(out, options.no_position) as archive:
+    with new_archive(out, options.no_position) as archive:
         add_flight(archive, flight, "")
     print(f"{flight.name} is in {out}")
     return 0

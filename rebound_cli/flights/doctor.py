@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.errors import ConfigurationError
-from rebound_cli.flights.archive import Archive, add_flight
+from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import kept_flights, runs_folder
 from rebound_cli.run_folder import read_text, versions
 from rebound_cli.service.files import FOLDER
@@ -33,7 +33,7 @@ def run_doctor(options: Namespace) -> int:
         if not file.is_file():
             raise ConfigurationError(f"{file} does not exist: give a file, or leave the option out.")
     runs = runs_folder(options.runs)
-    with Archive(options.out, options.no_position) as archive:
+    with new_archive(options.out, options.no_position) as archive:
         archive.add_data("versions.json", json.dumps(versions(), indent=2) + "\n")
         archive.add_text("machine.txt", _machine(runs))
         archive.add_text("journal.txt", _journal())

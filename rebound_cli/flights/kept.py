@@ -1,7 +1,6 @@
 """The flights of real vehicles in a folder of runs, told from all else there; and room for the present one.
 
-The oldest go where all together pass a budget or the disk has too little left. Not in the flight's own thread: files
-are looked at and removed where the log is written.
+Files are looked at and removed where the log is written, not in the flight's own thread.
 """
 
 import errno
@@ -161,7 +160,7 @@ def limits_of(config: DiskConfig, file_system_bytes: int) -> Limits:
 
 
 class Ring:
-    """Of the flights beside the present one's folder."""
+    """The oldest go where all together pass a budget or the disk has too little left; never the present one."""
 
     def __init__(self, present: Path, config: DiskConfig) -> None:
         self._present, self._runs = present, present.parent

@@ -1,7 +1,4 @@
-"""`rebound service`: writes the files, and has systemd do the rest.
-
-What is in /etc/rebound already stays as it is, every value of it.
-"""
+"""`rebound service`: writes the files, has systemd do the rest, and keeps every value that is in /etc/rebound."""
 
 import shutil
 import sys
@@ -9,15 +6,8 @@ from argparse import Namespace
 from pathlib import Path
 
 from companion.guard.config import GuardConfig
-from rebound_cli.documents import (
-    DocumentError,
-    Override,
-    apply_override,
-    empty_document,
-    load_document,
-    parse_document,
-    validated,
-)
+from rebound_cli import documents
+from rebound_cli.documents import DocumentError, Override, apply_override, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from
 from rebound_cli.run_folder import read_text
 from rebound_cli.service import files
@@ -88,12 +78,12 @@ def _install(system: System, options: Namespace) -> int:
 def plan(
     system: System, guard: Path | None = None, mission: Path | None = None, connect: str | None = None
 ) -> tuple[ServiceSettings, list[PlannedFile]]:
-    """What will hold, and the files of an installation; the unit last: until it is there, nothing else does anything.
+    """What will hold, and the files of an installation; the unit last: without it nothing else does anything.
 
     Raises DocumentError for what is wrong in the options, in the files they name, or in /etc/rebound.
     """
     stored = system.root / FOLDER / _SETTINGS_NAME
-    document = load_document(stored) if stored.exists() else empty_document(str(stored))
+    document = load_document(stored) if stored.exists() else documents.Document(str(stored))
     settings = validated(ServiceSettings, document, document.data)
     source = guard or mission
     if source is not None:
