@@ -141,10 +141,10 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
         # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
         options = ["--port", "0", "--remote", f"127.0.0.1:{own.local_port}", "--speed", "1"]
     else:
-        from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS as words  # noqa: N811
+        from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS
         from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
 
-        port = PX4_SIMULATOR_PORT + instance
+        port, words = PX4_SIMULATOR_PORT + instance, FIRST_ANSWER_WORDS
         options = ["--autopilot", "px4", "--port", str(port)]
         flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
     with VehicleProcess(flight.folder, options, words) as vehicle:

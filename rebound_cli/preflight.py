@@ -39,7 +39,7 @@ def run_preflight(options: Namespace) -> int:
         found = preflight.findings()
         _show(console, preflight, found)
         if options.json:
-            print(json.dumps([asdict(finding) for finding in found], indent=2))
+            print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
             found = _fix(console, preflight, connection, clock, found, options.yes)
     finally:
@@ -64,7 +64,7 @@ def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
 
 def show_findings(found: Sequence[Finding], width: int, tell: Callable[[str], None]) -> None:
     for finding in found:
-        tell(f"  {finding.verdict:4}  {finding.item:{width}} {finding.found}")
+        tell(f"  {finding.verdict.value:4}  {finding.item:{width}} {finding.found}")
         if finding.remedy:
             tell(f"        {'':{width}} -> {finding.remedy}")
 

@@ -137,10 +137,8 @@ def _recovery_end_us(report: FlightReport, number: int, facts: FlightFacts) -> f
     lasted_s = LONGEST_RECOVERY_S
     if collision.settled_after_s is not None:
         lasted_s = collision.settled_after_s + facts.settled_duration_s
-    end_us = min(collision.detected_at_us + lasted_s * 1e6, report.ended_at_us)
-    if number + 1 < len(report.collisions):
-        end_us = min(end_us, report.collisions[number + 1].detected_at_us)
-    return end_us
+    following_us = (later.detected_at_us for later in report.collisions[number + 1 :])
+    return min(collision.detected_at_us + lasted_s * 1e6, report.ended_at_us, *following_us)
 
 
 def _between(from_ned_m: Sequence[float], to_ned_m: Sequence[float], normal_ned: Sequence[float]) -> float:

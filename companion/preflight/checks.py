@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import Enum
 
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.held import HELD_S
@@ -11,7 +11,7 @@ from companion.link import round_trip
 from companion.preflight.survey import LISTENING_US, Survey, spread
 
 
-class Verdict(StrEnum):
+class Verdict(Enum):
     GOOD = "ok"
     DOUBTFUL = "look"
     BAD = "no"
