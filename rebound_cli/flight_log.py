@@ -64,12 +64,10 @@ def read_flight_log(path: Path) -> FlightLog:
                     strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
                 elif isinstance(sample, LocalPosition):
                     positions.append((at_us, *sample.position_ned_m, *sample.velocity_ned_m_s))
-    measured, moved, asked = (
-        np.array(rows, dtype=np.float64).reshape(len(rows), width)
-        for rows, width in ((imu, 8), (positions, 7), (setpoints, 4))
-    )
+    widths = ((imu, 8), (positions, 7), (setpoints, 4))
+    imu_rows, position_rows, setpoint_rows = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
     return FlightLog(
-        *(measured[:, 0], measured[:, 1], measured[:, 2:5], measured[:, 5:8]),
-        *(moved[:, 0], moved[:, 1:4], moved[:, 4:7]),
-        *(asked[:, 0], asked[:, 1:4]),
+        *(imu_rows[:, 0], imu_rows[:, 1], imu_rows[:, 2:5], imu_rows[:, 5:8]),
+        *(position_rows[:, 0], position_rows[:, 1:4], position_rows[:, 4:7]),
+        *(setpoint_rows[:, 0], setpoint_rows[:, 1:4]),
     )
