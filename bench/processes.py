@@ -1,14 +1,34 @@
 """Many flights on several processes of this machine."""
 
 import multiprocessing
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import TypeVar
 
-from rebound_cli.interrupts import ctrl_c_waiting
-from rebound_cli.progress import with_progress
+from rebound_cli.console import with_progress
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+@contextmanager
+def ctrl_c_waiting() -> Iterator[list[int]]:
+    """Meanwhile Ctrl-C is only noted, and the processes that are started never hear of it.
+
+    It reaches every process of the terminal; workers that hear it each print a traceback. They inherit what is blocked.
+    """
+    pressed: list[int] = []
+    # It unblocks the signal when it starts, which is with the first worker otherwise.
+    resource_tracker.ensure_running()
+    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield pressed
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.signal(signal.SIGINT, before)
 
 
 def in_processes(work: Callable[[Item], Result], items: Sequence[Item], jobs: int) -> list[Result]:

@@ -1,29 +1,44 @@
-"""What the commands' arguments have in common: kinds of values, and options that several commands have."""
+"""The command line: kinds of values, options that several commands have, and the commands' own."""
 
 import argparse
 import contextlib
 import importlib
 import importlib.resources
+import math
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+Parser: TypeAlias = argparse.ArgumentParser
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+Run: TypeAlias = Callable[[argparse.Namespace], int]
+Number = TypeVar("Number", int, float)
 
 SIMULATED_AUTOPILOTS = ("builtin", "px4")
 
 
-def port(text: str) -> int:
-    if not text.isdecimal() or int(text) > 65_535:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port: give a number from 0 to 65535")
-    return int(text)
+def number(kind: Callable[[str], Number], least: float, most: float, what: str) -> Callable[[str], Number]:
+    """A type of argument: `what` it is, and how it is given."""
+
+    def read(text: str) -> Number:
+        with contextlib.suppress(ValueError):
+            if least <= (value := kind(text)) <= most:
+                return value
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}")
+
+    return read
 
 
-def count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a count: give a whole number from 1 on")
-    return int(text)
+port = number(int, 0, 65_535, "a port: give a number from 0 to 65535")
+count = number(int, 1, math.inf, "a count: give a whole number from 1 on")
+# PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
+instance = number(int, 0, 9, "an instance: give a number from 0 to 9")
+speed = number(float, 0, 1000, "a speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR")
+# PX4's own integration is no faster than this.
+rate_hz = number(float, 1, 1000, "a rate: give a number of hertz from 1 to 1000")
+mass_kg = number(float, math.ulp(0.0), 1000, "a mass: give kilograms, such as 1.1")
 
 
 def mission_file(text: str) -> Path:
@@ -37,111 +52,248 @@ def mission_file(text: str) -> Path:
 
 
 def host_and_port(text: str) -> tuple[str, int]:
-    host, separator, number = text.rpartition(":")
-    if not separator or not host:
+    host, _, number = text.rpartition(":")
+    if not host:
         raise argparse.ArgumentTypeError(f"{text!r} is not HOST:PORT")
-    return host, port(number)
+    return host, int(port(number))
 
 
-def instance(text: str) -> int:
-    # PX4's SITL numbers ten of its companions' ports, 14540 to 14549.
-    if not text.isdecimal() or int(text) > 9:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an instance: give a number from 0 to 9")
-    return int(text)
-
-
-def speed(text: str) -> float:
-    return _number(
-        text, lambda value: 0 <= value <= 1000, "speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR"
-    )
-
-
-def hours(text: str) -> float:
-    return _number(text, lambda value: 0 < value <= 10_000, "time: give hours, such as 0.5")
-
-
-def rate_hz(text: str) -> float:
-    # PX4's own integration is no faster than this.
-    return _number(text, lambda value: 1 <= value <= 1000, "rate: give a number of hertz from 1 to 1000")
-
-
-def mass_kg(text: str) -> float:
-    return _number(text, lambda value: 0 < value <= 1000, "mass: give kilograms, such as 1.1")
-
-
-def _number(text: str, is_right: Callable[[float], bool], what: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not is_right(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a {what}")
-    return value
-
-
-def runs(function: str) -> Callable[[argparse.Namespace], int]:
+def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
-    return lambda options: int(getattr(importlib.import_module(module), name)(options))
+    return partial(_run, module, name)
 
 
-def add_jobs(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--jobs", type=count, default=2, help="processes at a time (default 2)")
+def _run(module: str, name: str, options: argparse.Namespace) -> int:
+    return int(getattr(importlib.import_module(module), name)(options))
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """For what is worked out on Dask: here, or wherever a scheduler has workers."""
-    parser.add_argument("--jobs", type=count, default=os.cpu_count() or 1, help="processes (default: one a core)")
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask scheduler whose workers do the work, e.g. tcp://10.0.0.7:8786"
-    )
+def _command(commands: Commands, name: str, function: str, summary: str, description: str) -> Parser:
+    parser = commands.add_parser(name, help=summary, description=description)
+    parser.set_defaults(run=runs(f"rebound_cli.{function}"))
+    return parser
 
 
-def add_world_options(parser: argparse.ArgumentParser) -> None:
+def _add_world_options(parser: Parser) -> None:
     parser.add_argument("--airframe", metavar="NAME|FILE", help="foldable, rigid or an airframe file")
     parser.add_argument("--seed", type=int, help="seed of every random number of the simulated vehicle")
     add_set(parser, "change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5")
 
 
-def add_set(parser: argparse.ArgumentParser, text: str) -> None:
+def add_set(parser: Parser, text: str) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help=text)
 
 
-def add_connect(parser: "argparse.ArgumentParser | argparse._MutuallyExclusiveGroup", required: bool) -> None:
-    parser.add_argument(
-        "--connect",
-        required=required,
-        metavar="URL",
-        help="a vehicle, e.g. udpin://0.0.0.0:14540 or serial:///dev/ttyAMA0:921600",
-    )
+def _add_connect(parser: "Parser | argparse._MutuallyExclusiveGroup", required: bool) -> None:
+    text = "a vehicle, e.g. udpin://0.0.0.0:14540 or serial:///dev/ttyAMA0:921600"
+    parser.add_argument("--connect", required=required, metavar="URL", help=text)
 
 
-def add_peer(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--peer", metavar="HOST[:PORT]", help="with udpin: hear this address alone (default: the first vehicle's)"
-    )
+def _add_peer_and_key(parser: Parser) -> None:
+    text = "with udpin: hear this address alone (default: the first vehicle's)"
+    parser.add_argument("--peer", metavar="HOST[:PORT]", help=text)
+    text = "with --connect: sign what is sent, hear only what is signed with this key; `rebound key new` makes one"
+    parser.add_argument("--signing-key", type=Path, metavar="FILE", help=text)
 
 
-def add_signing_key(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--signing-key",
-        type=Path,
-        metavar="FILE",
-        help="with --connect: sign what is sent, hear only what is signed with this key; `rebound key new` makes one",
-    )
+def add_companion(parser: Parser) -> None:
+    text = "settings from this file's companion: part, as tune writes it"
+    parser.add_argument("--companion", type=Path, metavar="FILE", help=text)
 
 
-def add_companion(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--companion", type=Path, metavar="FILE", help="settings from this file's companion: part, as tune writes it"
-    )
-
-
-def add_json(parser: argparse.ArgumentParser, what: str) -> None:
+def add_json(parser: Parser, what: str) -> None:
     parser.add_argument("--json", action="store_true", help=f"print the {what} on stdout and nothing else there")
 
 
-def add_documents_folder(parser: argparse.ArgumentParser, written: str) -> None:
-    parser.add_argument(
-        "--out", type=Path, default=Path("docs"), metavar="DIR", help=f"folder of {written} (default: docs)"
+def add_fly(commands: Commands) -> None:
+    fly = _command(commands, "fly", "fly:run_fly", "fly a mission", "Fly a mission from take-off to landing.")
+    text = "mission file, or the name of one that ships: wall"
+    fly.add_argument("mission", type=mission_file, metavar="MISSION", help=text)
+    how = fly.add_mutually_exclusive_group()
+    text = (
+        "start the simulated vehicle and fly it in real time over UDP, as without any of these; "
+        "px4: with your PX4 as its autopilot, see docs/px4.md"
     )
+    own, *_ = SIMULATED_AUTOPILOTS
+    how.add_argument("--sim", nargs="?", choices=SIMULATED_AUTOPILOTS, const=own, default=own, metavar="px4", help=text)
+    how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")
+    _add_connect(how, required=False)
+    _add_world_options(fly)
+    fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
+    text = "with --sim px4: PX4's instance (its option -i)"
+    fly.add_argument("--instance", type=instance, default=0, metavar="N", help=text)
+    add_companion(fly)
+    text = "go on with the mission where the flight in this folder was interrupted"
+    fly.add_argument("--resume", type=Path, metavar="RUN", help=text)
+    text = "what is known beforehand, e.g. another run's obstacles.json"
+    fly.add_argument("--obstacles", type=Path, metavar="FILE", help=text)
+    add_json(fly, "summary")
+    _add_peer_and_key(fly)
+    fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
+
+
+def add_guard(commands: Commands) -> None:
+    text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/guard.md."
+    guard = _command(commands, "guard", "guard:run_guard", "protect a flight that something else commands", text)
+    _add_connect(guard, required=True)
+    _add_peer_and_key(guard)
+    guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/guard.md")
+    add_set(guard, "change a setting, e.g. max_hits=5")
+    guard.add_argument("--modes", metavar="A,B", help="the modes that may be taken over, e.g. POSCTL,AUTO.MISSION")
+    guard.add_argument("--then", choices=("previous", "hold"), help="what the vehicle is given back to (default: hold)")
+    guard.add_argument("--out", type=Path, metavar="DIR", help="where the log goes (default runs/<time>-guard)")
+
+
+def add_init(commands: Commands) -> None:
+    text = "A copy, to be changed, of one of the missions that ship with the program; see docs/missions.md."
+    init = _command(commands, "init", "init:run_init", "write a mission to begin with", text)
+    init.add_argument("file", type=Path, metavar="FILE", help="the file to write, such as my-mission.yaml")
+    init.add_argument("--from", dest="model", default="wall", metavar="MISSION", help="which one (default: wall)")
+
+
+def add_sim(commands: Commands) -> None:
+    text = "A simulated PX4 quadrotor for any MAVLink client."
+    sim = _command(commands, "sim", "sim:run_sim", "run the simulated vehicle alone", text)
+    sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
+    _add_world_options(sim)
+    text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/px4.md"
+    sim.add_argument("--autopilot", choices=SIMULATED_AUTOPILOTS, default="builtin", help=text)
+    text = (
+        "UDP port to listen on for the companion (default 14580 + instance; 0: any free one); "
+        "with --autopilot px4 the TCP port (4560)"
+    )
+    sim.add_argument("--port", type=port, help=text)
+    text = "with --autopilot px4: where to listen for it (default 127.0.0.1: this machine alone)"
+    sim.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help=text)
+    text = "at most N times real time, 0 for as fast as it goes (default: $PX4_SIM_SPEED_FACTOR, else 1)"
+    default = os.environ.get("PX4_SIM_SPEED_FACTOR") or "1"
+    sim.add_argument("--speed", type=speed, default=default, metavar="N", help=text)
+    text = "with --autopilot px4: HIL_SENSOR a second; 250 is three times as fast and less like a real sensor"
+    sim.add_argument("--sensor-rate", type=int, choices=(250, 500, 1000), default=1000, help=text)
+    text = "where the companion's link sends unasked (default 127.0.0.1:14540 + instance)"
+    sim.add_argument("--remote", type=host_and_port, metavar="HOST:PORT", help=text)
+    text = "one more link, e.g. tcpin://0.0.0.0:5760 or serial:///dev/ttyUSB0:57600; see docs/vehicle.md"
+    sim.add_argument("--link", action="append", default=[], metavar="URL", help=text)
+    text = "adds N to the UDP ports and to the system's number"
+    sim.add_argument("--instance", type=instance, default=0, metavar="N", help=text)
+    text = "write what really happened to this .npz file at the end"
+    sim.add_argument("--truth", type=Path, metavar="FILE", help=text)
+    text = "how it is given a key of message signing: by SETUP_SIGNING on any link, or as PX4 1.17 (docs/vehicle.md)"
+    sim.add_argument("--signing", choices=("any-link", "px4-1.17"), default="any-link", help=text)
+    sim.add_argument("--signing-key", type=Path, metavar="FILE", help="it has this key, and MAV_SIGN_CFG is 1")
+    sim.add_argument("--stop-with-stdin", action="store_true", help="end when standard input ends")
+
+
+def add_preflight(commands: Commands) -> None:
+    text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/preflight.md."
+    summary = "look at a connected vehicle before its first flight"
+    preflight = _command(commands, "preflight", "preflight:run_preflight", summary, text)
+    _add_connect(preflight, required=True)
+    _add_peer_and_key(preflight)
+    add_companion(preflight)
+    preflight.add_argument("--fix", action="store_true", help="offer to set the parameters that would mend it")
+    preflight.add_argument("--yes", action="store_true", help="with --fix: set them without asking")
+    add_json(preflight, "findings")
+
+
+def add_status(commands: Commands) -> None:
+    text = "Asks a running `guard` or `fly --connect` on this machine; see docs/logs.md."
+    status = _command(commands, "status", "status:run_status", "what a running guard or flight is doing", text)
+    text = "where to ask (default: this session, then the service)"
+    status.add_argument("--socket", type=Path, metavar="PATH", help=text)
+    add_json(status, "status")
+
+
+def add_logs(commands: Commands) -> None:
+    text = "Flights that `fly --connect` and `guard` have recorded; see docs/logs.md."
+    logs = commands.add_parser("logs", help="recorded flights of real vehicles: list, show, export", description=text)
+    whats = logs.add_subparsers(required=True, metavar="WHAT", dest="what")
+    ways = {
+        "list": "every flight, the oldest first",
+        "show": "what happened in a flight",
+        "export": "one archive of a flight",
+    }
+    listed, shown, exported = (
+        _command(whats, name, f"flights.command:run_{name}", text, f"{text.capitalize()}.")
+        for name, text in ways.items()
+    )
+    for parser in (shown, exported):
+        text = "its name or folder (default: last)"
+        parser.add_argument("flight", nargs="?", default="last", metavar="FLIGHT", help=text)
+    for parser in (listed, shown, exported):
+        _add_runs(parser)
+    add_json(listed, "flights")
+    add_json(shown, "flight")
+    exported.add_argument("--out", type=Path, metavar="FILE", help="the archive (default: FLIGHT.tar.gz)")
+    _add_no_position(exported)
+
+
+def add_doctor(commands: Commands) -> None:
+    text = "Configuration without keys, versions, machine, journal, last flights; see docs/logs.md."
+    summary = "one archive for whoever is asked for help"
+    doctor = _command(commands, "doctor", "flights.doctor:run_doctor", summary, text)
+    out = Path("rebound-doctor.tar.gz")
+    doctor.add_argument("--out", type=Path, default=out, metavar="FILE", help="the archive (default: %(default)s)")
+    text = "settings beside those of /etc/rebound"
+    doctor.add_argument("--config", type=Path, action="append", default=[], metavar="FILE", help=text)
+    doctor.add_argument("--preflight", type=Path, metavar="FILE", help="what `rebound preflight --json` printed")
+    doctor.add_argument("--flights", type=count, default=3, metavar="N", help="how many of the last (default: 3)")
+    _add_runs(doctor)
+    _add_no_position(doctor)
+
+
+def _add_runs(parser: Parser) -> None:
+    text = "where the flights are (default: runs here, or the service's)"
+    parser.add_argument("--runs", type=Path, metavar="DIR", help=text)
+
+
+def _add_no_position(parser: Parser) -> None:
+    text = "without coordinates: no packets, no places in events and summary"
+    parser.add_argument("--no-position", action="store_true", help=text)
+
+
+def add_airframe(commands: Commands) -> None:
+    text = "PX4's parameters for one of our airframes, on standard output."
+    airframe = _command(commands, "airframe", "airframe:run_airframe", "print an airframe for PX4", text)
+    airframe.add_argument("target", choices=("px4",), help="for whom")
+    airframe.add_argument("--airframe", default="foldable", metavar="NAME|FILE", help="default: foldable")
+    text = "what PX4 flies by: motion capture, as indoors (default), an RTK GPS, or optical flow and a range finder"
+    airframe.add_argument("--position", choices=("mocap", "gps", "flow"), default="mocap", help=text)
+    text = "env: exports that PX4 SITL reads at start (default); params: for QGroundControl; airframe: for PX4"
+    airframe.add_argument("--format", choices=("env", "params", "airframe"), default="env", help=text)
+
+
+def add_key(commands: Commands) -> None:
+    text = "The key that a vehicle and those who may command it share; see docs/security.md."
+    key = _command(commands, "key", "key:run_key", "make a key for MAVLink's message signing", text)
+    text = "new: make a key; px4: write it as the file that PX4 has on its SD card"
+    key.add_argument("what", choices=("new", "px4"), help=text)
+    key.add_argument("file", type=Path, metavar="FILE", help="the key's file")
+    text = "new: ask for a passphrase, from which QGroundControl and MAVProxy make the same key (SHA-256)"
+    key.add_argument("--passphrase", action="store_true", help=text)
+    text = "px4: the file to write, to be copied to mavlink/ on the card (default: %(default)s)"
+    key.add_argument("--card", type=Path, default=Path("mavlink-signing-key.bin"), metavar="FILE", help=text)
+
+
+def add_completion(commands: Commands) -> None:
+    text = 'Prints a script for a shell to read: eval "$(rebound completion bash)" completes its words.'
+    completion = _command(commands, "completion", "main:run_completion", "completion for a shell", text)
+    completion.add_argument("shell", choices=("bash", "zsh"))
+
+
+def add_service(commands: Commands) -> None:
+    text = "Started at boot, watched, started again; see docs/companion-computer.md."
+    summary = "install the guard, or a mission, as a service of systemd"
+    service = _command(commands, "service", "service.command:run_service", summary, text)
+    text = (
+        "install: also after an upgrade, keeps all settings; status: as systemd sees it; "
+        "check: whether all is as it should be; uninstall: keeps settings and flights"
+    )
+    service.add_argument("what", choices=("install", "status", "check", "uninstall"), help=text)
+    how = service.add_mutually_exclusive_group()
+    text = "install: guard with these settings, from boot on"
+    how.add_argument("--guard", type=Path, metavar="CONFIG", help=text)
+    text = "install: fly this each time somebody starts the service"
+    how.add_argument("--mission", type=mission_file, metavar="FILE", help=text)
+    _add_connect(service, required=False)
+    service.add_argument("--dry-run", action="store_true", help="show what would be written or removed, and stop")

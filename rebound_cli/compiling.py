@@ -1,7 +1,7 @@
 """Kernels are compiled before a flight waits for them, and somebody who waits sees how far it is."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -47,37 +47,23 @@ def compiling_shown(console: Console, what: str) -> Iterator[None]:
         # Without numba nothing is compiled.
         yield
         return
-    shown = _Shown(lambda done, total: console.progress(what, done, total))
+    kernels: list[Any] = []
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: Any) -> None:
-            shown.looked(event.data["dispatcher"])
+            dispatcher = event.data["dispatcher"]
+            # Numba compiles functions of its own beside ours.
+            if dispatcher.py_func.__module__.partition(".")[0] in _ROOMS:
+                kernels[:] = kernels or _kernels_beside(dispatcher)
+                # They are compiled, or were kept by an earlier start.
+                console.progress(what, sum(bool(kernel.overloads) for kernel in kernels), len(kernels))
 
         on_end = on_start
 
     with event.install_listener("numba:compile", Listener()):
         yield
-    shown.finish()
-
-
-class _Shown:
-    """Counts the kernels of the rooms that are loaded and that are compiled, or were kept by an earlier start."""
-
-    def __init__(self, tell: Callable[[int, int], None]) -> None:
-        self._tell = tell
-        self._kernels: list[Any] = []
-
-    def looked(self, dispatcher: Any) -> None:
-        """At one that is being compiled; numba compiles functions of its own beside ours."""
-        if dispatcher.py_func.__module__.partition(".")[0] not in _ROOMS:
-            return
-        if not self._kernels:
-            self._kernels = _kernels_beside(dispatcher)
-        self._tell(sum(bool(kernel.overloads) for kernel in self._kernels), len(self._kernels))
-
-    def finish(self) -> None:
-        if self._kernels:
-            self._tell(len(self._kernels), len(self._kernels))
+    if kernels:
+        console.progress(what, len(kernels), len(kernels))
 
 
 def _kernels_beside(dispatcher: Any) -> list[Any]:

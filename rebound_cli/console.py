@@ -3,14 +3,14 @@
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
-from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self, TextIO
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Self, TextIO, TypeVar
 
 from rebound_cli.background import Background, at_once
 
 if TYPE_CHECKING:
     from companion.report import Event, Status
+    from rebound_cli.terminal import Terminal
 
 # Ten times a second looks continuous; in a file or a pipe a line every few seconds is enough to see life.
 LIVE_INTERVAL_S = 0.1
@@ -22,30 +22,17 @@ PLAIN_STEPS = 10
 STANDING_OUT = ("detection", "hit")
 
 Fields = Sequence[tuple[str, str]]
-
-
-class Display(Protocol):
-    """Where it is shown; called on the writer's thread, may raise what writing raises."""
-
-    def print(self, text: str) -> None: ...
-
-    def event(self, time_s: float, kind: str, text: str, stands_out: bool) -> None: ...
-
-    def state(self, fields: Fields) -> None: ...
-
-    def progress(self, what: str, done: int, total: int) -> None: ...
-
-    def ask(self, question: str) -> None: ...
-
-    def close(self) -> None: ...
+Item = TypeVar("Item")
 
 
 class Plain:
-    """Lines, for a pipe or a file."""
+    """Lines, for a pipe or a file; called on the writer's thread, may raise what writing raises."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._tenths = -1
+        # The state is no line of a service's journal: the service manager shows the present one.
+        self._is_journal = "NOTIFY_SOCKET" in os.environ
 
     def print(self, text: str) -> None:
         self.ask(f"{text}\n")
@@ -55,7 +42,8 @@ class Plain:
 
     def state(self, fields: Fields) -> None:
         (_, time_text), *others = fields
-        self.print("  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)]))
+        if not self._is_journal:
+            self.print("  ".join([f"{time_text:>11}", *(f"{name} {text}" for name, text in others)]))
 
     def progress(self, what: str, done: int, total: int) -> None:
         tenths = PLAIN_STEPS * done // total
@@ -71,13 +59,6 @@ class Plain:
         self._stream.flush()
 
 
-class Journal(Plain):
-    """Lines for a service's journal. The state is not among them: the service manager shows the present one."""
-
-    def state(self, fields: Fields) -> None:
-        pass
-
-
 class Console:
     """Text for a person, on stdout or, when stdout belongs to a program, on stderr.
 
@@ -88,7 +69,12 @@ class Console:
         self.writer = writer
         self._do = at_once if writer is None else writer.give
         self.is_terminal = stream.isatty()
-        self._display = _display(stream)
+        self._display: Plain | Terminal = Plain(stream)
+        if self.is_terminal:
+            # A companion that runs as a service has no terminal, and never loads what draws on one.
+            from rebound_cli import terminal
+
+            self._display = terminal.Terminal(stream)
         self._live_due_s = 0.0
         self.live_is_held = False  # while a question waits for its answer
 
@@ -126,9 +112,7 @@ class Console:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Return when all is shown that could be. Raises what kept the rest from it, unless more went wrong."""
         self._do(self._display.close)
         if self.writer is None:
@@ -137,15 +121,6 @@ class Console:
         self.writer.close(LAST_WAIT_S if kind is not None else None)
         if kind is None and self.writer.error is not None:
             raise self.writer.error
-
-
-def _display(stream: TextIO) -> Display:
-    if not stream.isatty():
-        return Journal(stream) if "NOTIFY_SOCKET" in os.environ else Plain(stream)
-    # A companion that runs as a service has no terminal, and never loads what draws on one.
-    from rebound_cli.terminal import Terminal
-
-    return Terminal(stream)
 
 
 def console_for(json_on_stdout: bool, writer: Background | None = None) -> Console:
@@ -169,3 +144,12 @@ def state_fields(status: "Status", flight_time_s: float, link: str = "") -> Fiel
     if status.round_trip_us is not None:
         fields.append(("round trip", f"{status.round_trip_us / 1e3:.0f} ms"))
     return [*fields, ("link", link)] if link else fields
+
+
+def with_progress(items: Iterable[Item], total: int, what: str = "flights") -> Iterable[Item]:
+    """Hand the items on, with a bar on the terminal; in a file or a pipe nothing is drawn."""
+    from rich.console import Console as RichConsole
+    from rich.progress import track
+
+    console = RichConsole(stderr=True)
+    return track(items, what, total, console=console, disable=not console.is_terminal)

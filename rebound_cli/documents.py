@@ -1,8 +1,11 @@
 """YAML files with the line of every value, `--set PATH=VALUE`, and errors that name file, line and remedy."""
 
+import difflib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
+from operator import eq
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -10,7 +13,6 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from companion.errors import ConfigurationError
-from rebound_cli.schema_hints import keys_allowed_at, nearest
 
 DocumentPath = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
@@ -44,33 +46,28 @@ class Document:
     """The content of a YAML file: plain data, where each value stands, and what --set changed."""
 
     name: str
-    data: dict[str, Any]
-    lines: dict[DocumentPath, int]
-    overrides: list[Override]
-
-    def line_of(self, path: DocumentPath) -> int:
-        """Line of the value, or of the nearest part around it that the file has; 1 for the whole file."""
-        for length in range(len(path), 0, -1):
-            if path[:length] in self.lines:
-                return self.lines[path[:length]]
-        return 1
+    data: dict[str, Any] = field(default_factory=dict)
+    lines: dict[DocumentPath, int] = field(default_factory=dict)
+    overrides: list[Override] = field(default_factory=list)
 
     def override_of(self, path: DocumentPath) -> Override | None:
         """The last --set that gave this value, or a part around or inside it."""
-        for override in reversed(self.overrides):
-            shorter = min(len(path), len(override.path))
-            if shorter and path[:shorter] == override.path[:shorter]:
-                return override
-        return None
+        around = (given for given in reversed(self.overrides) if path and all(map(eq, path, given.path)))
+        return next(around, None)
 
     def place_of(self, path: DocumentPath) -> str:
-        """Where a person has to look: `--set items.1=...` or `missions/wall.yaml:12`."""
-        override = self.override_of(path)
-        return override.text if override else f"{self.name}:{self.line_of(path)}"
+        """Where a person has to look: `--set items.1=...` or `missions/wall.yaml:12`.
+
+        That is the line of the value, or of the nearest part around it that the file has; 1 for the whole file.
+        """
+        if (override := self.override_of(path)) is not None:
+            return override.text
+        around = (self.lines[path[:length]] for length in range(len(path), 0, -1) if path[:length] in self.lines)
+        return f"{self.name}:{next(around, 1)}"
 
 
 def empty_document(name: str) -> Document:
-    return Document(name, {}, {}, [])
+    return Document(name)
 
 
 def load_document(path: Path) -> Document:
@@ -78,7 +75,9 @@ def load_document(path: Path) -> Document:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise DocumentError(f"{path}: no such file{_similar_file(path)}") from None
+        match = nearest(path.name, [entry.name for entry in path.parent.glob("*.yaml")])
+        question = f"; did you mean {path.with_name(match)}?" if match else "."
+        raise DocumentError(f"{path}: no such file{question}") from None
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else "it is not UTF-8 text"
         raise DocumentError(f"{path}: cannot be read: {reason}.") from error
@@ -114,7 +113,7 @@ def parse_document(text: str, name: str) -> Document:
         raise DocumentError(f"{name}: a value in it cannot be read: {str(error).partition(';')[0]}.") from error
     except RecursionError as error:
         raise DocumentError(f"{name}: nested too deeply, or in itself.") from error
-    return Document(name, data, lines, [])
+    return Document(name, data, lines)
 
 
 def _line(node: yaml.Node) -> int:
@@ -138,14 +137,6 @@ def _lines_below(node: yaml.Node, path: DocumentPath, name: str) -> Iterator[tup
             yield from _lines_below(item, (*path, index), name)
 
 
-def _similar_file(path: Path) -> str:
-    folder = path.parent
-    if not folder.is_dir():
-        return "."
-    match = nearest(path.name, [entry.name for entry in folder.glob("*.yaml")])
-    return f"; did you mean {folder / match}?" if match else "."
-
-
 def parse_override(text: str) -> Override:
     """Read `items.1.go_to.speed_m_s=2.5`; the value is YAML. Raises DocumentError."""
     dotted, separator, value_text = text.partition("=")
@@ -163,24 +154,19 @@ def apply_override(document: Document, override: Override) -> None:
     """Change one value; keys that are missing on the way are made, and the model judges them afterwards."""
     target: Any = document.data
     for depth, part in enumerate(override.path):
-        last = depth == len(override.path) - 1
-        if isinstance(target, list):
-            if not isinstance(part, int) or part >= len(target):
-                where = ".".join(map(str, override.path[:depth]))
-                raise DocumentError(
-                    f"{override.text}: '{where}' is a list of {len(target)}, counted from 0; it has no '{part}'."
-                )
-        elif isinstance(target, dict):
+        where = ".".join(map(str, override.path[:depth]))
+        if isinstance(target, dict):
             part = str(part)
-        else:
-            where = ".".join(map(str, override.path[:depth]))
+        elif not isinstance(target, list):
             raise DocumentError(f"{override.text}: '{where}' is a single value and has nothing below it.")
-        if last:
+        elif not isinstance(part, int) or part >= len(target):
+            text = f"'{where}' is a list of {len(target)}, counted from 0; it has no '{part}'"
+            raise DocumentError(f"{override.text}: {text}.")
+        if depth == len(override.path) - 1:
             target[part] = override.value
-        else:
-            if isinstance(target, dict) and target.get(part) is None:
-                target[part] = {}
-            target = target[part]
+        elif isinstance(target, dict) and target.get(part) is None:
+            target[part] = {}
+        target = target[part]
     document.overrides.append(override)
 
 
@@ -260,3 +246,51 @@ def _unknown_key(key: str, allowed: Sequence[str]) -> str:
     match = nearest(key, allowed)
     question = f"did you mean '{match}'? Allowed" if match else "allowed"
     return f"unknown key '{key}'; {question} here: {', '.join(allowed)}"
+
+
+def nearest(word: str, choices: Sequence[str]) -> str | None:
+    """The choice that a person most likely meant, if any is close."""
+    found = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
+    return found[0] if found else None
+
+
+@cache
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    """Made once: it takes some 0.1 s, and a file can have thousands of faults."""
+    return model.model_json_schema()
+
+
+def keys_allowed_at(model: type[BaseModel], path: Sequence[str | int]) -> tuple[str, ...]:
+    """Keys of every model that may stand at `path`, in the order of the model."""
+    schema = _schema(model)
+    definitions = schema.get("$defs", {})
+    places = list(_resolved(schema, definitions))
+    for part in path:
+        places = [below for place in places for below in _below(place, part, definitions)]
+    keys: dict[str, None] = {}
+    for place in places:
+        keys.update(dict.fromkeys(place.get("properties", {})))
+    return tuple(keys)
+
+
+def _resolved(schema: Any, definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The schema itself, its reference followed and its alternatives spread out."""
+    if not isinstance(schema, dict):
+        return
+    if "$ref" in schema:
+        yield from _resolved(definitions[schema["$ref"].rpartition("/")[2]], definitions)
+        return
+    alternatives = [*schema.get("anyOf", ()), *schema.get("oneOf", ()), *schema.get("allOf", ())]
+    if not alternatives or "properties" in schema:
+        yield schema
+    for alternative in alternatives:
+        yield from _resolved(alternative, definitions)
+
+
+def _below(schema: dict[str, Any], part: str | int, definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    if isinstance(part, str):
+        child = schema.get("properties", {}).get(part, schema.get("additionalProperties"))
+    else:
+        prefixed = schema.get("prefixItems", ())
+        child = prefixed[part] if part < len(prefixed) else schema.get("items")
+    yield from _resolved(child, definitions)

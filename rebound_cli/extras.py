@@ -1,14 +1,7 @@
 """What a drone does without, and the extra that brings it."""
 
-EXTRAS = {
-    "numba": "sim",
-    "pygeomag": "sim",
-    "ambiance": "sim",
-    "matplotlib": "sim",
-    "pyulog": "logs",
-    "mavsdk": "mavsdk",
-    "distributed": "bench",
-}
+EXTRAS = dict.fromkeys(("numba", "pygeomag", "ambiance", "matplotlib"), "sim")
+EXTRAS |= {"pyulog": "logs", "mavsdk": "mavsdk", "distributed": "bench"}
 
 
 def needed_text(error: ModuleNotFoundError) -> str:

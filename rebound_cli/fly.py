@@ -12,25 +12,22 @@ from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
-from rebound_cli import run_folder
+from rebound_cli import inputs, run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
-from rebound_cli.computer import Computer, watched
 from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
-from rebound_cli.flights.ring import room_for
-from rebound_cli.inputs import SimulatedWorld, load_mission_document, mission_from, resolved, world_from
+from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import AskPerson, Confirmation, ConfirmAtOnce, FlightFaultError, fly_realtime
-from rebound_cli.resume import remember_from, resume_of
+from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, fly_realtime, watched
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
-from rebound_cli.status.server import StatusServer, served
+from rebound_cli.status import StatusServer, served
 from rebound_cli.summary import FlightFacts, Flown, build_summary
 from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth
-from rebound_cli.vehicle_process import VehicleProcess
+from rebound_cli.vehicle_process import READY_WORDS, VehicleProcess
 
 # Where PX4's SITL sends its onboard streams unasked, plus its instance.
 PX4_COMPANION_PORT = 14540
@@ -41,7 +38,7 @@ class Flight:
     """A flight about to begin."""
 
     mission: Mission
-    world: SimulatedWorld | None
+    world: inputs.SimulatedWorld | None
     folder: Path
     recorder: FlightRecorder
     console: Console
@@ -55,27 +52,25 @@ def run_fly(options: Namespace) -> int:
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     if is_simulated and options.signing_key is not None:
         raise ConfigurationError("--signing-key belongs to --connect: leave it out where the vehicle is simulated.")
-    document = load_mission_document(options.mission, options.set, options.airframe, options.seed, options.companion)
+    given = (options.airframe, options.seed, options.companion)
+    document = inputs.load_mission_document(options.mission, options.set, *given)
     if options.obstacles is not None:
-        apply_override(
-            document, Override(f"--obstacles {options.obstacles}", ("obstacles", "file"), str(options.obstacles))
-        )
-    world = world_from(document) if is_simulated else None
-    mission = mission_from(document, world)
+        text = f"--obstacles {options.obstacles}"
+        apply_override(document, Override(text, ("obstacles", "file"), str(options.obstacles)))
+    world = inputs.world_from(document) if is_simulated else None
+    mission = inputs.mission_from(document, world)
     if options.resume is not None:
-        apply_override(
-            document, Override(f"--resume {options.resume}", ("resume",), resume_of(options.resume, mission))
-        )
-        if options.obstacles is None:
-            remember_from(options.resume, document)
-        mission = mission_from(document, world)
+        inputs.resume(document, options.resume, mission, knows_more=options.obstacles is None)
+        mission = inputs.mission_from(document, world)
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
         prepare_companion(console, mission.companion)
         if world is not None and options.lockstep:
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-        connection = _connection_for(options)
+        connection = open_signed(options) if options.connect is not None else None
+        if is_simulated and options.sim == "px4":
+            connection = udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance)
         folder = run_folder.create_run_folder(options.out, mission.name)
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
@@ -93,10 +88,9 @@ def run_fly(options: Namespace) -> int:
 def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> Flown:
     if options.lockstep:
         return _fly_lockstep(flight)
-    if connection is None:
-        return _fly_beside_vehicle(flight)
     if options.connect is None:
-        return _fly_beside_px4(flight, connection, options.instance)
+        return _fly_beside_vehicle(flight, connection, options.instance)
+    assert connection is not None, "--connect has one"
     confirmation = ConfirmAtOnce(flight.console) if options.yes else AskPerson(flight.console)
     operator = flight.mission.companion.operator
     with (
@@ -106,17 +100,10 @@ def _fly(flight: Flight, connection: Connection | None, options: Namespace) -> F
         return _fly_connected(flight, connection, confirmation, server, computer)
 
 
-def _connection_for(options: Namespace) -> Connection | None:
-    """To a vehicle that is not ours to start; None for one that is."""
-    if options.connect is not None:
-        return open_signed(options)
-    return udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance) if options.sim == "px4" else None
-
-
-def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: SimulatedWorld | None) -> None:
+def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: inputs.SimulatedWorld | None) -> None:
     if mission_file.resolve() != (folder / run_folder.MISSION_NAME).resolve():
         write_whole(folder / run_folder.MISSION_NAME, mission_file.read_bytes())
-    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, resolved(mission, world))
+    run_folder.write_yaml(folder / run_folder.RESOLVED_NAME, inputs.resolved(mission, world))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     if world is not None:
         run_folder.write_yaml(folder / run_folder.AIRFRAME_NAME, world.airframe.model_dump(mode="json"))
@@ -125,7 +112,7 @@ def _write_inputs(folder: Path, mission_file: Path, mission: Mission, world: Sim
 def _fly_connected(
     flight: Flight,
     connection: Connection,
-    confirmation: Confirmation,
+    confirmation: ConfirmAtOnce | AskPerson,
     server: StatusServer | None = None,
     computer: Computer | None = None,
 ) -> Flown:
@@ -145,40 +132,31 @@ def _fly_connected(
     return Flown(companion.report(), duration_s, None, timing, refused, connection.counts, fault)
 
 
-def _fly_beside_vehicle(flight: Flight) -> Flown:
-    connection = udp_in("127.0.0.1", 0)
-    # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
-    options = ["--port", "0", "--remote", f"127.0.0.1:{connection.local_port}", "--speed", "1"]
-    with VehicleProcess(flight.folder, options) as vehicle:
-        vehicle.wait_until_ready(flight.interrupts, flight.console)
-        flown = _fly_connected(flight, connection, ConfirmAtOnce())
-        vehicle.check_running()
-    return _with_truth(flight, flown)
-
-
-def _fly_beside_px4(flight: Flight, connection: Connection, instance: int) -> Flown:
-    """The body of the simulated vehicle for a PX4 that the person starts."""
-    from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS
-    from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
-
-    port = PX4_SIMULATOR_PORT + instance
-    with VehicleProcess(flight.folder, ["--autopilot", "px4", "--port", str(port)], FIRST_ANSWER_WORDS) as vehicle:
-        flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
-        vehicle.wait_until_ready(flight.interrupts, flight.console)
-        # What PX4 said while it booted is old.
-        while connection.receive(0):
-            pass
-        flown = _fly_connected(flight, connection, ConfirmAtOnce())
-        vehicle.check_running()
-    return _with_truth(flight, flown)
-
-
-def _with_truth(flight: Flight, flown: Flown) -> Flown:
-    """The flight beside what the simulated vehicle's process wrote; without it if PX4 never flew."""
+def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -> Flown:
+    """A simulated vehicle of our own; or its body, for the PX4 that the person starts, at the connection `px4`."""
     from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
 
+    if px4 is None:
+        own, words = udp_in("127.0.0.1", 0), READY_WORDS
+        # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
+        options = ["--port", "0", "--remote", f"127.0.0.1:{own.local_port}", "--speed", "1"]
+    else:
+        from sim_vehicle.hil.exchange import FIRST_ANSWER_WORDS
+        from sim_vehicle.shell.hil_tcp import PX4_SIMULATOR_PORT
+
+        port, words = PX4_SIMULATOR_PORT + instance, FIRST_ANSWER_WORDS
+        options = ["--autopilot", "px4", "--port", str(port)]
+        flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
+    with VehicleProcess(flight.folder, options, words) as vehicle:
+        vehicle.wait_until_ready(flight.interrupts, flight.console)
+        # What PX4 said while it booted is old.
+        while px4 is not None and px4.receive(0):
+            pass
+        flown = _fly_connected(flight, px4 or own, ConfirmAtOnce())
+        vehicle.check_running()
     path = flight.folder / run_folder.TRUTH_NAME
     if not path.exists():
+        # PX4 never flew.
         return flown
     return replace(flown, truth=FlightTruth(*load_truth(path), load_faults(path), load_stalls(path)))
 
@@ -197,13 +175,9 @@ def _fly_lockstep(flight: Flight) -> Flown:
 
 def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     world = flight.world
-    facts = FlightFacts(
-        mission=flight.mission.name,
-        airframe=world.airframe.name if world else None,
-        seed=world.seed if world else None,
-        settled_duration_s=flight.mission.companion.settled.duration_s,
-    )
-    summary = build_summary(flown, facts)
+    airframe, seed = (world.airframe.name, world.seed) if world else (None, None)
+    settled_s = flight.mission.companion.settled.duration_s
+    summary = build_summary(flown, FlightFacts(flight.mission.name, airframe, seed, settled_s))
     console, writer = flight.console, flight.recorder.writer
     if flown.timing is None:
         # In real time each was printed as it happened.
@@ -226,7 +200,7 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     return 0 if summary["outcome"] == "completed" else 1
 
 
-def _draw(flight: Flight, flown: Flown, world: SimulatedWorld) -> None:
+def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
     """The picture of the flight, beside and later where the person wants the prompt back."""
     from rebound_cli.figure.later import draw_later
 

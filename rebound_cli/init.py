@@ -5,35 +5,28 @@ import json
 import re
 import shlex
 from argparse import Namespace
-from importlib.resources.abc import Traversable
 
 from companion.errors import ConfigurationError
-from rebound_cli.run_folder import make_place
 
 
 def run_init(options: Namespace) -> int:
     """Raises ConfigurationError for a file that is there or a mission that is not."""
     if options.file.exists():
         raise ConfigurationError(f"{options.file} is there already: nothing was written.")
-    missions = _shipped()
+    files = importlib.resources.files("rebound_missions").iterdir()
+    missions = dict(sorted((file.name[:-5], file) for file in files if file.name.endswith(".yaml")))
     if options.model not in missions:
-        raise ConfigurationError(
-            f"No mission {options.model!r} ships with the program; there are {', '.join(missions)}."
-        )
+        there = ", ".join(missions)
+        raise ConfigurationError(f"No mission {options.model!r} ships with the program; there are {there}.")
     text = missions[options.model].read_text(encoding="utf-8")
     # The schema lies beside the original.
     text = re.sub(r"^# yaml-language-server:.*\n", "", text)
     name = json.dumps(re.sub("[^A-Za-z0-9._-]+", "-", options.file.stem))
     text = re.sub(rf"^name: {options.model}$", f"name: {name}", text, flags=re.MULTILINE)
-    make_place(options.file)
+    options.file.parent.mkdir(parents=True, exist_ok=True)
     options.file.write_text(text, encoding="utf-8")
     print(f"{options.file} is a copy of the mission '{options.model}'. Change it, then:")
     file = shlex.quote(str(options.file))
     print(f"    rebound check {file}    # says and draws what it would do")
     print(f"    rebound fly {file}      # flies it with the simulated vehicle")
     return 0
-
-
-def _shipped() -> dict[str, Traversable]:
-    files = importlib.resources.files("rebound_missions").iterdir()
-    return dict(sorted((file.name.removesuffix(".yaml"), file) for file in files if file.name.endswith(".yaml")))

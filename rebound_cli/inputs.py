@@ -6,17 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rebound_cli.documents import (
-    Document,
-    DocumentError,
-    Override,
-    apply_override,
-    apply_overrides,
-    empty_document,
-    load_document,
-    parse_override,
-    validated,
-)
+from companion.errors import ConfigurationError
+from rebound_cli import documents
+from rebound_cli.documents import Document, DocumentError, DocumentPath, Override, load_document, validated
+from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.mavlink.restamp import check_messages
@@ -39,16 +32,9 @@ class SimulatedWorld:
 
 
 def load_mission_document(
-    path: Path,
-    sets: Sequence[str],
-    airframe: str | None = None,
-    seed: int | None = None,
-    companion: Path | None = None,
+    path: Path, sets: Sequence[str], airframe: str | None = None, seed: int | None = None, companion: Path | None = None
 ) -> Document:
-    """The mission file with every --set, and --airframe and --seed, put in. Raises DocumentError.
-
-    The `companion:` part of the file `companion`, where one is given, takes the place of the mission's own.
-    """
+    """The mission file with every option put in, and the `companion:` part of that file. Raises DocumentError."""
     from companion.mission.config import CompanionConfig
 
     document = load_document(path)
@@ -72,17 +58,15 @@ def load_flown(file: Path) -> Document:
 
 
 def _apply_options(document: Document, sets: Sequence[str], airframe: str | None, seed: int | None) -> None:
-    apply_overrides(document, sets)
+    documents.apply_overrides(document, sets)
     for option, value in (("airframe", airframe), ("seed", seed)):
         if value is not None:
-            apply_override(document, Override(f"--{option} {value}", ("sim", option), value))
+            documents.apply_override(document, Override(f"--{option} {value}", ("sim", option), value))
 
 
 # A mission's models take a fifth of a simulated vehicle's start: imported where there is a mission.
 def mission_from(document: Document, world: SimulatedWorld | None = None) -> "Mission":
-    """`world`: the simulated vehicle that flies it, where there is one. Raises DocumentError, also for a file of known
-    obstacles that cannot be read.
-    """
+    """Flown by `world`, if simulated. Raises DocumentError, also for a file of obstacles that cannot be read."""
     from companion.mission.model import Mission
 
     read_obstacles(document)
@@ -135,9 +119,7 @@ def read_obstacles(document: Document) -> None:
 
 
 def world_from(document: Document) -> SimulatedWorld:
-    """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position and for a
-    fault of the wire that names no MAVLink message.
-    """
+    """The `sim:` part and its airframe. Raises DocumentError, also for a wall through the start position."""
     scene = validated(Scene, document, document.data.get("sim") or {}, ("sim",))
     for number, fault in enumerate(scene.faults):
         try:
@@ -154,10 +136,10 @@ def world_from(document: Document) -> SimulatedWorld:
 
 def load_world(path: Path | None, sets: Sequence[str], airframe: str | None, seed: int | None) -> SimulatedWorld:
     """For the simulated vehicle alone: of the mission file, if there is one, only the `sim:` part counts."""
-    for override in map(parse_override, sets):
+    for override in map(documents.parse_override, sets):
         if override.path[0] != "sim":
             raise DocumentError(f"{override.text}: only what begins with sim. counts here, such as sim.seed=7.")
-    document = load_document(path) if path is not None else empty_document("no mission file")
+    document = load_document(path) if path is not None else Document("no mission file")
     _apply_options(document, sets, airframe, seed)
     return world_from(document)
 
@@ -179,6 +161,49 @@ def resolved(mission: "Mission", world: SimulatedWorld | None) -> dict[str, Any]
     if world is not None:
         data["sim"] = world.scene.model_dump(mode="json", exclude_none=True)
     return data
+
+
+class ResumeError(ConfigurationError):
+    """A flight with which there is nothing to go on, or that is not this mission's."""
+
+
+def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
+    """The mission's `resume:` part, of a flight that ended early or whose process was killed. Raises ResumeError."""
+    flown = mission_from(load_flown(run / RESOLVED_NAME))
+    if flown.items != mission.items:
+        raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
+    events = list(read_records(run / EVENTS_NAME, whole_lines(read_text(run / EVENTS_NAME))))
+    armed = _last(events, "armed")
+    item, end = _last(events, "item"), _last(events, "aborted")
+    if _last(events, "done") is not None:
+        raise ResumeError(f"{run} was flown to its end: there is nothing to resume.")
+    if armed is None or item is None:
+        raise ResumeError(f"{run} ended before its first item: fly it from the start.")
+    try:
+        at_step = int((end or item)["data"].get("next_step", item["data"]["step"]))
+        return {
+            "at_step": max(1, at_step),
+            "origin_ned_m": [float(axis) for axis in armed["data"]["origin_ned_m"]],
+            "armed_at_us": armed["time_us"],
+            "armed_boot_us": armed["data"]["time_boot_us"],
+            "hits": sum(event["kind"] == "detection" for event in events) + (flown.resume.hits if flown.resume else 0),
+        }
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ResumeError(f"{run / EVENTS_NAME}: not the events of a flight; the file is damaged.") from error
+
+
+def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) -> None:
+    """Go on where that flight was interrupted, and if it `knows_more` with its obstacles. Raises ResumeError."""
+    stored = run / OBSTACLES_NAME
+    given: dict[DocumentPath, Any] = {("resume",): resume_of(run, mission)}
+    if knows_more and stored.exists():
+        given |= {("obstacles", "known"): [], ("obstacles", "file"): str(stored)}
+    for path, value in given.items():
+        documents.apply_override(document, Override(f"--resume {run}", path, value))
+
+
+def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:
+    return next((event for event in reversed(events) if event["kind"] == kind), None)
 
 
 def _sentence(error: Exception) -> str:

@@ -54,14 +54,12 @@ def fly_mission_lockstep(
         if console is not None and console.is_terminal:
             console.live(companion.status, flight_time_s)
 
-    started_s = time.monotonic()
+    started_s, truth = time.monotonic(), vehicle.truth
     is_finished = run_lockstep(companion, vehicle, recorder, interrupts, limit_s, look)
-    wall_clock_s = time.monotonic() - started_s
-    report = companion.report()
+    wall_clock_s, report = time.monotonic() - started_s, companion.report()
     if not is_finished:
         reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
         report = replace(report, outcome="failed", reason=reason)
-    truth = vehicle.truth
     return Flown(report, wall_clock_s, FlightTruth(truth.hits, truth.series(), EPOCH_US, truth.faults)), truth
 
 
@@ -73,23 +71,18 @@ def run_lockstep(
     limit_s: float,
     look: Callable[[float], None],
 ) -> bool:
-    """Exchange bytes until the companion has finished. False when virtual time ran out first.
-
-    A packet of the companion reaches the vehicle one interval later. `look` is told the virtual time in
-    seconds now and then.
+    """Exchange bytes until the companion has finished, its packets one interval later; `look` is told the virtual time
+    in seconds now and then. False when virtual time ran out first.
     """
-    vehicle_step, companion_step, record = vehicle.step, companion.step, recorder.record
     is_confirmed = is_stopped = False
     limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
-    pending = b""
-    count = 0
+    pending, count = b"", 0
     while not companion.finished:
-        frames = vehicle_step(pending)
-        time_boot_us = vehicle.time_boot_us
-        now_us = EPOCH_US + time_boot_us
-        result = companion_step(b"".join(frames), now_us)
+        frames = vehicle.step(pending)
+        now_us = EPOCH_US + vehicle.time_boot_us
+        result = companion.step(b"".join(frames), now_us)
         pending = b"".join(result.sent_frames)
-        record(now_us, result)
+        recorder.record(now_us, result)
         if result.events:
             recorder.record_obstacles(companion.obstacles())
         if not is_confirmed and companion.plan_is_ready():
@@ -99,12 +92,12 @@ def run_lockstep(
         count += 1
         if count % _LOOK_EVERY:
             continue
-        if time_boot_us > limit_us:
+        if vehicle.time_boot_us > limit_us:
             return False
         if interrupts.reason is not None and not is_stopped:
             is_stopped = True
             companion.stop(interrupts.reason)
             recorder.record_stop(now_us, interrupts.reason)
         look_for_file(companion, recorder, now_us)
-        look(time_boot_us / 1e6)
+        look(vehicle.time_boot_us / 1e6)
     return True

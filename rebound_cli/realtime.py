@@ -5,38 +5,37 @@ import os
 import select
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from companion.companion import Companion, StepResult
 from companion.errors import ReboundError
 from companion.messages import ComputerStatus
-from companion.report import Status
 from companion.shell.clock import Clock
+from companion.shell.computer import ComputerReader
 from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
-from rebound_cli.computer import Computer
+from rebound_cli.background import Background
 from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.status.server import StatusServer
+from rebound_cli.status import StatusServer
 from rebound_cli.timing import Heard, Timing, undisturbed
+
+if TYPE_CHECKING:
+    from companion.guard.guard import Guard
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
 # Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
 HANDING_OVER_US = 10_000_000
+# MAVLink's heartbeat goes as often, and a person watches no faster.
+COMPUTER_EVERY_US = 1_000_000
 
 
 class FlightFaultError(ReboundError):
     """Something around the flight failed; the vehicle has been handed over, as far as it could be reached."""
-
-
-class Confirmation(Protocol):
-    """Decides when the plan that the companion has ready may be flown."""
-
-    def poll(self, companion: Companion) -> None: ...
 
 
 class ConfirmAtOnce:
@@ -76,9 +75,7 @@ class AskPerson:
             self._is_asked = self._is_asked_again = True
             self._console.print(companion.plan_text())
             self._console.ask("Fly this plan? [y/N] ")
-            return
-        answer = self._read_answer()
-        if answer in ("y", "yes"):
+        elif (answer := self._read_answer()) in ("y", "yes"):
             companion.confirm_plan()
         elif answer is not None:
             companion.stop("the plan was not confirmed")
@@ -94,36 +91,11 @@ class AskPerson:
         return self._typed.split(b"\n")[0].decode(errors="replace").strip().lower()
 
 
-class Stepped(Protocol):
-    """The companion or the guard: bytes and time in, frames and events out."""
-
-    @property
-    def armed(self) -> bool | None: ...
-
-    @property
-    def finished(self) -> bool: ...
-
-    def next_deadline_us(self) -> int: ...
-
-    def step(self, received: bytes, now_us: int) -> StepResult: ...
-
-    def stop(self, reason: str) -> None: ...
-
-    def note(self, kind: str, text: str) -> None: ...
-
-    def status(self) -> Status: ...
-
-    def tell_computer(self, computer: ComputerStatus) -> None: ...
-
-
 def waiting(connection: Connection, timeout_s: float) -> bytes:
     """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
-    received = connection.receive(timeout_s)
-    if not received:
-        return received
-    pieces = [received]
-    while len(pieces) < MOST_DATAGRAMS and (received := connection.receive(0.0)):
-        pieces.append(received)
+    pieces = [connection.receive(timeout_s)]
+    while pieces[-1] and len(pieces) < MOST_DATAGRAMS:
+        pieces.append(connection.receive(0.0))
     return b"".join(pieces)
 
 
@@ -131,14 +103,45 @@ def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -
     """For a mission that waits for a file."""
     if companion.file_awaited is not None and Path(companion.file_awaited).exists():
         companion.file_is_there()
-        recorder.record_file(now_us)
+        recorder.record_input(now_us, "file")
+
+
+class Computer:
+    """Once a second its status of a second ago, read on a thread of its own: a disk that hangs answers nobody."""
+
+    def __init__(self, folder: Path) -> None:
+        self._reader = ComputerReader(folder)
+        self._background = Background("the computer's status")
+        self._latest: ComputerStatus | None = None
+        self._due_us = 0
+
+    def status(self, now_us: int) -> ComputerStatus | None:
+        """None as long as none is due, and where none could be read."""
+        if now_us < self._due_us:
+            return None
+        self._due_us = now_us + COMPUTER_EVERY_US
+        latest, self._latest = self._latest, None
+        self._background.give(self._read, now_us)
+        return latest
+
+    def _read(self, now_us: int) -> None:
+        self._latest = self._reader.read(now_us)
+
+    def close(self) -> None:
+        # A disk that hangs is not waited for.
+        self._background.close(0.1)
+
+
+def watched(folder: Path, is_wanted: bool) -> contextlib.AbstractContextManager[Computer | None]:
+    """The computer, and the disk that the folder is on; None where nobody wants to know."""
+    return contextlib.closing(Computer(folder)) if is_wanted else contextlib.nullcontext()
 
 
 @dataclass(slots=True)
 class Loop:
     """Exchanges with a vehicle until what is stepped has finished."""
 
-    stepped: Stepped
+    stepped: "Companion | Guard"  # bytes and time in, frames and events out
     connection: Connection
     clock: Clock
     recorder: FlightRecorder
@@ -171,8 +174,7 @@ class Loop:
                 place = traceback.extract_tb(error.__traceback__)[-1]
                 reason = f"fault around the flight, please report it: {type(error).__name__} in {place.name}: {error}"
                 self._hand_over(reason)
-                text = f"{reason[:1].upper()}{reason[1:]}; the vehicle was handed over, as far as it answered."
-                raise FlightFaultError(text) from error
+                raise FlightFaultError(f"F{reason[1:]}; the vehicle was handed over, as far as it answered.") from error
 
     def exchange(self) -> tuple[int, StepResult]:
         """Wait for bytes or the next deadline, take one step, send and record; when it was and what came of it."""
@@ -181,8 +183,7 @@ class Loop:
         now_us = self.clock.now_us()
         self.heard.take(len(received), now_us)
         result = self._step(received, now_us)
-        late = self.timing.stepped(deadline_us, now_us, self.clock.now_us())
-        if late is not None:
+        if (late := self.timing.stepped(deadline_us, now_us, self.clock.now_us())) is not None:
             self._note("late", late, now_us)
         return now_us, result
 
@@ -214,24 +215,21 @@ class Loop:
         if self.interrupts.reason is not None and not self.is_interrupted:
             self.is_interrupted = True
             self._stop(self.interrupts.reason)
-        news = self.connection.news()
-        if news is not None:
+        if (news := self.connection.news()) is not None:
             self._note("link", news, now_us)
         if self.stepped.armed is None:
             # Nobody has been heard yet who could be told.
             return
-        computer = None if self.computer is None else self.computer.status(now_us)
-        if computer is not None:
+        if self.computer is not None and (computer := self.computer.status(now_us)) is not None:
             self.stepped.tell_computer(computer)
-            self.recorder.record_computer(now_us, computer)
+            self.recorder.record_input(now_us, "computer", status=asdict(computer))
         for writer in (self.recorder.writer, self.console.writer, self.manager):
-            loss = None if writer is None else writer.news()
-            if loss is not None:
+            if writer is not None and (loss := writer.news()) is not None:
                 self._note("lost", loss, now_us)
 
     def _note(self, kind: str, text: str, now_us: int) -> None:
         self.stepped.note(kind, text)
-        self.recorder.record_note(now_us, kind, text)
+        self.recorder.record_input(now_us, "note", event=kind, text=text)
 
     def _stop(self, reason: str) -> None:
         self.stepped.stop(reason)
@@ -261,7 +259,7 @@ def fly_realtime(
     clock: Clock,
     recorder: FlightRecorder,
     console: Console,
-    confirmation: Confirmation,
+    confirmation: ConfirmAtOnce | AskPerson,
     interrupts: Interrupts,
     server: StatusServer | None = None,
     computer: Computer | None = None,

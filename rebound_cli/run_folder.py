@@ -6,7 +6,6 @@ import os
 import platform
 import re
 from contextlib import suppress
-from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 
     from companion.companion import StepResult
     from companion.memory.patch import Patch
-    from companion.messages import ComputerStatus
     from companion.report import Event
 
 RUNS_FOLDER = Path("runs")
@@ -49,17 +47,7 @@ OBSTACLES_NAME = "obstacles.json"
 HIT_KINDS = ("detection", "left_alone")
 
 # The packages whose version can change the bytes or the figures of a flight.
-_VERSIONED_PACKAGES = (
-    "pymavlink",
-    "fastcrc",
-    "numpy",
-    "numba",
-    "filterpy",
-    "shapely",
-    "pydantic",
-    "pyserial",
-    "matplotlib",
-)
+_VERSIONED = "pymavlink fastcrc numpy numba filterpy shapely pydantic pyserial matplotlib"
 
 
 class RunFolderError(ReboundError):
@@ -78,43 +66,20 @@ def check_place(out: Path | None) -> None:
 
 
 def create_run_folder(out: Path | None, mission_name: str) -> Path:
-    """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError."""
+    """`out` itself when given, otherwise a new `runs/<UTC time>-<mission>`. Raises RunFolderError, OSError."""
     check_place(out)
-    try:
-        if out is not None:
-            out.mkdir(parents=True, exist_ok=True)
-            return out
-        slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
-        stem = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}"
-        RUNS_FOLDER.mkdir(parents=True, exist_ok=True)
-        for attempt in range(1, 1000):
-            folder = RUNS_FOLDER / (stem if attempt == 1 else f"{stem}-{attempt}")
-            try:
-                folder.mkdir()
-            except FileExistsError:
-                continue
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        return out
+    slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", mission_name).strip("-.") or "mission"
+    stem, number = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{slug}", 1
+    RUNS_FOLDER.mkdir(parents=True, exist_ok=True)
+    while True:
+        folder = RUNS_FOLDER / (stem if number == 1 else f"{stem}-{number}")
+        with suppress(FileExistsError):
+            folder.mkdir()
             return folder
-    except OSError as error:
-        text = f"The run folder {out or RUNS_FOLDER} cannot be made: {error.strerror}."
-        raise RunFolderError(text) from error
-    raise RunFolderError(f"The run folder {RUNS_FOLDER / stem} cannot be made: too many have that name.")
-
-
-def make_folder(folder: Path) -> None:
-    """Before hours of work that are to be written there. Raises RunFolderError where it cannot be had."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunFolderError(f"The folder {folder} cannot be made: {error.strerror}.") from error
-    if not os.access(folder, os.W_OK):
-        raise RunFolderError(f"The folder {folder} cannot be written to.")
-
-
-def make_place(file: Path) -> None:
-    """The same for a single file, of which only the folder is made."""
-    make_folder(file.parent)
-    if file.is_dir() or (file.exists() and not os.access(file, os.W_OK)):
-        raise RunFolderError(f"{file} cannot be written to.")
+        number += 1
 
 
 class FlightRecorder:
@@ -143,7 +108,10 @@ class FlightRecorder:
             fcntl.flock(self._events_file, fcntl.LOCK_SH | fcntl.LOCK_NB)
         if writer is not None:
             for entries in (folder, folder.parent):
-                _sync_folder(entries)
+                # So that their names outlive a power cut.
+                descriptor = os.open(entries, os.O_RDONLY)
+                os.fsync(descriptor)
+                os.close(descriptor)
         self._is_confirmed = False
         self._stop_reason: str | None = None
         self.events: list[Event] = []
@@ -175,28 +143,19 @@ class FlightRecorder:
     def record_confirmation(self, now_us: int, is_confirmed: bool) -> None:
         """Whether the plan is agreed to by now, after the companion's step at `now_us`; written when it is newly so."""
         if is_confirmed and not self._is_confirmed:
-            self._record_input(now_us, "confirm")
+            self.record_input(now_us, "confirm")
         self._is_confirmed = is_confirmed
 
     def record_stop(self, now_us: int, reason: str) -> None:
         """The companion has been asked to stop, after its step at `now_us`; written once a reason."""
         if reason != self._stop_reason:
             self._stop_reason = reason
-            self._record_input(now_us, "stop", reason=reason)
+            self.record_input(now_us, "stop", reason=reason)
 
-    def record_file(self, now_us: int) -> None:
-        """The companion was told, after its step at `now_us`, that the file it waits for exists."""
-        self._record_input(now_us, "file")
-
-    def record_note(self, now_us: int, event: str, text: str) -> None:
-        """The companion was given an event to tell, after its step at `now_us`."""
-        self._record_input(now_us, "note", event=event, text=text)
-
-    def record_computer(self, now_us: int, computer: "ComputerStatus") -> None:
-        """The companion was told, after its step at `now_us`, how this computer is."""
-        self._record_input(now_us, "computer", status=asdict(computer))
-
-    def _record_input(self, now_us: int, kind: str, **data: Any) -> None:
+    def record_input(self, now_us: int, kind: str, **data: Any) -> None:
+        """What the companion was told besides, after its step at `now_us`: `file` (the one it waits for exists), `note`
+        (an event and its text), `computer` (its status).
+        """
         self._do(self._inputs_file.write, json.dumps({"time_us": now_us, "kind": kind, **data}) + "\n")
 
     def record_obstacles(self, patches: "Sequence[Patch]") -> None:
@@ -252,19 +211,10 @@ def write_json(path: Path, data: Any) -> None:
     write_whole(path, (json.dumps(data, indent=2) + "\n").encode())
 
 
-def _sync_folder(folder: Path) -> None:
-    """So that its names outlive a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def versions() -> dict[str, str]:
     """What a replay needs to match: the program, Python, the machine and the packages."""
     found = {"px4-rebound": __version__, "python": platform.python_version(), "machine": platform.platform()}
-    for package in _VERSIONED_PACKAGES:
+    for package in _VERSIONED.split():
         with suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)
     return found

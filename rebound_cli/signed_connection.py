@@ -14,38 +14,33 @@ KEEP_EVERY = MINUTE // 2
 
 
 class SignedConnection:
-    """What comes is heard only if it is signed, what goes is signed; the rest of the program sees neither.
-
-    The time stamp is kept in the background: no flight waits for a disk.
-    """
+    """What comes is heard only if it is signed, what goes is signed; no flight waits for the disk with its stamp."""
 
     def __init__(self, connection: Connection, signing: Signing, stamps: StampFile, clock: Clock) -> None:
         stamps.keep_first(signing.stamp)
-        self._connection, self._signing, self._stamps, self._clock = connection, signing, stamps, clock
+        self._connection, self.signing, self._stamps, self._clock = connection, signing, stamps, clock
         self._kept = signing.stamp
         self._writer = Background("the signatures' time stamp")
 
     def receive(self, timeout_s: float) -> bytes:
-        opened = b""
-        for _ in range(MOST_DATAGRAMS):
-            received = self._connection.receive(timeout_s)
-            opened = self._signing.opened(received, self._clock.now_us())
+        for number in range(MOST_DATAGRAMS):
+            received = self._connection.receive(0.0 if number else timeout_s)
+            opened = self.signing.opened(received, self._clock.now_us())
             if opened or not received:
                 break
-            timeout_s = 0.0
-        if self._signing.stamp - self._kept >= KEEP_EVERY:
+        if self.signing.stamp - self._kept >= KEEP_EVERY:
             self._keep()
         return opened
 
     def _keep(self) -> None:
-        self._kept = self._signing.stamp
+        self._kept = self.signing.stamp
         self._writer.give(self._stamps.keep, self._kept)
 
     def send(self, frame: bytes) -> None:
-        self._connection.send(self._signing.signed(frame, self._clock.now_us()))
+        self._connection.send(self.signing.signed(frame, self._clock.now_us()))
 
     def news(self) -> str | None:
-        return self._connection.news() or self._signing.news() or self._writer.news()
+        return self._connection.news() or self.signing.news() or self._writer.news()
 
     @property
     def counts(self) -> LinkCounts:
@@ -55,11 +50,6 @@ class SignedConnection:
         self._connection.close()
         self._keep()
         self._writer.close()
-
-    @property
-    def refused(self) -> dict[str, int]:
-        """How many packets were refused, by reason."""
-        return self._signing.refused
 
 
 def open_signed(options: Namespace) -> Connection:
@@ -77,5 +67,5 @@ def open_signed(options: Namespace) -> Connection:
 
 
 def refused_packets(connection: Connection | None) -> dict[str, int]:
-    """Of a connection without a key, none."""
-    return connection.refused if isinstance(connection, SignedConnection) else {}
+    """How many, by reason; of a connection without a key, none."""
+    return connection.signing.refused if isinstance(connection, SignedConnection) else {}

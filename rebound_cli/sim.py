@@ -26,6 +26,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 def run_sim(options: Namespace) -> int:
     """Serve until Ctrl-C or SIGTERM, or until stdin closes when the caller wants to be outlived by nobody."""
+    stopped = threading.Event()
     if options.truth is not None:
         _check_place(options.truth)
     world = load_world(options.mission, options.set, options.airframe, options.seed)
@@ -34,23 +35,16 @@ def run_sim(options: Namespace) -> int:
         # Before Ctrl-C means an end in good order: until then there is nothing to end.
         prepare_vehicle(console, world)
         console.still()
-        _serve(options, world, console)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, lambda *_: stopped.set())
+        if options.stop_with_stdin:
+            threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
+        serve_it = _serve_px4 if options.autopilot == "px4" else _serve_builtin
+        serve_it(options, world, stopped, console)
     return 0
 
 
-def _serve(options: Namespace, world: SimulatedWorld, console: Console) -> None:
-    stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: stopped.set())
-    if options.stop_with_stdin:
-        threading.Thread(target=_wait_for_end_of_stdin, args=(stopped,), daemon=True).start()
-    if options.autopilot == "px4":
-        _serve_px4(options, world, stopped, console)
-    else:
-        _serve_builtin(options, world, stopped, console)
-
-
-def _tell_of(hit: Hit, console: Console) -> None:
+def _tell_of(console: Console, hit: Hit) -> None:
     text = f"{impact_text(hit.kind, hit.impact_velocity_ned_m_s)}, {hit.peak_force_n:.0f} N"
     console.event(hit.contact_at_boot_us / 1e6, "hit", text)
 
@@ -65,35 +59,29 @@ def _check_place(truth: Path) -> None:
 
 def _serve_builtin(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
     signing, sign_cfg = _signing(options)
+    parameters = {"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)}
+    epoch_us = time.time_ns() // 1000
     vehicle = SimulatedVehicle(
-        world.airframe,
-        world.scene,
-        world.seed,
-        epoch_at_boot_us=time.time_ns() // 1000,
-        parameters={"MAV_SYS_ID": options.instance + 1, **sign_cfg, **time_outs_at(options.speed)},
-        signing=signing,
+        world.airframe, world.scene, world.seed, epoch_at_boot_us=epoch_us, parameters=parameters, signing=signing
     )
-    vehicle.truth.on_hit = partial(_tell_of, console=console)
+    vehicle.truth.on_hit = partial(_tell_of, console)
     remote = options.remote or ("127.0.0.1", COMPANION_PORT + options.instance)
     ports = px4_ports(vehicle, options.instance, options.port, remote)
     ports += [open_port(vehicle, address) for address in options.link]
     host, port = remote
-    console.print(f"{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.")
-    console.print(
-        f"  QGroundControl  finds it by itself, at UDP port {GROUND_PORT}\n"
-        f"  MAVSDK          udpin://0.0.0.0:{port}\n"
-        f"  mavutil         udpin:0.0.0.0:{port}\n"
-        f"  Rebound         --connect udpin://0.0.0.0:{port}"
-    )
+    console.print(f"""{READY_WORDS} '{world.airframe.name}': MAVLink to {host}:{port} over UDP. Ctrl-C stops it.
+  QGroundControl  finds it by itself, at UDP port {GROUND_PORT}
+  MAVSDK          udpin://0.0.0.0:{port}
+  mavutil         udpin:0.0.0.0:{port}
+  Rebound         --connect udpin://0.0.0.0:{port}""")
     serve(vehicle, ports, options.truth, stopped.is_set, options.speed)
 
 
 def _signing(options: Namespace) -> tuple[Signing, dict[str, float]]:
     """Of the vehicle, and MAV_SIGN_CFG where it is not the vehicle's default."""
-    is_px4_1_17 = options.signing == "px4-1.17"
-    if options.signing_key is not None:
-        return Signing(read_key(options.signing_key), is_px4_1_17), {"MAV_SIGN_CFG": 1}
-    return Signing(None, is_px4_1_17), {"MAV_SIGN_CFG": 0} if is_px4_1_17 else {}
+    is_px4_1_17, file = options.signing == "px4-1.17", options.signing_key
+    signing = Signing(None if file is None else read_key(file), is_px4_1_17)
+    return signing, {"MAV_SIGN_CFG": int(file is not None)} if is_px4_1_17 or file is not None else {}
 
 
 def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Event, console: Console) -> None:
@@ -104,7 +92,7 @@ def _serve_px4(options: Namespace, world: SimulatedWorld, stopped: threading.Eve
 
     def new_vehicle() -> HilVehicle:
         vehicle = HilVehicle(world.airframe, world.scene, world.seed, 1_000_000 // options.sensor_rate)
-        vehicle.truth.on_hit = partial(_tell_of, console=console)
+        vehicle.truth.on_hit = partial(_tell_of, console)
         return vehicle
 
     # Compiled, or loaded from numba's cache, before PX4 waits for it.

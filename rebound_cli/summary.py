@@ -97,18 +97,13 @@ def build_summary(flown: Flown, facts: FlightFacts) -> dict[str, Any]:
 
 def _collision(report: FlightReport, number: int) -> dict[str, Any]:
     collision = report.collisions[number]
-    settled_s, rebound_m_s = collision.settled_after_s, collision.rebound_speed_m_s
+    felt = ("impact_velocity_ned_m_s", "impact_speed_m_s", "normal_ned", "peak_specific_force_m_s2")
     return {
         "detected_at_s": _seconds(collision.detected_at_us - report.started_at_us),
         "detector": collision.detector,
-        "impact_velocity_ned_m_s": _rounded(collision.impact_velocity_ned_m_s),
-        "impact_speed_m_s": round(collision.impact_speed_m_s, _DIGITS),
-        "normal_ned": _rounded(collision.normal_ned),
-        "peak_specific_force_m_s2": round(collision.peak_specific_force_m_s2, _DIGITS),
-        "recovery_setpoint_ned_m": _rounded(collision.recovery_setpoint_ned_m),
-        "settled_after_s": None if settled_s is None else round(settled_s, _TIME_DIGITS),
-        "overshoot_m": round(collision.overshoot_m, _DIGITS),
-        "rebound_speed_m_s": None if rebound_m_s is None else round(rebound_m_s, _DIGITS),
+        **_rounded(collision, *felt, "recovery_setpoint_ned_m"),
+        **_rounded(collision, "settled_after_s", digits=_TIME_DIGITS),
+        **_rounded(collision, "overshoot_m", "rebound_speed_m_s"),
         "stopped_off_m": _between(collision.position_ned_m, collision.recovery_setpoint_ned_m, collision.normal_ned),
     }
 
@@ -123,16 +118,13 @@ def _truth(report: FlightReport, number: int, facts: FlightFacts, hit: "Hit", tr
         "kind": hit.kind,
         "contact_at_s": _seconds(contact_at_us - report.started_at_us),
         "detection_latency_ms": round((collision.detected_at_us - contact_at_us) / 1e3, 3),
-        "impact_velocity_ned_m_s": _rounded(hit.impact_velocity_ned_m_s),
-        "normal_ned": _rounded(hit.normal_ned),
-        "contact_duration_s": round(hit.contact_duration_s, _TIME_DIGITS),
-        "max_fold_m": round(hit.max_fold_m, _TIME_DIGITS),
-        "rebound_speed_m_s": round(hit.rebound_speed_m_s, _DIGITS),
+        **_rounded(hit, "impact_velocity_ned_m_s", "normal_ned"),
+        **_rounded(hit, "contact_duration_s", "max_fold_m", digits=_TIME_DIGITS),
+        **_rounded(hit, "rebound_speed_m_s"),
         "peak_force_n": round(hit.peak_force_n, 2),
         "factor_of_safety": round(BREAKING_FORCE_N / hit.peak_force_n, 3) if facts.airframe == _PAPERS_FRAME else None,
         "impulse_n_s": round(math.hypot(*hit.impulse_ned_n_s), _DIGITS),
-        "energy_before_j": round(hit.energy_before_j, _DIGITS),
-        "energy_after_j": round(hit.energy_after_j, _DIGITS),
+        **_rounded(hit, "energy_before_j", "energy_after_j"),
         "overshoot_m": round(overshoot_m, _DIGITS),
         "height_lost_m": round(height_lost_m, _DIGITS),
         "stopped_off_m": _between(believed_ned_m, collision.recovery_setpoint_ned_m, hit.normal_ned),
@@ -145,10 +137,8 @@ def _recovery_end_us(report: FlightReport, number: int, facts: FlightFacts) -> f
     lasted_s = LONGEST_RECOVERY_S
     if collision.settled_after_s is not None:
         lasted_s = collision.settled_after_s + facts.settled_duration_s
-    end_us = min(collision.detected_at_us + lasted_s * 1e6, report.ended_at_us)
-    if number + 1 < len(report.collisions):
-        end_us = min(end_us, report.collisions[number + 1].detected_at_us)
-    return end_us
+    following_us = (later.detected_at_us for later in report.collisions[number + 1 :])
+    return min(collision.detected_at_us + lasted_s * 1e6, report.ended_at_us, *following_us)
 
 
 def _between(from_ned_m: Sequence[float], to_ned_m: Sequence[float], normal_ned: Sequence[float]) -> float:
@@ -161,5 +151,10 @@ def _seconds(time_us: float) -> float:
     return round(time_us / 1e6, _TIME_DIGITS)
 
 
-def _rounded(vector: tuple[float, float, float]) -> list[float]:
-    return [round(component, _DIGITS) for component in vector]
+def _rounded(what: object, *names: str, digits: int = _DIGITS) -> dict[str, Any]:
+    """Its numbers and vectors of these names; None stays None."""
+    found = {name: getattr(what, name) for name in names}
+    return {
+        name: [round(axis, digits) for axis in value] if isinstance(value, tuple) else value and round(value, digits)
+        for name, value in found.items()
+    }

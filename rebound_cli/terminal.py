@@ -1,10 +1,11 @@
 """A terminal: what has happened scrolls by above one region that is drawn anew, with the state now."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TextIO
 
 from rich.console import Console as RichConsole
-from rich.console import RenderableType
+from rich.console import Group, RenderableType
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
@@ -51,10 +52,7 @@ class Terminal:
     def progress(self, what: str, done: int, total: int) -> None:
         row = Table.grid(padding=(0, 1))
         row.add_row(f"{done} of {total}", ProgressBar(total, done, width=_BAR_WIDTH))
-        whole = Table.grid()
-        whole.add_row(what)
-        whole.add_row(row)
-        self._show(whole)
+        self._show(Group(what, row))
 
     def ask(self, question: str) -> None:
         self.close()
@@ -66,23 +64,21 @@ class Terminal:
         self._live = self._new_region()
 
     def _show(self, region: RenderableType) -> None:
-        self._raise()
-        try:
+        with self._unless_gone():
             self._live.start()
             self._live.update(region, refresh=True)
-        except OSError as error:
-            self._error = error
-            raise
 
     def _draw(self, what: RenderableType, end: str = "\n") -> None:
-        self._raise()
-        try:
+        with self._unless_gone():
             self._rich.print(what, end=end)
-        except OSError as error:
-            self._error = error
-            raise
 
-    def _raise(self) -> None:
+    @contextmanager
+    def _unless_gone(self) -> Iterator[None]:
         """A terminal that is gone stays gone; rich would keep what it could not write, and try it all again."""
         if self._error is not None:
             raise self._error
+        try:
+            yield
+        except OSError as error:
+            self._error = error
+            raise

@@ -13,7 +13,7 @@ _BIN_US = 100
 # How long another thread of ours may keep the loop's from running: Python's own 5 ms is more than a sample's interval.
 _SWITCH_INTERVAL_S = 0.0001
 # A figure that a person can read; PX4's slowest stream, the heartbeat, comes once a second.
-_RATE_OVER_US, _SILENT_US = 1_000_000, 1_000_000
+_SECOND_US = 1_000_000
 
 
 class Timing:
@@ -58,9 +58,9 @@ class Heard:
         """The rate of about the last second; empty before anything has been heard."""
         if self._last_us == 0:
             return ""
-        if now_us - self._last_us >= _SILENT_US:
+        if now_us - self._last_us >= _SECOND_US:
             return f"silent for {(now_us - self._last_us) / 1e6:.1f} s"
-        if now_us - self._since_us >= _RATE_OVER_US:
+        if now_us - self._since_us >= _SECOND_US:
             self._text = f"{self._bytes / 1e3 / ((now_us - self._since_us) / 1e6):.1f} kB/s"
             self._bytes, self._since_us = 0, now_us
         return self._text

@@ -68,30 +68,22 @@ class Matches:
 
 
 def match_contacts(collisions: Sequence[CollisionReport], hits: "Sequence[Hit]", settled_duration_s: float) -> Matches:
-    """Match on the vehicle's boot clock: a detection belongs to the contact that its IMU sample covers.
+    """Match on the vehicle's boot clock: a detection belongs to the contact that its IMU sample covers, one to one.
 
-    One contact explains one detection; `settled_duration_s` is how long a vehicle must have stayed
-    settled before the companion calls it recovered.
+    The companion calls a vehicle recovered that has stayed settled for `settled_duration_s`.
     """
     collision_of_hit: dict[int, CollisionReport] = {}
     hit_of_collision: list[Hit | None] = []
     for collision in collisions:
         index = index_of_hit(collision.sample_time_boot_us, hits)
-        if index is None or index in collision_of_hit:
-            hit_of_collision.append(None)
-            continue
-        collision_of_hit[index] = collision
-        hit_of_collision.append(hits[index])
+        is_new = index is not None and collision_of_hit.setdefault(index, collision) is collision
+        hit_of_collision.append(hits[index] if index is not None and is_new else None)
     recontacts = sum(
         not _is_recovered(collision_of_hit.get(index - 1), hits[index].contact_at_boot_us, settled_duration_s)
         for index in range(1, len(hits))
     )
-    return Matches(
-        tuple(hit_of_collision),
-        false_detections=hit_of_collision.count(None),
-        missed_contacts=len(hits) - len(collision_of_hit),
-        recontacts=recontacts,
-    )
+    missed = len(hits) - len(collision_of_hit)
+    return Matches(tuple(hit_of_collision), hit_of_collision.count(None), missed, recontacts)
 
 
 def index_of_hit(sample_time_boot_us: int, hits: "Sequence[Hit]") -> int | None:

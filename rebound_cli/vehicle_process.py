@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from companion.errors import ReboundError
@@ -40,14 +39,9 @@ class VehicleProcess:
         command = [sys.executable, "-m", "rebound_cli", "sim", "--mission", str(folder / RESOLVED_NAME)]
         command += [*options, "--truth", str(folder / TRUTH_NAME), "--stop-with-stdin"]
         with (folder / VEHICLE_LOG_NAME).open("wb") as log:
-            self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                # Ctrl-C goes to the companion alone: the vehicle has to fly on until it has landed or holds.
-                start_new_session=True,
-            )
+            # Ctrl-C goes to the companion alone: the vehicle has to fly on until it has landed or holds.
+            pipe = subprocess.PIPE
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=log, stderr=log, start_new_session=True)
 
     def wait_until_ready(self, interrupts: Interrupts, console: Console) -> None:
         """Return when the vehicle is on the air. Raises VehicleProcessError when the person has had enough.
@@ -80,8 +74,13 @@ class VehicleProcess:
     def _said(self) -> list[str]:
         return (self._folder / VEHICLE_LOG_NAME).read_text(errors="replace").strip().splitlines()
 
-    def stop(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """End the process; its truth file is complete when this returns."""
+        if kind is KeyboardInterrupt:
+            self._process.kill()
         if self._process.stdin is not None:
             self._process.stdin.close()
         for harsher in (self._process.terminate, self._process.kill):
@@ -91,13 +90,3 @@ class VehicleProcess:
             except subprocess.TimeoutExpired:
                 harsher()
         self._process.wait()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if kind is KeyboardInterrupt:
-            self._process.kill()
-        self.stop()

@@ -1,12 +1,16 @@
 """The rooms' rules: who may import whom, and where the world outside may be touched."""
 
-import ast
+import argparse
 import graphlib
 import importlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import bench.main
+import rebound_cli.main
 from bench.diagrams import with_diagrams
 from bench.import_graph import PACKAGES, imported_names, module_imports
 
@@ -88,20 +92,21 @@ def test_the_documented_diagrams_are_those_of_the_tables() -> None:
     assert text == with_diagrams(text), "run `make diagrams`"
 
 
-def test_every_command_runs_a_function_that_there_is() -> None:
+def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield command
+                yield from commands_of(command)
+
+
+@pytest.mark.parametrize("main", [bench.main, rebound_cli.main])
+def test_every_command_runs_a_function_that_there_is(main: Any) -> None:
     # Commands name their function in text, to import it late: no type checker sees a wrong one.
-    named = [
-        node.args[0].value
-        for package in ("rebound_cli", "bench")
-        for path in sources(package)
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "runs"
-        if isinstance(node.args[0], ast.Constant)
-    ]
-    assert len(named) > 10
-    for function in named:
-        module, _, attribute = str(function).partition(":")
-        assert callable(getattr(importlib.import_module(module), attribute)), function
+    runs = [run for command in commands_of(main.build_parser()) if (run := command.get_default("run"))]
+    assert len(runs) > 5
+    for module, function in (run.args for run in runs):
+        assert callable(getattr(importlib.import_module(module), function)), function
 
 
 @pytest.mark.parametrize("path", sources("tests/benchmarks"), ids=lambda path: path.stem)

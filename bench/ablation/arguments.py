@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from bench.ablation.rules import RULES
-from rebound_cli.arguments import Commands, add_workers, count, runs
+from bench.arguments import add_workers
+from rebound_cli.arguments import Commands, count, runs
 
 
 def add_ablation(commands: Commands) -> None:

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from bench.arguments import add_vehicles, add_workers
 from bench.recoveries.arguments import add_recoveries
-from bench.vehicles_argument import add_vehicles
-from rebound_cli.arguments import Commands, add_workers, count, runs
+from rebound_cli.arguments import Commands, count, runs
 
 
 def add_campaign(commands: Commands) -> None:

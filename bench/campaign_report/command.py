@@ -4,6 +4,7 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
+from bench.arguments import DRAWN_NAME, DRAWN_TITLE
 from bench.campaign.plan import Campaign
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.campaign_report import tables
@@ -15,15 +16,14 @@ from bench.campaign_report.picture import missions_figure
 from bench.campaign_report.reading import HOW_TO_READ
 from bench.detectors_report.bars import Bar, bars_text, summary_text
 from bench.marked import checked_text, write_part
+from bench.places import make_folder
 from bench.random_missions.campaign import missions_campaign
 from bench.random_missions.generator import MissionCase
 from bench.recoveries.command import PART as RECOVERY_PART
 from bench.recoveries.command import write_table
 from bench.recoveries.hits import recoveries_campaign
-from bench.vehicles_argument import DRAWN_NAME, DRAWN_TITLE
 from companion.errors import ConfigurationError
 from rebound_cli import __version__
-from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
 PART, TITLE = "campaign", "Campaign"

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from bench.arguments import add_workers
 from bench.detectors_report.arguments import add_data
-from rebound_cli.arguments import Commands, add_workers, count, runs
+from rebound_cli.arguments import Commands, count, runs
 
 
 def add_corpus(commands: Commands) -> None:

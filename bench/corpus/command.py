@@ -11,10 +11,11 @@ from bench.corpus.recording import record
 from bench.corpus.verdict import FlightCase, work_out
 from bench.detectors.campaigns import healthy_campaign, injected_campaign
 from bench.detectors.watching import FLOWN_WITH
+from bench.places import make_folder, make_place
 from bench.processes import in_processes
 from bench.random_missions.generator import AIRFRAMES, MissionCase
 from companion.errors import ReboundError
-from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME, make_folder, make_place, write_json
+from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME, write_json
 
 # Each recorded impact so often, each time in another flight.
 ROUNDS = 4

@@ -4,8 +4,8 @@ import os
 from argparse import ArgumentParser
 from pathlib import Path
 
-from bench.vehicles_argument import add_vehicles
-from rebound_cli.arguments import Commands, add_documents_folder, add_workers, count, hours, runs
+from bench.arguments import add_documents_folder, add_vehicles, add_workers, hours
+from rebound_cli.arguments import Commands, count, runs
 
 
 def add_data(parser: ArgumentParser) -> None:

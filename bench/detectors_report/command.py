@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from bench.arguments import DRAWN_NAME, DRAWN_TITLE
 from bench.campaign.plan import Campaign
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.detectors.campaigns import (
@@ -23,9 +24,8 @@ from bench.detectors_report.bars import Bar, bars_text, summary_text
 from bench.detectors_report.numbers import Hits
 from bench.detectors_report.reading import HOW_TO_READ
 from bench.marked import checked_text, write_part
-from bench.vehicles_argument import DRAWN_NAME, DRAWN_TITLE
+from bench.places import make_folder
 from rebound_cli import __version__
-from rebound_cli.run_folder import make_folder
 
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
 PART, TITLE = "detectors", "Detection"

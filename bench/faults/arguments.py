@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, add_jobs, count, runs
+from bench.arguments import add_jobs
+from rebound_cli.arguments import Commands, count, runs
 
 
 def add_faults(commands: Commands) -> None:

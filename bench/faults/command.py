@@ -14,9 +14,9 @@ from bench.faults.files import tried
 from bench.faults.flight import fly, fly_from_one_take_off
 from bench.faults.table import PART, TITLE, Row, text_of
 from bench.marked import checked_text, write_part
+from bench.processes import ctrl_c_waiting
 from companion.errors import ConfigurationError
-from rebound_cli.interrupts import ctrl_c_waiting
-from rebound_cli.progress import with_progress
+from rebound_cli.console import with_progress
 
 # A flight's number in the record is its row's plus so many for each seed.
 NAMES = (*FLOWN, *FILES)

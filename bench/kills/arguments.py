@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from rebound_cli.arguments import Commands, add_workers, count, runs
+from bench.arguments import add_workers
+from rebound_cli.arguments import Commands, count, runs
 
 
 def add_kills(commands: Commands) -> None:

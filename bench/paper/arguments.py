@@ -1,7 +1,8 @@
 """The arguments of `bench paper`."""
 
+from bench.arguments import add_documents_folder, add_jobs
 from bench.paper.results_arguments import add_results
-from rebound_cli.arguments import Commands, add_documents_folder, add_jobs, count, runs
+from rebound_cli.arguments import Commands, count, runs
 
 # Chosen so that all of it takes less than five minutes on two cores.
 DEFAULT_SEEDS = 6

@@ -19,9 +19,9 @@ from bench.paper.arguments import DEFAULT_SEEDS
 from bench.paper.flights import fly
 from bench.paper.study import Study, StudyFindings, concluded
 from bench.paper.table import ClaimRow, rows_text
+from bench.places import make_folder
 from bench.processes import in_processes
 from rebound_cli import __version__
-from rebound_cli.run_folder import make_folder
 
 STUDIES: tuple[Study, ...] = (
     arm,

@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.baselines.config import BaselineMission
 from bench.paper.flights import DETECTOR, GAMMA_S, LAW
+from bench.places import make_place
 from bench.processes import in_processes
 from bench.sensitivity import stop_sensitivity_text
 from rebound_cli import __version__
@@ -19,7 +20,7 @@ from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import load_mission_document, with_guards, world_from
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import TLOG_NAME, FlightRecorder, make_place
+from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
 from rebound_cli.summary import FlightFacts, build_summary
 from rebound_cli.truth_match import match_contacts
 

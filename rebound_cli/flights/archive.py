@@ -5,22 +5,17 @@ import json
 import re
 import tarfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import yaml
 
+from rebound_cli import run_folder
 from rebound_cli.flights.kept import KeptFlight
-from rebound_cli.run_folder import (
-    EVENTS_NAME,
-    GUARD_NAME,
-    INPUTS_NAME,
-    SUMMARY_NAME,
-    VERSIONS_NAME,
-    read_text,
-    whole_lines,
-)
+from rebound_cli.run_folder import read_text, whole_lines
 
 # The names of all quantities end in frame and unit: these are the places.
 _PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")
@@ -30,13 +25,12 @@ _PLACES = re.compile(r"\[-?\d[\d.]*(?:, -?\d[\d.]*)+\]|(?<=position )[-+]\d[\d.]
 _KEY = re.compile(r"\b[0-9a-fA-F]{64}\b")
 
 
+@dataclass(frozen=True, slots=True)
 class Archive:
-    """A new tar.gz, whole when the `with` ends; where that fails, nothing is left of it."""
+    """A tar.gz that is being written."""
 
-    def __init__(self, path: Path, no_position: bool) -> None:
-        self._path, self._unfinished = path, path.with_name(f"{path.name}.part")
-        self.no_position = no_position
-        self._tar = tarfile.open(self._unfinished, "w:gz")  # noqa: SIM115
+    tar: tarfile.TarFile
+    no_position: bool
 
     def add_text(self, name: str, text: str) -> None:
         self._add(name, _PLACES.sub("[left out]", text) if self.no_position else text)
@@ -61,23 +55,19 @@ class Archive:
         content = _KEY.sub("(key left out)", text).encode()
         entry = tarfile.TarInfo(name)
         entry.size, entry.mtime = len(content), int(time.time())
-        self._tar.addfile(entry, io.BytesIO(content))
+        self.tar.addfile(entry, io.BytesIO(content))
 
-    def add_file(self, name: str, file: Path) -> None:
-        """As long as it is now: the present flight goes on meanwhile."""
-        self._tar.add(file, name, recursive=False)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._tar.close()
-        if kind is None:
-            self._unfinished.replace(self._path)
-        else:
-            self._unfinished.unlink()
+@contextmanager
+def new_archive(path: Path, no_position: bool) -> Iterator[Archive]:
+    """Whole when the `with` ends; where that fails, nothing is left of it."""
+    unfinished = path.with_name(f"{path.name}.part")
+    try:
+        with tarfile.open(unfinished, "w:gz") as tar:
+            yield Archive(tar, no_position)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
 
 
 def add_flight(archive: Archive, flight: KeptFlight, below: str) -> None:
@@ -88,10 +78,11 @@ def add_flight(archive: Archive, flight: KeptFlight, below: str) -> None:
     for file in sorted(flight.folder.iterdir()):
         name = f"{below}{flight.name}/{file.name}"
         if not archive.no_position:
-            archive.add_file(name, file)
-        elif file.name in (EVENTS_NAME, INPUTS_NAME):
+            # As long as it is now: the present flight goes on meanwhile.
+            archive.tar.add(file, name, recursive=False)
+        elif file.name in (run_folder.EVENTS_NAME, run_folder.INPUTS_NAME):
             archive.add_data(name, whole_lines(read_text(file)))
-        elif file.name in (SUMMARY_NAME, GUARD_NAME, VERSIONS_NAME):
+        elif file.name in (run_folder.SUMMARY_NAME, run_folder.GUARD_NAME, run_folder.VERSIONS_NAME):
             archive.add_data(name, read_text(file))
 
 

@@ -5,9 +5,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from companion.report import Event
 from rebound_cli.console import console_for
-from rebound_cli.flights.archive import Archive, add_flight
+from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
 from rebound_cli.run_folder import EVENTS_NAME, RunFolderError, read_records
 
@@ -37,10 +36,8 @@ def run_show(options: Namespace) -> int:
         return 0
     console = console_for(False)
     console.print(f"{told['name']}: {told['end']}; {told['hits']} hits, {told['size_bytes'] / 1e6:.1f} MB")
-    began_us = events[0]["time_us"] if events else 0
-    console.events(
-        [Event(event["time_us"], event["kind"], str(event.get("text", "")), {}) for event in events], began_us
-    )
+    for event in events:
+        console.event((event["time_us"] - events[0]["time_us"]) / 1e6, event["kind"], str(event.get("text", "")))
     return 0
 
 
@@ -48,7 +45,7 @@ def run_export(options: Namespace) -> int:
     """Raises FlightError, RunFolderError."""
     flight = flight_named(runs_folder(options.runs), options.flight)
     out = options.out or Path(f"{flight.name}.tar.gz")
-    with Archive(out, options.no_position) as archive:
+    with new_archive(out, options.no_position) as archive:
         add_flight(archive, flight, "")
     print(f"{flight.name} is in {out}")
     return 0
@@ -62,15 +59,12 @@ def overview(flight: KeptFlight) -> dict[str, Any]:
     except RunFolderError:
         lines, ends = [], []
     summary = flight.summary()
-    if flight.is_being_flown():
-        end = "being flown"
-    else:
-        end = "cut off" if summary is None else str(summary.get("reason") or summary.get("outcome"))
+    end = "cut off" if summary is None else str(summary.get("reason") or summary.get("outcome"))
     return {
         "name": flight.name,
         "begun": flight.begun,
         "duration_s": (ends[-1]["time_us"] - ends[0]["time_us"]) / 1e6 if ends else None,
         "size_bytes": flight.size_bytes,
         "hits": hits_in(lines),
-        "end": end,
+        "end": "being flown" if flight.is_being_flown() else end,
     }

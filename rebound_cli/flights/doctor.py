@@ -6,14 +6,16 @@ import platform
 import shutil
 import subprocess
 from argparse import Namespace
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from companion.errors import ConfigurationError
-from rebound_cli.flights.archive import Archive, add_flight
+from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import kept_flights, runs_folder
 from rebound_cli.run_folder import read_text, versions
-from rebound_cli.service.settings import FOLDER
-from rebound_cli.status.asking import StatusError, ask
+from rebound_cli.service.files import FOLDER
+from rebound_cli.status import StatusError, ask
 
 SETTINGS = Path("/", FOLDER)
 # What a service's unit and the rule of its device are called.
@@ -31,12 +33,12 @@ def run_doctor(options: Namespace) -> int:
         if not file.is_file():
             raise ConfigurationError(f"{file} does not exist: give a file, or leave the option out.")
     runs = runs_folder(options.runs)
-    with Archive(options.out, options.no_position) as archive:
+    with new_archive(options.out, options.no_position) as archive:
         archive.add_data("versions.json", json.dumps(versions(), indent=2) + "\n")
         archive.add_text("machine.txt", _machine(runs))
         archive.add_text("journal.txt", _journal())
-        archive.add_data("status.json", _status())
-        settings = [*options.config, *(sorted(SETTINGS.glob("*.yaml")) if SETTINGS.is_dir() else ())]
+        archive.add_data("status.json", json.dumps(_status(), indent=2) + "\n")
+        settings = [*options.config, *sorted(SETTINGS.glob("*.yaml"))]
         for number, file in enumerate(settings, start=1):
             archive.add_data(f"settings/{number}-{file.name}", read_text(file))
         for folder, pattern in _SYSTEM_FILES:
@@ -48,9 +50,7 @@ def run_doctor(options: Namespace) -> int:
         for flight in flights:
             add_flight(archive, flight, "flights/")
     size_mb = options.out.stat().st_size / 1e6
-    what = (
-        "coordinates are left out" if options.no_position else "the flights' coordinates are in it: see --no-position"
-    )
+    what = "coordinates are left out" if options.no_position else "flights' coordinates are in it: see --no-position"
     print(f"{options.out}: {size_mb:.1f} MB, {len(flights)} flights; keys are left out, {what}.")
     return 0
 
@@ -80,8 +80,8 @@ def _journal() -> str:
     return (done.stdout + done.stderr).decode(errors="replace")
 
 
-def _status() -> str:
+def _status() -> Mapping[str, Any]:
     try:
-        return json.dumps(ask(None), indent=2) + "\n"
+        return ask(None)
     except StatusError as error:
-        return json.dumps({"error": str(error)}) + "\n"
+        return {"error": str(error)}

@@ -1,25 +1,24 @@
-"""The flights of real vehicles in a folder of runs, told from all else that may lie there."""
+"""The flights of real vehicles in a folder of runs, told from all else there; and room for the present one.
 
+Files are looked at and removed where the log is written, not in the flight's own thread.
+"""
+
+import errno
 import fcntl
 import json
+import os
 import re
-from collections.abc import Mapping, Sequence
+import shutil
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from companion.errors import ReboundError
-from rebound_cli.run_folder import (
-    AIRFRAME_NAME,
-    EVENTS_NAME,
-    HIT_KINDS,
-    RUNS_FOLDER,
-    SUMMARY_NAME,
-    TLOG_NAME,
-    read_text,
-    whole_lines,
-)
+from companion.mission.config import DiskConfig
+from rebound_cli import run_folder
+from rebound_cli.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_text, whole_lines
 
 # As `create_run_folder` names them. A folder that a person has named is that person's.
 _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")
@@ -27,6 +26,20 @@ _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")
 _BLOCK_BYTES = 512
 # Where a service flies: below systemd's StateDirectory=rebound.
 SERVICE_RUNS = Path("/var/lib/rebound/runs")
+
+_MB = 1_000_000
+_MIB = 1 << 20
+# journald's SystemMaxUse: a tenth of the file system, and 4 GiB at most (journald.conf(5)).
+_MOST_BYTES = 4096 * _MIB
+# PX4's logger removes its oldest logs until so much is free, or a tenth of a smaller disk (logger/util.cpp).
+_FREE_BYTES = 300 * _MIB
+# With less than this PX4's logger records nothing (logger/util.cpp). Here packets end; events, the summary and the
+# time stamps of signatures still find room.
+LAST_BYTES = 10 * _MIB
+# At PX4's fastest streams packets are some 125 kB a second: a little more than a megabyte by then.
+LOOK_EVERY_US = 10_000_000
+# Renamed to this before it is removed: a power cut leaves no half of a flight behind under its name.
+_GOING = ".removed-"
 
 
 class FlightError(ReboundError):
@@ -50,34 +63,43 @@ class KeptFlight:
         try:
             with (self.folder / EVENTS_NAME).open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return False
+        except OSError as error:
+            return isinstance(error, BlockingIOError)
         return False
 
     def event_lines(self) -> Sequence[str]:
         """Of `events.jsonl`, as far as they were written. Raises RunFolderError."""
         return whole_lines(read_text(self.folder / EVENTS_NAME)).splitlines(keepends=True)
 
+    def has_hit(self) -> bool:
+        """Where that cannot be read it might have."""
+        try:
+            return hits_in(self.event_lines()) > 0
+        except ReboundError:
+            return True
+
+    def remove(self) -> bool:
+        """Not where another program flies it now, or where it is somebody else's."""
+        if self.is_being_flown():
+            return False
+        going = self.folder.with_name(_GOING + self.name)
+        try:
+            os.rename(self.folder, going)
+        except OSError:
+            return False
+        shutil.rmtree(going, ignore_errors=True)
+        return True
+
     def summary(self) -> Mapping[str, Any] | None:
         """None of a flight that is not over, or was cut off."""
         with suppress(OSError, ValueError):
-            return dict(json.loads((self.folder / SUMMARY_NAME).read_text(encoding="utf-8")))
+            return dict(json.loads((self.folder / run_folder.SUMMARY_NAME).read_text(encoding="utf-8")))
         return None
 
 
 def hits_in(lines: Sequence[str]) -> int:
     """Of lines as `event_line` writes them, which need not be parsed for it."""
-    return sum(line.count(f'"kind": "{kind}"') for line in lines for kind in HIT_KINDS)
-
-
-def has_hit(flight: KeptFlight) -> bool:
-    """Where that cannot be read it might have."""
-    try:
-        return hits_in(flight.event_lines()) > 0
-    except ReboundError:
-        return True
+    return sum(line.count(f'"kind": "{kind}"') for line in lines for kind in run_folder.HIT_KINDS)
 
 
 def size_of(folder: Path) -> int:
@@ -98,7 +120,7 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
         tlog = folder / TLOG_NAME
         # One that another program has just removed is none.
         with suppress(FileNotFoundError):
-            if name and not folder.is_symlink() and tlog.is_file() and not (folder / AIRFRAME_NAME).exists():
+            if name and not folder.is_symlink() and tlog.is_file() and not (folder / run_folder.AIRFRAME_NAME).exists():
                 found.append((name[1], tlog.stat().st_mtime, KeptFlight(folder, name[1], size_of(folder))))
     return [flight for *_, flight in sorted(found, key=lambda entry: entry[:2])]
 
@@ -106,12 +128,86 @@ def kept_flights(runs: Path) -> list[KeptFlight]:
 def flight_named(runs: Path, name: str) -> KeptFlight:
     """`last`, a name in the folder of runs, or a path. Raises FlightError."""
     flights = kept_flights(runs)
-    if name == "last":
-        if not flights:
-            raise FlightError(f"No flight of a vehicle is in {runs}.")
+    if name == "last" and flights:
         return flights[-1]
+    if name == "last":
+        raise FlightError(f"No flight of a vehicle is in {runs}.")
     for folder in (runs / name, Path(name)):
         if (folder / TLOG_NAME).is_file():
             begun = _NAMED_BY_US.fullmatch(folder.name)
             return KeptFlight(folder, begun[1] if begun else "", size_of(folder))
     raise FlightError(f"No flight {name} is in {runs}; `rebound logs list` names those that are.")
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """In bytes: of all flights together, and of what is left free."""
+
+    max_use: int
+    keep_free: int
+
+    def to_go(self, used_bytes: int, free_bytes: int) -> int:
+        """How much is to be removed, of what all flights take and what is free."""
+        return max(used_bytes - self.max_use, self.keep_free - free_bytes, 0)
+
+
+def limits_of(config: DiskConfig, file_system_bytes: int) -> Limits:
+    tenth = file_system_bytes // 10
+    return Limits(
+        min(tenth, _MOST_BYTES) if config.max_use_mb is None else round(config.max_use_mb * _MB),
+        min(tenth, _FREE_BYTES) if config.keep_free_mb is None else round(config.keep_free_mb * _MB),
+    )
+
+
+class Ring:
+    """The oldest go where all together pass a budget or the disk has too little left; never the present one."""
+
+    def __init__(self, present: Path, config: DiskConfig) -> None:
+        self._present, self._runs = present, present.parent
+        self._config = config
+        self._due_us = 0
+        self._others_bytes: int | None = None  # what the others take: they do not change
+        self._hits: dict[Path, bool] = {}
+        self._has_room = True
+
+    def make_room(self, now_us: int) -> None:
+        """For the packets of the present flight. Raises OSError where nothing can go and the disk is nearly full."""
+        if now_us >= self._due_us:
+            self._due_us = now_us + LOOK_EVERY_US
+            self._look()
+        if not self._has_room:
+            text = f"less than {LAST_BYTES // _MIB} MiB of the disk are free, packets are left out until there are more"
+            raise OSError(errno.ENOSPC, text)
+
+    def _look(self) -> None:
+        disk = shutil.disk_usage(self._runs)
+        limits = limits_of(self._config, disk.total)
+        if self._others_bytes is None:
+            # What a power cut left of one that was being removed.
+            for folder in self._runs.glob(f"{_GOING}*"):
+                shutil.rmtree(folder, ignore_errors=True)
+            self._others_bytes = sum(flight.size_bytes for flight in self._others())
+        to_go = limits.to_go(self._others_bytes + size_of(self._present), disk.free)
+        if to_go > 0:
+            self._remove(to_go)
+        self._has_room = shutil.disk_usage(self._runs).free >= min(LAST_BYTES, limits.keep_free)
+
+    def _others(self) -> list[KeptFlight]:
+        return [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
+
+    def _remove(self, to_go: int) -> None:
+        """From the oldest on: those without a hit, then those with one."""
+        others = self._others()
+        self._others_bytes = sum(flight.size_bytes for flight in others)
+        for flight in others:
+            if flight.folder not in self._hits:
+                self._hits[flight.folder] = flight.has_hit()
+        for flight in sorted(others, key=lambda flight: self._hits[flight.folder]):
+            if to_go > 0 and flight.remove():
+                to_go -= flight.size_bytes
+                self._others_bytes -= flight.size_bytes
+
+
+def room_for(folder: Path, out: Path | None, config: DiskConfig) -> Callable[[int], None] | None:
+    """What a recorder asks before it writes packets; nothing where a person has named the folder, and keeps it."""
+    return Ring(folder, config).make_room if out is None else None

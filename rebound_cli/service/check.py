@@ -3,14 +3,15 @@
 import pwd
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TypeAlias
 
 from companion.errors import ConfigurationError
 from companion.preflight.checks import Finding, Verdict
-from rebound_cli.service.files import UNIT, UNIT_NAME, USER
-from rebound_cli.service.plan import Plan, plan
-from rebound_cli.service.system import System, hidden_program
+from rebound_cli.preflight import show_findings
+from rebound_cli.service.files import UNIT, UNIT_NAME, USER, PlannedFile, ServiceSettings
+from rebound_cli.service.system import System, answer, hidden_program
 
 # systemd-analyze's scale has 10 for a service that may do everything; it calls up to 2 safe or nearly so.
 MOST_EXPOSED = 2.0
@@ -18,73 +19,58 @@ _BY_ID = Path("/dev/serial/by-id")
 _AGAIN = "sudo rebound service install"
 
 
-def run_check(system: System) -> int:
+Plan: TypeAlias = Callable[[System], tuple[ServiceSettings, list[PlannedFile]]]
+
+
+def run_check(system: System, plan: Plan) -> int:
     """Print the findings; 0 when none of them is bad."""
-    found = list(_findings(system))
-    for finding in found:
-        print(f"  {finding.verdict.value:4}  {finding.item:10} {finding.found}")
-        if finding.remedy:
-            print(f"        {'':10} -> {finding.remedy}")
+    found = list(_findings(system, plan))
+    show_findings(found, 10, print)
     return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0
 
 
-def _findings(system: System) -> Iterator[Finding]:
-    if not (system.root / UNIT).exists():
+def _judged(item: str, is_good: bool, good: str, bad: str, remedy: str = _AGAIN) -> Finding:
+    return Finding(item, Verdict.GOOD, good) if is_good else Finding(item, Verdict.BAD, bad, remedy)
+
+
+def _findings(system: System, plan: Plan) -> Iterator[Finding]:
+    unit = system.root / UNIT
+    if not unit.exists():
         yield Finding("unit", Verdict.BAD, f"/{UNIT} is not there", f"{_AGAIN} --guard CONFIG --connect URL")
         return
     try:
-        planned = plan(system)
+        settings, planned = plan(system)
     except ConfigurationError as error:
         yield Finding("settings", Verdict.BAD, str(error), f"mend it, then {_AGAIN}")
         return
-    yield Finding("settings", Verdict.GOOD, f"{planned.settings.run} at {planned.settings.connect}")
-    yield _files(planned, system)
-    yield _program()
-    if system.is_running:
-        yield _user()
-        if planned.settings.device is not None:
-            yield _device(planned.settings.device)
-    yield from analysed(system, (system.root / UNIT).read_text(encoding="utf-8"))
-
-
-def _files(planned: Plan, system: System) -> Finding:
+    yield Finding("settings", Verdict.GOOD, f"{settings.run} at {settings.connect}")
+    there = {file: system.root / file.path for file in planned}
     other = [
         f"/{file.path}"
-        for file in planned.files
-        if not (system.root / file.path).exists() or (system.root / file.path).read_text(encoding="utf-8") != file.text
+        for file, path in there.items()
+        if not path.exists() or path.read_text(encoding="utf-8") != file.text
     ]
-    if other:
-        return Finding("files", Verdict.BAD, f"not as this version writes them: {', '.join(other)}", _AGAIN)
-    return Finding("files", Verdict.GOOD, "as this version writes them")
-
-
-def _program() -> Finding:
+    text = "as this version writes them"
+    yield _judged("files", not other, text, f"not {text}: {', '.join(other)}")
     hidden = hidden_program()
-    if hidden is not None:
-        return Finding("program", Verdict.BAD, f"{hidden} is hidden from the service", "install it in /opt/rebound")
-    return Finding("program", Verdict.GOOD, "where the service can read it")
-
-
-def _user() -> Finding:
-    try:
-        pwd.getpwnam(USER)
-    except KeyError:
-        return Finding("user", Verdict.BAD, f"{USER} is not there", _AGAIN)
-    return Finding("user", Verdict.GOOD, USER)
+    text = f"{hidden} is hidden from the service"
+    yield _judged("program", hidden is None, "where the service can read it", text, "install it in /opt/rebound")
+    if system.is_running:
+        yield _judged("user", USER in {user.pw_name for user in pwd.getpwall()}, USER, f"{USER} is not there")
+        if settings.device is not None:
+            yield _device(settings.device)
+    yield from analysed(unit.read_text(encoding="utf-8"))
 
 
 def _device(device: str) -> Finding:
-    if not Path(device).exists():
-        return Finding(
-            "device", Verdict.BAD, f"{device} is not there", "look at the cable, and at raspi-config's serial port"
-        )
     names = sorted(name for name in _BY_ID.glob("*") if name.resolve() == Path(device).resolve())
     if names and not device.startswith(str(_BY_ID)):
         return Finding("device", Verdict.DOUBTFUL, f"{device} may be another device tomorrow", f"use {names[0]}")
-    return Finding("device", Verdict.GOOD, device)
+    remedy = "look at the cable, and at raspi-config's serial port"
+    return _judged("device", Path(device).exists(), device, f"{device} is not there", remedy)
 
 
-def analysed(system: System, unit: str) -> Iterator[Finding]:
+def analysed(unit: str) -> Iterator[Finding]:
     """What systemd-analyze says of the unit, offline."""
     if shutil.which("systemd-analyze") is None:
         yield Finding("unit", Verdict.DOUBTFUL, "not looked at: there is no systemd-analyze here")
@@ -92,21 +78,10 @@ def analysed(system: System, unit: str) -> Iterator[Finding]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, UNIT_NAME)
         file.write_text(unit, encoding="utf-8")
-        said, code = system.answer("systemd-analyze", "verify", str(file))
+        said, code = answer("systemd-analyze", "verify", str(file))
         # It exits with 0 where it complains of a line that it leaves out.
-        is_clean = code == 0 and not said
-        yield Finding(
-            "unit",
-            Verdict.GOOD if is_clean else Verdict.BAD,
-            said.partition("\n")[0] or "in order",
-            "" if is_clean else _AGAIN,
-        )
+        yield _judged("unit", code == 0 and not said, "in order", said.partition("\n")[0] or "not in order")
         threshold = f"--threshold={MOST_EXPOSED * 10:.0f}"
-        said, code = system.answer("systemd-analyze", "security", "--offline=true", "--no-pager", threshold, str(file))
-        overall = said.rpartition("→ ")[2]
-        yield Finding(
-            "exposure",
-            Verdict.GOOD if code == 0 else Verdict.BAD,
-            overall.rpartition(": ")[2] or "unknown",
-            "" if code == 0 else _AGAIN,
-        )
+        said, code = answer("systemd-analyze", "security", "--offline=true", "--no-pager", threshold, str(file))
+        exposure = said.rpartition("→ ")[2].rpartition(": ")[2] or "unknown"
+        yield _judged("exposure", code == 0, exposure, exposure)

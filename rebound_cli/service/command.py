@@ -1,14 +1,25 @@
-"""`rebound service`: writes the files, and has systemd do the rest."""
+"""`rebound service`: writes the files, has systemd do the rest, and keeps every value that is in /etc/rebound."""
 
 import shutil
+import sys
 from argparse import Namespace
+from pathlib import Path
 
+from companion.guard.config import GuardConfig
+from rebound_cli import documents
+from rebound_cli.documents import DocumentError, Override, apply_override, load_document, parse_document, validated
+from rebound_cli.inputs import mission_from
+from rebound_cli.run_folder import read_text
+from rebound_cli.service import files
 from rebound_cli.service.check import run_check
-from rebound_cli.service.files import STATE_FOLDER, SYSUSERS, UDEV, UNIT, UNIT_NAME
-from rebound_cli.service.plan import plan
-from rebound_cli.service.settings import FOLDER
-from rebound_cli.service.system import ServiceError, System, hidden_program
+from rebound_cli.service.files import FOLDER, SYSUSERS, UDEV, UNIT, UNIT_NAME, PlannedFile, ServiceSettings
+from rebound_cli.service.system import ServiceError, System, hidden_program, serial_group
 
+_SETTINGS_NAME, _GUARD_NAME = "service.yaml", "guard.yaml"
+# A guard by all its defaults, of which the first to be changed is shown.
+_GUARD_TEXT = "# Settings: docs/guard.md.\nthen: hold\n"
+# What was asked for, beside what is kept.
+_NEW = ".new"
 _BOOT = "It runs from the next boot on."
 _STARTED = f"""It runs now, and from every boot on: rebound service status
 What ran before goes on as it was. Restart it on the ground: sudo systemctl restart {UNIT_NAME}"""
@@ -28,27 +39,27 @@ def run_on(system: System, options: Namespace) -> int:
     if options.what == "uninstall":
         return _uninstall(system, options.dry_run)
     if options.what == "check":
-        return run_check(system)
+        return run_check(system, plan)
     return system.call("systemctl", "status", "--no-pager", UNIT_NAME)
 
 
 def _install(system: System, options: Namespace) -> int:
-    planned = plan(system, options.guard, options.mission, options.connect)
+    settings, planned = plan(system, options.guard, options.mission, options.connect)
     if options.dry_run:
-        print("\n".join(f"# /{file.path}\n{file.text}" for file in planned.files), end="")
+        print("\n".join(f"# /{file.path}\n{file.text}" for file in planned), end="")
         return 0
     system.refuse_if_unfit()
     hidden = hidden_program()
     if hidden is not None:
         text = f"{hidden} is hidden from the service: install Rebound in /opt/rebound (docs/companion-computer.md)."
         raise ServiceError(text)
-    for file in planned.files:
+    for file in planned:
         if not file.is_kept:
             system.write(file.path, file.text)
         print(f"{'kept' if file.is_kept else 'wrote'} /{file.path}")
-    if planned.settings.device is None:
+    if settings.device is None:
         (system.root / UDEV).unlink(missing_ok=True)
-    is_guard = planned.settings.run == "guard"
+    is_guard = settings.run == "guard"
     system.told("systemd-sysusers", *system.root_option(), SYSUSERS.rpartition("/")[2])
     _reload(system)
     # What was a guard and is a mission now is not to begin with the next boot.
@@ -56,10 +67,71 @@ def _install(system: System, options: Namespace) -> int:
     if is_guard and system.is_running:
         # It is ready when the vehicle is heard: nobody waits for that here.
         system.told("systemctl", "start", "--no-block", UNIT_NAME)
-    for sentence in planned.left_aside:
-        print(sentence)
+    for file in planned:
+        if file.path.endswith(_NEW):
+            beside = Path(file.path).name
+            print(f"/{file.path.removesuffix(_NEW)} is kept. What you asked for is beside it, as {beside}.")
     print(_NOT_STARTED if not is_guard else _STARTED if system.is_running else _BOOT)
     return 0
+
+
+def plan(
+    system: System, guard: Path | None = None, mission: Path | None = None, connect: str | None = None
+) -> tuple[ServiceSettings, list[PlannedFile]]:
+    """What will hold, and the files of an installation; the unit last: without it nothing else does anything.
+
+    Raises DocumentError for what is wrong in the options, in the files they name, or in /etc/rebound.
+    """
+    stored = system.root / FOLDER / _SETTINGS_NAME
+    document = load_document(stored) if stored.exists() else documents.Document(str(stored))
+    settings = validated(ServiceSettings, document, document.data)
+    source = guard or mission
+    if source is not None:
+        document.data["run"] = "mission" if guard is None else "guard"
+    if connect is not None:
+        apply_override(document, Override(f"--connect {connect}", ("connect",), connect))
+    asked = validated(ServiceSettings, document, document.data)
+    is_new = not stored.exists()
+    settings = asked if is_new else settings
+    planned = _in_etc(system, _SETTINGS_NAME, asked.text() if is_new or asked != settings else None)
+    for kind in sorted({asked.run, settings.run}):
+        text = None
+        if kind == asked.run and source is not None:
+            text = read_text(source)
+            _check_run(kind, text, str(source))
+        planned += _in_etc(system, f"{kind}.yaml", text)
+        _check_run(kind, planned[-1].text, f"/{planned[-1].path}")
+    planned.append(PlannedFile(SYSUSERS, files.sysusers_text()))
+    if settings.device is not None:
+        planned.append(PlannedFile(UDEV, files.udev_text(settings.device)))
+    unit = files.unit_text(settings, sys.executable, system.release(), serial_group())
+    return settings, [*planned, PlannedFile(UNIT, unit)]
+
+
+def _in_etc(system: System, name: str, asked: str | None) -> list[PlannedFile]:
+    """A person's file; where there is one already, that one, and beside it what is asked for now."""
+    path = f"{FOLDER}/{name}"
+    if (system.root / path).exists():
+        stored = read_text(system.root / path)
+        beside = [] if asked in (None, stored) else [PlannedFile(path + _NEW, str(asked))]
+        return [*beside, PlannedFile(path, stored, is_kept=True)]
+    if asked is None and name != _GUARD_NAME:
+        raise DocumentError(f"/{path}: no such file; give --mission FILE.")
+    return [PlannedFile(path, asked or _GUARD_TEXT)]
+
+
+def _check_run(kind: str, text: str, name: str) -> None:
+    """The guard's settings or the mission, as the service will read them. Raises DocumentError."""
+    document = parse_document(text, name)
+    if kind == "guard":
+        validated(GuardConfig, document, document.data)
+        return
+    obstacles = document.data.get("obstacles")
+    file = obstacles.get("file") if isinstance(obstacles, dict) else None
+    if isinstance(file, str) and not Path(file).is_absolute():
+        place = document.place_of(("obstacles", "file"))
+        raise DocumentError(f"{place}: obstacles.file: the mission is copied to /{FOLDER}; give the file's whole path.")
+    mission_from(document)
 
 
 def _uninstall(system: System, is_dry_run: bool) -> int:
@@ -77,7 +149,7 @@ def _uninstall(system: System, is_dry_run: bool) -> int:
         (system.root / path).unlink()
         print(f"removed /{path}")
     _reload(system)
-    print(f"Settings in /{FOLDER} and flights in {STATE_FOLDER} are kept.")
+    print(f"Settings in /{FOLDER} and flights in {files.STATE_FOLDER} are kept.")
     return 0
 
 

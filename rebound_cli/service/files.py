@@ -1,13 +1,22 @@
-"""The files of the service that follow from its settings: the unit, udev's rules, the user."""
+"""The service's files: its settings in /etc/rebound, and what follows from them: the unit, udev's rules, the user."""
 
+import json
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Annotated, Literal
 
+from pydantic import AfterValidator, Field
+
+from companion.errors import AddressError
+from companion.shell.addresses import serial_device
+from companion.written import Written
 from rebound_cli import exit_codes
 from rebound_cli.flights.kept import SERVICE_RUNS
-from rebound_cli.service.settings import ServiceSettings
 
+FOLDER = "etc/rebound"
 UNIT_NAME = "rebound.service"
 UNIT = f"etc/systemd/system/{UNIT_NAME}"
 UDEV = "etc/udev/rules.d/90-rebound.rules"
@@ -15,17 +24,65 @@ SYSUSERS = "etc/sysusers.d/rebound.conf"
 USER = "rebound"
 STATE_FOLDER = SERVICE_RUNS.parent
 
+# The UART of a Raspberry Pi at the rate of PX4's TELEM2 for a companion (SER_TEL2_BAUD).
+DEFAULT_URL = "serial:///dev/ttyAMA0:921600"
+# What udev lets a device's name consist of; anything else would have to be quoted in its rules.
+_DEVICE = re.compile(r"/dev/[A-Za-z0-9#+.:=@_/-]+")
 # The release of systemd that brought RestartSteps and RestartMaxDelaySec; older ones complain of them.
-BACK_OFF_SINCE = 254
-# MAVLink's heartbeat protocol gives a component up after five beats of one second: others take it for gone by then.
-# PX4 has had control back for four of them (COM_OF_LOSS_T, 1 s), and no busy card is taken for a loop that hangs.
-WATCHDOG_S = 5
-# Handing the vehicle over takes 10 s at most (realtime.HANDING_OVER_US); as long again for a slow card to take the log.
-STOP_S = 20
+_BACK_OFF_SINCE = 254
 # Linux's numbers of USB serial ports (devices.txt). A port that is plugged in again may have another name.
 _USB_MAJORS = {"ttyACM": 166, "ttyUSB": 188}
 _BY_ID = "/dev/serial/by-id/"
-_WRITTEN_BY = "# Written by `rebound service install`, from /etc/rebound/service.yaml."
+_UNIT = Path(__file__).with_name(UNIT_NAME).read_text(encoding="utf-8")
+_WRITTEN_BY = _UNIT.partition("\n")[0]
+
+
+def _address(url: str) -> str:
+    try:
+        device = serial_device(url)
+    except AddressError as error:
+        raise ValueError(str(error)) from error
+    if device is not None and (_DEVICE.fullmatch(device) is None or ".." in device):
+        raise ValueError(f"{device!r} is not the name of a device, such as /dev/ttyAMA0")
+    return url
+
+
+Plain = Annotated[str, Field(strict=True, min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
+
+
+class ServiceSettings(Written):
+    """/etc/rebound/service.yaml; a key that a new version brings is optional."""
+
+    run: Literal["guard", "mission"] = "guard"
+    connect: Annotated[Plain, AfterValidator(_address)] = DEFAULT_URL
+    peer: Plain | None = None
+    signing_key: Plain | None = None
+
+    @property
+    def device(self) -> str | None:
+        """The serial device; None on a network."""
+        return serial_device(self.connect)
+
+    def arguments(self) -> Sequence[str]:
+        """What the service runs, after `rebound`."""
+        file = f"/{FOLDER}/{self.run}.yaml"
+        first = ["guard", "--config", file] if self.run == "guard" else ["fly", file, "--yes"]
+        options = {"--connect": self.connect, "--peer": self.peer, "--signing-key": self.signing_key}
+        return [*first, *(word for name, value in options.items() if value is not None for word in (name, value))]
+
+    def text(self) -> str:
+        """A file that says the same. A quoted text of JSON is one of YAML."""
+        lines = [f"{key}: {json.dumps(value)}\n" for key, value in self.model_dump(exclude_none=True).items()]
+        return "# What the service runs. After a change: sudo rebound service install\n" + "".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedFile:
+    """A file below the system's root; a kept one is there already with this text."""
+
+    path: str
+    text: str
+    is_kept: bool = False
 
 
 def sysusers_text() -> str:
@@ -46,111 +103,47 @@ def udev_text(device: str) -> str:
 def unit_text(settings: ServiceSettings, python: str, systemd: int | None, serial_group: str) -> str:
     """`systemd`: its release, None where nobody knows. `serial_group` may open serial ports."""
     is_guard = settings.run == "guard"
-    command = " ".join(map(_word, (python, "-P", "-m", "rebound_cli", *settings.arguments())))
-    parts = [
-        _WRITTEN_BY,
-        "",
-        "[Unit]",
-        f"Description=Rebound: {'guard of a vehicle' if is_guard else 'a mission'}",
-        "After=network.target",
-        "# The back-off bounds how often it is started; it is never given up.",
-        "StartLimitIntervalSec=0",
-        "",
-        "[Service]",
-        "# Ready at the vehicle's first heartbeat, however late that comes.",
-        "Type=notify",
-        "TimeoutStartSec=infinity",
-        f"ExecStart={command}",
-        *_restarting(is_guard, systemd),
-        "# Fed by the loop that decides.",
-        f"WatchdogSec={WATCHDOG_S}",
-        f"TimeoutStopSec={STOP_S}",
-        "",
-        f"User={USER}",
-        f"WorkingDirectory={STATE_FOLDER}",
-        "StateDirectory=rebound",
-        "CacheDirectory=rebound",
-        "RuntimeDirectory=rebound",
-        "Environment=NUMBA_CACHE_DIR=/var/cache/rebound",
-        "UMask=0027",
-        "# Half of the computer's memory is the system's, whatever happens here.",
-        "MemoryMax=50%",
-        "TasksMax=64",
-        "LimitCORE=0",
-        "",
-        *_link(settings.device, serial_group),
-        "",
-        *_HARDENED,
-        # Machine code is made here by numba alone (the extras [fit] and [sim]).
-        *(["MemoryDenyWriteExecute=yes"] if find_spec("numba") is None else []),
-    ]
-    if is_guard:
-        parts += ["", "[Install]", "WantedBy=multi-user.target"]
-    return "\n".join(parts) + "\n"
+    unit = _UNIT.format(
+        what="guard of a vehicle" if is_guard else "a mission",
+        command=" ".join(map(_word, (python, "-P", "-m", "rebound_cli", *settings.arguments()))),
+        restarting=_restarting(is_guard, systemd),
+        user=USER,
+        state=STATE_FOLDER,
+        link=_link(settings.device, serial_group),
+        no_machine_code="yes" if find_spec("numba") is None else "no",
+        install="\n[Install]\nWantedBy=multi-user.target" if is_guard else "",
+    )
+    return unit.rstrip() + "\n"
 
 
-_HARDENED = (
-    "NoNewPrivileges=yes",
-    "CapabilityBoundingSet=",
-    "ProtectSystem=strict",
-    "ProtectHome=yes",
-    "ProtectClock=yes",
-    "ProtectControlGroups=yes",
-    "ProtectHostname=yes",
-    "ProtectKernelLogs=yes",
-    "ProtectKernelModules=yes",
-    "ProtectKernelTunables=yes",
-    "ProtectProc=invisible",
-    "PrivateTmp=yes",
-    "RemoveIPC=yes",
-    "LockPersonality=yes",
-    "RestrictNamespaces=yes",
-    "RestrictRealtime=yes",
-    "RestrictSUIDSGID=yes",
-    "SystemCallArchitectures=native",
-    "SystemCallFilter=@system-service",
-    "SystemCallFilter=~@privileged @resources",
-    "SystemCallErrorNumber=EPERM",
-)
-
-
-def _restarting(is_guard: bool, systemd: int | None) -> list[str]:
+def _restarting(is_guard: bool, systemd: int | None) -> str:
     if not is_guard:
-        return ["# A mission arms the vehicle: each flight is started by a person, never by a restart.", "Restart=no"]
-    lines = [
-        "Restart=on-failure",
-        "RestartSec=1",
-        "# The command line or the configuration is wrong: the next start would end the same way.",
-        f"RestartPreventExitStatus={' '.join(map(str, exit_codes.PERMANENT))}",
-    ]
-    if systemd is not None and systemd >= BACK_OFF_SINCE:
-        # 1 s in the air, where it counts; after five failures in a row the time for which a vehicle is waited for.
-        lines[2:2] = ["RestartSteps=5", "RestartMaxDelaySec=10"]
-    return lines
+        return "# A mission arms the vehicle: each flight is started by a person, never by a restart.\nRestart=no"
+    # 1 s in the air, where it counts; after five failures in a row the time for which a vehicle is waited for.
+    has_back_off = systemd is not None and systemd >= _BACK_OFF_SINCE
+    back_off = "RestartSteps=5\nRestartMaxDelaySec=10\n" if has_back_off else ""
+    return f"""Restart=on-failure
+RestartSec=1
+{back_off}# The command line or the configuration is wrong: the next start would end the same way.
+RestartPreventExitStatus={" ".join(map(str, exit_codes.PERMANENT))}"""
 
 
-def _link(device: str | None, serial_group: str) -> list[str]:
+def _link(device: str | None, serial_group: str) -> str:
     """The one way out to the vehicle: a device without a network, or a network without a device."""
     if device is None:
-        return ["PrivateDevices=yes", "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6"]
-    return [
-        f"# The link: {device}",
-        "DevicePolicy=closed",
-        f"DeviceAllow={_device_rule(device)} rw",
-        f"SupplementaryGroups={serial_group}",
-        "PrivateNetwork=yes",
-        "IPAddressDeny=any",
-        "RestrictAddressFamilies=AF_UNIX",
-    ]
-
-
-def _device_rule(device: str) -> str:
+        return "PrivateDevices=yes\nRestrictAddressFamilies=AF_UNIX AF_INET AF_INET6"
     name = Path(device).name
     if device.startswith(_BY_ID):
         # udev ends the names of converters, which are ttyUSB, with the number of their port (60-serial.rules).
         name = "ttyUSB" if re.search(r"-port\d+$", name) else "ttyACM"
     major = _USB_MAJORS.get(name[:6])
-    return device if major is None else f"char-{major}"
+    return f"""# The link: {device}
+DevicePolicy=closed
+DeviceAllow={device if major is None else f"char-{major}"} rw
+SupplementaryGroups={serial_group}
+PrivateNetwork=yes
+IPAddressDeny=any
+RestrictAddressFamilies=AF_UNIX"""
 
 
 def _word(text: str) -> str:

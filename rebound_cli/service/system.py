@@ -57,21 +57,12 @@ class System:
         if code != 0:
             raise ServiceError(f"`{' '.join(command)}` failed with exit code {code}: what it says is above.")
 
-    def answer(self, *command: str) -> tuple[str, int]:
-        """What the program prints, and its exit code."""
-        done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        return done.stdout.strip(), done.returncode
-
     def release(self) -> int | None:
         """systemd's; None where there is none."""
         if shutil.which("systemctl") is None:
             return None
-        found = re.match(r"systemd (\d+)", self.answer("systemctl", "--version")[0])
+        found = re.match(r"systemd (\d+)", answer("systemctl", "--version")[0])
         return None if found is None else int(found[1])
-
-    def serial_group(self) -> str:
-        present = {group.gr_name for group in grp.getgrall()}
-        return next((name for name in _SERIAL_GROUPS if name in present), _SERIAL_GROUPS[0])
 
     def write(self, path: str, text: str) -> None:
         """Whenever this ends, the file is whole: the old one or the new one."""
@@ -84,11 +75,18 @@ class System:
         file.chmod(0o644)
 
 
+def answer(*command: str) -> tuple[str, int]:
+    """What the program prints, and its exit code."""
+    done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return done.stdout.strip(), done.returncode
+
+
+def serial_group() -> str:
+    present = {group.gr_name for group in grp.getgrall()}
+    return next((name for name in _SERIAL_GROUPS if name in present), _SERIAL_GROUPS[0])
+
+
 def hidden_program() -> str | None:
     """The folder with a part of this program that the service could not read."""
     parts = (sys.prefix, sys.base_prefix, str(Path(rebound_cli.__file__).parent))
-    return next((part for part in parts if _is_hidden(Path(part).resolve())), None)
-
-
-def _is_hidden(folder: Path) -> bool:
-    return any(folder.is_relative_to(place) for place in _HIDDEN)
+    return next((part for part in parts if any(Path(part).resolve().is_relative_to(place) for place in _HIDDEN)), None)

@@ -7,13 +7,12 @@ from pathlib import Path
 
 from companion.errors import ConfigurationError
 from companion.mission.config import CompanionConfig
-from rebound_cli.console import console_for
+from rebound_cli.console import console_for, with_progress
 from rebound_cli.documents import parse_document, validated
 from rebound_cli.inputs import load_world
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.shaking import Stage, shaking
-from rebound_cli.progress import with_progress
 from rebound_cli.replay.recording import is_run_folder
 from rebound_cli.replay.settings import companion_settings
 from rebound_cli.replay.watching import watch_log

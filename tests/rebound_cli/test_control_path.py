@@ -20,11 +20,18 @@ from companion.shell.tlog import read_tlog
 from rebound_cli import fly as command
 from rebound_cli import run_folder
 from rebound_cli.background import MOST_WAITING, Background
-from rebound_cli.computer import INTERVAL_US, Computer
 from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import HANDING_OVER_US, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.realtime import (
+    COMPUTER_EVERY_US,
+    HANDING_OVER_US,
+    Computer,
+    ConfirmAtOnce,
+    FlightFaultError,
+    Loop,
+    fly_realtime,
+)
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.timing import TOO_LATE_US, Timing, undisturbed
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -150,7 +157,7 @@ class EverySecond:
     def status(self, now_us):
         if now_us < self.due_us:
             return None
-        self.due_us = now_us + INTERVAL_US
+        self.due_us = now_us + COMPUTER_EVERY_US
         return ComputerStatus(now_us, 90_500, (5, 50), 61, 812, 3792, 9_000, 30_000)
 
 
@@ -199,9 +206,9 @@ def test_the_computer_is_read_aside_and_told_a_second_later(tmp_path):
     # When it has been read
     computer.close()
     # Then that is told once, when the next is due
-    assert computer.status(4 + INTERVAL_US) is None
-    assert computer.status(5 + INTERVAL_US).at_us == 5
-    assert computer.status(6 + INTERVAL_US) is None
+    assert computer.status(4 + COMPUTER_EVERY_US) is None
+    assert computer.status(5 + COMPUTER_EVERY_US).at_us == 5
+    assert computer.status(6 + COMPUTER_EVERY_US) is None
 
 
 def test_a_full_disk_ends_no_flight_and_is_told(tmp_path):

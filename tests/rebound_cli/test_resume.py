@@ -5,9 +5,8 @@ import json
 import pytest
 import yaml
 
-from rebound_cli.inputs import load_mission_document, mission_from
+from rebound_cli.inputs import load_mission_document, mission_from, resume_of
 from rebound_cli.main import main
-from rebound_cli.resume import resume_of
 from rebound_cli.run_folder import EVENTS_NAME
 from tests.rebound_cli.command import QUICK, SQUARE, assert_comes_again, events_of
 

@@ -6,8 +6,7 @@ import sys
 
 import pytest
 
-from rebound_cli import fly
-from rebound_cli.guard import command as guard
+from rebound_cli import fly, guard
 from rebound_cli.main import main
 from rebound_cli.run_folder import TLOG_NAME, check_place
 from tests.rebound_cli.command import ROOT, WALL

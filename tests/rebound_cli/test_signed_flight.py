@@ -82,7 +82,7 @@ def fly(folder: Path, forges: bool) -> Any:
     recorder, console = FlightRecorder(folder, Background("log")), Console(sys.stderr, Background("console"))
     fly_realtime(Companion(mission), connection, world, recorder, console, ConfirmAtOnce(), Interrupts())
     recorder.close()
-    world.refused = connection.refused
+    world.refused = connection.signing.refused
     connection.close()
     return world
 
@@ -143,13 +143,13 @@ def test_what_was_recorded_before_a_restart_is_not_heard_after_it(tmp_path: Path
     recorded = [bytes(STOLEN.pack(vehicle)) for _ in range(20)]
     first = Line(recorded, now_us)
     before = session(key_file, first)
-    assert before.receive(1.0) and before.refused == {}
+    assert before.receive(1.0) and before.signing.refused == {}
     before.close()
     # When they are played again
     again = Line(recorded, now_us - 86_400_000_000)
     after = session(key_file, again)
     # Then none is heard, and what is sent is later than all before
-    assert after.receive(1.0) == b"" and after.refused == {"old": 20}
+    assert after.receive(1.0) == b"" and after.signing.refused == {"old": 20}
     for connection in (before, after):
         connection.send(bytes(STOLEN.pack(mav.MAVLink(None, 1, 191))))
     assert first.stamps() < again.stamps()
@@ -218,5 +218,5 @@ def test_a_flood_that_is_refused_does_not_wake_the_loop_for_each_packet(tmp_path
     line.waiting.append(bytes(STOLEN.pack(end)))
     connection = session(tmp_path / "key", line)
     assert connection.receive(0.0) == bytes(STOLEN.pack(mav.MAVLink(None, 1, 1)))
-    assert connection.refused == {reason: 299}
+    assert connection.signing.refused == {reason: 299}
     connection.close()

@@ -12,9 +12,7 @@ import pytest
 
 from companion.report import Event, Status
 from rebound_cli.main import main
-from rebound_cli.status.asking import StatusError, ask, text_of
-from rebound_cli.status.place import socket_of_this_program, sockets_to_ask
-from rebound_cli.status.server import StatusServer, StatusServerError, served
+from rebound_cli.status import StatusError, StatusServer, ask, served, socket_of_this_program, sockets_to_ask, text_of
 
 WATCHING = Status("watching", "POSCTL", True, (1.0, 2.0, -3.0), 0.5, "armed", 12_000)
 ARMED = Event(500_000, "armed", "armed", {})
@@ -130,7 +128,7 @@ def test_the_socket_of_a_program_that_was_killed_is_taken_over(path):
 
 
 def test_the_socket_of_a_program_that_runs_is_left_to_it(server, path, monkeypatch):
-    with pytest.raises(StatusServerError, match="another program answers there"):
+    with pytest.raises(StatusError, match="another program answers there"):
         StatusServer(path, {"command": "fly", "folder": "-"})
     assert ask(path)["command"] == "guard"
     # And a flight goes on without, and says so

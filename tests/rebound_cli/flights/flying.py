@@ -1,5 +1,7 @@
 """Small flights on disk: one that a guard really decided, and folders that only look like flights."""
 
+from dataclasses import asdict
+
 from pymavlink.dialects.v20 import development as dialect
 
 from companion.guard.config import GuardConfig
@@ -32,10 +34,10 @@ def record(folder, steps=50, writer=None, make_room=None):
         recorder.record(now_us, guard.step(b"".join(message.pack(vehicle) for message in messages), now_us))
         if number == 20:
             guard.tell_computer(COMPUTER)
-            recorder.record_computer(now_us, COMPUTER)
+            recorder.record_input(now_us, "computer", status=asdict(COMPUTER))
         if number == 30:
             guard.note("late", "a step came late")
-            recorder.record_note(now_us, "late", "a step came late")
+            recorder.record_input(now_us, "note", event="late", text="a step came late")
     recorder.close()
     return recorder
 

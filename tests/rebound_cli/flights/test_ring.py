@@ -9,9 +9,8 @@ import pytest
 
 from companion.mission.config import DiskConfig
 from rebound_cli.background import Background
-from rebound_cli.flights import ring
-from rebound_cli.flights.kept import kept_flights
-from rebound_cli.flights.ring import LAST_BYTES, LOOK_EVERY_US, Limits, Ring, bytes_to_go, limits_of, room_for
+from rebound_cli.flights import kept as ring
+from rebound_cli.flights.kept import LAST_BYTES, LOOK_EVERY_US, Limits, Ring, kept_flights, limits_of, room_for
 from rebound_cli.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
 
@@ -60,7 +59,7 @@ def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_oth
     ("used", "free", "to_go"), [(900, 300, 0), (1000, 200, 0), (1200, 300, 200), (900, 150, 50), (1200, 150, 200)]
 )
 def test_what_has_to_go_is_what_passes_the_budget_or_what_the_disk_lacks(used, free, to_go):
-    assert bytes_to_go(used, free, Limits(max_use=1000, keep_free=200)) == to_go
+    assert Limits(max_use=1000, keep_free=200).to_go(used, free) == to_go
 
 
 def test_the_oldest_without_a_hit_go_first_those_with_one_last_and_the_present_one_never(tmp_path, disk):

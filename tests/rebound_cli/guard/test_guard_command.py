@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from companion.guard.config import GuardConfig
-from rebound_cli.status.asking import ask
+from rebound_cli.status import ask
 from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
 pytestmark = pytest.mark.realtime

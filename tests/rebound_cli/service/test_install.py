@@ -11,8 +11,7 @@ from rebound_cli import exit_codes
 from rebound_cli.main import main
 from rebound_cli.service import check, command
 from rebound_cli.service.check import MOST_EXPOSED, analysed
-from rebound_cli.service.files import SYSUSERS, UDEV, UNIT, udev_text, unit_text
-from rebound_cli.service.settings import ServiceSettings
+from rebound_cli.service.files import SYSUSERS, UDEV, UNIT, ServiceSettings, udev_text, unit_text
 from rebound_cli.service.system import ServiceError, System, hidden_program
 
 ROOT = Path(__file__).parents[3]
@@ -197,7 +196,7 @@ def test_a_step_that_systemd_refuses_is_named(system, monkeypatch):
 
 
 def test_exit_codes_that_no_restart_mends_end_the_service(monkeypatch):
-    monkeypatch.setattr("rebound_cli.guard.command.prepare_companion", lambda *_: None)
+    monkeypatch.setattr("rebound_cli.guard.prepare_companion", lambda *_: None)
     assert values(unit(), "RestartPreventExitStatus") == ["2 78"]
     assert (exit_codes.USAGE, exit_codes.CONFIGURATION) == exit_codes.PERMANENT
     assert main(["guard", "--connect", "nowhere"]) == exit_codes.CONFIGURATION
@@ -256,14 +255,14 @@ def test_systemd_finds_nothing_to_complain_of_and_little_exposed(connect, run):
     # With an interpreter that is there, for systemd looks.
     systemd = System().release()
     text = unit_text(ServiceSettings(run=run, connect=connect), shutil.which("python3"), systemd, "dialout")
-    verified, exposure = analysed(System(), text)
+    verified, exposure = analysed(text)
     assert (verified.verdict.value, verified.found) == ("ok", "in order")
     assert exposure.verdict.value == "ok" and float(exposure.found.split()[0]) <= MOST_EXPOSED
 
 
 @NEEDS_SYSTEMD
 def test_systemd_finds_what_is_wrong_in_a_unit():
-    verified, exposure = analysed(System(), "[Service]\nType=notify\nExecStart=/bin/true\nRestartStep=5\n")
+    verified, exposure = analysed("[Service]\nType=notify\nExecStart=/bin/true\nRestartStep=5\n")
     assert verified.verdict.value == "no" and "RestartStep" in verified.found
     assert exposure.verdict.value == "no" and float(exposure.found.split()[0]) > 9
 

@@ -3,6 +3,7 @@
 import json
 import sys
 from argparse import Namespace
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from companion.errors import ConfigurationError
@@ -14,7 +15,6 @@ from rebound_cli.console import Console, console_for
 from rebound_cli.replay.settings import companion_settings
 from rebound_cli.signed_connection import open_signed
 
-EXIT_NOT_READY = 1
 LONGEST_WAIT_S = 0.05
 # PX4 answers a parameter within 50 ms; after a second it has not taken it.
 SETTING_TAKES_S = 1.0
@@ -32,25 +32,23 @@ def run_preflight(options: Namespace) -> int:
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
         while not preflight.finished:
             _exchange(preflight, connection, clock)
-            news = connection.news()
-            if news is not None:
+            if (news := connection.news()) is not None:
                 console.print(news)
         if preflight.survey.refusal is not None:
             raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
         found = preflight.findings()
         _show(console, preflight, found)
         if options.json:
-            print(json.dumps([_plain(finding) for finding in found], indent=2))
+            print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
             found = _fix(console, preflight, connection, clock, found, options.yes)
     finally:
         connection.close()
-    return EXIT_NOT_READY if any(finding.verdict is Verdict.BAD for finding in found) else 0
+    return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0
 
 
 def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> None:
-    received = connection.receive(LONGEST_WAIT_S)
-    for frame in preflight.step(received, clock.now_us()):
+    for frame in preflight.step(connection.receive(LONGEST_WAIT_S), clock.now_us()):
         connection.send(frame)
 
 
@@ -59,12 +57,16 @@ def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
     release = "" if version is None else " " + ".".join(map(str, version))
     kind = identity.vehicle_type if identity is not None else "vehicle"
     console.print(f"\nPX4{release}, {kind}")
-    for finding in found:
-        console.print(f"  {finding.verdict.value:4}  {finding.item:20} {finding.found}")
-        if finding.remedy:
-            console.print(f"        {'':20} -> {finding.remedy}")
+    show_findings(found, 20, console.print)
     counts = [sum(finding.verdict is verdict for finding in found) for verdict in Verdict]
     console.print(f"\n  {counts[0]} good, {counts[1]} worth a look, {counts[2]} in the way of a flight")
+
+
+def show_findings(found: Sequence[Finding], width: int, tell: Callable[[str], None]) -> None:
+    for finding in found:
+        tell(f"  {finding.verdict.value:4}  {finding.item:{width}} {finding.found}")
+        if finding.remedy:
+            tell(f"        {'':{width}} -> {finding.remedy}")
 
 
 def _fix(
@@ -77,8 +79,11 @@ def _fix(
         if finding.fix is None:
             continue
         name, value = finding.fix
-        if not is_agreed and not _agrees(console, f"Set {name} = {value:g}? [y/N] "):
-            continue
+        if not is_agreed:
+            console.ask(f"Set {name} = {value:g}? [y/N] ")
+            # The end of input is a no.
+            if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+                continue
         for frame in preflight.set_parameter(name, value, clock.now_us()):
             connection.send(frame)
         until_us = clock.now_us() + round(SETTING_TAKES_S * 1e6)
@@ -87,13 +92,3 @@ def _fix(
         answer = preflight.parameter(name)
         console.print(f"  {name} is {'not told' if answer is None else format(answer, 'g')} now")
     return preflight.findings()
-
-
-def _agrees(console: Console, question: str) -> bool:
-    """The end of input is a no."""
-    console.ask(question)
-    return sys.stdin.readline().strip().lower() in ("y", "yes")
-
-
-def _plain(finding: Finding) -> dict[str, object]:
-    return {**asdict(finding), "verdict": finding.verdict.value}

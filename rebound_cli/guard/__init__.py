@@ -1,1 +1,0 @@
-"""`rebound guard`: protection for a flight that something else commands."""

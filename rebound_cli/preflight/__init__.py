@@ -1,1 +1,0 @@
-"""`rebound preflight`: what a connected vehicle needs before its first flight."""

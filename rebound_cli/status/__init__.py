@@ -1,1 +1,0 @@
-"""The state of a running program for whoever asks on this machine: `rebound status`."""
