@@ -170,6 +170,21 @@ def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
     assert "the accelerometer reads zero on all axes" in f.event("implausible").text
 
 
+@pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])
+def test_a_landing_counts_where_the_height_does_not_speak_against_it(height_m, state):
+    # Given a vehicle on its way to its goal, when it is said five times to stand on the ground
+    f = flight_in("mission")
+    f.run_for(0.5)
+    landed = mav.MAVLink_extended_sys_state_message(0, mav.MAV_LANDED_STATE_ON_GROUND)
+    for _ in range(10):
+        f.vehicle.position[2] = -height_m
+        attacked(f, [bytes(landed.pack(mav.MAVLink(None, 1, 1)))])
+    # Then a hit of that moment is answered up in the air, and not below the height from which hits count
+    f.vehicle.push_m_s2 = (-60.0, 0.0)
+    f.step()
+    assert f.state == state
+
+
 # --- silence
 
 
