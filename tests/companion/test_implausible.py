@@ -143,6 +143,15 @@ def test_a_weak_force_of_one_sample_is_a_hit_only_where_the_velocity_shows_what_
     assert claim.is_contradicted(fixes(changed_m_s)) is is_none
 
 
+def test_a_push_along_an_axis_that_is_stuck_is_not_taken_back_for_what_the_others_show_of_it():
+    # Given a sensor that shows the east of a push alone, which took 1.3 m/s off the way north
+    earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
+    claim = Claim(1_000_000, earlier, (0.0, 7.0, 0.0), 0.005, later_boot_us=1_004_000)
+    assert not claim.is_contradicted(fixes(-1.3))
+    # Then without it the one sample stands alone
+    assert claim.is_contradicted(fixes(0.0))
+
+
 def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_a_hit():
     true = [VelocityFix(at_ms * 1000, STILL, STILL, STILL) for at_ms in range(800, 1160, 30)]
     forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL, STILL)
