@@ -18,8 +18,10 @@ def note_height(flight: FlightContext) -> None:
 
 
 def landed(flight: FlightContext, goes_down: bool) -> LandedState:
-    """What the vehicle says of the ground. Up by its own height, and not on its way down, it has not landed: who says so
-    may have forged it, and would make the detector deaf."""
+    """What the vehicle says of the ground. Up by its own height, and not on its way down, it has not landed.
+
+    Who says so may have forged it, and a detector is off on the ground.
+    """
     is_up = flight.has_climbed and not goes_down and flight.vehicle.landed is LandedState.ON_GROUND
     return LandedState.UNDEFINED if is_up else flight.vehicle.landed
 
