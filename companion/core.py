@@ -16,7 +16,7 @@ from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.hearing import hear
-from companion.flight.leaving_ground import note_height, too_low
+from companion.flight.leaving_ground import landed, note_height, too_low
 from companion.flight.limiting import Limiter
 from companion.flight.machine import Machine
 from companion.flight.operator import Texts, status_text, values
@@ -129,13 +129,13 @@ def follow_resets(core: Core, samples: Sequence[Sample], now_us: int) -> Sequenc
 def situation(core: Core) -> Situation:
     """What the flight knows, for the detector."""
     flight = core.flight
-    target = flight.target
+    target, goes_down = flight.target, core.machine.state is State.LANDING
     return Situation(
         off_reason=why_not_detecting(core),
         armed=flight.vehicle.armed,
-        landed_state=flight.vehicle.landed,
+        landed_state=landed(flight, goes_down),
         height_m=flight.height_m,
-        descent_commanded=core.machine.state is State.LANDING,
+        descent_commanded=goes_down,
         setpoint_position_ned_m=None if target is None else target.position_ned_m,
     )
 

@@ -83,8 +83,16 @@ class When:
     for_s: float = math.inf
 
     def is_on(self, air: Air) -> bool:
+        return self.is_on_at(air, air.now_s)
+
+    def is_on_at(self, air: Air, at_s: float) -> bool:
+        """Whether it was on then, by the vehicle's clock."""
         since_s = air.since.get(self.state)
-        return since_s is not None and 0.0 <= air.now_s - since_s - self.after_s < self.for_s
+        return since_s is not None and 0.0 <= at_s - since_s - self.after_s < self.for_s
+
+    def ended_s(self, air: Air) -> float:
+        """When it ends; of what has not begun never."""
+        return air.since.get(self.state, math.inf) + self.after_s + self.for_s
 
     @classmethod
     def flying(cls, chance: random.Random, for_s: float = math.inf) -> When:

@@ -32,11 +32,15 @@ class Expected:
     """Without one where nobody could see it: a hit that nobody answers shows PX4 and the airframe, not this program."""
     false_hits: int = 0
     """Recoveries from nothing that a flight may count as a collision."""
+    blinds: bool = False
+    """While it acts nothing shows a hit. What the wall does to a vehicle that meets it then shows PX4 and the airframe,
+    not this program; the hit may be told when the sensor is back, as late as any other after its touch."""
 
     def text(self) -> str:
         parts = [" or ".join(_WORDS[outcome] for outcome in self.outcomes)]
         parts += ["the hit found"] if self.finds else [] if self.has_wall else ["(no wall in the way)"]
         parts += [] if self.false_hits else ["nothing else taken for one"]
+        parts += ["who meets the wall meanwhile is PX4's and the airframe's"] if self.blinds else []
         return "; ".join(parts)
 
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from bench.campaign.plan import Json
 from bench.faults.air import Air, Branched, Hung, Injector, Killed, Landing
-from bench.faults.fault import COMPLETED, FAILED, KILLED, Fault
+from bench.faults.fault import COMPLETED, FAILED, HANDED_OVER, KILLED, Fault
+from bench.faults.injectors import Rewritten
 from bench.random_missions.crashes import AIRBORNE_M, crashes, heights_m, tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.generator import AIRFRAMES
@@ -222,15 +223,20 @@ class _Flight:
         touches = [hit for hit in flown.truth.hits if hit.closing_speed_m_s >= 0.0]
         told_s = [at for at, event in zip(self.recorder.told_s, flown.events, strict=True) if event.kind == "detection"]
         first = next((hit for hit in touches if hit.closing_speed_m_s >= NOTICED_M_S), None)
+        blind_until_us = self._blind_until_us(first)
+        unseen = blind_until_us is not None
+        if first is not None and blind_until_us is not None:
+            touches.append(replace(first, ended_at_boot_us=max(first.ended_at_boot_us, blind_until_us)))
         is_found = first is not None and any(_is_of(first, at_s) for at_s in told_s)
         beside = [at_s for at_s in told_s if not any(_is_of(hit, at_s) for hit in touches) and self._is_up(flown, at_s)]
         counted_false = max(0, len(beside) - flown.report.unconfirmed)
         outcome = self.ended or flown.report.outcome
         again = [hit.closing_speed_m_s for hit in touches if first is not None and _is_later(hit, first)]
-        complaints = [f"{cause}: {details}" for cause, details in crashes(flown) if self._counts(cause)]
+        complaints = [f"{cause}: {details}" for cause, details in crashes(flown) if self._counts(cause) and not unseen]
         complaints += [f"setpoint outside: {self.air.outside[0]}"] if self.air.outside else []
         complaints += self._authority() + self._log()
-        complaints += [f"{outcome}: {flown.report.reason}"] if outcome not in expected.outcomes else []
+        outcomes = (*expected.outcomes, HANDED_OVER) if unseen else expected.outcomes
+        complaints += [f"{outcome}: {flown.report.reason}"] if outcome not in outcomes else []
         complaints += ["hit not found"] if expected.finds and first is not None and not is_found else []
         complaints += [f"{counted_false} false hits counted"] if counted_false > expected.false_hits else []
         if self.fault_text and FAILED not in expected.outcomes:
@@ -240,6 +246,7 @@ class _Flight:
             "outcome": outcome,
             "hit": first is not None,
             "found": is_found,
+            "unseen": unseen,
             "false": counted_false,
             "unconfirmed": flown.report.unconfirmed,
             "tilt_deg": round(float(tilts_deg(flown.truth.series["attitude_wxyz"]).max()), 1),
@@ -247,6 +254,14 @@ class _Flight:
             "again_m_s": round(max(again, default=0.0), 2),
             "after_told": self.air.after_told,
         }
+
+    def _blind_until_us(self, hit: Hit | None) -> float | None:
+        """When the fault's end lets a hit be seen that it hid; None for one that it did not hide."""
+        if hit is None or not self.fault.expected.blinds:
+            return None
+        assert isinstance(self.injector, Rewritten), "what hides a hit rewrites the sensor's messages"
+        when = self.injector.when
+        return 1e6 * when.ended_s(self.air) if when.is_on_at(self.air, 1e-6 * hit.contact_at_boot_us) else None
 
     def _counts(self, cause: str) -> bool:
         """A landing that PX4 or a pilot flies may come at any time."""

@@ -16,6 +16,8 @@ from sim_vehicle.bench.faults import other
 _BLIND = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
 _MAY_END = Expected((COMPLETED, HANDED_OVER), finds=False)
 _MAY_MISS = Expected(finds=False)
+# Off, and known to be: a detector without forces sees no hit.
+_OFF = Expected(finds=False, blinds=True)
 # A sensor that steps and stays shows what a push does, and its own estimate is no second witness.
 _STEPS = Expected(finds=False, false_hits=1)
 _NAN = math.nan
@@ -136,14 +138,14 @@ FAULTS = (
         "sensors",
         "zero on all axes for 1 s",
         _rewritten(IMU, 1.0, xacc=0.0, yacc=0.0, zacc=0.0),
-        _MAY_MISS,
+        _OFF,
     ),
     Fault(
         "accelerometer near zero",
         "sensors",
         "zero with noise of 0.02 m/s2 on all axes for 1 s",
         lambda c: Rewritten(When.flying(c, 1.0), (IMU,), _noise),
-        _MAY_MISS,
+        _OFF,
     ),
     Fault(
         "IMU stuck",

@@ -73,8 +73,9 @@ def _flights(results: Sequence[Json]) -> tuple[str, str]:
     happened = ", ".join(f"{name} {count}" for name, count in counts.most_common())
     hits = [result for result in whole if result["hit"]]
     happened += f"; hits found {sum(result['found'] for result in hits)} of {len(hits)}"
-    for key, words in (("false", "counted for nothing"), ("unconfirmed", "taken back")):
-        number = sum(result[key] for result in whole)
+    told = (("unseen", "of them met unseen"), ("false", "counted for nothing"), ("unconfirmed", "taken back"))
+    for key, words in told:
+        number = sum(result.get(key, 0) for result in whole)
         happened += f", {number} {words}" if number else ""
     if not whole:
         return happened, "–"

@@ -58,6 +58,12 @@ class Watch:
         return self.sight.blind_reason
 
     @property
+    def is_attitude_old(self) -> bool:
+        """Whether forces can no longer be summed up to what velocities are held against."""
+        latest = self.turning.latest
+        return latest is not None and self.last_imu_boot_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
+
+    @property
     def estimate_trusted(self) -> bool:
         """False while the vehicle's velocity and position cannot be believed: part of a hit was not measured.
 
@@ -123,7 +129,10 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
         elif not watch.losses_told and type(sample) in WISHED:
             watch.heard.add(WISHED[type(sample)])
         watch.estimator.hear(sample)
-        if watch.estimator.trust.is_trusted:
+        is_attitude_old = watch.is_attitude_old
+        if is_attitude_old:
+            watch.estimator.forget()
+        if watch.estimator.trust.is_trusted and not is_attitude_old:
             watch.state, impact = watch.detector.step(watch.state, sample, situation)
         else:
             doubtful = situation._replace(estimate_trusted=False)
@@ -150,6 +159,8 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
     on = situation.off_reason is None
     threshold_m_s2 = watch.state.threshold_m_s2
     reason = why_blind(sight, threshold_m_s2, watch.config.sight, now_us, watch.useless) if on else None
+    if on and reason is None and watch.is_attitude_old:
+        reason = f"no ATTITUDE_QUATERNION for {round(watch.config.sight.silence_s * 1e3)} ms"
     if (reason is None) != (sight.blind_reason is None) and on:
         text = "the detector sees again" if reason is None else f"detector blind: {reason}"
         notices.append(Notice("link", text, {}))

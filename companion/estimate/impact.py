@@ -107,9 +107,8 @@ class ImpactEstimator:
             now_us = sample.time_boot_us
             strapdown = self.strapdown
             if not strapdown.imu(now_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s):
-                self.fixes.clear()
+                self.forget()
                 self.sums.clear()
-                self.trust.errors.clear()
             self.trust.age(now_us)
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
             self.earlier_imu, self.imu = self.imu, sample
@@ -121,8 +120,7 @@ class ImpactEstimator:
                 self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
         elif isinstance(sample, Odometry):
             if self.odometry_boot_us is None or sample.reset_counter != self.reset_counter:
-                self.fixes.clear()
-                self.trust.errors.clear()
+                self.forget()
             self.odometry_boot_us, self.reset_counter = sample.time_boot_us, sample.reset_counter
             self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
         elif isinstance(sample, Vibration):
@@ -137,6 +135,11 @@ class ImpactEstimator:
             return
         if self.push is not None:
             self._seek(self.push)
+
+    def forget(self) -> None:
+        """Velocity or sum have jumped: what the one said beside the other is no measure any more."""
+        self.fixes.clear()
+        self.trust.errors.clear()
 
     def _seek(self, push: Push) -> None:
         """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""

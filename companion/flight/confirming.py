@@ -10,13 +10,14 @@ the obstacle, of which a velocity tells.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
+from statistics import fmean, median
 
 from companion.detection.interface import Evidence
 from companion.estimate.approach import HIT_LEAVES_M_S, VelocityFix
 from companion.estimate.guards import MOTORS_RAD_S2
 from companion.estimate.history import MotionHistory
 from companion.estimate.impact import ImpactEstimate
+from companion.flight.doubt import STRUCK_M_S
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.mission.config import GuardsConfig
 
@@ -70,7 +71,16 @@ class Claim:
         in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - self.earlier.time_boot_us)
         pushed_m_s = mean_came - mean_was + in_sum_m_s
         least_m_s = 0.5 * max(size_m_s2 * self.averaging_s, HIT_LEAVES_M_S)
-        return pushed_m_s < least_m_s and least_m_s > SURE * spread
+        is_unmoved = pushed_m_s < least_m_s and least_m_s > SURE * spread
+        return is_unmoved and self._any_push_m_s(before, after, in_sum_m_s, away) < STRUCK_M_S
+
+    @staticmethod
+    def _any_push_m_s(
+        before: Sequence[VelocityFix], after: Sequence[VelocityFix], in_sum_m_s: float, away: Sequence[float]
+    ) -> float:
+        """By how much the velocities show a push from whatever side: an axis that is stuck shows no force along it."""
+        was, came = ([fmean(axis) for axis in zip(*map(_less_sum, fixes), strict=True)] for fixes in (before, after))
+        return math.hypot(*(c - w + in_sum_m_s * a for c, w, a in zip(came, was, away, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)

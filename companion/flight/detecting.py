@@ -34,7 +34,8 @@ def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation
     """What no detector feels: that the vehicle leans or presses on something, where it is to fly to a place."""
     target, attitude, leaning, pressing = flight.target, flight.vehicle.attitude, flight.leaning, flight.pressing
     flown_to = situation.setpoint_position_ned_m
-    is_off = situation.off_reason is not None or situation.descent_commanded
+    # Of a silence nothing is known: half a second without a place is no lean that lasted as long.
+    is_off = situation.off_reason is not None or situation.descent_commanded or not flight.is_heard
     if is_off or flown_to is None or target is None or target.leans_only or attitude is None:
         leaning.forget()
         pressing.forget()

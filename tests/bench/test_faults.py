@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
@@ -158,6 +159,17 @@ def test_a_judge_names_each_kind_of_loss() -> None:
     assert [*results] == [*bad]
     for words, result in results.items():
         assert any(text.startswith(words) for text in result["complaints"]), (words, result)
+
+
+def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
+    # Given an accelerometer that is off in the second of a hit at 1.9 m/s
+    hidden = FLOWN["accelerometer zero"]
+    results: list[Json] = []
+    faults = [hidden, replace(hidden, expected=replace(hidden.expected, blinds=False))]
+    fly_from_one_take_off(46, faults, lambda _, result: results.append(result))
+    told, untold = results
+    assert told["unseen"] and told["complaints"] == []
+    assert not untold["unseen"] and any(text.startswith("fell: ") for text in untold["complaints"])
 
 
 def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:

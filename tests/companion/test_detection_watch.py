@@ -10,7 +10,7 @@ from companion.detection import watch as watching
 from companion.detection.interface import Phase, Situation
 from companion.detection.watch import advance, start_watch
 from companion.estimate import impact
-from companion.messages import Attitude, ImuSample, LocalPosition, Sample
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 
 INTERVAL_US = 4_000
@@ -143,10 +143,11 @@ def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reaso
 
 
 def imu_every(watch, every_us, start_us, until_us):
-    """Bare samples, looked after every 4 ms; the times at which the watch became seeing or blind."""
+    """Samples with an attitude each, looked after every 4 ms; when the watch became seeing or blind."""
     changes, was = [], watch.blind_reason is None
     for t in range(start_us, until_us, INTERVAL_US):
-        heard = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))] if (t - start_us) % every_us == 0 else []
+        pair: list[Sample] = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, 0.0, 0.0, 0.0))]
+        heard = pair if (t - start_us) % every_us == 0 else []
         advance(watch, heard, WANTED, t)
         if (watch.blind_reason is None) is not was:
             was = not was
@@ -180,6 +181,29 @@ def test_samples_that_a_link_held_back_and_delivers_at_once_prove_no_rate():
     advance(watch, late, WANTED, 2_000_000)
     advance(watch, [], WANTED, 2_200_000)
     assert "below 20" in watch.blind_reason
+
+
+def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_is_blind():
+    # Given a level vehicle that flies north; no attitude comes from 4 s on, and at 4.4 s it leans to gain 1.8 m/s
+    watch, impacts, texts = start_watch(CompanionConfig(), 0), [], []
+    from_us, until_us, speeding_up_m_s2 = 4_400_000, 5_000_000, 3.0
+    for t in range(INTERVAL_US, 6_000_000, INTERVAL_US):
+        led_s, leans = max(0, min(t, until_us) - from_us) * 1e-6, from_us < t <= until_us
+        # No estimate stands still to the last digit.
+        north_m_s = 1.0 + 0.001 * math.sin(1e-5 * t) + speeding_up_m_s2 * led_s
+        place = (1e-6 * t + 0.5 * speeding_up_m_s2 * led_s**2, 0.0, -1.5)
+        thrust = -math.hypot(9.80665, speeding_up_m_s2 if leans else 0.0)
+        samples: list[Sample] = [ImuSample(t, (0.0, 0.0, thrust), (0.0, 0.0, 0.0))]
+        if t % 32_000 == 0:
+            samples += [Odometry(t, place, (north_m_s, 0.0, 0.0), 0), LocalPosition(t, place, (north_m_s, 0.0, 0.0))]
+        if not 4_000_000 < t <= until_us:
+            samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
+        seen = advance(watch, samples, WANTED, t)
+        impacts += seen.impacts
+        texts += [notice.text for notice in seen.notices if notice.kind == "link"]
+    # Then a velocity that no force explains is no hit, and it is told
+    assert impacts == []
+    assert texts == ["detector blind: no ATTITUDE_QUATERNION for 250 ms", "the detector sees again"]
 
 
 def test_a_watch_that_is_not_wanted_is_off_not_blind():

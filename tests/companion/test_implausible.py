@@ -143,6 +143,15 @@ def test_a_weak_force_of_one_sample_is_a_hit_only_where_the_velocity_shows_what_
     assert claim.is_contradicted(fixes(changed_m_s)) is is_none
 
 
+def test_a_push_along_an_axis_that_is_stuck_is_not_taken_back_for_what_the_others_show_of_it():
+    # Given a sensor that shows the east of a push alone, which took 1.3 m/s off the way north
+    earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
+    claim = Claim(1_000_000, earlier, (0.0, 7.0, 0.0), 0.005, later_boot_us=1_004_000)
+    assert not claim.is_contradicted(fixes(-1.3))
+    # Then without it the one sample stands alone
+    assert claim.is_contradicted(fixes(0.0))
+
+
 def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_a_hit():
     true = [VelocityFix(at_ms * 1000, STILL, STILL, STILL) for at_ms in range(800, 1160, 30)]
     forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL, STILL)
@@ -168,6 +177,21 @@ def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
         attacked(f, [bytes(off.pack(attacker._tx))])
     assert f.state == "mission" and f.companion.report().collisions == ()
     assert "the accelerometer reads zero on all axes" in f.event("implausible").text
+
+
+@pytest.mark.parametrize(("height_m", "state"), [(1.5, "recovering"), (0.3, "mission")])
+def test_a_landing_counts_where_the_height_does_not_speak_against_it(height_m, state):
+    # Given a vehicle on its way to its goal, when it is said five times to stand on the ground
+    f = flight_in("mission")
+    f.run_for(0.5)
+    landed = mav.MAVLink_extended_sys_state_message(0, mav.MAV_LANDED_STATE_ON_GROUND)
+    for _ in range(10):
+        f.vehicle.position[2] = -height_m
+        attacked(f, [bytes(landed.pack(mav.MAVLink(None, 1, 1)))])
+    # Then a hit of that moment is answered up in the air, and not below the height from which hits count
+    f.vehicle.push_m_s2 = (-60.0, 0.0)
+    f.step()
+    assert f.state == state
 
 
 # --- silence

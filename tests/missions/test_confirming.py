@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from bench.faults.packets import ODOMETRY, POSITION, changed
 from companion.companion import Companion
+from companion.mavlink.packet import message_id_of
 from companion.report import Event
 from rebound_cli.documents import apply_overrides, parse_document
 from rebound_cli.inputs import mission_from, world_from
@@ -100,6 +102,20 @@ class Air:
                     frame = packed(mav.MAVLink_highres_imu_message(message.time_usec, *values, *[0] * 7, 0x3F))
                 heard.append(frame)
             return heard
+
+        self.vehicle.step = step
+
+    def move_places(self, by_m: float, seconds: float) -> None:
+        """Let the vehicle say for a while that it is so far north of where it is; no reset is counted."""
+        fly, until_us = self.vehicle.step, self.vehicle.time_boot_us + round(seconds * 1e6)
+
+        def move(message: mav.MAVLink_message) -> None:
+            message.x += by_m
+
+        def step(received: bytes) -> list[bytes]:
+            is_on = self.vehicle.time_boot_us < until_us
+            kinds = (POSITION, ODOMETRY) if is_on else ()
+            return [changed(f, move) if message_id_of(f) in kinds else f for f in fly(received)]
 
         self.vehicle.step = step
 
@@ -202,6 +218,18 @@ def test_an_imu_that_measures_nothing_for_a_second_makes_the_detector_blind_and_
     assert len(links) == 2 and links[0].startswith(reason) and links[1] == "the detector sees again"
     report = air.companion.report()
     assert (report.collisions, report.unconfirmed) == ((), 0)
+
+
+def test_places_that_are_not_believed_for_half_a_second_are_no_lean_on_an_obstacle_of_half_a_second():
+    # Given a vehicle that speeds up, when its places jump by 50 m until no velocity speaks against them any more
+    air = Air()
+    air.run_until(lambda: air.state == "mission" and air.motion()[0] > 1.0)
+    air.move_places(50.0, seconds=1.0)
+    air.run_until(lambda: air.companion.finished, 1.0)
+    # Then it is handed over for being out of its fence, and nothing was in its way
+    report = air.companion.report()
+    assert "outside the fence" in report.reason
+    assert (report.collisions, report.obstacles) == ((), ())
 
 
 def test_the_hits_allowed_are_not_used_up_by_hits_that_were_none():
