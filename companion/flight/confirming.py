@@ -17,10 +17,11 @@ from companion.estimate.approach import HIT_LEAVES_M_S, VelocityFix
 from companion.estimate.guards import MOTORS_RAD_S2
 from companion.estimate.history import MotionHistory
 from companion.estimate.impact import ImpactEstimate
-from companion.flight.doubt import STRUCK_M_S
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.mission.config import GuardsConfig
 
+# A push that moved the vehicle by as much is a hit: twice what an estimate has been seen to show of one that it missed.
+STRUCK_M_S = 0.5
 # All but the longest contacts are over (0.12 s at 1 m/s), and the vehicle's estimate is 20 to 40 ms late. A setpoint
 # that leans by 17 degrees for so long moves a vehicle by 3 cm.
 DECIDED_US = 150_000
