@@ -21,4 +21,4 @@ def add_identify(commands: Commands) -> None:
     identify.add_argument(
         "--based-on", metavar="NAME", help="airframe for all else (default: foldable, rigid where no spring is seen)"
     )
-    identify.set_defaults(run=runs("rebound_cli.identify:run_identify"))
+    identify.set_defaults(run=runs("rebound_cli.identification.command:run_identify"))
