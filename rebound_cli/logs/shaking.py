@@ -24,6 +24,9 @@ class Stage(Enum):
     LANDING = "landing"
 
 
+# Away from the ground, a take-off and a landing.
+FLYING = (Stage.HOVER, Stage.UNDER_WAY)
+
 # The running mean's. Long enough for 25 samples at 50 Hz (a spread good to 15 %), short enough to have forgotten the
 # ground by the top of a take-off and to follow drag as the speed changes.
 MEMORY_US = 500_000
@@ -62,6 +65,10 @@ class Shaking:
         return {
             stage: np.sqrt((row**2).mean(axis=0)) for stage, row in rows.items() if len(row) * self.interval_us > 1e6
         }
+
+    def noise_data(self) -> dict[str, list[float]]:
+        """The same for a program."""
+        return {stage.value: [round(v, 3) for v in row.tolist()] for stage, row in self.noise_m_s2().items()}
 
 
 def shaking(log: Log) -> Shaking:
