@@ -1,5 +1,6 @@
 """Telemetry logs (.tlog): ours, MAVProxy's and QGroundControl's, with any number of systems on them."""
 
+import math
 import struct
 from collections import Counter
 from pathlib import Path
@@ -9,52 +10,14 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.kind import other_arms
-from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
+from rebound_cli.logs.log import Demand, Heard, Log, LogError, other_arms
 
 Packets = list[tuple[int, bytes]]
-Source = tuple[int, int]
 
-# time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros at the end are left out.
+# POSITION_TARGET_LOCAL_NED: time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros
+# at the end are left out. The mask's first six bits tell what of position and velocity is to be ignored.
 _TARGET = struct.Struct("<I11fHB")
-_MASK_POSITION, _MASK_VELOCITY, _MASK_VELOCITY_DOWN = 0x07, 0x38, 0x20
-
-
-def read_telemetry(path: Path) -> Log:
-    """Raises LogError."""
-    try:
-        packets = list(read_tlog(path))
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror or error}.") from error
-    if not packets:
-        raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
-    vehicle, others = _vehicle(path, packets)
-    source = (vehicle.system_id, vehicle.component_id)
-    decoder = Decoder()
-    decoder.listen_to(*source)
-    heard: list[Heard] = []
-    for at_us, packet in packets:
-        if source_of(packet) != source:
-            continue
-        if message_id_of(packet) == MessageId.POSITION_TARGET_LOCAL_NED:
-            heard.append(Heard(at_us, _demand(packet)))
-            continue
-        heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
-    kinds = {message_id_of(packet) for _, packet in packets if source_of(packet) == source}
-    losses = [f"{MessageId(number).name} is not in it" for number in _WANTED if number not in kinds]
-    if others:
-        losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
-    if MessageId.HIGHRES_IMU not in kinds:
-        raise LogError(
-            f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "
-            "asked (MAV_x_MODE, or SET_MESSAGE_INTERVAL 105)."
-        )
-    name = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}"
-    return checked(
-        Log(path, name, packets[0][0], tuple(heard), tuple(losses), other_arms=other_arms(vehicle.vehicle_type))
-    )
-
-
+# Without these a detector loses something.
 _WANTED = (
     MessageId.LOCAL_POSITION_NED,
     MessageId.ATTITUDE_QUATERNION,
@@ -63,6 +26,36 @@ _WANTED = (
     MessageId.ODOMETRY,
     MessageId.VIBRATION,
 )
+
+
+def read_telemetry(path: Path) -> Log:
+    """Raises LogError."""
+    packets = list(read_tlog(path))
+    if not packets:
+        raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
+    vehicle, others = _vehicle(path, packets)
+    source, decoder = (vehicle.system_id, vehicle.component_id), Decoder()
+    decoder.listen_to(*source)
+    heard: list[Heard] = []
+    kinds: set[int] = set()
+    for at_us, packet in packets:
+        if source_of(packet) != source:
+            continue
+        kinds.add(message_id_of(packet))
+        if message_id_of(packet) == MessageId.POSITION_TARGET_LOCAL_NED:
+            heard.append(Heard(at_us, _demand(packet)))
+        else:
+            heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
+    if MessageId.HIGHRES_IMU not in kinds:
+        raise LogError(
+            f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "
+            "asked (MAV_x_MODE, or SET_MESSAGE_INTERVAL 105)."
+        )
+    losses = [f"{wanted.name} is not in it" for wanted in _WANTED if wanted not in kinds]
+    if others:
+        losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
+    name, arms = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}", other_arms(vehicle.vehicle_type)
+    return Log(path, name, packets[0][0], tuple(heard), tuple(losses), other_arms=arms)
 
 
 def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
@@ -88,9 +81,6 @@ def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
 
 
 def _demand(packet: bytes) -> Demand:
-    payload = payload_of(packet).ljust(_TARGET.size, b"\0")
-    time_ms, x, y, z, vx, vy, vz, *_, mask, _ = _TARGET.unpack_from(payload)
-    position = None if mask & _MASK_POSITION or x != x or y != y or z != z else (x, y, z)
-    velocity = None if mask & _MASK_VELOCITY or vx != vx or vy != vy or vz != vz else (vx, vy, vz)
-    down = None if mask & _MASK_VELOCITY_DOWN or vz != vz else vz
-    return Demand(time_ms * 1000, position, velocity, down)
+    time_ms, *values, mask, _ = _TARGET.unpack_from(payload_of(packet).ljust(_TARGET.size, b"\0"))
+    asked = [math.nan if mask & 1 << bit else values[bit] for bit in range(6)]
+    return Demand.of(time_ms * 1000, asked[:3], asked[3:])

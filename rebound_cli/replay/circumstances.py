@@ -5,13 +5,15 @@ from companion.link.vehicle import OLD_NEWS_US
 from companion.messages import CurrentMode, ExtendedState, Heartbeat, LandedState, LocalPosition
 from companion.px4_mode import AUTO_LAND
 from rebound_cli.logs.log import Demand, Heard
-from rebound_cli.logs.modes import flies_setpoints
 
 # AUTO.PRECLAND
 _AUTO_PRECLAND = 4 << 16 | 9 << 24
 # From this downward speed asked for PX4's land detector takes a descent to be meant: 1.1 x LNDMC_Z_VEL_MAX, 0.25 m/s
 # (land_detector/MulticopterLandDetector.cpp).
 DESCENT_M_S = 0.275
+# MANUAL, ACRO, STABILIZED, RATTITUDE: the sticks ask for an attitude or for rates, and position control is off
+# (commander/ModeUtil/control_mode.cpp). It is taken to act where the mode is unknown.
+_BY_STICKS_ALONE = (1, 5, 7, 8)
 _NO_DEMAND = Demand(0, None, None, None)
 
 
@@ -81,7 +83,7 @@ class Circumstances:
 
     def _flown(self) -> Demand:
         """The setpoint, in a mode that flies it."""
-        return self._demand if flies_setpoints(self._mode) else _NO_DEMAND
+        return _NO_DEMAND if self._mode >> 16 & 0xFF in _BY_STICKS_ALONE else self._demand
 
     def _is_told_to_descend(self) -> bool:
         if self._mode in (AUTO_LAND, _AUTO_PRECLAND) or self._landed is LandedState.LANDING:
