@@ -69,6 +69,10 @@ def mass_kg(text: str) -> float:
     return _number(text, lambda value: 0 < value <= 1000, "mass: give kilograms, such as 1.1")
 
 
+def share(text: str) -> float:
+    return _number(text, lambda value: 0 <= value <= 1, "share: give a number from 0 to 1")
+
+
 def _number(text: str, is_right: Callable[[float], bool], what: str) -> float:
     try:
         value = float(text)

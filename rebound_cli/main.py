@@ -11,22 +11,18 @@ from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, exit_codes
 from rebound_cli.airframe_arguments import add_airframe
 from rebound_cli.arguments import SIMULATED_AUTOPILOTS
-from rebound_cli.check.arguments import add_check
 from rebound_cli.completion_arguments import add_completion
 from rebound_cli.extras import needed_text
 from rebound_cli.flights.arguments import add_doctor, add_logs
 from rebound_cli.fly_arguments import add_fly
 from rebound_cli.guard.arguments import add_guard
-from rebound_cli.identification.arguments import add_identify
 from rebound_cli.init_arguments import add_init
 from rebound_cli.key_arguments import add_key
-from rebound_cli.plan.arguments import add_plan
 from rebound_cli.preflight.arguments import add_preflight
-from rebound_cli.replay.arguments import add_replay
 from rebound_cli.service.arguments import add_service
 from rebound_cli.sim_arguments import add_sim
 from rebound_cli.status.arguments import add_status
-from rebound_cli.tune.arguments import add_tune
+from rebound_cli.tool_arguments import add_check, add_identify, add_plan, add_replay, add_tune
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)

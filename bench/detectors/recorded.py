@@ -24,8 +24,7 @@ from companion.estimate.rotation import body_to_ned
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
 from rebound_cli.logs.log import Heard, Log, Told
 from rebound_cli.logs.reader import read_log
-from rebound_cli.replay.circumstances import Circumstances
-from rebound_cli.replay.watching import watch_log
+from rebound_cli.replay.watching import Circumstances, watch_log
 
 Floats = npt.NDArray[np.float64]
 

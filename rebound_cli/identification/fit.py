@@ -6,6 +6,7 @@ The spring is the paper's eq. 2 on a wall that cannot pull: its path and its reb
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median_high
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -17,6 +18,8 @@ from rebound_cli.identification.hit import Floats, Hit, Push, Track
 _LEAST_CONTACT_INTERVALS = 2.5
 # Speed and loss are two numbers; from two hits they would follow without a check.
 FEWEST_FOR_LOSS = 3
+# Leaving one hit out has to leave at least two.
+FEWEST_FOR_LEAVE_ONE_OUT = 3
 
 _STARTS_RAD_S = (25.0, 60.0, 120.0, 250.0)
 _START_RATIO = 0.3
@@ -227,3 +230,40 @@ def _from_track(hit: Hit, data: Track) -> Spring:
     logarithm_sigma, ratio_sigma, *_ = np.sqrt(variance * np.diag(np.linalg.pinv(best.jac.T @ best.jac))).tolist()
     natural = math.exp(best.x[0])
     return Spring(Number(natural, natural * logarithm_sigma), Number(float(best.x[1]), ratio_sigma))
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """Everything fitted to the hits; None where they do not show it."""
+
+    hits: Sequence[Hit]
+    restitution: Rebound
+    with_loss: Rebound | None
+    spring: Spring | None
+    friction: Number | None
+
+    @property
+    def deepest_m(self) -> float:
+        """The furthest that any of the hits pressed the spring."""
+        return 0.0 if self.spring is None else max(map(self.spring.depth_m, self.hits))
+
+    @property
+    def stop_m(self) -> float | None:
+        stops = [hit.stop_m for hit in self.hits if hit.stop_m is not None]
+        return median_high(stops) if stops else None
+
+
+def identify(hits: Sequence[Hit]) -> Identified:
+    with_loss = fit_restitution_with_loss(hits) if len(hits) >= FEWEST_FOR_LOSS else None
+    return Identified(hits, fit_restitution(hits), with_loss, fit_spring(hits), fit_friction(hits))
+
+
+def leave_one_out(hits: Sequence[Hit]) -> dict[str, list[float | None]]:
+    """Predicted minus measured speed out (m/s) of every hit, each model fitted to all the others."""
+    errors: dict[str, list[float | None]] = {}
+    for index, hit in enumerate(hits):
+        found = identify([*hits[:index], *hits[index + 1 :]])
+        models = {"restitution": found.restitution, "restitution and loss": found.with_loss, "spring": found.spring}
+        for name, model in models.items():
+            errors.setdefault(name, []).append(None if model is None else model.speed_out(hit) - hit.speed_out_m_s)
+    return {name: column for name, column in errors.items() if any(error is not None for error in column)}

@@ -8,8 +8,8 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from companion.messages import ImuSample, LocalPosition
-from rebound_cli.replay.findings import Finding
-from rebound_cli.replay.result import Replay
+from rebound_cli.replay.report import Replay
+from rebound_cli.replay.watching import Finding
 
 Floats = npt.NDArray[np.float64]
 

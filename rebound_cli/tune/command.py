@@ -1,20 +1,28 @@
 """`rebound tune`: from healthy flights to what a detector can see on this vehicle, and the settings to fly with."""
 
 import json
+import textwrap
 from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
 
 from companion.errors import ConfigurationError
 from companion.mission.config import CompanionConfig
 from rebound_cli.console import console_for
 from rebound_cli.documents import parse_document, validated
-from rebound_cli.inputs import load_world
+from rebound_cli.inputs import companion_settings, load_world
+from rebound_cli.logs.shaking import clipped
 from rebound_cli.progress import with_progress
-from rebound_cli.replay.settings import companion_settings
-from rebound_cli.tune.healthy import read_healthy
-from rebound_cli.tune.hits import sight
-from rebound_cli.tune.report import Tuning, tuning_data, tuning_text
-from rebound_cli.tune.settings import advise, margins, settings_text
+from rebound_cli.tune.healthy import Healthy, read_healthy
+from rebound_cli.tune.hits import SPEEDS_M_S, Sight, sight
+from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
+SCHEMA = 1
+
+_WIDTH = 110
 BUILT_IN = ("foldable", "rigid")
 # Beside the recorded rate: what a radio or a slow serial port leaves of it, and PX4's default.
 RATES_HZ = (100.0, 50.0)
@@ -49,3 +57,103 @@ def run_tune(options: Namespace) -> int:
         out.write_text(text, encoding="utf-8")
         console.print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
     return 0
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """All that was worked out."""
+
+    detector: str
+    flights: Sequence[Healthy]
+    margins: Sequence[Margin]
+    sights: Sequence[Sight]
+    advice: Advice
+
+
+def tuning_text(tuning: Tuning) -> str:
+    parts = [*map(_flight_rows, tuning.flights), _margin_rows(tuning), _sight_rows(tuning)]
+    return "\n\n".join("\n".join(part) for part in parts) + "\n"
+
+
+def _flight_rows(flight: Healthy) -> Iterator[str]:
+    log, found, shaking = flight.log, flight.findings, flight.shaking
+    rows = [
+        f"{log.path}: {log.vehicle}, {flight.in_air_s:.0f} s in the air, IMU at {shaking.rate_hz:.0f} Hz",
+        f"  {'':<16}{'noise x, y, z, RMS':<26}{'largest departure sideways, along z':<36}[m/s^2]",
+    ]
+    for stage, noise in shaking.noise_m_s2().items():
+        x, y, z = shaking.during(stage).T
+        values = ", ".join(f"{value:.2f}" for value in noise)
+        rows.append(f"  {stage.value:<16}{values:<26}{np.hypot(x, y).max():.1f}, {np.abs(z).max():.1f}")
+    count, how = clipped(log)
+    alarms, blind_s = len(found.collisions), sum(span.duration_s for span in found.blind)
+    blind = f"blind for {blind_s:.2f} s, first: {found.blind[0].reason}" if found.blind else "never blind"
+    rows += [
+        f"  clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})",
+        f"  as set now: {alarms or 'no'} false alarm{'s' if alarms > 1 else ''}, {blind}",
+        *(f"  note: {loss}" for loss in log.losses),
+    ]
+    for row in rows:
+        yield textwrap.fill(row, _WIDTH, subsequent_indent="    ") if len(row) > _WIDTH else row
+
+
+def _margin_rows(tuning: Tuning) -> Iterator[str]:
+    yield f"detector '{tuning.detector}': the largest sign of a hit in these flights, as a share of each threshold"
+    for margin in tuning.margins:
+        share = f"below {SHARES[0]:g}" if margin.share is None else f"{margin.share:.2f}"
+        alarm = "   a false alarm" if (margin.share or 0.0) >= 1.0 else ""
+        yield f"  {margin.setting:<28}{margin.value:<10g}{share}{alarm}"
+    if left := tuning.advice.false_alarms_left:
+        yield f"  with the settings below still {left} false alarms: this vehicle is not made quiet by thresholds"
+
+
+def _sight_rows(tuning: Tuning) -> Iterator[str]:
+    hits = tuning.sights[0].hits
+    yield f"hits put into these flights, seen of {hits}, by speed in m/s (eq. 2, head-on, by force alone)"
+    yield f"  {'':<24}{''.join(f'{speed:>6g}' for speed in SPEEDS_M_S)}   all seen from"
+    for one in tuning.sights:
+        counts, certain = "".join(f"{count:>6}" for count in one.seen), one.certain_from_m_s
+        text = "no speed tried" if certain is None else f"{certain:g} m/s on"
+        yield f"  {one.airframe + f', {one.rate_hz:.0f} Hz':<24}{counts}   {text}"
+
+
+def tuning_data(tuning: Tuning) -> dict[str, Any]:
+    """The same for a program; SI units, body FRD."""
+    return {
+        "schema": SCHEMA,
+        "detector": tuning.detector,
+        "flights": [_flight_data(flight) for flight in tuning.flights],
+        "margins": [asdict(margin) for margin in tuning.margins],
+        "hits": [
+            {
+                "airframe": one.airframe,
+                "rate_hz": round(one.rate_hz, 2),
+                "hits": one.hits,
+                "speeds_m_s": list(SPEEDS_M_S),
+                "seen": list(one.seen),
+                "all_seen_from_m_s": one.certain_from_m_s,
+            }
+            for one in tuning.sights
+        ],
+        "settings": [
+            {"place": ".".join(("companion", *place)), "value": value, "reason": reason}
+            for place, (value, reason) in tuning.advice.settings.items()
+        ],
+        "false_alarms_left": tuning.advice.false_alarms_left,
+    }
+
+
+def _flight_data(flight: Healthy) -> dict[str, Any]:
+    count, how = clipped(flight.log)
+    return {
+        "log": str(flight.log.path),
+        "vehicle": flight.log.vehicle,
+        "in_air_s": round(flight.in_air_s, 2),
+        "imu_rate_hz": round(flight.shaking.rate_hz, 2),
+        "noise_rms_frd_m_s2": flight.shaking.noise_data(),
+        "clipped_samples": count,
+        "clipping_known_by": how,
+        "false_alarms": len(flight.findings.collisions),
+        "blind_s": round(sum(span.duration_s for span in flight.findings.blind), 3),
+        "notes": list(flight.log.losses),
+    }

@@ -13,9 +13,8 @@ from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.shaking import FLYING, Shaking, Stage, shaking
-from rebound_cli.replay.findings import Findings
 from rebound_cli.replay.recording import is_run_folder
-from rebound_cli.replay.watching import watch_log
+from rebound_cli.replay.watching import Findings, watch_log
 from rebound_cli.run_folder import SUMMARY_NAME, TLOG_NAME
 from rebound_cli.tune.hits import hit_moments
 

@@ -11,9 +11,14 @@ import pytest
 from bench.head_on import head_on
 from rebound_cli.documents import load_document, validated
 from rebound_cli.identification.capture import find_hit, read_table
-from rebound_cli.identification.fit import fit_friction, fit_restitution, fit_restitution_with_loss, fit_spring
+from rebound_cli.identification.fit import (
+    fit_friction,
+    fit_restitution,
+    fit_restitution_with_loss,
+    fit_spring,
+    leave_one_out,
+)
 from rebound_cli.identification.hit import IdentificationError
-from rebound_cli.identification.report import leave_one_out
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.scene import Scene

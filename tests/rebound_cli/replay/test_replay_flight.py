@@ -7,8 +7,7 @@ import pytest
 import yaml
 
 from rebound_cli.main import main
-from rebound_cli.replay.recording import read_recording
-from rebound_cli.replay.reproduction import reproduce
+from rebound_cli.replay.recording import read_recording, reproduce
 from tests.rebound_cli.command import WALL
 
 
