@@ -6,9 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeAlias
 
+from companion import messages
 from companion.errors import ReboundError
-from companion.messages import ImuSample, Sample, Vector3
+from companion.messages import ImuSample, MessageId, Sample, Vector3
 
+# Without these a detector loses something.
+WANTED = {
+    MessageId.LOCAL_POSITION_NED: messages.LocalPosition,
+    MessageId.ATTITUDE_QUATERNION: messages.Attitude,
+    MessageId.EXTENDED_SYS_STATE: messages.ExtendedState,
+    MessageId.ATTITUDE_TARGET: messages.AttitudeTarget,
+    MessageId.ODOMETRY: messages.Odometry,
+    MessageId.VIBRATION: messages.Vibration,
+}
 # Of a quad-x every rotor is as far aside as ahead, of a plus one of them is zero; half-way between them are 22.5 deg.
 _LEAST_DIAGONAL = math.tan(math.pi / 8)
 

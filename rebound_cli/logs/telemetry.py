@@ -10,22 +10,13 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import Demand, Heard, Log, LogError, other_arms
+from rebound_cli.logs.log import WANTED, Demand, Heard, Log, LogError, other_arms
 
 Packets = list[tuple[int, bytes]]
 
 # POSITION_TARGET_LOCAL_NED: time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros
 # at the end are left out. The mask's first six bits tell what of position and velocity is to be ignored.
 _TARGET = struct.Struct("<I11fHB")
-# Without these a detector loses something.
-_WANTED = (
-    MessageId.LOCAL_POSITION_NED,
-    MessageId.ATTITUDE_QUATERNION,
-    MessageId.EXTENDED_SYS_STATE,
-    MessageId.ATTITUDE_TARGET,
-    MessageId.ODOMETRY,
-    MessageId.VIBRATION,
-)
 
 
 def read_telemetry(path: Path) -> Log:
@@ -51,7 +42,7 @@ def read_telemetry(path: Path) -> Log:
             f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "
             "asked (MAV_x_MODE, or SET_MESSAGE_INTERVAL 105)."
         )
-    losses = [f"{wanted.name} is not in it" for wanted in _WANTED if wanted not in kinds]
+    losses = [f"{wanted.name} is not in it" for wanted in WANTED if wanted not in kinds]
     if others:
         losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
     name, arms = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}", other_arms(vehicle.vehicle_type)

@@ -16,18 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from pyulog import ULog
 
+from companion import messages
 from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
-from companion.messages import (
-    Attitude,
-    AttitudeTarget,
-    ExtendedState,
-    Heartbeat,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    Odometry,
-    Vibration,
-)
 from rebound_cli.logs.log import Demand, Heard, Log, LogError, other_arms, vector
 
 Floats = npt.NDArray[np.float64]
@@ -192,7 +182,7 @@ def _vehicle_type(path: Path, status: _Topic | None, parameters: Mapping[str, fl
         _VTOL if vtol is not None and vtol.all() else 0,
     ]
     kind = next((kind for kind in kinds if kind and kind not in MULTICOPTERS), max(kinds) or _QUADROTOR)
-    identity = identify(Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, False, 0, 0))
+    identity = identify(messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, False, 0, 0))
     if isinstance(identity, str):
         raise LogError(f"{path}: {identity}; collisions are looked for in multicopters' logs alone.")
     return kind
@@ -255,7 +245,7 @@ def _imu_samples(topics: _Topics, imu: _Topic) -> Iterator[Heard]:
     biases = [_bias(topics, sensor, imu.time_us) for sensor in ("accel", "gyro")]
     for index, time_us, row in imu.rows(np.column_stack([force, turning]) - np.column_stack(biases)):
         sample_us = time_us if taken_us is None else int(taken_us[index])
-        yield Heard(time_us, ImuSample(sample_us, vector(row), vector(row[3:])))
+        yield Heard(time_us, messages.ImuSample(sample_us, vector(row), vector(row[3:])))
 
 
 def _bias(topics: _Topics, sensor: str, at_us: npt.NDArray[np.int64]) -> Floats:
@@ -286,16 +276,16 @@ def _local_position(topic: _Topic) -> Iterator[Heard]:
     resets = np.sum(counters, axis=0) if counters else None
     for index, time_us, row in topic.rows(topic.vector("x", "y", "z", "vx", "vy", "vz")):
         position, velocity = vector(row), vector(row[3:])
-        yield Heard(time_us, LocalPosition(_ms(time_us), position, velocity))
+        yield Heard(time_us, messages.LocalPosition(_ms(time_us), position, velocity))
         if resets is not None:
-            yield Heard(time_us, Odometry(time_us, position, velocity, int(resets[index]) % 256))
+            yield Heard(time_us, messages.Odometry(time_us, position, velocity, int(resets[index]) % 256))
 
 
 def _attitude(topic: _Topic) -> Iterator[Heard]:
     rates = topic.vector("rollspeed", "pitchspeed", "yawspeed")  # until v1.11
     for index, time_us, (w, x, y, z) in topic.rows(topic.array("q", 4)):
         turning = None if rates is None else vector(rates[index].tolist())
-        yield Heard(time_us, Attitude(_ms(time_us), (w, x, y, z), turning))
+        yield Heard(time_us, messages.Attitude(_ms(time_us), (w, x, y, z), turning))
 
 
 def _attitude_target(topic: _Topic) -> Iterator[Heard]:
@@ -303,7 +293,7 @@ def _attitude_target(topic: _Topic) -> Iterator[Heard]:
     for index, time_us, thrust in topic.rows(topic.array("thrust_body")):
         w, x, y, z = [math.nan] * 4 if attitudes is None else attitudes[index].tolist()
         attitude = (w, x, y, z) if math.isfinite(w + x + y + z) else None
-        yield Heard(time_us, AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
+        yield Heard(time_us, messages.AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
 
 
 def _vibration(topic: _Topic) -> Iterator[Heard]:
@@ -313,7 +303,7 @@ def _vibration(topic: _Topic) -> Iterator[Heard]:
     for time_us, count, (gyro, accel) in zip(
         topic.time_us.tolist(), clipping.sum(axis=1), levels.tolist(), strict=True
     ):
-        yield Heard(time_us, Vibration(time_us, gyro, accel, (int(count), 0, 0)))
+        yield Heard(time_us, messages.Vibration(time_us, gyro, accel, (int(count), 0, 0)))
 
 
 def _heartbeat(topic: _Topic) -> Iterator[Heard]:
@@ -326,7 +316,7 @@ def _heartbeat(topic: _Topic) -> Iterator[Heard]:
         status = _CRITICAL if acts > 0 else _ACTIVE if arm == _ARMED else _STANDBY
         kind = int(kind) if int(kind) in MULTICOPTERS else _QUADROTOR
         mode = _MODES.get(int(state), 0)
-        beat = Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(arm == _ARMED), mode, status)
+        beat = messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(arm == _ARMED), mode, status)
         yield Heard(time_us, beat)
 
 
@@ -358,16 +348,16 @@ def _landed_states(topics: _Topics) -> Iterator[Heard]:
     for time_us, field, value in sorted(news, key=lambda item: item[0]):
         known[field] = value
         if "landed" in known:
-            yield Heard(time_us, ExtendedState(_landed_state(known)))
+            yield Heard(time_us, messages.ExtendedState(_landed_state(known)))
 
 
-def _landed_state(known: Mapping[str, int]) -> LandedState:
+def _landed_state(known: Mapping[str, int]) -> messages.LandedState:
     if known["landed"]:
-        return LandedState.ON_GROUND
+        return messages.LandedState.ON_GROUND
     if known.get("flag_control_auto_enabled") and known.get("current.valid"):
-        flown = {_TAKEOFF: LandedState.TAKEOFF, _LAND: LandedState.LANDING}
-        return flown.get(known.get("current.type", 0), LandedState.IN_AIR)
-    return LandedState.IN_AIR
+        flown = {_TAKEOFF: messages.LandedState.TAKEOFF, _LAND: messages.LandedState.LANDING}
+        return flown.get(known.get("current.type", 0), messages.LandedState.IN_AIR)
+    return messages.LandedState.IN_AIR
 
 
 _CONVERSIONS = {

@@ -5,21 +5,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from companion.messages import Vector3
+from companion.mission import items
 from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
-from companion.mission.items import (
-    GoToItem,
-    HoldItem,
-    LandItem,
-    OrbitItem,
-    PathItem,
-    ReturnItem,
-    SetSpeedItem,
-    SetYawItem,
-    TakeoffItem,
-    VelocityItem,
-    WaitForItem,
-)
 from companion.mission.itinerary import Leg, itinerary
 from companion.mission.model import Mission
 from rebound_cli.plan import shape
@@ -83,26 +71,26 @@ class _Plan:
     def add_leg(self, leg: Leg) -> None:
         action = leg.step.action
         match action:
-            case TakeoffItem():
+            case items.TakeoffItem():
                 self._add_place(shape.TAKEOFF, leg.end_ned_m)
-            case GoToItem() | PathItem() | OrbitItem():
+            case items.GoToItem() | items.PathItem() | items.OrbitItem():
                 self._fly_at(action.speed_m_s or self._cruise_m_s)
                 for place in _corners(action, leg):
                     self._add_place(shape.WAYPOINT, place, action.yaw_deg)
-            case VelocityItem():
+            case items.VelocityItem():
                 self._fly_at(math.hypot(*action.velocity_ned_m_s))
                 self._add_place(shape.WAYPOINT, leg.end_ned_m, action.yaw_deg)
-            case HoldItem():
+            case items.HoldItem():
                 self._add(shape.DELAY, action.duration_s, -1.0, -1.0, -1.0)
-            case SetYawItem():
+            case items.SetYawItem():
                 self._add_place(shape.WAYPOINT, leg.end_ned_m, action.yaw_deg)
-            case ReturnItem():
+            case items.ReturnItem():
                 self._add(shape.RETURN_TO_LAUNCH)
-            case LandItem():
+            case items.LandItem():
                 self._add_place(shape.LAND, (*leg.end_ned_m[:2], 0.0))
-            case WaitForItem() | ExpectItem():
+            case items.WaitForItem() | ExpectItem():
                 self.notes.append(f"left out: item {leg.step.label}, {leg.step.name}")
-            case SetSpeedItem():
+            case items.SetSpeedItem():
                 self._cruise_m_s = action.speed_m_s
 
     def _fly_at(self, speed_m_s: float) -> None:
@@ -127,11 +115,11 @@ class _Plan:
         self.items.append({**extra, **item, "type": "SimpleItem"})
 
 
-def _corners(action: GoToItem | PathItem | OrbitItem, leg: Leg) -> Sequence[Vector3]:
+def _corners(action: items.GoToItem | items.PathItem | items.OrbitItem, leg: Leg) -> Sequence[Vector3]:
     """Places between which PX4 may fly straight; of a circle at equal angles, the first where the vehicle joins it."""
-    if isinstance(action, GoToItem):
+    if isinstance(action, items.GoToItem):
         return [action.position_ned_m]
-    if isinstance(action, PathItem):
+    if isinstance(action, items.PathItem):
         return action.points_ned_m
     assert leg.way is not None
     (north_m, east_m, down_m), end = action.centre_ned_m, leg.way.target_m

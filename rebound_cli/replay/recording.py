@@ -23,23 +23,11 @@ from companion.mavlink.packet import source_of
 from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.shell.tlog import read_tlog
+from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.replay.watching import Findings, Notebook
-from rebound_cli.run_folder import (
-    EVENTS_NAME,
-    GUARD_NAME,
-    INPUTS_NAME,
-    RESOLVED_NAME,
-    SUMMARY_NAME,
-    TLOG_NAME,
-    VERSIONS_NAME,
-    event_line,
-    read_records,
-    read_text,
-    whole_lines,
-)
 
 
 @dataclass(slots=True)
@@ -68,31 +56,27 @@ class Recording:
 
 
 def is_run_folder(path: Path) -> bool:
-    return path.is_dir() and (path / TLOG_NAME).exists()
+    return path.is_dir() and (path / run_folder.TLOG_NAME).exists()
 
 
 def read_recording(folder: Path) -> Recording:
     """Raises LogError, DocumentError, RunFolderError."""
-    inputs_file = folder / INPUTS_NAME
+    inputs_file, tlog = folder / run_folder.INPUTS_NAME, folder / run_folder.TLOG_NAME
     if not inputs_file.exists():
-        raise LogError(
-            f"{folder}: no {INPUTS_NAME} in it, so the flight was recorded by a version that cannot be replayed to the "
-            f"bit; replay {folder / TLOG_NAME} instead."
-        )
+        text = f"no {inputs_file.name} in it, so the flight was recorded by a version that no replay repeats to the bit"
+        raise LogError(f"{folder}: {text}; replay {tlog} instead.")
     file = settings_file(folder)
-    document = load_flown(file)
-    settings: Mission | GuardConfig = (
-        mission_from(document) if file.name == RESOLVED_NAME else validated(GuardConfig, document, document.data)
-    )
-    steps = _steps(folder / TLOG_NAME)
+    document, is_guard = load_flown(file), file.name == run_folder.GUARD_NAME
+    settings = validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
+    steps = _steps(tlog)
     if not steps:
-        raise LogError(f"{folder / TLOG_NAME}: no packet in it: nothing was ever heard in this flight.")
-    end_us, is_cut = max(steps), not (folder / SUMMARY_NAME).exists()
+        raise LogError(f"{tlog}: no packet in it: nothing was ever heard in this flight.")
+    end_us, is_cut = max(steps), not (folder / run_folder.SUMMARY_NAME).exists()
     # Of a flight that was cut off a last line may be unfinished; in any other that is damage.
-    inputs, events = (read_text(folder / name) for name in (INPUTS_NAME, EVENTS_NAME))
+    inputs, events = (run_folder.read_text(folder / name) for name in (inputs_file.name, run_folder.EVENTS_NAME))
     if is_cut:
-        inputs, events = whole_lines(inputs), whole_lines(events)
-    for record in read_records(inputs_file, inputs):
+        inputs, events = run_folder.whole_lines(inputs), run_folder.whole_lines(events)
+    for record in run_folder.read_records(inputs_file, inputs):
         steps.setdefault(record["time_us"], Step(record["time_us"])).told.append(record)
     lines = events.splitlines(keepends=True)
     if is_cut:
@@ -105,18 +89,18 @@ def read_recording(folder: Path) -> Recording:
         steps = {time_us: step for time_us, step in steps.items() if time_us < end_us}
         if not steps:
             raise LogError(f"{folder}: cut off before a whole step of the flight was written.")
-        told = zip(lines, read_records(folder / EVENTS_NAME, events), strict=True)
+        told = zip(lines, run_folder.read_records(folder / run_folder.EVENTS_NAME, events), strict=True)
         lines = [line for line, event in told if event["time_us"] < end_us]
     try:
-        versions = dict(json.loads(read_text(folder / VERSIONS_NAME)))
+        versions = dict(json.loads(run_folder.read_text(folder / run_folder.VERSIONS_NAME)))
     except (ValueError, TypeError) as error:
-        raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
+        raise LogError(f"{folder / run_folder.VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
 
 
 def settings_file(folder: Path) -> Path:
     """The mission as it was flown, or the guard's settings."""
-    return folder / (GUARD_NAME if (folder / GUARD_NAME).exists() else RESOLVED_NAME)
+    return folder / (run_folder.GUARD_NAME if (folder / run_folder.GUARD_NAME).exists() else run_folder.RESOLVED_NAME)
 
 
 def _steps(tlog: Path) -> dict[int, Step]:
@@ -156,7 +140,7 @@ def reproduce(recording: Recording) -> Reproduction:
         result = stepped.step(b"".join(step.received), step.time_us)
         for event in result.events:
             then = expected[len(told)] if len(told) < len(expected) else None
-            told.append(event_line(event))
+            told.append(run_folder.event_line(event))
             if then is None:
                 differences.append(f"this event is new: {told[-1].strip()}")
             elif told[-1] != then:
@@ -196,7 +180,7 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
             try:
                 status = ComputerStatus(**record["status"] | {"cpu_percent": tuple(record["status"]["cpu_percent"])})
             except (TypeError, KeyError) as error:
-                raise LogError(f"{INPUTS_NAME}: a status of the computer is damaged.") from error
+                raise LogError(f"{run_folder.INPUTS_NAME}: a status of the computer is damaged.") from error
             stepped.tell_computer(status)
 
 

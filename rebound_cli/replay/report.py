@@ -7,18 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.detection.interface import Evidence, ImpactKind
-from companion.messages import (
-    Attitude,
-    AttitudeTarget,
-    ExtendedState,
-    LandedState,
-    LocalPosition,
-    MessageId,
-    Odometry,
-    Vibration,
-)
+from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
-from rebound_cli.logs.log import Log, LogError
+from rebound_cli.logs.log import WANTED, Log, LogError
 from rebound_cli.logs.shaking import Shaking, clipped, shaking
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
 from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
@@ -30,17 +21,6 @@ _WIDTH = 110
 _HOW = {
     Evidence.FORCE: "the contact's own force",
     Evidence.AFTERMATH: "what followed a contact between the samples",
-}
-
-
-# What of a detector's losses a log can have by these samples.
-_SAMPLES = {
-    MessageId.LOCAL_POSITION_NED: LocalPosition,
-    MessageId.ATTITUDE_QUATERNION: Attitude,
-    MessageId.ATTITUDE_TARGET: AttitudeTarget,
-    MessageId.EXTENDED_SYS_STATE: ExtendedState,
-    MessageId.ODOMETRY: Odometry,
-    MessageId.VIBRATION: Vibration,
 }
 
 
@@ -91,7 +71,7 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
     missing = [
         f"without {message.name} '{config.detector}' loses: {loss}"
         for message, loss in detector.losses.items()
-        if message in _SAMPLES and _SAMPLES[message] not in kinds
+        if message in WANTED and WANTED[message] not in kinds
     ]
     if log.other_arms is not None and config.estimate.fits_arms:
         missing.append(f"a {log.other_arms}: a hit's normal is fitted for the four arms of a quad-x")

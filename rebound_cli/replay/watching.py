@@ -4,21 +4,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
+from companion import messages
 from companion.core import POLL_INTERVAL_US
 from companion.detection.interface import Situation
 from companion.detection.watch import Watch, advance, start_watch
 from companion.estimate.impact import ImpactEstimate
 from companion.link.vehicle import OLD_NEWS_US
-from companion.messages import (
-    CurrentMode,
-    ExtendedState,
-    Heartbeat,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-    MessageId,
-    Sample,
-)
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND, mode_name
 from rebound_cli.logs.log import Demand, Heard, Log, Told
@@ -46,7 +37,7 @@ class Circumstances:
     def __init__(self) -> None:
         self.situation = Situation()
         self._armed: bool | None = None
-        self._landed = LandedState.UNDEFINED
+        self._landed = messages.LandedState.UNDEFINED
         self._mode = 0
         self._down_m: float | None = None
         self._ground_down_m: float | None = None
@@ -56,19 +47,19 @@ class Circumstances:
     def hear(self, heard: Heard) -> bool:
         """Whether the sample changed the situation."""
         match heard.sample:
-            case LocalPosition(position_ned_m=(_, _, down_m)):
+            case messages.LocalPosition(position_ned_m=(_, _, down_m)):
                 self._down_m = down_m
-                is_down = self._landed is LandedState.ON_GROUND or self._armed is False
+                is_down = self._landed is messages.LandedState.ON_GROUND or self._armed is False
                 if self._ground_down_m is None and is_down:
                     self._ground_down_m = down_m
-            case Heartbeat(armed=armed, custom_mode=mode):
+            case messages.Heartbeat(armed=armed, custom_mode=mode):
                 # Heights count from the place of arming, which is where the vehicle stands when it is armed.
                 if armed and self._armed is False:
                     self._ground_down_m = self._down_m
                 self._armed, self._mode = armed, mode
-            case CurrentMode(custom_mode=mode):
+            case messages.CurrentMode(custom_mode=mode):
                 self._mode = mode
-            case ExtendedState(landed_state=landed):
+            case messages.ExtendedState(landed_state=landed):
                 self._landed = landed
             case Demand() as demand:
                 # PX4 keeps OFFBOARD for so long without a setpoint (COM_OF_LOSS_T); logs hold five in a second.
@@ -87,7 +78,7 @@ class Circumstances:
     def _add_up(self) -> None:
         # The setpoint, in a mode that flies it.
         flown = _NO_DEMAND if self._mode >> 16 & 0xFF in _BY_STICKS_ALONE else self._demand
-        is_landing = self._mode in (AUTO_LAND, _AUTO_PRECLAND) or self._landed is LandedState.LANDING
+        is_landing = self._mode in (AUTO_LAND, _AUTO_PRECLAND) or self._landed is messages.LandedState.LANDING
         height_m = None
         if self._down_m is not None and self._ground_down_m is not None:
             height_m = self._ground_down_m - self._down_m
@@ -169,7 +160,7 @@ class Notebook:
     def __init__(self) -> None:
         self.findings = Findings()
         self._open: dict[str, tuple[int, str]] = {}
-        self._landed = LandedState.UNDEFINED
+        self._landed = messages.LandedState.UNDEFINED
         self._armed: bool | None = None
         self._mode: int | None = None
         self._noted_us: int | None = None
@@ -188,7 +179,7 @@ class Notebook:
         self._note_span("off", off, at_us)
         elapsed_us = 0 if self._noted_us is None else at_us - self._noted_us
         self._noted_us = at_us
-        if situation.armed and situation.landed_state is not LandedState.ON_GROUND:
+        if situation.armed and situation.landed_state is not messages.LandedState.ON_GROUND:
             findings.flown_us += elapsed_us
             findings.watched_us += elapsed_us if off is None and watch.blind_reason is None else 0
 
@@ -207,12 +198,13 @@ class Notebook:
     def note_samples(self, samples: Sequence[Told], at_us: int) -> None:
         """Take-offs, landings, arming and modes, as the vehicle reports them."""
         for sample in samples:
-            if isinstance(sample, ExtendedState):
-                was_down, is_down = (state is LandedState.ON_GROUND for state in (self._landed, sample.landed_state))
-                if was_down != is_down and self._landed is not LandedState.UNDEFINED:
+            if isinstance(sample, messages.ExtendedState):
+                ground = messages.LandedState.ON_GROUND
+                was_down, is_down = self._landed is ground, sample.landed_state is ground
+                if was_down != is_down and self._landed is not messages.LandedState.UNDEFINED:
                     self.tell(at_us, "landed" if is_down else "took off")
                 self._landed = sample.landed_state
-            elif isinstance(sample, Heartbeat):
+            elif isinstance(sample, messages.Heartbeat):
                 if sample.armed != self._armed and (self._armed is not None or sample.armed):
                     self.tell(at_us, "armed" if sample.armed else "disarmed")
                 if sample.custom_mode != self._mode:
@@ -230,10 +222,10 @@ def watch_log(log: Log, config: CompanionConfig, rate_hz: float | None = None) -
     heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
     circumstances, notebook = Circumstances(), Notebook()
     # A log begins with old news of every topic: until the first IMU sample nobody was on the watch.
-    start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, ImuSample))
+    start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
     watch = start_watch(config, start_us)
 
-    def step(samples: Sequence[Sample], now_us: int) -> None:
+    def step(samples: Sequence[messages.Sample], now_us: int) -> None:
         for notice in advance(watch, samples, circumstances.situation, now_us).notices:
             notebook.tell(now_us, notice.text)
         notebook.note(watch, circumstances.situation, now_us)
@@ -261,11 +253,11 @@ def thinned(heard: tuple[Heard, ...], rate_hz: float) -> Iterator[Heard]:
 
     A sample stays the mean over its own interval: a lower rate does not average, it leaves samples out.
     """
-    kind = next(kind for kind in KINDS if kind.message_id == MessageId.HIGHRES_IMU)
+    kind = next(kind for kind in KINDS if kind.message_id == messages.MessageId.HIGHRES_IMU)
     stream = Stream(kind, heard[0].at_us)
     stream.set_interval(interval_from_request(1e6 / rate_hz))
     for item in heard:
-        if isinstance(item.sample, ImuSample):
+        if isinstance(item.sample, messages.ImuSample):
             if item.at_us <= stream.due_after_us:
                 continue
             stream.sent(item.at_us)

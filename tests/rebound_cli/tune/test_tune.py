@@ -14,7 +14,7 @@ from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.logs.log import Heard
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
-from rebound_cli.tune.healthy import crash
+from rebound_cli.tune.command import crash
 from rebound_cli.tune.hits import SPEEDS_M_S, STEP_S, Sight, hit_moments, impulse_since_touch, sight, with_hits
 from rebound_cli.tune.settings import RESERVE, advise, margins, settings_text
 from sim_vehicle.airframe import load_built_in
