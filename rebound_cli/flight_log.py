@@ -64,19 +64,10 @@ def read_flight_log(path: Path) -> FlightLog:
                     strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
                 elif isinstance(sample, LocalPosition):
                     positions.append((at_us, *sample.position_ned_m, *sample.velocity_ned_m_s))
-    imu_rows, position_rows, setpoint_rows = _rows(imu, 8), _rows(positions, 7), _rows(setpoints, 4)
+    widths = ((imu, 8), (positions, 7), (setpoints, 4))
+    imu_rows, position_rows, setpoint_rows = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
     return FlightLog(
-        imu_at_us=imu_rows[:, 0],
-        imu_time_boot_us=imu_rows[:, 1],
-        specific_force_frd_m_s2=imu_rows[:, 2:5],
-        accelerated_ned_m_s=imu_rows[:, 5:8],
-        position_at_us=position_rows[:, 0],
-        position_ned_m=position_rows[:, 1:4],
-        velocity_ned_m_s=position_rows[:, 4:7],
-        setpoint_at_us=setpoint_rows[:, 0],
-        setpoint_ned_m=setpoint_rows[:, 1:4],
+        *(imu_rows[:, 0], imu_rows[:, 1], imu_rows[:, 2:5], imu_rows[:, 5:8]),
+        *(position_rows[:, 0], position_rows[:, 1:4], position_rows[:, 4:7]),
+        *(setpoint_rows[:, 0], setpoint_rows[:, 1:4]),
     )
-
-
-def _rows(rows: list[tuple[float, ...]], width: int) -> Floats:
-    return np.array(rows, dtype=np.float64).reshape(len(rows), width)

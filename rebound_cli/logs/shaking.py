@@ -55,9 +55,10 @@ class Shaking:
         """Samples a second; gaps count for nothing."""
         return 1e6 / self.interval_us
 
-    def during(self, *stages: Stage) -> Floats:
-        """Departures in these stages."""
-        return self.departure_frd_m_s2[[stage in stages for stage in self.stages]]
+    def during(self, stage: Stage) -> Floats:
+        """Departures in this stage."""
+        departures: Floats = self.departure_frd_m_s2[self.stages == stage]
+        return departures
 
     def noise_m_s2(self) -> Mapping[Stage, Floats]:
         """RMS on each axis for every stage with more than a second of samples."""

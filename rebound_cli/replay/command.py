@@ -9,8 +9,7 @@ from pathlib import Path
 from rebound_cli.console import Console, console_for
 from rebound_cli.inputs import companion_settings
 from rebound_cli.logs.log import LogError
-from rebound_cli.logs.reader import read_log
-from rebound_cli.logs.telemetry import read_telemetry
+from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.recording import is_run_folder, read_recording, settings_file
 from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
 from rebound_cli.run_folder import RUNS_FOLDER, TLOG_NAME, versions

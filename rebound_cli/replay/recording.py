@@ -27,7 +27,7 @@ from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
-from rebound_cli.replay.watching import Findings, Notebook
+from rebound_cli.replay.watching import Findings
 
 
 @dataclass(slots=True)
@@ -132,7 +132,7 @@ def reproduce(recording: Recording) -> Reproduction:
     """Fly the recording to its end, whatever differs."""
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
-    notebook, expected, differences = Notebook(), list(recording.event_lines), []
+    findings, expected, differences = Findings(), list(recording.event_lines), []
     told: list[str] = []
     for step in recording.steps:
         # What the flight knew when the packets came; they may move it on.
@@ -145,18 +145,19 @@ def reproduce(recording: Recording) -> Reproduction:
                 differences.append(f"this event is new: {told[-1].strip()}")
             elif told[-1] != then:
                 differences.append(f"event {len(told)} was {then.strip()} and is {told[-1].strip()}")
-            notebook.tell(event.time_us, event.text)
+            findings.tell(event.time_us, event.text)
         if list(step.sent) != list(result.sent_frames):
             were, are = len(step.sent), len(result.sent_frames)
             what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
             differences.append(f"at {step.time_us} us {what}")
         assert stepped.core is not None, "the first step begins it"
-        notebook.note(stepped.core.watch, known, step.time_us)
+        findings.note(stepped.core.watch, known, step.time_us)
         for record in step.told:
             _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
+    findings.close(recording.steps[-1].time_us)
     return Reproduction(
-        findings=notebook.close(recording.steps[-1].time_us),
+        findings=findings,
         steps=len(recording.steps),
         packets_received=sum(len(step.received) for step in recording.steps),
         packets_sent=sum(len(step.sent) for step in recording.steps),

@@ -79,24 +79,19 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
 
 
 def report_text(replay: Replay, pictures: Sequence[str]) -> str:
-    """The whole report; times in seconds since the log's start."""
+    """The whole report, with a picture of each impact; times in seconds since the log's start."""
     log, rate_hz = replay.log, replay.shaking.rate_hz
     recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
     headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
     told: list[tuple[int, list[str]]] = [(h.at_us, [h.text]) for h in replay.findings.happenings]
-    for finding, picture in zip(replay.findings.impacts, _names(replay, pictures), strict=True):
-        told.append((finding.at_us, [*_finding_rows(replay, finding), *([f"picture: {picture}"] if picture else [])]))
+    for finding, picture in zip(replay.findings.impacts, pictures, strict=True):
+        told.append((finding.at_us, [*_finding_rows(replay, finding), f"picture: {picture}"]))
     timeline = [_entry(log.seconds(at_us), texts) for at_us, texts in sorted(told, key=lambda row: row[0])]
     parts = [f"{headline}, detector '{replay.detector}'", *(["\n".join(timeline)] if timeline else [])]
     parts.append("\n".join(_wrapped(fact, "", "  ") for fact in _facts(replay)))
     if replay.reproduction is not None:
         parts.append(_wrapped(_reproduction_text(replay.reproduction), "", "  "))
     return "\n\n".join([*parts, _verdict(replay)]) + "\n"
-
-
-def _names(replay: Replay, pictures: Sequence[str]) -> list[str | None]:
-    """A picture or None for each impact."""
-    return [*pictures, *[None] * (len(replay.findings.impacts) - len(pictures))]
 
 
 def _entry(at_s: float, texts: Sequence[str]) -> str:
@@ -193,7 +188,7 @@ def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
         "collisions": len(findings.collisions),
         "impacts": [
             {**_finding_data(replay, finding), "picture": name}
-            for finding, name in zip(findings.impacts, _names(replay, pictures), strict=True)
+            for finding, name in zip(findings.impacts, pictures, strict=True)
         ],
         "happenings": [{"at_s": _seconds(replay, h.at_us), "text": h.text} for h in findings.happenings],
         "watched_share": findings.watched_share,

@@ -12,7 +12,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.link.vehicle import OLD_NEWS_US
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND, mode_name
-from rebound_cli.logs.log import Demand, Heard, Log, Told
+from rebound_cli.logs.log import Demand, Heard, Log
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
@@ -39,13 +39,15 @@ class Circumstances:
         self._armed: bool | None = None
         self._landed = messages.LandedState.UNDEFINED
         self._mode = 0
+        self._told_mode: int | None = None  # in a heartbeat
         self._down_m: float | None = None
         self._ground_down_m: float | None = None
         self._demand = _NO_DEMAND
         self._demand_old_us = 0  # from then on it is no longer flown, unless it is renewed
 
-    def hear(self, heard: Heard) -> bool:
-        """Whether the sample changed the situation."""
+    def hear(self, heard: Heard) -> Sequence[str]:
+        """Take-offs, landings, arming and modes, as the sample reports them."""
+        happened: list[str] = []
         match heard.sample:
             case messages.LocalPosition(position_ned_m=(_, _, down_m)):
                 self._down_m = down_m
@@ -56,18 +58,25 @@ class Circumstances:
                 # Heights count from the place of arming, which is where the vehicle stands when it is armed.
                 if armed and self._armed is False:
                     self._ground_down_m = self._down_m
-                self._armed, self._mode = armed, mode
+                if armed != self._armed and (armed or self._armed is not None):
+                    happened.append("armed" if armed else "disarmed")
+                if mode != self._told_mode:
+                    happened.append(f"mode {mode_name(mode)}")
+                self._armed, self._mode, self._told_mode = armed, mode, mode
             case messages.CurrentMode(custom_mode=mode):
                 self._mode = mode
             case messages.ExtendedState(landed_state=landed):
+                was_down, is_down = (state is messages.LandedState.ON_GROUND for state in (self._landed, landed))
+                if was_down != is_down and self._landed is not messages.LandedState.UNDEFINED:
+                    happened.append("landed" if is_down else "took off")
                 self._landed = landed
             case Demand() as demand:
                 # PX4 keeps OFFBOARD for so long without a setpoint (COM_OF_LOSS_T); logs hold five in a second.
                 self._demand, self._demand_old_us = demand, heard.at_us + OLD_NEWS_US
             case _:
-                return False
+                return ()
         self._add_up()
-        return True
+        return happened
 
     def wait(self, now_us: int) -> None:
         """Time has passed: a setpoint that nobody renewed is no longer flown."""
@@ -138,6 +147,8 @@ class Findings:
     happenings: list[Happening] = field(default_factory=list)
     flown_us: int = 0  # armed and in the air
     watched_us: int = 0  # of that, with a detector that was on and saw
+    _open: dict[str, tuple[int, str]] = field(default_factory=dict)
+    _noted_us: int | None = None
 
     @property
     def watched_share(self) -> float | None:
@@ -153,26 +164,13 @@ class Findings:
         """Touches that are no collisions: landings, hands."""
         return [finding for finding in self.impacts if not finding.is_collision]
 
-
-class Notebook:
-    """Writes findings down as the watch makes them."""
-
-    def __init__(self) -> None:
-        self.findings = Findings()
-        self._open: dict[str, tuple[int, str]] = {}
-        self._landed = messages.LandedState.UNDEFINED
-        self._armed: bool | None = None
-        self._mode: int | None = None
-        self._noted_us: int | None = None
-
     def note(self, watch: Watch, situation: Situation, at_us: int) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
-        estimate, findings, off = watch.estimate, self.findings, situation.off_reason
+        estimate, off = watch.estimate, situation.off_reason
         if estimate is not None:
-            if not findings.impacts or findings.impacts[-1].first.impact is not estimate.impact:
-                finding = Finding(at_us, watch.state.threshold_m_s2, situation, estimate, estimate)
-                findings.impacts.append(finding)
-            findings.impacts[-1].final = estimate
+            if not self.impacts or self.impacts[-1].first.impact is not estimate.impact:
+                self.impacts.append(Finding(at_us, watch.state.threshold_m_s2, situation, estimate, estimate))
+            self.impacts[-1].final = estimate
         self._note_span("blind", watch.blind_reason, at_us)
         if off != self._open.get("off", (0, None))[1]:
             self._note_span("off", None, at_us)
@@ -180,8 +178,8 @@ class Notebook:
         elapsed_us = 0 if self._noted_us is None else at_us - self._noted_us
         self._noted_us = at_us
         if situation.armed and situation.landed_state is not messages.LandedState.ON_GROUND:
-            findings.flown_us += elapsed_us
-            findings.watched_us += elapsed_us if off is None and watch.blind_reason is None else 0
+            self.flown_us += elapsed_us
+            self.watched_us += elapsed_us if off is None and watch.blind_reason is None else 0
 
     def _note_span(self, name: str, reason: str | None, at_us: int) -> None:
         """A span lasts as long as there is a reason and goes by its first: a blind detector's changes its figures."""
@@ -189,46 +187,28 @@ class Notebook:
             self._open.setdefault(name, (at_us, reason))
         elif name in self._open:
             start_us, first_reason = self._open.pop(name)
-            spans = self.findings.blind if name == "blind" else self.findings.off
-            spans.append(Span(start_us, at_us, first_reason))
+            (self.blind if name == "blind" else self.off).append(Span(start_us, at_us, first_reason))
 
     def tell(self, at_us: int, text: str) -> None:
-        self.findings.happenings.append(Happening(at_us, text))
+        self.happenings.append(Happening(at_us, text))
 
-    def note_samples(self, samples: Sequence[Told], at_us: int) -> None:
-        """Take-offs, landings, arming and modes, as the vehicle reports them."""
-        for sample in samples:
-            if isinstance(sample, messages.ExtendedState):
-                ground = messages.LandedState.ON_GROUND
-                was_down, is_down = self._landed is ground, sample.landed_state is ground
-                if was_down != is_down and self._landed is not messages.LandedState.UNDEFINED:
-                    self.tell(at_us, "landed" if is_down else "took off")
-                self._landed = sample.landed_state
-            elif isinstance(sample, messages.Heartbeat):
-                if sample.armed != self._armed and (self._armed is not None or sample.armed):
-                    self.tell(at_us, "armed" if sample.armed else "disarmed")
-                if sample.custom_mode != self._mode:
-                    self.tell(at_us, f"mode {mode_name(sample.custom_mode)}")
-                self._armed, self._mode = sample.armed, sample.custom_mode
-
-    def close(self, at_us: int) -> Findings:
+    def close(self, at_us: int) -> None:
         self._note_span("blind", None, at_us)
         self._note_span("off", None, at_us)
-        return self.findings
 
 
 def watch_log(log: Log, config: CompanionConfig, rate_hz: float | None = None) -> Findings:
     """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded."""
     heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
-    circumstances, notebook = Circumstances(), Notebook()
+    circumstances, findings = Circumstances(), Findings()
     # A log begins with old news of every topic: until the first IMU sample nobody was on the watch.
     start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
     watch = start_watch(config, start_us)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
         for notice in advance(watch, samples, circumstances.situation, now_us).notices:
-            notebook.tell(now_us, notice.text)
-        notebook.note(watch, circumstances.situation, now_us)
+            findings.tell(now_us, notice.text)
+        findings.note(watch, circumstances.situation, now_us)
 
     for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
         last_poll_us = min(at_us, last_us + _MOST_POLLS * POLL_INTERVAL_US)
@@ -237,15 +217,16 @@ def watch_log(log: Log, config: CompanionConfig, rate_hz: float | None = None) -
             step((), poll_us)
         items = list(group)
         for item in items:
-            circumstances.hear(item)
+            for text in circumstances.hear(item):
+                findings.tell(at_us, text)
         circumstances.wait(at_us)
-        notebook.note_samples([item.sample for item in items], at_us)
         # One by one: two impacts of one instant would otherwise be one.
         for item in items:
             if not isinstance(item.sample, Demand):
                 step((item.sample,), at_us)
         last_us = at_us
-    return notebook.close(last_us)
+    findings.close(last_us)
+    return findings
 
 
 def thinned(heard: tuple[Heard, ...], rate_hz: float) -> Iterator[Heard]:
