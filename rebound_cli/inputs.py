@@ -16,6 +16,7 @@ from sim_vehicle.mavlink.restamp import check_messages
 from sim_vehicle.scene import Scene, check_start_is_free
 
 if TYPE_CHECKING:
+    from companion.mission.config import CompanionConfig
     from companion.mission.model import Mission
 
 
@@ -55,6 +56,24 @@ def load_flown(file: Path) -> Document:
     if isinstance(companion, dict):
         document.data["companion"] = {key: value for key, value in companion.items() if key not in BASELINES}
     return document
+
+
+def companion_settings(path: Path | None, sets: Sequence[str], detector: str | None) -> "CompanionConfig":
+    """The companion's for a replay: defaults, a file's, and what the command line changes. Raises DocumentError.
+
+    Of the file only the `companion:` part counts.
+    """
+    from companion.mission.config import CompanionConfig
+    from rebound_cli.run_folder import GUARD_NAME, RESOLVED_NAME
+
+    if path is None:
+        document = documents.empty_document("no mission file")
+    else:
+        document = load_flown(path) if path.name in (GUARD_NAME, RESOLVED_NAME) else load_document(path)
+    documents.apply_overrides(document, sets)
+    if detector is not None:
+        documents.apply_override(document, Override(f"--detector {detector}", ("companion", "detector"), detector))
+    return validated(CompanionConfig, document, document.data.get("companion") or {}, ("companion",))
 
 
 def _apply_options(document: Document, sets: Sequence[str], airframe: str | None, seed: int | None) -> None:

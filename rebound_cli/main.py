@@ -10,12 +10,8 @@ from pathlib import Path
 
 from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, arguments, exit_codes
-from rebound_cli.check.arguments import add_check
 from rebound_cli.extras import needed_text
-from rebound_cli.identification.arguments import add_identify
-from rebound_cli.plan.arguments import add_plan
-from rebound_cli.replay.arguments import add_replay
-from rebound_cli.tune.arguments import add_tune
+from rebound_cli.tool_arguments import add_check, add_identify, add_plan, add_replay, add_tune
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
