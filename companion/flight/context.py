@@ -1,5 +1,6 @@
 """What the parts of a flight share: the mission, the vehicle as heard, and what is to be sent and told."""
 
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
@@ -16,7 +17,15 @@ from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
-from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
+from companion.messages import (
+    CommandAck,
+    LocalPosition,
+    Outgoing,
+    PositionSetpoint,
+    PositionTarget,
+    Sticks,
+    Vector3,
+)
 from companion.mission.expectations import ExpectItem
 from companion.mission.items import ReturnItem
 from companion.mission.itinerary import steps_to_fly
@@ -79,6 +88,9 @@ class Inputs(NamedTuple):
     impacts: Sequence[ImpactEstimate] = ()
     stop_reason: str | None = None
     refusal: str | None = None  # why the other end cannot be flown
+    echoes: Sequence[PositionTarget] = ()  # as the next two for a guard alone
+    sticks: Sequence[Sticks] = ()
+    is_enabled: bool = False  # by a person, after it stood down
 
 
 @dataclass(slots=True)
@@ -216,6 +228,10 @@ class FlightContext:
     def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
+
+    def tell_fault(self, now_us: int, text: str, error: Exception) -> None:
+        """A fault of this program."""
+        self.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
 
     @property
     def own_modes(self) -> tuple[int | None, ...]:

@@ -87,21 +87,32 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | Non
             return None
         flight.tell(now_us, "link", HEARD_AGAIN)
         return Move(Trigger.HEARD_AGAIN)
-    if silent_s <= link.silence_s:
+    text = silent_link(flight, now_us)
+    if text is None:
         return None
     # A vehicle that has been told to land is already doing what is safe.
     landing = state is State.LANDING and flight.expected_mode == AUTO_LAND
-    text = f"the link has been silent for {silent_s:.1f} s"
     flight.tell(now_us, "link", text, silent_s=round(silent_s, 3))
     return Move(Trigger.INTERRUPTED, text, hand_over=not landing)
 
 
-def _position_silent(flight: FlightContext, state: State) -> Move | None:
+def silent_link(flight: FlightContext, now_us: int) -> str | None:
+    """What is wrong with a link on which nothing comes any more; None where something does."""
+    silent_s = flight.silent_s(now_us)
+    is_silent = silent_s > flight.mission.companion.link.silence_s
+    return f"the link has been silent for {silent_s:.1f} s" if is_silent else None
+
+
+def silent_position(flight: FlightContext) -> str | None:
+    """The same of positions, on a link that is alive."""
     silent_s = flight.position_silent_s
-    if state not in ON_SETPOINTS or silent_s <= flight.mission.companion.link.position_silence_s:
-        return None
-    text = f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive"
-    return Move(Trigger.INTERRUPTED, text, hand_over=True)
+    is_silent = silent_s > flight.mission.companion.link.position_silence_s
+    return f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive" if is_silent else None
+
+
+def _position_silent(flight: FlightContext, state: State) -> Move | None:
+    text = silent_position(flight) if state in ON_SETPOINTS else None
+    return None if text is None else Move(Trigger.INTERRUPTED, text, hand_over=True)
 
 
 def _abort_condition(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:

@@ -33,6 +33,11 @@ class Machine:
         handing_over = isinstance(self.activity, HandOver) and not self.activity.finished
         return self.state in FINAL_STATES and not handing_over
 
+    @property
+    def holds(self) -> bool:
+        """Whether the setpoints are this program's; of a flight all are."""
+        return True
+
     def step(self, inputs: Inputs, now_us: int) -> bool:
         """Take all moves that are due; whether there were any."""
         before = self.activity
@@ -58,9 +63,8 @@ class Machine:
     def fail(self, error: Exception, now_us: int) -> bool:
         """This program is at fault: hand the vehicle over while that can still be done, and say what happened."""
         flight, before = self.flight, self.activity
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        text = f"fault of the companion, please report it: {type(error).__name__} in {place.name}: {error}"
-        flight.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
+        text = fault_text("companion", error)
+        flight.tell_fault(now_us, text, error)
         if flight.fault or self.state in FINAL_STATES:
             # even handing over fails: silence lets the vehicle's own failsafe act
             self.activity = LetGo()
@@ -69,7 +73,7 @@ class Machine:
             self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
         except Exception as second:
             # what ends a flight fails, too
-            flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
+            flight.tell_fault(now_us, f"and again: {second}", second)
             self.state, self.activity = State.ABORTED, LetGo()
             flight.outcome, flight.reason = "failed", text
         return self.activity is not before
@@ -133,6 +137,12 @@ class Machine:
         text = f"{flight.outcome}: {move.text}"
         flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index)
         return HandOver(flight, now_us) if move.hand_over else LetGo()
+
+
+def fault_text(program: str, error: Exception) -> str:
+    """Of a program that is at fault, for people."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"fault of the {program}, please report it: {type(error).__name__} in {place.name}: {error}"
 
 
 def _hits(count: int) -> str:

@@ -32,7 +32,7 @@ class GuardConfig(Written):
     # With `then: previous` a mission flies into the same wall again. Three hits in one flight are no accident.
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
     # A hit while a program on a link of its own sends setpoints. `reposition` leads the vehicle clear by a command; a
-    # real PX4 that gets it while the contact lasts flies off backwards (see guard.aside): not done unasked.
+    # real PX4 that gets it while the contact lasts flies off backwards (see guard.holding): not done unasked.
     beside_program: Literal["tell", "reposition"] = "tell"
     # The answer takes 10 ms, CURRENT_MODE at 10 Hz 100 ms; a command lost on the way is repeated after 500 ms.
     confirm_within_s: Annotated[Positive, Field(ge=0.2)] = 1.0

@@ -13,10 +13,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from companion.estimate.normal import Search, further
-from companion.guard.attached import AttachedGuard, AttachedStep
+from companion.guard.attached import SETPOINTS, AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
-from companion.guard.gate import SETPOINTS
-from companion.guard.guard import collisions
 from companion.guard.states import State
 from companion.mavlink.fields import HEARD
 from companion.report import CollisionReport, Event
@@ -126,7 +124,7 @@ class CollisionGuard:
     @property
     def collisions(self) -> tuple[CollisionReport, ...]:
         with self._changed:
-            return collisions(self._guard.core)
+            return self._guard.core.collisions()
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Block until the condition holds; looked at whenever something has happened."""

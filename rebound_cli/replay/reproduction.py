@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.companion import Companion, StepResult
-from companion.core import situation
 from companion.detection.interface import Situation
 from companion.guard.config import GuardConfig
-from companion.guard.core import situation as guard_situation
 from companion.guard.guard import Guard
 from rebound_cli.replay.findings import Findings, Notebook
 from rebound_cli.replay.recording import Recording, Step
@@ -68,9 +66,7 @@ def reproduce(recording: Recording) -> Reproduction:
 
 
 def _known(stepped: Companion | Guard) -> Situation:
-    if stepped.core is None:
-        return _BEFORE_THE_FIRST_STEP
-    return guard_situation(stepped.core) if isinstance(stepped, Guard) else situation(stepped.core)
+    return _BEFORE_THE_FIRST_STEP if stepped.core is None else stepped.core.situation()
 
 
 class _Comparison:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from companion.core import start
+from companion.core import FlightCore
 from companion.flight.collision import CollisionRecord
 from companion.flight.hearing import hear
 from companion.flight.pinned import BEGUN_US, LONGEST_US, Hanging, has_room_below, let_go
@@ -73,7 +73,7 @@ def test_what_is_about_to_hang_does_not_lean_yet():
     [(1.0, 0.0, True), (1.0, 1.5, True), (1.0, 2.0, False), (3.0, 2.0, True), (0.25, 0.0, False), (0.5, -2.0, True)],
 )
 def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, has_room):
-    flight = start(
+    flight = FlightCore(
         Mission.model_validate({"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}), 0
     ).flight
     flight.origin_ned_m = (0.0, 0.0, -0.1)

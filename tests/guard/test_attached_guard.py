@@ -2,8 +2,8 @@
 
 import pytest
 
+from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
-from companion.guard.gate import Gate
 from companion.guard.holding import is_foreign
 from companion.guard.states import State
 from companion.messages import PositionTarget, Refused
@@ -143,7 +143,7 @@ def test_fields_of_another_dialect_make_no_sample_and_no_error():
 
 
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():
-    guard = AttachedAir().guard.core.guard
+    guard = AttachedAir().guard.core.flight
     there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
     guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
     assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]

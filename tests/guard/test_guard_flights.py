@@ -170,11 +170,11 @@ def test_the_next_flight_is_guarded_again():
     assert air.state is State.RECOVERING
     air.mode(LAND)
     air.until(lambda: air.state is State.STOOD_DOWN, 1.0)
-    assert air.guard.core.guard.hits > 0
+    assert air.guard.core.flight.hits > 0
     air.until(lambda: air.state is State.STANDING_BY, 30.0)
     assert air.guard.status().armed is False
     # the hits allowed are those of a flight
-    assert air.guard.core.guard.hits == 0
+    assert air.guard.core.flight.hits == 0
 
 
 def test_a_vehicle_that_refuses_offboard_is_asked_to_hold():
