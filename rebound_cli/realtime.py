@@ -25,7 +25,7 @@ from rebound_cli.timing import Heard, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
-# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
+# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (link.commands).
 HANDING_OVER_US = 10_000_000
 
 

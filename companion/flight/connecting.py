@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Generic, TypeVar
 
 from companion.flight.context import FlightContext, Inputs, Move, Target
-from companion.flight.early_end import battery_complaint
+from companion.flight.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, RequestMessage, VehicleCommand

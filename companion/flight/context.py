@@ -7,11 +7,10 @@ from typing import NamedTuple, Protocol
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
-from companion.flight.command_client import CommandClient, CommandOutcome
-from companion.flight.course import Pace
 from companion.flight.leaning import Leaning
 from companion.flight.pressing import Pressing
 from companion.flight.states import State, Trigger
+from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -26,13 +25,12 @@ from companion.messages import (
     Sticks,
     Vector3,
 )
-from companion.mission.expectations import ExpectItem
-from companion.mission.items import ReturnItem
+from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.itinerary import steps_to_fly
 from companion.mission.model import Mission
-from companion.mission.program import Step
 from companion.recovery.interface import Moving
 from companion.report import Event, JsonValue, Outcome
+from companion.ways.course import Pace
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ import math
 
 from companion.flight.context import Expectation, FlightContext, as_text
 from companion.messages import LocalPosition
-from companion.mission.expectations import (
+from companion.mission.items import (
     ExpectFlightTime,
     ExpectHeight,
     ExpectHit,

@@ -1,13 +1,14 @@
-"""What every step begins with: the vehicle view brought up to date by what was heard."""
+"""What every step begins with: the vehicle as it was heard, and whether it is off the ground."""
 
 from collections.abc import Sequence
 
 from companion.flight.context import FlightContext
-from companion.flight.held import HELD_S, LOSS_PARAMETER, longer_loss_text
-from companion.link.identity import identify, is_autopilot
+from companion.flight.envelope import HELD_S, LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
+from companion.link.vehicle import identify, is_autopilot
 from companion.messages import (
     Heartbeat,
+    LandedState,
     Parameter,
     ReadParameter,
     Refused,
@@ -100,3 +101,25 @@ def _tell_conflict(flight: FlightContext, now_us: int) -> None:
     if last_us is None or now_us - last_us >= LASTING_US:
         count = flight.vehicle.conflicts
         flight.tell(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
+
+
+# A vehicle that has come down lower than this, and was not told to, drags itself along the ground: nothing of that is a
+# hit to recover from. Its feet are a tenth of a metre below it, and where it leans they are not what touches.
+SCRAPING_M = 0.1
+
+
+def note_height(flight: FlightContext) -> None:
+    """Whether the vehicle has left the ground behind; a hit that throws it down again does not bring that back."""
+    height_m = flight.height_m
+    if height_m is None or flight.vehicle.landed is LandedState.ON_GROUND:
+        flight.has_climbed = False
+    elif height_m >= flight.mission.companion.min_detection_height_m:
+        flight.has_climbed = True
+
+
+def too_low(flight: FlightContext, goes_down: bool) -> str | None:
+    """Why the height stands against a hit, or None. `goes_down`: the vehicle is to meet the ground."""
+    least_m, height_m = flight.mission.companion.min_detection_height_m, flight.height_m
+    if flight.has_climbed and not goes_down:
+        least_m = min(least_m, SCRAPING_M)
+    return f"below {least_m:g} m" if height_m is None or height_m < least_m else None

@@ -7,15 +7,12 @@ from companion.flight import expecting
 from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
-from companion.flight.early_end import ON_THE_GROUND, early_end
-from companion.flight.handover import HandOver, LetGo
-from companion.flight.landing import Land, TakeBack
-from companion.flight.progress import FlyItems, HoldAfterRecovery
+from companion.flight.ending import ON_THE_GROUND, HandOver, LetGo, early_end
+from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.remembering import remember
-from companion.flight.returning import FlyHome
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
-from companion.flight.takeoff import TakeOff
+from companion.flight.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.mission.items import TakeoffItem
 from companion.px4_mode import OFFBOARD
 

@@ -3,17 +3,18 @@
 import math
 
 from companion.flight.context import FlightContext, as_text
+from companion.flight.envelope import unattended_text
 from companion.flight.expecting import describe
-from companion.flight.held import unattended_text
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.stored import describe as describe_patch
-from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
 from companion.mission.items import (
     Action,
+    ExpectItem,
     GoToItem,
     HoldItem,
     LandItem,
+    MissionItem,
     OrbitItem,
     PathItem,
     ReturnItem,
@@ -22,10 +23,10 @@ from companion.mission.items import (
     TakeoffItem,
     VelocityItem,
     WaitForItem,
+    program,
 )
 from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision
-from companion.mission.program import MissionItem, program
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05

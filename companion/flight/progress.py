@@ -1,21 +1,16 @@
-"""State mission: one step after the other; state holding: the pause after a recovery."""
+"""State mission: one step after the other; holding: a pause after a recovery; returning: home. All watch for hits."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from companion.flight import expecting
-from companion.flight.around import passed, way_around
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.course import LEAST_TRY_M_S, climb, first_leg, stay
-from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
-from companion.flight.trajectory import Trajectory
-from companion.flight.waiting import Waiting
 from companion.messages import Vector3
-from companion.mission.expectations import ExpectItem
 from companion.mission.items import (
+    ExpectItem,
     GoToItem,
     HoldItem,
     LandItem,
@@ -25,10 +20,14 @@ from companion.mission.items import (
     ReturnItem,
     SetSpeedItem,
     SetYawItem,
+    SteadyCondition,
+    Step,
     TakeoffItem,
     VelocityItem,
     WaitForItem,
 )
+from companion.ways.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
+from companion.ways.trajectory import Trajectory
 
 # Of a time-out, and of a goal out of reach; "continue" is no move.
 _TRIGGERS = {
@@ -199,3 +198,146 @@ class HoldAfterRecovery:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         return Move(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
+
+
+class Waiting:
+    """Holds the one condition of the item."""
+
+    def __init__(self, item: WaitForItem, flight: FlightContext) -> None:
+        self._item = item
+        self._steady_since_us: int | None = None
+        flight.file_awaited, flight.file_is_there = item.file, False
+
+    def is_over(self, flight: FlightContext, now_us: int) -> bool:
+        item = self._item
+        if item.flight_time_s is not None:
+            assert flight.armed_at_us is not None
+            return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
+        if item.steady is not None:
+            return self._is_steady(item.steady, flight, now_us)
+        # A hit ends the step by the mission's policy, as it does every other.
+        if flight.file_is_there:
+            flight.file_awaited = None
+        return flight.file_is_there
+
+    def _is_steady(self, steady: SteadyCondition, flight: FlightContext, now_us: int) -> bool:
+        latest, target = flight.vehicle.history.latest(), flight.target
+        assert latest is not None and target is not None, "the flight is in the air"
+        rests = (
+            math.dist(latest.position_ned_m, target.position_ned_m) <= steady.within_m
+            and math.hypot(*latest.velocity_ned_m_s) <= steady.speed_m_s
+        )
+        if not rests:
+            self._steady_since_us = None
+        elif self._steady_since_us is None:
+            self._steady_since_us = now_us
+        return self._steady_since_us is not None and now_us - self._steady_since_us >= steady.for_s * 1e6
+
+
+# Below PX4's MC_YAWRATE_MAX (200 deg/s) and its MPC_YAWRAUTO_MAX (45 deg/s): the vehicle can follow.
+YAW_RATE_RAD_S = math.radians(45.0)
+# Slower, or nearer, than this there is no direction that noise in the last digits could not have made.
+_LEAST_SPEED_M_S = 0.05
+_LEAST_DISTANCE_M = 0.05
+
+
+@dataclass(slots=True)
+class Heading:
+    """A heading on its way to another. Radians clockwise from north; None: the vehicle's own affair."""
+
+    yaw_rad: float | None
+    at_us: int
+    rate_rad_s: float
+    fixed_rad: float | None
+    centre_m: Vector3 | None = None
+    along: bool = False
+
+    @classmethod
+    def of_step(cls, step: Step, yaw_rad: float | None, now_us: int) -> "Heading":
+        """The heading that the step asks for, beginning with the present one."""
+        action = step.action
+        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, SetYawItem) else YAW_RATE_RAD_S
+        asked = getattr(action, "yaw_deg", None)
+        fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
+        centre = action.centre_ned_m if isinstance(action, OrbitItem) and asked == "centre" else None
+        along = isinstance(action, PathItem | OrbitItem) and asked == "along"
+        return cls(yaw_rad, now_us, rate_rad_s, fixed_rad, centre, along)
+
+    @property
+    def is_fixed(self) -> bool:
+        return self.centre_m is None and not self.along
+
+    @property
+    def is_reached(self) -> bool:
+        """Of a fixed heading; one that follows the way is never late."""
+        return not self.is_fixed or self.yaw_rad == self.fixed_rad
+
+    def turn(self, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
+        """Turn on until now, the shorter way."""
+        wanted = self._wanted(position_m, velocity_m_s)
+        elapsed_s, self.at_us = (now_us - self.at_us) * 1e-6, now_us
+        if wanted is None or self.yaw_rad is None:
+            self.yaw_rad = wanted
+            return wanted
+        way = math.remainder(wanted - self.yaw_rad, math.tau)
+        step = self.rate_rad_s * elapsed_s
+        self.yaw_rad = wanted if abs(way) <= step else self.yaw_rad + math.copysign(step, way)
+        return self.yaw_rad
+
+    def _wanted(self, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
+        if self.centre_m is not None:
+            north, east = self.centre_m[0] - position_m[0], self.centre_m[1] - position_m[1]
+            return math.atan2(east, north) if math.hypot(north, east) > _LEAST_DISTANCE_M else self.yaw_rad
+        if self.along:
+            north, east, _ = velocity_m_s
+            return math.atan2(east, north) if math.hypot(north, east) > _LEAST_SPEED_M_S else self.yaw_rad
+        return self.fixed_rad
+
+
+class FlyHome:
+    """Up where that is asked for, then straight; begun anew after each recovery on the way."""
+
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        assert flight.target is not None, "the flight is in the air"
+        self._flight = flight
+        self._began_us = flight.way_us
+        flight.going_home = True
+        flight.yaw_rad = flight.target.yaw_rad
+        start = flight.mission_ned_m(flight.target.position_ned_m)
+        pace = replace(flight.pace, factor=1.0).against(flight.leaning.wind_m_s2, (-start[0], -start[1], 0.0))
+        planned = home_around(start, flight.returning_as, pace, surroundings(flight))
+        self._is_cut_off = planned.way is None
+        self._way: Trajectory = planned.way or stay(start)
+        if self._is_cut_off:
+            flight.unreachable.append("home")
+            flight.tell(now_us, "unreachable", "home out of reach: no way round what is known; landing here")
+            return
+        round_it = " round what is known" if planned.is_detour else ""
+        text = f"returning over {self._way.distance_m:.1f} m{round_it}"
+        flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
+
+    @property
+    def _elapsed_s(self) -> float:
+        return (self._flight.way_us - self._began_us) * 1e-6
+
+    def target(self, now_us: int) -> Target | None:
+        elapsed_s = self._elapsed_s
+        position, velocity, acceleration = self._way.at(elapsed_s)
+        place = self._flight.local_ned_m(position)
+        if elapsed_s >= self._way.duration_s:
+            return Target(place, self._flight.yaw_rad)
+        return self._flight.under_way(place, self._flight.yaw_rad, velocity, acceleration)
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if self._is_cut_off:
+            return Move(Trigger.LAND_DUE)
+        overdue_s = self._elapsed_s - self._way.duration_s
+        if overdue_s < 0.0:
+            return None
+        latest, limits = flight.vehicle.history.latest(), flight.mission.companion.flight
+        goal = flight.local_ned_m(self._way.target_m)
+        if latest is not None and math.dist(latest.position_ned_m, goal) <= limits.acceptance_radius_m:
+            return Move(Trigger.HOME_REACHED)
+        if overdue_s > limits.arrival_timeout_s:
+            return Move(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
+        return None

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
-from companion.flight.held import Known, touched
+from companion.flight.envelope import Known, touched
 from companion.flight.states import Trigger
-from companion.memory.merging import is_same, remembered
-from companion.memory.patch import Patch, Touch
+from companion.memory.patch import Patch, Touch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import Surroundings
-from companion.memory.touching import touch_of
 from companion.messages import Vector3
 from companion.recovery.direction import plus
 from companion.recovery.interface import Contact

@@ -10,7 +10,7 @@ from companion.core import POLL_INTERVAL_US
 from companion.estimate.normal import Search, further
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
-from companion.link.identity import AUTOPILOT_COMPONENT_ID
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
 from companion.mavlink.fields import fields_from, sample_from
 from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk, TimeSyncReply

@@ -6,10 +6,9 @@ from pydantic import Field, field_validator
 
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
-from companion.mission.items import LandItem, TakeoffItem
+from companion.mission.items import LandItem, MissionItem, TakeoffItem
 from companion.mission.model import Mission
 from companion.mission.policy import Limits
-from companion.mission.program import MissionItem
 from companion.px4_mode import MODE_NAMES
 from companion.recovery.interface import RecoveryConfig
 from companion.recovery.registry import RECOVERY_LAWS, check_known_law

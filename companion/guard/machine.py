@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from companion.estimate.rotation import yaw_rad
 from companion.flight.after_hit import note_before
-from companion.flight.authority import Holder, who_decided
 from companion.flight.context import Inputs
-from companion.flight.early_end import HEARD_AGAIN, silent_link, silent_position
+from companion.flight.ending import HEARD_AGAIN, Holder, silent_link, silent_position, who_decided
 from companion.flight.machine import fault_text
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState

@@ -2,7 +2,7 @@
 
 from companion.flight.connecting import Meet
 from companion.flight.context import FlightContext, Inputs, Target
-from companion.flight.held import unattended_text
+from companion.flight.envelope import unattended_text
 from companion.guard.context import GuardContext, Move
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, SetMessageInterval, VehicleCommand

@@ -26,6 +26,11 @@ from companion.mavlink.packet import (
     source_of,
 )
 from companion.messages import (
+    ANGULAR_VELOCITY_RAD_S,
+    POSITION_M,
+    SPECIFIC_FORCE_M_S2,
+    THRUST_FRACTION,
+    TIME_US,
     Attitude,
     AttitudeTarget,
     AutopilotVersion,
@@ -48,13 +53,6 @@ from companion.messages import (
     TimeSyncAnswer,
     TimeSyncRequest,
     Vibration,
-)
-from companion.messages.bounds import (
-    ANGULAR_VELOCITY_RAD_S,
-    POSITION_M,
-    SPECIFIC_FORCE_M_S2,
-    THRUST_FRACTION,
-    TIME_US,
     is_rotation,
     within,
 )
@@ -203,7 +201,7 @@ KNOWN_IDS = frozenset(dialect.mavlink_map)
 class Decoder:
     """A byte stream in any chunks, with any damage, to packets; never raises on what it is fed.
 
-    What no vehicle can truly say becomes `Refused` (bounds.py).
+    What no vehicle can truly say becomes `Refused` (see messages).
 
     Until `listen_to` names the vehicle only heartbeats are converted; then only what that component sent.
     """

@@ -9,14 +9,19 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Refused, Sample
-from companion.messages.bounds import (
+from companion.messages import (
     ANGULAR_VELOCITY_RAD_S,
     POSITION_M,
     SPECIFIC_FORCE_M_S2,
     TIME_US,
     VELOCITY_M_S,
     ZERO_G_OFFSET_M_S2,
+    Attitude,
+    ImuSample,
+    LocalPosition,
+    Odometry,
+    Refused,
+    Sample,
     is_rotation,
     within,
 )

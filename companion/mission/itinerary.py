@@ -5,28 +5,29 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from companion.flight.around import Planned, home_around, way_around
-from companion.flight.course import Pace, climb
-from companion.flight.trajectory import Chain, LineProfile, Trajectory
 from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
 from companion.mission.config import CompanionConfig
-from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
 from companion.mission.items import (
+    ExpectItem,
     GoToItem,
     HoldItem,
     LandItem,
+    MissionItem,
     ReturnItem,
     SetSpeedItem,
     SetYawItem,
+    Step,
     TakeoffItem,
     WaitForItem,
+    program,
 )
 from companion.mission.policy import Resume
-from companion.mission.program import MissionItem, Step, program
+from companion.ways.course import Pace, Planned, climb, home_around, way_around
+from companion.ways.trajectory import Chain, LineProfile, Trajectory
 
 # Setpoints this far apart in time are looked at for the fence: 4 cm at 2 m/s, as they are sent.
 _LOOK_EVERY_S = 0.02

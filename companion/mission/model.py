@@ -8,9 +8,9 @@ from pydantic import Field, field_validator, model_validator
 from companion.memory.stored import ObstaclesConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
+from companion.mission.items import MissionItem
 from companion.mission.itinerary import first_complaint
 from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, Resume
-from companion.mission.program import MissionItem
 from companion.recovery.interface import RecoveryConfig
 from companion.recovery.registry import RECOVERY_LAWS, check_known_law
 from companion.written import Written

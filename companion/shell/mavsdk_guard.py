@@ -29,7 +29,7 @@ START_TIMEOUT_S = 20.0
 # How long a thread of the program's that computes may keep Python from MAVSDK's: between the datagram that shows a hit
 # and the setpoint it is waited for up to three times. Python's own 5 ms would be 15; this costs such a thread some 1 %.
 SWITCH_INTERVAL_S = 0.0001
-# Giving back takes 10 ms. At most three modes are asked for, each given up after 2.5 s (flight.command_client), after a
+# Giving back takes 10 ms. At most three modes are asked for, each given up after 2.5 s (link.commands), after a
 # wait for a report of the present one.
 GIVING_BACK_US = 10_000_000
 # A setpoint's interval.

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.patches import Polygon
 
 from companion.memory.patch import Patch
-from companion.memory.shape import outline
+from companion.memory.surroundings import outline
 from companion.report import FlightReport
 from rebound_cli.figure.outline import footprint
 from rebound_cli.figure.style import ASKED, DETECTED, MEASURED, OBSTACLE, REMEMBERED, finish, seconds_since_start

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
 from companion.messages import Heartbeat
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.topics import Topics

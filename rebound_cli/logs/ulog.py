@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
 from companion.messages import Attitude, AttitudeTarget, Heartbeat, LocalPosition, Odometry, Vector3, Vibration
 from rebound_cli.logs.inertial import averaging_us, clipped_at_us, imu_samples, inertial_topic
 from rebound_cli.logs.kind import QUADROTOR, other_arms, rotors, vehicle_type

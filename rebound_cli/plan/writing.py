@@ -4,10 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from companion.flight.trajectory import Trajectory
 from companion.messages import Vector3
-from companion.mission.expectations import ExpectItem
 from companion.mission.items import (
+    ExpectItem,
     GoToItem,
     HoldItem,
     LandItem,
@@ -22,6 +21,7 @@ from companion.mission.items import (
 )
 from companion.mission.itinerary import Leg, itinerary
 from companion.mission.model import Mission
+from companion.ways.trajectory import Trajectory
 from rebound_cli.plan import commands
 from rebound_cli.plan.fences import plan_of_fence
 from sim_vehicle.geography import Origin

@@ -6,8 +6,7 @@ from argparse import Namespace
 from dataclasses import asdict
 
 from companion.errors import ConfigurationError
-from companion.preflight.checks import Finding, Verdict
-from companion.preflight.preflight import Preflight
+from companion.preflight import Finding, Preflight, Verdict
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli.console import Console, console_for

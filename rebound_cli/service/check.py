@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from companion.errors import ConfigurationError
-from companion.preflight.checks import Finding, Verdict
+from companion.preflight import Finding, Verdict
 from rebound_cli.service.files import UNIT, UNIT_NAME, USER
 from rebound_cli.service.plan import Plan, plan
 from rebound_cli.service.system import System, hidden_program

@@ -4,10 +4,17 @@ import math
 
 import pytest
 
-from companion.memory.merging import is_same, patch_of, remembered
-from companion.memory.patch import GOES_ON_MOST_M, REACHES_M, Touch
+from companion.memory.patch import (
+    GOES_ON_MOST_M,
+    LEAST_SPEED_M_S,
+    REACHES_M,
+    Touch,
+    is_same,
+    patch_of,
+    remembered,
+    touch_of,
+)
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, describe, file_data
-from companion.memory.touching import LEAST_SPEED_M_S, touch_of
 
 CLEARANCE_M = 0.55
 SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)

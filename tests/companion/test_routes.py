@@ -6,17 +6,13 @@ from itertools import pairwise
 import pytest
 from shapely import LineString, Point
 
-from companion.flight.around import home_around, passed, way_around
-from companion.flight.course import Pace
-from companion.flight.curve import CurveProfile
-from companion.memory.merging import remembered
-from companion.memory.patch import REACHES_M, Patch, Touch
+from companion.memory.patch import REACHES_M, Patch, Touch, remembered, touch_of
 from companion.memory.route import route
-from companion.memory.shape import believed, core
-from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings
-from companion.memory.touching import touch_of
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings, believed, core
 from companion.mission.fence import Fence
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
+from companion.ways.course import Pace, home_around, passed, way_around
+from companion.ways.trajectory import CurveProfile
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M

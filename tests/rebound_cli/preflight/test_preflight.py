@@ -1,8 +1,7 @@
 """`rebound preflight` on the simulated vehicle, through the wire."""
 
 from companion.mission.config import CompanionConfig
-from companion.preflight.checks import Verdict
-from companion.preflight.preflight import Preflight
+from companion.preflight import Preflight, Verdict
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle

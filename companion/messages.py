@@ -1,12 +1,13 @@
-"""Typed samples in.
+"""Typed samples in and typed commands out: the only language between the codec and the core.
 
 World frame NED, body frame FRD, SI units, quaternions (w, x, y, z) body to NED. Times named `time_boot_us`
 are the vehicle's own boot clock. None means "not given"; MAVLink's NaN and type masks stay in the codec.
 """
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 Vector3: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
@@ -242,3 +243,194 @@ Sample: TypeAlias = (
     | AutopilotVersion
     | Refused
 )
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """MAV_CMD_DO_SET_MODE; `custom_mode` in PX4's packing (main << 16 | sub << 24)."""
+
+    command_id: ClassVar[int] = 176
+    custom_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetArmed:
+    """MAV_CMD_COMPONENT_ARM_DISARM, never forced."""
+
+    command_id: ClassVar[int] = 400
+    armed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetMessageInterval:
+    """MAV_CMD_SET_MESSAGE_INTERVAL."""
+
+    command_id: ClassVar[int] = 511
+    message_id: int
+    interval_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class RequestMessage:
+    """MAV_CMD_REQUEST_MESSAGE."""
+
+    command_id: ClassVar[int] = 512
+    message_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reposition:
+    """MAV_CMD_DO_REPOSITION with a change to AUTO.LOITER: hold there. Altitude above mean sea level."""
+
+    command_id: ClassVar[int] = 192
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage | Reposition
+
+
+@dataclass(frozen=True, slots=True)
+class SendCommand:
+    """A command with its transmission count, as COMMAND_LONG.confirmation wants it."""
+
+    command: VehicleCommand
+    confirmation: int
+
+
+@dataclass(frozen=True, slots=True)
+class PositionSetpoint:
+    """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
+
+    `leans_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
+    `is_height_free`: down by velocity and acceleration, whatever height is given.
+    """
+
+    time_us: int
+    position_ned_m: Vector3
+    yaw_rad: float | None
+    velocity_ned_m_s: Vector3 | None = None
+    acceleration_ned_m_s2: Vector3 | None = None
+    leans_only: bool = False
+    is_height_free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OnboardHeartbeat:
+    """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""
+
+    active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncReply:
+    vehicle_time_ns: int
+    companion_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncAsk:
+    """TIMESYNC of our own; the vehicle echoes the time."""
+
+    companion_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReadParameter:
+    """PARAM_REQUEST_READ."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetParameter:
+    """PARAM_SET; an int is sent as INT32, a float as REAL32, as PX4 has them."""
+
+    name: str
+    value: int | float
+
+
+@dataclass(frozen=True, slots=True)
+class StatusText:
+    """STATUSTEXT, in as many packets as its length needs."""
+
+    severity: Severity
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NamedValue:
+    """NAMED_VALUE_FLOAT: a number to plot; the name has at most ten characters."""
+
+    time_us: int
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class DebugVector:
+    """DEBUG_VECT: three numbers to plot; the name has at most ten characters."""
+
+    time_us: int
+    name: str
+    vector: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class ComputerStatus:
+    """ONBOARD_COMPUTER_STATUS; `at_us` since the epoch, a MiB is 2^20 bytes, a temperature nobody measures None."""
+
+    at_us: int
+    uptime_ms: int
+    cpu_percent: tuple[int, ...]  # of each core
+    temperature_deg_c: int | None
+    memory_used_mib: int
+    memory_total_mib: int
+    disk_used_mib: int
+    disk_total_mib: int
+
+
+Outgoing: TypeAlias = (
+    SendCommand
+    | PositionSetpoint
+    | OnboardHeartbeat
+    | TimeSyncReply
+    | TimeSyncAsk
+    | ReadParameter
+    | SetParameter
+    | StatusText
+    | NamedValue
+    | DebugVector
+    | ComputerStatus
+)
+
+
+# All three axes of a sensor at the end of its range at once, and a tenth more for its calibration.
+_OF_RANGE = 1.1 * math.sqrt(3.0)
+# 40 g is the widest range among PX4's accelerometer drivers (ADIS16470, ADIS16507).
+SPECIFIC_FORCE_M_S2 = _OF_RANGE * 40.0 * 9.80665
+# The widest zero-g offset among PX4's accelerometers (MPU-6000, z: 80 mg). A sensor that is off reads no more; thrust
+# is more in all but free fall, which shows no contact.
+ZERO_G_OFFSET_M_S2 = 0.08 * 9.80665
+# 4000 deg/s is the widest range among PX4's gyroscope drivers (ICM-45686).
+ANGULAR_VELOCITY_RAD_S = _OF_RANGE * math.radians(4000.0)
+# EKF2 holds its own states within these: velocity_limit, and Ekf::constrainStates.
+VELOCITY_M_S = 100.0
+POSITION_M = 1.0e6
+# Thrust is the length of a vector with three parts of at most 1 (PX4's streams/ATTITUDE_TARGET.hpp).
+THRUST_FRACTION = math.sqrt(3.0)
+# Microseconds are exact in double precision up to here: 285 years.
+TIME_US = 1 << 53
+# PX4 sends rotations in single precision, good to 1e-6; one that is further from length 1 than this is no rotation.
+QUATERNION_ERROR = 1.0e-3
+
+
+def within(most: float, *values: float) -> bool:
+    """Whether the vector is no longer than `most`. One with NaN or an infinity is not."""
+    return math.hypot(*values) <= most
+
+
+def is_rotation(w: float, x: float, y: float, z: float) -> bool:
+    """Whether a quaternion has length 1."""
+    return abs(w * w + x * x + y * y + z * z - 1.0) <= QUATERNION_ERROR
