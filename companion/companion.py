@@ -1,7 +1,7 @@
 """The companion as a step function: bytes and the time in, bytes and events out."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -9,10 +9,11 @@ from companion.core import Core, FlightCore
 from companion.flight.plan import plan_text
 from companion.flight.remembering import all_known
 from companion.flight.states import State
-from companion.mavlink.decode import CONVERTERS, Decoder
+from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
-from companion.messages import ComputerStatus, Sample
+from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.report import Event, ExpectationReport, FlightReport, Status
 
@@ -37,8 +38,8 @@ class Stepped(ABC, Generic[CoreT]):
 
     _first_state: ClassVar = State.CONNECT.value
 
-    def __init__(self, converters: Mapping[int, Callable[[Any], Sample | None]] = CONVERTERS) -> None:
-        self._decoder, self._encoder = Decoder(converters), Encoder()
+    def __init__(self, readers: Mapping[int, Reader] = READERS) -> None:
+        self._decoder, self._encoder = Decoder(readers), Encoder()
         self._is_addressed = False
         self._core: CoreT | None = None
         self._stop_reason: str | None = None

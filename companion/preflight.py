@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+from companion import messages
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.envelope import HELD_S
 from companion.link import round_trip
@@ -16,29 +17,7 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Identity, identify, is_autopilot
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
-from companion.messages import (
-    AutopilotVersion,
-    Battery,
-    EstimatorStatus,
-    Heartbeat,
-    ImuSample,
-    LocalPosition,
-    MessageId,
-    OnboardHeartbeat,
-    Outgoing,
-    Parameter,
-    ReadParameter,
-    RequestMessage,
-    Sample,
-    SendCommand,
-    SetMessageInterval,
-    SetParameter,
-    TimeSyncAnswer,
-    TimeSyncReply,
-    TimeSyncRequest,
-    Vector3,
-    Vibration,
-)
+from companion.messages import Sample, Vector3
 from companion.mission.config import CompanionConfig
 
 # What decides whether a collision is survived.
@@ -74,12 +53,12 @@ class Survey:
     heard_since_us: int | None = None
     listening_since_us: int | None = None
     parameters: dict[str, int | float] = field(default_factory=dict)
-    imu: list[ImuSample] = field(default_factory=list)
+    imu: list[messages.ImuSample] = field(default_factory=list)
     positions_ned_m: list[Vector3] = field(default_factory=list)
     velocities_ned_m_s: list[Vector3] = field(default_factory=list)
-    vibration: list[Vibration] = field(default_factory=list)
-    estimator: list[EstimatorStatus] = field(default_factory=list)
-    battery: Battery | None = None
+    vibration: list[messages.Vibration] = field(default_factory=list)
+    estimator: list[messages.EstimatorStatus] = field(default_factory=list)
+    battery: messages.Battery | None = None
     round_trip: RoundTrip = field(default_factory=RoundTrip)
     _now_us: int = 0
     _heartbeat_due_us: int = 0
@@ -93,19 +72,19 @@ class Survey:
 
 
 def start_survey(config: CompanionConfig, now_us: int) -> Survey:
-    return Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)))
+    return Survey(config, now_us, StreamMonitor(config.streams, (messages.MessageId.VIBRATION,)))
 
 
-def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[Outgoing]:
+def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
     """Take what was heard, return what is to be sent; call it every 50 ms at least."""
     survey._now_us = now_us
-    outgoing: list[Outgoing] = []
+    outgoing: list[messages.Outgoing] = []
     for sample in samples:
         _hear(survey, sample, now_us, outgoing)
     if now_us >= survey._heartbeat_due_us:
         # From the start: a vehicle may wait for somebody before it speaks, or learn from it what time it is.
         survey._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
-        outgoing.append(OnboardHeartbeat(active=False))
+        outgoing.append(messages.OnboardHeartbeat(active=False))
     if survey.identity is None:
         if survey.refusal is None and now_us - survey.started_us > survey.config.link.heartbeat_wait_s * 1e6:
             wait_s = survey.config.link.heartbeat_wait_s
@@ -119,40 +98,40 @@ def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[Outg
     return outgoing
 
 
-def _hear(survey: Survey, sample: Sample, now_us: int, outgoing: list[Outgoing]) -> None:
+def _hear(survey: Survey, sample: Sample, now_us: int, outgoing: list[messages.Outgoing]) -> None:
     listens = survey.listening_since_us is not None
     if listens:
         survey.streams.count(type(sample), now_us)
     match sample:
-        case Heartbeat() if is_autopilot(sample):
+        case messages.Heartbeat() if is_autopilot(sample):
             survey.armed = sample.armed
             if survey.identity is None and survey.refusal is None:
                 _meet(survey, sample, now_us)
-        case Parameter(name, value):
+        case messages.Parameter(name, value):
             if name in PARAMETERS:
                 survey.parameters[name] = value
-        case AutopilotVersion(version):
+        case messages.AutopilotVersion(version):
             survey.version = version
-        case Battery():
+        case messages.Battery():
             survey.battery = sample
-        case EstimatorStatus():
+        case messages.EstimatorStatus():
             survey.estimator.append(sample)
-        case TimeSyncRequest(vehicle_time_ns):
-            outgoing.append(TimeSyncReply(vehicle_time_ns, now_us * 1000))
-        case TimeSyncAnswer():
+        case messages.TimeSyncRequest(vehicle_time_ns):
+            outgoing.append(messages.TimeSyncReply(vehicle_time_ns, now_us * 1000))
+        case messages.TimeSyncAnswer():
             survey.round_trip.hear(sample, now_us)
-        case ImuSample() if listens:
+        case messages.ImuSample() if listens:
             survey.imu.append(sample)
-        case LocalPosition() if listens:
+        case messages.LocalPosition() if listens:
             survey.positions_ned_m.append(sample.position_ned_m)
             survey.velocities_ned_m_s.append(sample.velocity_ned_m_s)
-        case Vibration() if listens:
+        case messages.Vibration() if listens:
             survey.vibration.append(sample)
         case _:
             pass
 
 
-def _meet(survey: Survey, heartbeat: Heartbeat, now_us: int) -> None:
+def _meet(survey: Survey, heartbeat: messages.Heartbeat, now_us: int) -> None:
     identity = identify(heartbeat)
     if isinstance(identity, str):
         survey.refusal = identity
@@ -160,19 +139,21 @@ def _meet(survey: Survey, heartbeat: Heartbeat, now_us: int) -> None:
         survey.identity, survey.heard_since_us = identity, now_us
 
 
-def _ask(survey: Survey, now_us: int, outgoing: list[Outgoing]) -> None:
+def _ask(survey: Survey, now_us: int, outgoing: list[messages.Outgoing]) -> None:
     asked = survey.round_trip.ask(now_us)
     if asked is not None:
         outgoing.append(asked)
     if now_us < survey._ask_due_us:
         return
     survey._ask_due_us = now_us + ASK_AGAIN_US
-    outgoing += [ReadParameter(name) for name in PARAMETERS if name not in survey.parameters]
+    outgoing += [messages.ReadParameter(name) for name in PARAMETERS if name not in survey.parameters]
     if survey.version is None:
-        outgoing.append(SendCommand(RequestMessage(MessageId.AUTOPILOT_VERSION), 0))
+        outgoing.append(messages.SendCommand(messages.RequestMessage(messages.MessageId.AUTOPILOT_VERSION), 0))
     if survey.listening_since_us is None:
-        outgoing += [SendCommand(stream.request(), 0) for stream in survey.streams.streams]
-        outgoing.append(SendCommand(SetMessageInterval(MessageId.ESTIMATOR_STATUS, 1_000_000), 0))
+        outgoing += [messages.SendCommand(stream.request(), 0) for stream in survey.streams.streams]
+        outgoing.append(
+            messages.SendCommand(messages.SetMessageInterval(messages.MessageId.ESTIMATOR_STATUS, 1_000_000), 0)
+        )
 
 
 def spread(vectors: Sequence[Vector3]) -> float:
@@ -475,7 +456,7 @@ class Preflight:
     def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:
         """What sets it; `parameter` shows the vehicle's answer after further steps."""
         self.survey.parameters.pop(name, None)
-        return (self._encoder.encode(SetParameter(name, value)), *self.step(b"", now_us))
+        return (*self._encoder.packets(messages.SetParameter(name, value)), *self.step(b"", now_us))
 
     def parameter(self, name: str) -> int | float | None:
         """As the vehicle last told it."""

@@ -16,15 +16,7 @@ from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
-from companion.messages import (
-    CommandAck,
-    LocalPosition,
-    Outgoing,
-    PositionSetpoint,
-    PositionTarget,
-    Sticks,
-    Vector3,
-)
+from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, PositionTarget, Sticks, Vector3
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.itinerary import steps_to_fly
 from companion.mission.model import Mission

@@ -2,21 +2,12 @@
 
 from collections.abc import Sequence
 
+from companion import messages
 from companion.flight.context import FlightContext
 from companion.flight.envelope import HELD_S, LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
-from companion.messages import (
-    Heartbeat,
-    LandedState,
-    Parameter,
-    ReadParameter,
-    Refused,
-    Sample,
-    TimeSyncAnswer,
-    TimeSyncReply,
-    TimeSyncRequest,
-)
+from companion.messages import Sample
 from companion.px4_mode import mode_name
 
 
@@ -27,7 +18,7 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
     vehicle.note_silence(now_us)
     own_modes = flight.own_modes
     for sample in samples:
-        if isinstance(sample, Heartbeat):
+        if isinstance(sample, messages.Heartbeat):
             if not is_autopilot(sample):
                 continue
             if vehicle.identity is None:
@@ -41,18 +32,18 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
                 # Another vehicle under its name: nothing that it says counts.
                 vehicle.conflicts += 1
                 continue
-        elif isinstance(sample, Refused):
+        elif isinstance(sample, messages.Refused):
             text = flight.refusals.add(sample, now_us)
             if text is not None:
                 flight.tell(now_us, "implausible", text, message=sample.message)
             continue
-        elif isinstance(sample, Parameter) and sample.name == LOSS_PARAMETER:
+        elif isinstance(sample, messages.Parameter) and sample.name == LOSS_PARAMETER:
             if flight.loss_s is None and sample.value > HELD_S:
                 flight.tell(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
             flight.loss_s = sample.value
-        elif isinstance(sample, TimeSyncRequest):
-            flight.outbox.append(TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
-        elif isinstance(sample, TimeSyncAnswer):
+        elif isinstance(sample, messages.TimeSyncRequest):
+            flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
+        elif isinstance(sample, messages.TimeSyncAnswer):
             flight.round_trip.hear(sample, now_us)
         vehicle.hear(sample, now_us, own_modes)
         streams.count(type(sample), now_us)
@@ -89,7 +80,7 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
         return
     flight.outbox.append(asked)
     if flight.loss_s is None:
-        flight.outbox.append(ReadParameter(LOSS_PARAMETER))
+        flight.outbox.append(messages.ReadParameter(LOSS_PARAMETER))
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
         flight.tell(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)
@@ -111,7 +102,7 @@ SCRAPING_M = 0.1
 def note_height(flight: FlightContext) -> None:
     """Whether the vehicle has left the ground behind; a hit that throws it down again does not bring that back."""
     height_m = flight.height_m
-    if height_m is None or flight.vehicle.landed is LandedState.ON_GROUND:
+    if height_m is None or flight.vehicle.landed is messages.LandedState.ON_GROUND:
         flight.has_climbed = False
     elif height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True

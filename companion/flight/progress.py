@@ -9,23 +9,7 @@ from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
 from companion.messages import Vector3
-from companion.mission.items import (
-    ExpectItem,
-    GoToItem,
-    HoldItem,
-    LandItem,
-    Motion,
-    OrbitItem,
-    PathItem,
-    ReturnItem,
-    SetSpeedItem,
-    SetYawItem,
-    SteadyCondition,
-    Step,
-    TakeoffItem,
-    VelocityItem,
-    WaitForItem,
-)
+from companion.mission import items
 from companion.ways.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
 from companion.ways.trajectory import Trajectory
 
@@ -53,30 +37,30 @@ class FlyItems:
         self._started_us, self._way_began_us = now_us, flight.way_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
-        self._waiting = Waiting(self._action, flight) if isinstance(self._action, WaitForItem) else None
+        self._waiting = Waiting(self._action, flight) if isinstance(self._action, items.WaitForItem) else None
         self._way: Trajectory = stay(start)
         self._out_of_reach = ""
         match self._action:
-            case TakeoffItem():
+            case items.TakeoffItem():
                 # tried again after a hit in the climb
                 self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
-            case SetSpeedItem():
+            case items.SetSpeedItem():
                 flight.pace = flight.pace.changed_to(self._action)
         factor = flight.tally.pace_factor
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
         flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
-        if isinstance(self._action, ExpectItem):
+        if isinstance(self._action, items.ExpectItem):
             expecting.begin(flight, step.label, self._action, now_us)
-        elif isinstance(self._action, GoToItem | VelocityItem | PathItem | OrbitItem):
+        elif isinstance(self._action, items.GoToItem | items.VelocityItem | items.PathItem | items.OrbitItem):
             self._plan(self._action, start, now_us)
 
-    def _plan(self, action: Motion, start_m: Vector3, now_us: int) -> None:
+    def _plan(self, action: items.Motion, start_m: Vector3, now_us: int) -> None:
         """The item's own way, or one round what is known; what is left of a path that was interrupted."""
         flight = self._flight
         behind = flight.tally.points_passed if flight.after_recovery.trigger is Trigger.RECOVERED_TO_DETOUR else 0
-        if isinstance(action, PathItem) and 0 < behind < len(action.points_ned_m):
+        if isinstance(action, items.PathItem) and 0 < behind < len(action.points_ned_m):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
         pace = replace(flight.pace, factor=flight.tally.pace_factor)
@@ -96,7 +80,7 @@ class FlyItems:
 
     def interrupt(self, now_us: int) -> None:
         """A hit ends the present way: how much of a path has been flown?"""
-        if isinstance(self._action, PathItem):
+        if isinstance(self._action, items.PathItem):
             tally = self._flight.tally
             tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._on_the_way_s))
 
@@ -116,10 +100,10 @@ class FlyItems:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         while True:
-            if isinstance(self._action, ReturnItem):
+            if isinstance(self._action, items.ReturnItem):
                 flight.returning_as = self._action
                 return Move(Trigger.RETURN_DUE)
-            if isinstance(self._action, LandItem):
+            if isinstance(self._action, items.LandItem):
                 return Move(Trigger.LAND_DUE)
             if self._out_of_reach:
                 trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
@@ -139,16 +123,16 @@ class FlyItems:
     def _is_done(self, flight: FlightContext, now_us: int) -> bool:
         elapsed_s = self._on_the_way_s
         match self._action:
-            case SetSpeedItem() | ExpectItem():
+            case items.SetSpeedItem() | items.ExpectItem():
                 return True
-            case HoldItem(duration_s=duration_s):
+            case items.HoldItem(duration_s=duration_s):
                 return now_us - self._started_us >= duration_s * 1e6
-            case WaitForItem():
+            case items.WaitForItem():
                 assert self._waiting is not None
                 return self._waiting.is_over(flight, now_us)
-            case VelocityItem():
+            case items.VelocityItem():
                 return elapsed_s >= self._way.duration_s and self._has_turned(now_us)
-            case SetYawItem():
+            case items.SetYawItem():
                 return self._has_turned(now_us)
             case _:
                 over = elapsed_s >= self._way.duration_s and self._has_turned(now_us)
@@ -203,7 +187,7 @@ class HoldAfterRecovery:
 class Waiting:
     """Holds the one condition of the item."""
 
-    def __init__(self, item: WaitForItem, flight: FlightContext) -> None:
+    def __init__(self, item: items.WaitForItem, flight: FlightContext) -> None:
         self._item = item
         self._steady_since_us: int | None = None
         flight.file_awaited, flight.file_is_there = item.file, False
@@ -220,7 +204,7 @@ class Waiting:
             flight.file_awaited = None
         return flight.file_is_there
 
-    def _is_steady(self, steady: SteadyCondition, flight: FlightContext, now_us: int) -> bool:
+    def _is_steady(self, steady: items.SteadyCondition, flight: FlightContext, now_us: int) -> bool:
         latest, target = flight.vehicle.history.latest(), flight.target
         assert latest is not None and target is not None, "the flight is in the air"
         rests = (
@@ -253,14 +237,14 @@ class Heading:
     along: bool = False
 
     @classmethod
-    def of_step(cls, step: Step, yaw_rad: float | None, now_us: int) -> "Heading":
+    def of_step(cls, step: items.Step, yaw_rad: float | None, now_us: int) -> "Heading":
         """The heading that the step asks for, beginning with the present one."""
         action = step.action
-        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, SetYawItem) else YAW_RATE_RAD_S
+        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else YAW_RATE_RAD_S
         asked = getattr(action, "yaw_deg", None)
         fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
-        centre = action.centre_ned_m if isinstance(action, OrbitItem) and asked == "centre" else None
-        along = isinstance(action, PathItem | OrbitItem) and asked == "along"
+        centre = action.centre_ned_m if isinstance(action, items.OrbitItem) and asked == "centre" else None
+        along = isinstance(action, items.PathItem | items.OrbitItem) and asked == "along"
         return cls(yaw_rad, now_us, rate_rad_s, fixed_rad, centre, along)
 
     @property

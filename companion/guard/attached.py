@@ -12,7 +12,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
-from companion.mavlink.fields import fields_from, sample_from
+from companion.mavlink.readers import sample_from
 from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk, TimeSyncReply
 from companion.report import Event
 
@@ -79,7 +79,7 @@ class AttachedGuard:
         sent: list[tuple[str, Mapping[str, Any]]] = []
         for message in outputs.messages:
             if not isinstance(message, OnboardHeartbeat | TimeSyncAsk | TimeSyncReply):
-                sent += fields_from(self._encoder, message)
+                sent += self._encoder.fields(message)
         for name, fields in sent:
             if name in SETPOINTS:
                 self._gate.sends(fields)

@@ -6,7 +6,7 @@ from companion.companion import Stepped
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.guard.states import State
-from companion.mavlink.decode import LONE_GUARD_CONVERTERS
+from companion.mavlink.readers import LONE_GUARD_READERS
 from companion.report import CollisionReport, RoundTripReport
 
 
@@ -16,7 +16,7 @@ class Guard(Stepped[GuardCore]):
     _first_state: ClassVar = State.CONNECTING.value
 
     def __init__(self, config: GuardConfig) -> None:
-        super().__init__(LONE_GUARD_CONVERTERS)
+        super().__init__(LONE_GUARD_READERS)
         self._config = config
 
     def _begun(self, now_us: int) -> GuardCore:

@@ -9,22 +9,9 @@ from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
+from companion.mission import items
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
-from companion.mission.items import (
-    ExpectItem,
-    GoToItem,
-    HoldItem,
-    LandItem,
-    MissionItem,
-    ReturnItem,
-    SetSpeedItem,
-    SetYawItem,
-    Step,
-    TakeoffItem,
-    WaitForItem,
-    program,
-)
 from companion.mission.policy import Resume
 from companion.ways.course import Pace, Planned, climb, home_around, way_around
 from companion.ways.trajectory import Chain, LineProfile, Trajectory
@@ -43,7 +30,7 @@ class Flyable(Protocol):
     """What ways are worked out from: a mission, which has them checked while it is read."""
 
     @property
-    def items(self) -> tuple[MissionItem, ...]: ...
+    def items(self) -> tuple[items.MissionItem, ...]: ...
     @property
     def fence(self) -> Fence: ...
     @property
@@ -61,7 +48,7 @@ class Leg:
     `is_cut_off`: what is known beforehand leaves no way there; `is_detour`: the way leads round it.
     """
 
-    step: Step
+    step: items.Step
     start_ned_m: Vector3
     way: Trajectory | None
     lasts_s: float | None
@@ -78,21 +65,21 @@ def itinerary(mission: Flyable) -> tuple[Leg, ...]:
     return tuple(_legs(mission, mission.obstacles.patches()))
 
 
-def steps_to_fly(mission: Flyable) -> tuple[Step, ...]:
+def steps_to_fly(mission: Flyable) -> tuple[items.Step, ...]:
     """The program, or what of it an interrupted flight has left: up, to where its step begins, and on from there.
 
     Raises ValueError for a step that there is not.
     """
-    steps = program(mission.items)
+    steps = items.program(mission.items)
     if mission.resume is None:
         return steps
     at = mission.resume.at_step
     if at >= len(steps):
         raise ValueError(f"resume.at_step: the mission has {len(steps)} steps, counted from 0; there is no {at}")
     begin = tuple(_legs(mission))[at]
-    there = GoToItem(position_ned_m=begin.start_ned_m)
-    back = Step(at, begin.step.label, MissionItem(go_to=there), there)
-    paces = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, SetSpeedItem)]
+    there = items.GoToItem(position_ned_m=begin.start_ned_m)
+    back = items.Step(at, begin.step.label, items.MissionItem(go_to=there), there)
+    paces = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, items.SetSpeedItem)]
     return (steps[0], *paces[-1:], back, *steps[at:])
 
 
@@ -101,28 +88,28 @@ def _legs(mission: Flyable, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
     pace = Pace.of(flight)
-    for step in program(mission.items):
+    for step in items.program(mission.items):
         action = step.action
         way: Trajectory | None = None
         lasts_s: float | None = 0.0
         planned: Planned | None = None
         match action:
-            case TakeoffItem():
+            case items.TakeoffItem():
                 way = climb(place, action.height_m, flight)
-            case HoldItem():
+            case items.HoldItem():
                 lasts_s = action.duration_s
-            case WaitForItem():
+            case items.WaitForItem():
                 lasts_s = step.item.timeout_s
-            case SetSpeedItem():
+            case items.SetSpeedItem():
                 pace = pace.changed_to(action)
-            case SetYawItem():
+            case items.SetYawItem():
                 lasts_s = 180.0 / action.rate_deg_s
-            case ExpectItem():
+            case items.ExpectItem():
                 pass
-            case ReturnItem():
+            case items.ReturnItem():
                 planned = home_around(place, action, pace, known)
                 lasts_s = _landing_s(place if planned.way is None else planned.way.target_m)
-            case LandItem():
+            case items.LandItem():
                 lasts_s = _landing_s(place)
             case _:
                 planned = way_around(action, place, pace, known)
@@ -153,7 +140,7 @@ def first_complaint(mission: Flyable) -> str | None:
         complaint = mission.fence.complaint(leg.end_ned_m)
         if complaint is not None:
             return f"items: the position of item {number} ({leg.step.name}) {complaint}"
-        if not isinstance(leg.step.action, TakeoffItem):
+        if not isinstance(leg.step.action, items.TakeoffItem):
             complaint = _way_complaint(mission.fence, leg.way)
         if complaint is not None:
             return f"items: on its way item {number} ({leg.step.name}) {complaint}"

@@ -16,7 +16,7 @@ from companion.estimate.normal import Search, further
 from companion.guard.attached import SETPOINTS, AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
-from companion.mavlink.fields import HEARD
+from companion.mavlink.readers import HEARD
 from companion.report import CollisionReport, Event
 from companion.shell.clock import Clock
 from companion.shell.mavsdk_link import GuardError, MavsdkLink

@@ -9,17 +9,9 @@ from typing import TypeAlias
 from companion.memory.route import route
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
+from companion.mission import items
 from companion.mission.config import FlightConfig
 from companion.mission.fence import Fence
-from companion.mission.items import (
-    GoToItem,
-    Motion,
-    OrbitItem,
-    PathItem,
-    ReturnItem,
-    SetSpeedItem,
-    VelocityItem,
-)
 from companion.ways.trajectory import Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
 
 # What is left of the speeding up against a strong wind: 4 m/s after ten seconds.
@@ -48,7 +40,7 @@ class Pace:
         """With which a mission begins."""
         return cls(config.cruise_speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
 
-    def changed_to(self, item: SetSpeedItem) -> "Pace":
+    def changed_to(self, item: items.SetSpeedItem) -> "Pace":
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
         return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration, factor=1.0)
 
@@ -81,35 +73,35 @@ def stay(place_m: Vector3) -> LineProfile:
     return LineProfile(place_m, place_m, 1.0, 1.0)
 
 
-def first_leg(item: Motion, start_m: Vector3) -> Vector3:
+def first_leg(item: items.Motion, start_m: Vector3) -> Vector3:
     """Where the item goes at first; to an orbit's middle, as all directions follow."""
     match item:
-        case VelocityItem():
+        case items.VelocityItem():
             return item.velocity_ned_m_s
-        case GoToItem():
+        case items.GoToItem():
             first = item.position_ned_m
-        case PathItem():
+        case items.PathItem():
             first = item.points_ned_m[0]
-        case OrbitItem():
+        case items.OrbitItem():
             first = item.centre_ned_m
     return (first[0] - start_m[0], first[1] - start_m[1], first[2] - start_m[2])
 
 
-def way_of(item: Motion, start_m: Vector3, pace: Pace) -> Trajectory:
+def way_of(item: items.Motion, start_m: Vector3, pace: Pace) -> Trajectory:
     """How to fly the item from where the setpoint is."""
-    if isinstance(item, VelocityItem):
+    if isinstance(item, items.VelocityItem):
         return _with_velocity(item, start_m, pace)
     limits = pace.limits(item.speed_m_s, item.acceleration_m_s2)
     match item:
-        case GoToItem():
+        case items.GoToItem():
             return LineProfile(start_m, item.position_ned_m, *limits)
-        case PathItem():
+        case items.PathItem():
             return CurveProfile((start_m, *item.points_ned_m), *limits)
-        case OrbitItem():
+        case items.OrbitItem():
             return _round(item, start_m, limits)
 
 
-def _with_velocity(item: VelocityItem, start_m: Vector3, pace: Pace) -> LineProfile:
+def _with_velocity(item: items.VelocityItem, start_m: Vector3, pace: Pace) -> LineProfile:
     """The line that is covered in the time, ramps included."""
     speed = math.hypot(*item.velocity_ned_m_s)
     _, braking, speeding_up = pace.limits(None, item.acceleration_m_s2)
@@ -123,7 +115,7 @@ def _with_velocity(item: VelocityItem, start_m: Vector3, pace: Pace) -> LineProf
     return LineProfile(start_m, target, top, braking, speeding_up)
 
 
-def _round(item: OrbitItem, start_m: Vector3, limits: Limits) -> Chain:
+def _round(item: items.OrbitItem, start_m: Vector3, limits: Limits) -> Chain:
     """To the nearest point of the circle, which for a start in its middle is the one in the north, and round."""
     n, e, _ = item.centre_ned_m
     start_rad = math.atan2(start_m[1] - e, start_m[0] - n)
@@ -132,7 +124,7 @@ def _round(item: OrbitItem, start_m: Vector3, limits: Limits) -> Chain:
     return Chain((LineProfile(start_m, circle.at(0.0)[0], *limits), circle))
 
 
-def way_home(start_m: Vector3, item: ReturnItem, pace: Pace, fence: Fence) -> Chain:
+def way_home(start_m: Vector3, item: items.ReturnItem, pace: Pace, fence: Fence) -> Chain:
     """Up first where that is asked for, then straight to above the arming position, never above the fence."""
     limits = pace.limits(item.speed_m_s, None)
     wanted_m = max(-start_m[2], item.height_m or 0.0)
@@ -163,30 +155,30 @@ class Planned:
     left_out: int = 0
 
 
-def way_around(item: Motion, start_m: Vector3, pace: Pace, known: Surroundings) -> Planned:
+def way_around(item: items.Motion, start_m: Vector3, pace: Pace, known: Surroundings) -> Planned:
     """The item's own way where that is free. A velocity is flown as it is: it asks for a motion, not for a place."""
     own = way_of(item, start_m, pace)
-    if isinstance(item, VelocityItem) or not _is_blocked(own, known):
+    if isinstance(item, items.VelocityItem) or not _is_blocked(own, known):
         return Planned(own)
     points = _points_of(item, own)
     places, left_out = [start_m], 0
     for point in points:
-        is_welcome = not isinstance(item, OrbitItem) or known.is_clear(point, start_m)
+        is_welcome = not isinstance(item, items.OrbitItem) or known.is_clear(point, start_m)
         found = route(known, places[-1], point) if is_welcome else None
         left_out += found is None
         places += found or ()
     # Of a circle any part is worth flying; a line or a path has somewhere to be.
-    if len(places) == 1 or (not isinstance(item, OrbitItem) and places[-1] != points[-1]):
+    if len(places) == 1 or (not isinstance(item, items.OrbitItem) and places[-1] != points[-1]):
         return Planned(None)
     limits = pace.limits(item.speed_m_s, item.acceleration_m_s2)
-    if not isinstance(item, GoToItem):
+    if not isinstance(item, items.GoToItem):
         curve = CurveProfile(places, *limits)
         if not _is_blocked(curve, known) and _is_inside(curve, known):
             return Planned(curve, True, left_out)
     return Planned(lines(places, limits), True, left_out)
 
 
-def home_around(start_m: Vector3, item: ReturnItem, pace: Pace, known: Surroundings) -> Planned:
+def home_around(start_m: Vector3, item: items.ReturnItem, pace: Pace, known: Surroundings) -> Planned:
     """Home as the item says; where there is something above, or in the way, round it."""
     own = way_home(start_m, item, pace, known.fence)
     if not _is_blocked(own, known):
@@ -204,7 +196,7 @@ def lines(places_m: Sequence[Vector3], limits: Limits) -> Chain:
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 
-def passed(item: PathItem, way: Trajectory, elapsed_s: float) -> int:
+def passed(item: items.PathItem, way: Trajectory, elapsed_s: float) -> int:
     """How many of a path's points lie behind the vehicle: all up to the last one that its way has led through."""
     flown = looks(way, min(elapsed_s, way.duration_s))
     numbers = [
@@ -237,13 +229,13 @@ def _is_inside(way: Trajectory, known: Surroundings) -> bool:
     return all(fence.contains(n, e) and fence.min_height_m <= -d <= fence.max_height_m for n, e, d in places)
 
 
-def _points_of(item: GoToItem | PathItem | OrbitItem, own: Trajectory) -> Sequence[Vector3]:
+def _points_of(item: items.GoToItem | items.PathItem | items.OrbitItem, own: Trajectory) -> Sequence[Vector3]:
     match item:
-        case GoToItem():
+        case items.GoToItem():
             return (item.position_ned_m,)
-        case PathItem():
+        case items.PathItem():
             return item.points_ned_m
-        case OrbitItem():
+        case items.OrbitItem():
             assert isinstance(own, Chain), "to the circle and round it"
             circle = own.parts[1]
             count = math.ceil(360.0 * item.turns / ROUND_BY_DEG)

@@ -111,15 +111,15 @@ def test_the_gate_knows_its_own_by_content_and_each_but_once():
 def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
     from pymavlink.dialects.v20 import development as dialect
 
-    from companion.mavlink.decode import GUARD_CONVERTERS, Decoder
-    from companion.mavlink.fields import sample_from
+    from companion.mavlink.decode import Decoder
+    from companion.mavlink.readers import GUARD_READERS, sample_from
     from sim_vehicle.airframe import load_built_in
     from sim_vehicle.scene import Scene
     from sim_vehicle.vehicle import SimulatedVehicle
     from tests.guard.attached_air import fields_of
 
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
-    decoder, parser = Decoder(GUARD_CONVERTERS), dialect.MAVLink(None)
+    decoder, parser = Decoder(GUARD_READERS), dialect.MAVLink(None)
     decoder.listen_to(1, 1)
     kinds = set()
     for _ in range(1000):
@@ -133,7 +133,7 @@ def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
 
 
 def test_fields_of_another_dialect_make_no_sample_and_no_error():
-    from companion.mavlink.fields import sample_from
+    from companion.mavlink.readers import sample_from
 
     assert sample_from("HIGHRES_IMU", (1, 1), {"message_id": 105}) is None
     assert sample_from("HEARTBEAT", (1, 1), {"type": None, "custom_mode": None}) is None
