@@ -54,7 +54,7 @@ def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> Non
 
 
 def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
-    identity, version = preflight.survey.identity, preflight.survey.version
+    identity, version = preflight.survey.vehicle.identity, preflight.survey.vehicle.version
     release = "" if version is None else " " + ".".join(map(str, version))
     kind = identity.vehicle_type if identity is not None else "vehicle"
     console.print(f"\nPX4{release}, {kind}")
@@ -70,7 +70,7 @@ def _fix(
     console: Console, preflight: Preflight, connection: Connection, clock: Clock, found: list[Finding], is_agreed: bool
 ) -> list[Finding]:
     """Set what can be set, one by one as the person agrees; the findings afterwards."""
-    if preflight.survey.armed:
+    if preflight.survey.vehicle.armed:
         raise ConfigurationError("The vehicle is armed: nothing is set on a vehicle that may be flying.")
     for finding in found:
         if finding.fix is None:
