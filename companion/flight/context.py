@@ -18,8 +18,7 @@ from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
 from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, PositionTarget, Sticks, Vector3
 from companion.mission.items import ExpectItem, ReturnItem, Step
-from companion.mission.itinerary import steps_to_fly
-from companion.mission.model import Mission
+from companion.mission.model import Mission, steps_to_fly
 from companion.recovery.interface import Moving
 from companion.report import Event, JsonValue, Outcome
 from companion.ways.course import Pace

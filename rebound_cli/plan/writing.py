@@ -19,8 +19,7 @@ from companion.mission.items import (
     VelocityItem,
     WaitForItem,
 )
-from companion.mission.itinerary import Leg, itinerary
-from companion.mission.model import Mission
+from companion.mission.model import Leg, Mission, itinerary
 from companion.ways.trajectory import Trajectory
 from rebound_cli.plan import commands
 from rebound_cli.plan.fences import plan_of_fence
