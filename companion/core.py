@@ -8,8 +8,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from companion.detection.interface import Situation
 from companion.detection.watch import Watch, start_watch
@@ -19,7 +18,7 @@ from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.hearing import hear, note_height, too_low
-from companion.flight.machine import Machine
+from companion.flight.machine import Machine, StateMachine
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.remembering import known_surfaces
 from companion.flight.states import FINAL_STATES, State
@@ -52,40 +51,8 @@ class Outputs:
 NOTHING = Outputs((), ())
 
 
-class Streaming(Protocol):
-    """What a state does for the setpoint stream."""
-
-    def target(self, now_us: int) -> Target | None: ...
-
-
-class Steered(Protocol):
-    """A state machine as the core runs it."""
-
-    @property
-    def state(self) -> Enum: ...
-    @property
-    def activity(self) -> Streaming: ...
-    @property
-    def finished(self) -> bool:
-        """Nothing is left to send."""
-        ...
-
-    @property
-    def holds(self) -> bool:
-        """Whether the vehicle flies, or is about to fly, by this program's setpoints."""
-        ...
-
-    def step(self, inputs: Inputs, now_us: int) -> bool:
-        """Take all moves that are due; whether there were any."""
-        ...
-
-    def fail(self, error: Exception, now_us: int) -> bool:
-        """This program is at fault: give the vehicle away; whether that is a move."""
-        ...
-
-
 FlightT = TypeVar("FlightT", bound=FlightContext)
-MachineT = TypeVar("MachineT", bound=Steered)
+MachineT = TypeVar("MachineT", bound=StateMachine)
 
 
 class Core(ABC, Generic[FlightT, MachineT]):

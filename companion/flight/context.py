@@ -1,6 +1,5 @@
 """What the parts of a flight share: the mission, the vehicle as heard, and what is to be sent and told."""
 
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
@@ -217,10 +216,6 @@ class FlightContext:
     def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
-
-    def tell_fault(self, now_us: int, text: str, error: Exception) -> None:
-        """A fault of this program."""
-        self.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
 
     @property
     def own_modes(self) -> tuple[int | None, ...]:

@@ -7,7 +7,7 @@ from companion.estimate.rotation import yaw_rad
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
 from companion.flight.ending import HEARD_AGAIN, Holder, silent_link, silent_position, who_decided
-from companion.flight.machine import fault_text
+from companion.flight.machine import StateMachine
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
 from companion.guard.context import Activity, GuardContext, Move
@@ -40,18 +40,18 @@ _BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 _TO_HOLD = (Trigger.STOPPED, Trigger.HIT_BESIDE_PROGRAM, Trigger.NOT_CONFIRMED, Trigger.BLIND, Trigger.CROSSED)
 
 
-@dataclass(slots=True)
-class GuardMachine:
-    """The present state and what is being done in it. The same inputs always give the same moves."""
+@dataclass
+class GuardMachine(StateMachine):
+    """The present state and what is being done in it."""
 
-    guard: GuardContext
+    program = "guard"
+    flight: GuardContext
     activity: Activity
     state: State = State.CONNECTING
     outcome: str = ""  # why it ended
 
     @property
     def holds(self) -> bool:
-        """Whether the guard wants the vehicle for itself."""
         return self.state in HOLDING or (isinstance(self.activity, StandDown) and self.activity.hands_over)
 
     @property
@@ -59,55 +59,47 @@ class GuardMachine:
         return self.state is State.ENDED
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
-        """Take all moves that are due; whether there were any."""
         before = self.activity
         self._take(self._from_outside(inputs, now_us), now_us)
         for estimate in inputs.impacts:
             trigger = self._trigger_of_hit()
-            if trigger is Trigger.HIT_BESIDE_PROGRAM and self.guard.config.beside_program == "tell":
-                self.guard.left_alone += 1
+            if trigger is Trigger.HIT_BESIDE_PROGRAM and self.flight.config.beside_program == "tell":
+                self.flight.left_alone += 1
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
-                self.guard.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
+                self.flight.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif TABLE.moves(self.state, trigger):
                 self._remember_hit(now_us)
                 is_first = self.state is State.WATCHING
-                note_before(self.guard, FlightState.MISSION if is_first else FlightState.RECOVERING)
-                record_collision(self.guard, estimate, now_us)
+                note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
+                record_collision(self.flight, estimate, now_us)
                 self._take(Move(trigger), now_us)
-        move = self.activity.step(self.guard, inputs, now_us)
+        move = self.activity.step(self.flight, inputs, now_us)
         while move is not None and TABLE.moves(self.state, move.trigger):
             self._take(move, now_us)
             # The answers and positions of this step belong to the state that asked for them.
-            move = self.activity.step(self.guard, Inputs(), now_us)
+            move = self.activity.step(self.flight, Inputs(), now_us)
         return self.activity is not before
 
-    def fail(self, error: Exception, now_us: int) -> bool:
-        """This program is at fault: give the vehicle back while that can still be done, and say what happened."""
-        guard, before = self.guard, self.activity
-        text = fault_text("guard", error)
-        guard.tell_fault(now_us, text, error)
-        if guard.fault or self.state is State.GIVING_BACK:
-            # even giving back fails: silence lets the vehicle's own failsafe act
-            self.state, self.activity, self.outcome = State.ENDED, End(), text
-        guard.fault = text
-        try:
-            self._take(Move(Trigger.STOPPED, text), now_us)
-        except Exception as second:
-            # what gives back fails, too
-            guard.tell_fault(now_us, f"and again: {second}", second)
-            self.state, self.activity, self.outcome = State.ENDED, End(), text
-        return self.activity is not before
+    @property
+    def _gives_away(self) -> bool:
+        return self.state is State.GIVING_BACK
+
+    def _give_away(self, text: str, now_us: int) -> None:
+        self._take(Move(Trigger.STOPPED, text), now_us)
+
+    def _let_go(self, text: str) -> None:
+        self.state, self.activity, self.outcome = State.ENDED, End(), text
 
     def _trigger_of_hit(self) -> Trigger:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
-        guard = self.guard
+        guard = self.flight
         beside = guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out
         beside = guard.program_elsewhere or (beside and self.state is State.WATCHING)
         beside = beside and TABLE.moves(self.state, Trigger.HIT_BESIDE_PROGRAM)
         return Trigger.HIT_BESIDE_PROGRAM if beside else Trigger.HIT
 
     def _remember_hit(self, now_us: int) -> None:
-        guard = self.guard
+        guard = self.flight
         guard.hits += 1
         if self.state is not State.WATCHING:
             return
@@ -118,7 +110,7 @@ class GuardMachine:
 
     def _from_outside(self, inputs: Inputs, now_us: int) -> Move | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
-        guard = self.guard
+        guard = self.flight
         guard.note_silence(now_us)
         if guard.vehicle.armed is False and TABLE.moves(self.state, Trigger.DISARMED):
             return Move(Trigger.DISARMED, "disarmed")
@@ -136,7 +128,7 @@ class GuardMachine:
         return None if blind is None else Move(Trigger.BLIND, blind)
 
     def _taken_by_another(self, inputs: Inputs) -> str | None:
-        guard = self.guard
+        guard = self.flight
         report, expected = guard.vehicle.mode, guard.expected_mode
         if guard.sticks is not None and any(has_moved(guard.sticks, now) for now in inputs.sticks):
             return STICKS
@@ -156,7 +148,7 @@ class GuardMachine:
 
     def _heard_again(self, now_us: int) -> Move | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
-        guard = self.guard
+        guard = self.flight
         may_be_restarted = self.state is State.CONNECTING or guard.vehicle.armed is False
         if not may_be_restarted or guard.is_silent(now_us) or not guard.was_silent:
             return None
@@ -166,7 +158,7 @@ class GuardMachine:
         if move is None or not TABLE.moves(self.state, move.trigger):
             return
         self.state = TABLE.next_state(self.state, move.trigger)
-        guard = self.guard
+        guard = self.flight
         if move.text:
             guard.tell(now_us, _KINDS.get(move.trigger, "guard"), move.text)
         if move.trigger in _TO_HOLD:
@@ -174,7 +166,7 @@ class GuardMachine:
         self.activity = self._begin(move, now_us)
 
     def _begin(self, move: Move, now_us: int) -> Activity:
-        guard = self.guard
+        guard = self.flight
         if self.state not in HOLDING:
             guard.command_client.cancel()
             guard.expected_mode = None
@@ -202,7 +194,7 @@ class GuardMachine:
                 return End()
 
     def _take_over(self, now_us: int) -> Activity:
-        guard = self.guard
+        guard = self.flight
         mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
         guard.tell(now_us, "take_over", f"taking over from {mode}", mode=mode)
         guard.command_client.cancel()
@@ -213,7 +205,7 @@ class GuardMachine:
         return self.activity.recover
 
     def _limit_hits(self) -> None:
-        guard, limit = self.guard, self.guard.config.max_hits
+        guard, limit = self.flight, self.flight.config.max_hits
         if guard.hits >= limit and not guard.then_hold:
             guard.then_hold = f"hit {guard.hits} of at most {limit}"
 

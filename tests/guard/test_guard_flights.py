@@ -307,4 +307,4 @@ def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
     assert air.until(lambda: air.state is State.WATCHING, 3.0) < 1.0
     air.until(lambda: air.vehicle_mode() == "POSCTL", 1.0)
     assert [event.kind for event in air.events].count("unconfirmed") == 1
-    assert air.guard.core.machine.guard.hits == 0
+    assert air.guard.core.flight.hits == 0
