@@ -6,7 +6,7 @@ from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
 from companion.flight.envelope import Known, touched
 from companion.flight.states import Trigger
-from companion.memory.patch import Patch, Touch, is_same, remembered, touch_of
+from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
@@ -91,7 +91,7 @@ def _with_hits(flight: FlightContext, hits: int) -> tuple[Patch, ...]:
     return remembered(flight.mission.obstacles.patches(), touches, _clearance_m(flight))
 
 
-def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Touch]:
+def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Patch]:
     reach_m = flight.mission.companion.estimate.reach_m
     touches = []
     for record in records:

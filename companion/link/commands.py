@@ -1,9 +1,10 @@
 """Commands to the vehicle: one at a time, repeated until answered, given up in the end."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from companion import messages
+from companion.messages import CommandResult
 from companion.px4_mode import AUTO_LOITER, mode_name
 
 # PX4 answers in 2 to 10 ms on UDP; a telemetry radio's round trip stays below half a second.
@@ -13,19 +14,19 @@ CONFIRMATION_TIMEOUT_US = 2_500_000
 # A temporary refusal (a check still failing) is worth asking about once a second, PX4's own rhythm of checks.
 REFUSAL_PAUSE_US = 1_000_000
 # Answers that promise an effect.
-TAKEN_UP = (messages.CommandResult.ACCEPTED, messages.CommandResult.IN_PROGRESS)
+TAKEN_UP = (CommandResult.ACCEPTED, CommandResult.IN_PROGRESS)
 # Five lost or refused in a row are no accident.
 ATTEMPTS = 5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Pending:
     """A command on its way: sent `attempts` times, to be sent again at `repeat_at_us`."""
 
     command: messages.VehicleCommand
-    attempts: int
-    repeat_at_us: int
-    last_result: messages.CommandResult | None
+    attempts: int = 0
+    repeat_at_us: int = 0
+    last_result: CommandResult | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,6 @@ class CommandOutcome:
     `refused`: it failed and the last that the vehicle said was no, rather than nothing.
     """
 
-    command: messages.VehicleCommand
     succeeded: bool
     text: str
     refused: bool = False
@@ -63,11 +63,11 @@ def needs_confirmation(command: messages.VehicleCommand) -> bool:
     return isinstance(command, messages.SetMode) or (isinstance(command, messages.SetArmed) and command.armed)
 
 
-def is_final(command: messages.VehicleCommand, result: messages.CommandResult) -> bool:
+def is_final(command: messages.VehicleCommand, result: CommandResult) -> bool:
     """Whether asking again is useless; a disarm is refused because the vehicle flies, which will not pass soon."""
-    if result in (messages.CommandResult.DENIED, messages.CommandResult.UNSUPPORTED, messages.CommandResult.FAILED):
+    if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
         return True
-    return result is messages.CommandResult.TEMPORARILY_REJECTED and command == messages.SetArmed(False)
+    return result is CommandResult.TEMPORARILY_REJECTED and command == messages.SetArmed(False)
 
 
 class CommandClient:
@@ -83,13 +83,10 @@ class CommandClient:
     @property
     def requested_mode(self) -> int | None:
         """The mode asked for and not yet confirmed."""
-        match None if self._pending is None else self._pending.command:
-            case messages.SetMode(custom_mode):
-                return custom_mode
-            case messages.Reposition():
-                return AUTO_LOITER
-            case _:
-                return None
+        command = None if self._pending is None else self._pending.command
+        if isinstance(command, messages.SetMode):
+            return command.custom_mode
+        return AUTO_LOITER if isinstance(command, messages.Reposition) else None
 
     @property
     def is_unsaid(self) -> bool:
@@ -98,7 +95,7 @@ class CommandClient:
 
     def begin(self, command: messages.VehicleCommand) -> None:
         """Take up a command, dropping any other; it goes out in the next `step`."""
-        self._pending = Pending(command, 0, 0, None)
+        self._pending = Pending(command)
 
     def cancel(self) -> None:
         self._pending = None
@@ -113,37 +110,29 @@ class CommandClient:
         pending = self._pending
         if pending is None:
             return None, None
-        if needs_confirmation(pending.command) and seen:
-            return self._end(True, "confirmed")
+        is_confirmed_by_sight = needs_confirmation(pending.command)
+        if is_confirmed_by_sight and seen:
+            return self._end(pending, True, "confirmed")
         for ack in acks:
             if ack.command == pending.command.command_id and pending.attempts > 0:
-                pending = self._pending = _answered(pending, ack.result, now_us)
-                if ack.result is messages.CommandResult.ACCEPTED and not needs_confirmation(pending.command):
-                    return self._end(True, "accepted")
+                wait_us = CONFIRMATION_TIMEOUT_US if ack.result in TAKEN_UP else REFUSAL_PAUSE_US
+                pending.last_result, pending.repeat_at_us = ack.result, now_us + wait_us
+                if ack.result is CommandResult.ACCEPTED and not is_confirmed_by_sight:
+                    return self._end(pending, True, "accepted")
                 if is_final(pending.command, ack.result):
-                    return self._end(False, f"the vehicle answered {ack.result.name}")
+                    return self._end(pending, False, f"the vehicle answered {ack.result.name}")
         if now_us < pending.repeat_at_us:
             return None, None
         if pending.attempts >= ATTEMPTS:
-            return self._end(False, _why_given_up(pending))
-        self._pending = replace(pending, attempts=pending.attempts + 1, repeat_at_us=now_us + ACK_TIMEOUT_US)
-        return messages.SendCommand(pending.command, pending.attempts) if may_send else None, None
+            return self._end(pending, False, _why_given_up(pending))
+        attempt, pending.repeat_at_us = pending.attempts, now_us + ACK_TIMEOUT_US
+        pending.attempts += 1
+        return messages.SendCommand(pending.command, attempt) if may_send else None, None
 
-    def _end(self, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
-        assert self._pending is not None
-        command, last_result = self._pending.command, self._pending.last_result
+    def _end(self, pending: Pending, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
         self._pending = None
-        refused = not succeeded and last_result is not None and last_result not in TAKEN_UP
-        return None, CommandOutcome(command, succeeded, f"{describe(command)}: {text}", refused)
-
-
-def _answered(pending: Pending, result: messages.CommandResult, now_us: int) -> Pending:
-    waits_us = {
-        messages.CommandResult.ACCEPTED: CONFIRMATION_TIMEOUT_US,
-        messages.CommandResult.IN_PROGRESS: CONFIRMATION_TIMEOUT_US,
-    }
-    wait_us = waits_us.get(result, REFUSAL_PAUSE_US)
-    return replace(pending, last_result=result, repeat_at_us=now_us + wait_us)
+        refused = not succeeded and pending.last_result is not None and pending.last_result not in TAKEN_UP
+        return None, CommandOutcome(succeeded, f"{describe(pending.command)}: {text}", refused)
 
 
 def _why_given_up(pending: Pending) -> str:

@@ -21,24 +21,11 @@ GOES_ON_MOST_M = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Touch:
-    """One hit: the place on the surface, the unit normal out of it and its standard deviation.
-
-    `reaches_m` is how far the surface is believed to reach beyond this place, whatever else is known.
-    """
-
-    place_ned_m: Vector3
-    normal_ned: Vector3
-    normal_error_rad: float
-    reaches_m: float
-    found_at_us: int
-
-
-@dataclass(frozen=True, slots=True)
 class Patch:
     """One surface: all touches of it, the unit normal that they agree on and its standard deviation.
 
-    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `found_at_us`: first touch.
+    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `reaches_m` is how far it is
+    believed to reach beyond its touches, whatever else is known; `found_at_us` the first touch.
     """
 
     touches_ned_m: tuple[Vector3, ...]
@@ -147,8 +134,8 @@ def touch_of(
     reach_m: float,
     found_at_us: int,
     is_behind: bool = False,
-) -> Touch | None:
-    """The touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
+) -> Patch | None:
+    """The one touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
 
     ``normal_ned`` is horizontal, steep or zero (see recovery.direction). ``reach_m``: centre to the guards' rim.
     ``is_behind``: what was hit is known to have come after the vehicle.
@@ -160,13 +147,14 @@ def touch_of(
     normal, error_rad = (normal_ned, ERROR_RAD) if is_behind else _direction(normal_ned, against, is_clipped)
     if normal == (0.0, 0.0, 0.0):
         return None
-    place = tuple(c - reach_m * x for c, x in zip(centre_ned_m, normal, strict=True))
+    n, e, d = (c - reach_m * x for c, x in zip(centre_ned_m, normal, strict=True))
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
-    return Touch((place[0], place[1], place[2]), normal, error_rad, reaches_m, found_at_us)
+    return Patch(((n, e, d),), normal, error_rad, reaches_m, found_at_us)
 
 
-def _agreement(normal: Vector3, against: Vector3) -> float:
-    return sum(a * b for a, b in zip(normal, against, strict=True))
+def _agreement(a: Vector3, b: Vector3) -> float:
+    """The cosine between unit vectors; 0 where one is zero."""
+    return max(-1.0, min(1.0, sum(x * y for x, y in zip(a, b, strict=True))))
 
 
 def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vector3, float]:
@@ -180,7 +168,7 @@ def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vec
         return normal, ERROR_RAD
     # Either may be right: half way between both is at most half of the angle wrong.
     middle = away_from((normal[0] + against[0], normal[1] + against[1], normal[2] + against[2]))
-    half_rad = 0.5 * math.acos(max(-1.0, min(1.0, agreement)))
+    half_rad = 0.5 * math.acos(agreement)
     return middle, max(CLIPPED_ERROR_RAD, half_rad)
 
 
@@ -195,7 +183,7 @@ MOST_ANGLE_RAD = math.radians(60.0)
 LEAST_BASE_M = 0.4
 
 
-def remembered(known: Sequence[Patch], touches: Sequence[Touch], clearance_m: float) -> tuple[Patch, ...]:
+def remembered(known: Sequence[Patch], touches: Sequence[Patch], clearance_m: float) -> tuple[Patch, ...]:
     """The known patches and what the touches, in their order, add to them.
 
     ``clearance_m``: how far the vehicle's centre stays off a surface. Through a gap of less than twice that it cannot
@@ -209,35 +197,33 @@ def remembered(known: Sequence[Patch], touches: Sequence[Touch], clearance_m: fl
     return tuple(patches)
 
 
-def is_same(patch: Patch, touch: Touch, clearance_m: float) -> bool:
+def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
     """Whether the touch is one more of the patch's surface."""
-    lone = patch_of(touch)
-    if patch.is_steep != lone.is_steep:
+    place = touch.centre_ned_m
+    if patch.is_steep != touch.is_steep:
         return False
     errors_rad = math.hypot(patch.normal_error_rad, touch.normal_error_rad)
-    if _angle_rad(patch.normal_ned, touch.normal_ned) > min(MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)):
+    if math.acos(_agreement(patch.normal_ned, touch.normal_ned)) > min(
+        MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)
+    ):
         return False
     if patch.is_steep:
-        beside_m = min(math.dist(touch.place_ned_m[:2], place[:2]) for place in patch.touches_ned_m)
+        beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
         is_near = beside_m <= patch.believed_beyond_m() + 2.0 * clearance_m
     else:
-        along_m, height_m = patch.along_m(touch.place_ned_m), -touch.place_ned_m[2]
+        along_m, height_m = patch.along_m(place), -place[2]
         beside_m = _outside_m(along_m, patch.touched_along_m())
         is_near = (
             _outside_m(along_m, patch.believed_along_m()) <= 2.0 * clearance_m
             and _outside_m(height_m, patch.believed_heights_m()) <= 2.0 * clearance_m
         )
     bends_m = beside_m * math.tan(min(patch.normal_error_rad, MOST_ANGLE_RAD))
-    return is_near and abs(patch.off_m(touch.place_ned_m)) <= 2.0 * PLACE_ERROR_M + bends_m
+    return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + bends_m
 
 
-def patch_of(touch: Touch) -> Patch:
-    return Patch((touch.place_ned_m,), touch.normal_ned, touch.normal_error_rad, touch.reaches_m, touch.found_at_us)
-
-
-def _joined(patches: Sequence[Patch], touch: Touch) -> Patch:
+def _joined(patches: Sequence[Patch], touch: Patch) -> Patch:
     """One patch of all; the normal by the means of the normals, then by the places where those lie far apart."""
-    parts = [*patches, patch_of(touch)]
+    parts = [*patches, touch]
     weights = [part.hits / max(part.normal_error_rad, 1e-3) ** 2 for part in parts]
     total = sum(weights)
     n, e, d = (
@@ -274,10 +260,6 @@ def _turned_to_places(patch: Patch) -> Patch:
     if normal[0] * patch.normal_ned[0] + normal[1] * patch.normal_ned[1] < 0.0:
         normal = (-normal[0], -normal[1], 0.0)
     return replace(patch, normal_ned=normal, normal_error_rad=error_rad)
-
-
-def _angle_rad(a: Vector3, b: Vector3) -> float:
-    return math.acos(max(-1.0, min(1.0, sum(x * y for x, y in zip(a, b, strict=True)))))
 
 
 def _outside_m(value: float, bounds: tuple[float, float]) -> float:
