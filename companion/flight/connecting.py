@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.flight.context import FlightContext, Inputs, Move, Silent
 from companion.flight.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
@@ -13,7 +13,7 @@ from companion.messages import LandedState, MessageId, RequestMessage, VehicleCo
 MoveT = TypeVar("MoveT")
 
 
-class Meet(ABC, Generic[MoveT]):
+class Meet(Silent, ABC, Generic[MoveT]):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
 
     def __init__(self, now_us: int) -> None:
@@ -32,9 +32,6 @@ class Meet(ABC, Generic[MoveT]):
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         """What is asked of a vehicle that has just been met."""
         return [RequestMessage(MessageId.AUTOPILOT_VERSION), *[stream.request() for stream in flight.streams.streams]]
-
-    def target(self, now_us: int) -> Target | None:
-        return None
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> MoveT | None:
         identity, companion = flight.vehicle.identity, flight.mission.companion
@@ -86,14 +83,11 @@ class Connect(Meet[Move]):
         return Move(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
 
 
-class Ready:
+class Ready(Silent):
     """Show the plan; nothing happens until it is confirmed."""
 
     def __init__(self) -> None:
         self._shown = False
-
-    def target(self, now_us: int) -> Target | None:
-        return None
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if not self._shown:

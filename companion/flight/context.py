@@ -293,6 +293,13 @@ class Activity(Protocol):
         ...
 
 
+class Silent:
+    """Of a state in which no setpoint is sent."""
+
+    def target(self, now_us: int) -> None:
+        return None
+
+
 def as_text(vector: Vector3) -> str:
     """For people, two decimals and no negative zero."""
     return "[" + ", ".join(f"{round(value, 2) + 0.0:.2f}" for value in vector) + "]"

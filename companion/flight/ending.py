@@ -3,7 +3,7 @@
 import math
 from enum import Enum
 
-from companion.flight.context import FlightContext, Inputs, Move, Target
+from companion.flight.context import FlightContext, Inputs, Move, Silent, Target
 from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.link.vehicle import ModeReport
@@ -23,14 +23,21 @@ DISARM_NEWS_US = 1_500_000
 
 def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
     """The first reason to end, the pilot's before all others."""
-    return (
-        _control_lost(flight, state, now_us)
-        or _refused(inputs)
-        or _stopped(state, inputs)
-        or _link_silent(flight, state, now_us)
-        or _position_silent(flight, state)
-        or _abort_condition(flight, state, inputs, now_us)
-    )
+    lost = _control_lost(flight, state, now_us)
+    if lost is not None:
+        return lost
+    if inputs.refusal is not None:
+        return Move(Trigger.REFUSED, inputs.refusal)
+    if inputs.stop_reason is not None:
+        return Move(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
+    silent = _link_silent(flight, state, now_us)
+    if silent is not None or state not in ON_SETPOINTS:
+        return silent
+    reason = silent_position(flight)
+    # The mission's own conditions are looked at with each new position, so that a silent link is not one of them.
+    if reason is None and inputs.positions and flight.armed_at_us is not None:
+        reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+    return None if reason is None else Move(Trigger.INTERRUPTED, reason, hand_over=True)
 
 
 def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | None:
@@ -64,16 +71,6 @@ def _may_be_down(flight: FlightContext, now_us: int) -> bool:
     if flight.foreign_mode_since_us is None:
         flight.foreign_mode_since_us = now_us
     return now_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
-
-
-def _refused(inputs: Inputs) -> Move | None:
-    return Move(Trigger.REFUSED, inputs.refusal) if inputs.refusal is not None else None
-
-
-def _stopped(state: State, inputs: Inputs) -> Move | None:
-    if inputs.stop_reason is None:
-        return None
-    return Move(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
 
 
 def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | None:
@@ -112,30 +109,14 @@ def silent_position(flight: FlightContext) -> str | None:
     return f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive" if is_silent else None
 
 
-def _position_silent(flight: FlightContext, state: State) -> Move | None:
-    text = silent_position(flight) if state in ON_SETPOINTS else None
-    return None if text is None else Move(Trigger.INTERRUPTED, text, hand_over=True)
-
-
-def _abort_condition(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
-    """The mission's own conditions; looked at with each new position, so that a silent link is not one of them."""
-    if state not in ON_SETPOINTS or not inputs.positions or flight.armed_at_us is None:
-        return None
-    reason = _outside_fence(flight) or _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
-    return None if reason is None else Move(Trigger.INTERRUPTED, reason, hand_over=True)
-
-
-def _outside_fence(flight: FlightContext) -> str | None:
-    """Two positions in a row have to say so: one forged or broken packet ends no flight."""
-    most_m, newest = flight.mission.abort_when.outside_fence_by_m, flight.vehicle.history.newest(2)
-    if most_m is None or len(newest) < 2:
-        return None
-    outside_m = min(flight.mission.fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in newest)
-    return f"the vehicle is {outside_m:.2f} m outside the fence" if outside_m > most_m else None
-
-
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
-    when = flight.mission.abort_when
+    when, newest = flight.mission.abort_when, flight.vehicle.history.newest(2)
+    # Two positions in a row have to say so: one forged or broken packet ends no flight.
+    if when.outside_fence_by_m is not None and len(newest) == 2:
+        fence = flight.mission.fence
+        outside_m = min(fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in newest)
+        if outside_m > when.outside_fence_by_m:
+            return f"the vehicle is {outside_m:.2f} m outside the fence"
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
     if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
         return f"flight time above {when.flight_time_above_s:g} s"
@@ -183,15 +164,12 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 
-class LetGo:
+class LetGo(Silent):
     """Nothing more to do: the vehicle is not ours, or it was never taken."""
 
     finished = True
 
-    def target(self, now_us: int) -> Target | None:
-        return None
-
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> None:
         return None
 
 

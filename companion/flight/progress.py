@@ -11,7 +11,7 @@ from companion.flight.states import Trigger
 from companion.messages import Vector3
 from companion.mission import items
 from companion.ways.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
-from companion.ways.trajectory import Trajectory
+from companion.ways.trajectory import Motion, Trajectory
 
 # Of a time-out, and of a goal out of reach; "continue" is no move.
 _TRIGGERS = {
@@ -21,7 +21,38 @@ _TRIGGERS = {
 }
 
 
-class FlyItems:
+class _OnAWay:
+    """A way in mission coordinates, begun at a time on the clock of ways."""
+
+    _flight: FlightContext
+    _way: Trajectory
+    _way_began_us: int
+
+    @property
+    def _elapsed_s(self) -> float:
+        return (self._flight.way_us - self._way_began_us) * 1e-6
+
+    def _turned(self, motion: Motion, now_us: int) -> float | None:
+        """The heading at this motion."""
+        return self._flight.yaw_rad
+
+    def target(self, now_us: int) -> Target | None:
+        elapsed_s = self._elapsed_s
+        motion = self._way.at(elapsed_s)
+        yaw_rad, place = self._turned(motion, now_us), self._flight.local_ned_m(motion[0])
+        if elapsed_s >= self._way.duration_s:
+            return Target(place, yaw_rad)
+        # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
+        return self._flight.under_way(place, yaw_rad, *motion[1:])
+
+    def _arrived(self) -> bool:
+        flight = self._flight
+        latest, goal = flight.vehicle.history.latest(), flight.local_ned_m(self._way.target_m)
+        radius_m = flight.mission.companion.flight.acceptance_radius_m
+        return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
+
+
+class FlyItems(_OnAWay):
     """From `flight.step_index` on, until the step is land or return. Every step starts where the last setpoint was."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
@@ -82,21 +113,10 @@ class FlyItems:
         """A hit ends the present way: how much of a path has been flown?"""
         if isinstance(self._action, items.PathItem):
             tally = self._flight.tally
-            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._on_the_way_s))
+            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._elapsed_s))
 
-    @property
-    def _on_the_way_s(self) -> float:
-        return (self._flight.way_us - self._way_began_us) * 1e-6
-
-    def target(self, now_us: int) -> Target | None:
-        elapsed_s = self._on_the_way_s
-        position, velocity, acceleration = self._way.at(elapsed_s)
-        yaw_rad = self._heading.turn(position, velocity, now_us)
-        place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s:
-            return Target(place, yaw_rad)
-        # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
-        return self._flight.under_way(place, yaw_rad, velocity, acceleration)
+    def _turned(self, motion: Motion, now_us: int) -> float | None:
+        return self._heading.turn(motion[0], motion[1], now_us)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         while True:
@@ -121,7 +141,7 @@ class FlyItems:
         self._begin(flight, now_us)
 
     def _is_done(self, flight: FlightContext, now_us: int) -> bool:
-        elapsed_s = self._on_the_way_s
+        elapsed_s = self._elapsed_s
         match self._action:
             case items.SetSpeedItem() | items.ExpectItem():
                 return True
@@ -138,18 +158,12 @@ class FlyItems:
                 over = elapsed_s >= self._way.duration_s and self._has_turned(now_us)
                 if over and self._over_since_us is None:
                     self._over_since_us = now_us
-                return over and self._arrived(flight)
+                return over and self._arrived()
 
     def _has_turned(self, now_us: int) -> bool:
         if self._heading.is_fixed:
             self._heading.turn(self._way.target_m, (0.0, 0.0, 0.0), now_us)
         return self._heading.is_reached
-
-    def _arrived(self, flight: FlightContext) -> bool:
-        latest = flight.vehicle.history.latest()
-        goal = flight.local_ned_m(self._way.target_m)
-        radius_m = flight.mission.companion.flight.acceptance_radius_m
-        return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Move | None:
         item, began_us = flight.step.item, flight.tally.began_us
@@ -278,13 +292,13 @@ class Heading:
         return self.fixed_rad
 
 
-class FlyHome:
+class FlyHome(_OnAWay):
     """Up where that is asked for, then straight; begun anew after each recovery on the way."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
         self._flight = flight
-        self._began_us = flight.way_us
+        self._way_began_us = flight.way_us
         flight.going_home = True
         flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
@@ -300,28 +314,14 @@ class FlyHome:
         text = f"returning over {self._way.distance_m:.1f} m{round_it}"
         flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
 
-    @property
-    def _elapsed_s(self) -> float:
-        return (self._flight.way_us - self._began_us) * 1e-6
-
-    def target(self, now_us: int) -> Target | None:
-        elapsed_s = self._elapsed_s
-        position, velocity, acceleration = self._way.at(elapsed_s)
-        place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s:
-            return Target(place, self._flight.yaw_rad)
-        return self._flight.under_way(place, self._flight.yaw_rad, velocity, acceleration)
-
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if self._is_cut_off:
             return Move(Trigger.LAND_DUE)
         overdue_s = self._elapsed_s - self._way.duration_s
         if overdue_s < 0.0:
             return None
-        latest, limits = flight.vehicle.history.latest(), flight.mission.companion.flight
-        goal = flight.local_ned_m(self._way.target_m)
-        if latest is not None and math.dist(latest.position_ned_m, goal) <= limits.acceptance_radius_m:
+        if self._arrived():
             return Move(Trigger.HOME_REACHED)
-        if overdue_s > limits.arrival_timeout_s:
+        if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
             return Move(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
         return None

@@ -1,7 +1,6 @@
 """State takeoff: setpoints, OFFBOARD, arm, climb. State landing: PX4's own land mode, and out of it after a hit."""
 
 import math
-from enum import Enum
 
 from companion.estimate.rotation import yaw_rad
 from companion.flight.context import Activity, FlightContext, Inputs, Move, Target, as_text
@@ -24,19 +23,13 @@ BOOT_CLOCK_SLACK_US = 3_000_000
 MOST_AHEAD_M = 0.15
 
 
-class Step(Enum):
-    LEAD = "streaming setpoints"
-    MODE = "switching to OFFBOARD"
-    ARM = "arming"
-    CLIMB = "climbing"
-
-
 class TakeOff:
     """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
 
     def __init__(self, flight: FlightContext, item: TakeoffItem, now_us: int) -> None:
         self._flight, self._item = flight, item
-        self._step = Step.LEAD
+        # Streaming setpoints, switching to OFFBOARD, arming, climbing: one after the other.
+        self._now = self._lead
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
@@ -54,19 +47,11 @@ class TakeOff:
         return self._flight.under_way(position, self._yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        match self._step:
-            case Step.LEAD:
-                return self._lead(flight, now_us)
-            case Step.MODE:
-                return self._switch(flight, inputs, now_us)
-            case Step.ARM:
-                return self._arm(flight, inputs, now_us)
-            case Step.CLIMB:
-                return self._climb(flight, now_us)
+        return self._now(flight, inputs, now_us)
 
-    def _lead(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _lead(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
-            self._step = Step.MODE
+            self._now = self._switch
             flight.expected_mode = flight.vehicle.custom_mode
             flight.command_client.begin(SetMode(OFFBOARD))
             return self._switch(flight, Inputs(), now_us)
@@ -79,7 +64,7 @@ class TakeOff:
         if not outcome.succeeded:
             return Move(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
         flight.expected_mode = OFFBOARD
-        self._step = Step.ARM
+        self._now = self._arm
         flight.arming_requested = True
         flight.command_client.begin(SetArmed(True))
         return self._arm(flight, Inputs(), now_us)
@@ -90,7 +75,7 @@ class TakeOff:
             return None
         if not outcome.succeeded:
             return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
-        self._step = Step.CLIMB
+        self._now = self._climb
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.way_us
         self._ground_ned_m = mean_position(flight)
@@ -105,7 +90,7 @@ class TakeOff:
         flight.tell(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
 
-    def _climb(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         profile, latest = self._profile, flight.vehicle.history.latest()
         assert profile is not None
         limits = flight.mission.companion.flight

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from companion.estimate.rotation import yaw_rad
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
-from companion.flight.ending import HEARD_AGAIN, Holder, silent_link, silent_position, who_decided
+from companion.flight.ending import HEARD_AGAIN, Holder, LetGo, silent_link, silent_position, who_decided
 from companion.flight.machine import StateMachine
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
 from companion.guard.context import Activity, GuardContext, Move
 from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.guard.watching import Connect, End, StandBy, Watch
+from companion.guard.watching import Connect, StandBy, Watch
 from companion.messages import Sticks
 from companion.px4_mode import OFFBOARD, mode_name
 
@@ -88,7 +88,7 @@ class GuardMachine(StateMachine):
         self._take(Move(Trigger.STOPPED, text), now_us)
 
     def _let_go(self, text: str) -> None:
-        self.state, self.activity, self.outcome = State.ENDED, End(), text
+        self.state, self.activity, self.outcome = State.ENDED, LetGo(), text
 
     def _trigger_of_hit(self) -> Trigger:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
@@ -180,34 +180,25 @@ class GuardMachine(StateMachine):
             case State.WATCHING:
                 return Watch(guard, now_us)
             case State.TAKING_OVER:
-                return self._take_over(now_us)
+                mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
+                guard.tell(now_us, "take_over", f"taking over from {mode}", mode=mode)
+                guard.command_client.cancel()
+                return TakeOver(guard, Recover(guard, now_us), now_us)
             case State.RECOVERING:
-                recover = Recover(guard, now_us) if move.trigger is Trigger.HIT else self._recover()
-                return Recovering(recover, now_us)
+                if move.trigger is Trigger.HIT:
+                    return Recovering(Recover(guard, now_us), now_us)
+                assert isinstance(self.activity, TakeOver), "the table leads here from there alone"
+                return Recovering(self.activity.recover, now_us)
             case State.GIVING_BACK:
-                self._limit_hits()
+                limit = guard.config.max_hits
+                if guard.hits >= limit and not guard.then_hold:
+                    guard.then_hold = f"hit {guard.hits} of at most {limit}"
                 return GiveBack(guard, move.trigger in _BESIDE_PROGRAM, now_us)
             case State.STOOD_DOWN:
                 return StandDown(guard, move.text.startswith(STICKS), now_us)
             case State.ENDED:
                 self.outcome = move.text
-                return End()
-
-    def _take_over(self, now_us: int) -> Activity:
-        guard = self.flight
-        mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
-        guard.tell(now_us, "take_over", f"taking over from {mode}", mode=mode)
-        guard.command_client.cancel()
-        return TakeOver(guard, Recover(guard, now_us), now_us)
-
-    def _recover(self) -> Recover:
-        assert isinstance(self.activity, TakeOver), "the table leads here from there alone"
-        return self.activity.recover
-
-    def _limit_hits(self) -> None:
-        guard, limit = self.flight, self.flight.config.max_hits
-        if guard.hits >= limit and not guard.then_hold:
-            guard.then_hold = f"hit {guard.hits} of at most {limit}"
+                return LetGo()
 
 
 def has_moved(before: Sticks, now: Sticks) -> bool:

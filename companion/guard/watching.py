@@ -1,7 +1,7 @@
 """States connecting, standing by and watching: nothing is commanded, at most it is made ready to be."""
 
 from companion.flight.connecting import Meet
-from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.context import FlightContext, Inputs, Silent, Target
 from companion.flight.envelope import unattended_text
 from companion.guard.context import GuardContext, Move
 from companion.guard.states import Trigger
@@ -68,14 +68,11 @@ class Connect(Meet[Move]):
         return Move(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
 
 
-class StandBy:
+class StandBy(Silent):
     """Nothing to guard; why is told when it changes."""
 
     def __init__(self) -> None:
         self._told: str | None = None
-
-    def target(self, now_us: int) -> Target | None:
-        return None
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
         vehicle = guard.vehicle
@@ -115,13 +112,3 @@ class Watch:
             guard.program_elsewhere = True
         reason = why_not(guard)
         return None if reason is None else Move(Trigger.NOT_TO_GUARD, reason)
-
-
-class End:
-    """Nothing more to do."""
-
-    def target(self, now_us: int) -> Target | None:
-        return None
-
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
-        return None
