@@ -13,6 +13,18 @@ Vector3: TypeAlias = tuple[float, float, float]
 Quaternion: TypeAlias = tuple[float, float, float, float]
 
 
+class Sample:
+    """Something that was heard."""
+
+    __slots__ = ()
+
+
+class Outgoing:
+    """Something that is to be sent."""
+
+    __slots__ = ()
+
+
 class CommandResult(IntEnum):
     """MAV_RESULT."""
 
@@ -62,7 +74,7 @@ class MessageId(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class Refused(Sample):
     """A message of the vehicle's that was not believed: a value that is not finite, or that no vehicle can have."""
 
     message: str
@@ -70,7 +82,7 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
-class Heartbeat:
+class Heartbeat(Sample):
     system_id: int
     component_id: int
     vehicle_type: int  # MAV_TYPE
@@ -81,7 +93,7 @@ class Heartbeat:
 
 
 @dataclass(frozen=True, slots=True)
-class ImuSample:
+class ImuSample(Sample):
     """HIGHRES_IMU: mean over the vehicle's integration interval that ends at `time_boot_us`."""
 
     time_boot_us: int
@@ -90,14 +102,14 @@ class ImuSample:
 
 
 @dataclass(frozen=True, slots=True)
-class LocalPosition:
+class LocalPosition(Sample):
     time_boot_us: int
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
 
 
 @dataclass(frozen=True, slots=True)
-class Odometry:
+class Odometry(Sample):
     """ODOMETRY: what LOCAL_POSITION_NED says, and how often the estimator has let it jump (modulo 256)."""
 
     time_boot_us: int
@@ -107,7 +119,7 @@ class Odometry:
 
 
 @dataclass(frozen=True, slots=True)
-class Attitude:
+class Attitude(Sample):
     """ATTITUDE_QUATERNION; the rates are those of the moment, not a mean."""
 
     time_boot_us: int
@@ -116,7 +128,7 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True)
-class AttitudeTarget:
+class AttitudeTarget(Sample):
     """ATTITUDE_TARGET: what the vehicle's position control asks of its attitude control."""
 
     time_boot_us: int
@@ -125,14 +137,14 @@ class AttitudeTarget:
 
 
 @dataclass(frozen=True, slots=True)
-class PositionTarget:
+class PositionTarget(Sample):
     """POSITION_TARGET_LOCAL_NED: the place that the vehicle's position control flies to; None where there is none."""
 
     position_ned_m: Vector3 | None
 
 
 @dataclass(frozen=True, slots=True)
-class GlobalPosition:
+class GlobalPosition(Sample):
     """GLOBAL_POSITION_INT; altitude above mean sea level."""
 
     latitude_deg: float
@@ -141,14 +153,14 @@ class GlobalPosition:
 
 
 @dataclass(frozen=True, slots=True)
-class Sticks:
+class Sticks(Sample):
     """MANUAL_CONTROL as PX4 tells it: the pilot's pitch, roll, throttle and yaw sticks, -1 to 1, 0 in the middle."""
 
     deflections: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Vibration:
+class Vibration(Sample):
     """VIBRATION as PX4 fills it: the mean change from sample to sample, and clipped samples since boot.
 
     `clipping_counts` has one count for each accelerometer, its three axes together.
@@ -161,38 +173,38 @@ class Vibration:
 
 
 @dataclass(frozen=True, slots=True)
-class Battery:
+class Battery(Sample):
     """SYS_STATUS of a vehicle that knows its charge."""
 
     remaining_percent: int
 
 
 @dataclass(frozen=True, slots=True)
-class ExtendedState:
+class ExtendedState(Sample):
     landed_state: LandedState
 
 
 @dataclass(frozen=True, slots=True)
-class CurrentMode:
+class CurrentMode(Sample):
     custom_mode: int
     intended_custom_mode: int | None
 
 
 @dataclass(frozen=True, slots=True)
-class CommandAck:
+class CommandAck(Sample):
     command: int  # MAV_CMD
     result: CommandResult
 
 
 @dataclass(frozen=True, slots=True)
-class TimeSyncRequest:
+class TimeSyncRequest(Sample):
     """TIMESYNC with tc1 = 0: the vehicle asks for our time."""
 
     vehicle_time_ns: int
 
 
 @dataclass(frozen=True, slots=True)
-class TimeSyncAnswer:
+class TimeSyncAnswer(Sample):
     """TIMESYNC that answers ours: the time we sent, and the vehicle's when it answered."""
 
     companion_time_ns: int
@@ -200,7 +212,7 @@ class TimeSyncAnswer:
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(Sample):
     """PARAM_VALUE; whole numbers are int."""
 
     name: str
@@ -208,7 +220,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class EstimatorStatus:
+class EstimatorStatus(Sample):
     """ESTIMATOR_STATUS: innovations against their gates (1 is turned down), and what is estimated."""
 
     ratios: tuple[float, ...]  # of velocity and place, as far as a sensor measures them
@@ -217,32 +229,8 @@ class EstimatorStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class AutopilotVersion:
+class AutopilotVersion(Sample):
     flight_version: tuple[int, int, int]
-
-
-Sample: TypeAlias = (
-    Heartbeat
-    | ImuSample
-    | LocalPosition
-    | Odometry
-    | Attitude
-    | AttitudeTarget
-    | PositionTarget
-    | GlobalPosition
-    | Sticks
-    | Vibration
-    | Battery
-    | ExtendedState
-    | CurrentMode
-    | CommandAck
-    | TimeSyncRequest
-    | TimeSyncAnswer
-    | Parameter
-    | EstimatorStatus
-    | AutopilotVersion
-    | Refused
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +280,7 @@ VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMes
 
 
 @dataclass(frozen=True, slots=True)
-class SendCommand:
+class SendCommand(Outgoing):
     """A command with its transmission count, as COMMAND_LONG.confirmation wants it."""
 
     command: VehicleCommand
@@ -300,7 +288,7 @@ class SendCommand:
 
 
 @dataclass(frozen=True, slots=True)
-class PositionSetpoint:
+class PositionSetpoint(Outgoing):
     """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
 
     `leans_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
@@ -317,34 +305,34 @@ class PositionSetpoint:
 
 
 @dataclass(frozen=True, slots=True)
-class OnboardHeartbeat:
+class OnboardHeartbeat(Outgoing):
     """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""
 
     active: bool
 
 
 @dataclass(frozen=True, slots=True)
-class TimeSyncReply:
+class TimeSyncReply(Outgoing):
     vehicle_time_ns: int
     companion_time_ns: int
 
 
 @dataclass(frozen=True, slots=True)
-class TimeSyncAsk:
+class TimeSyncAsk(Outgoing):
     """TIMESYNC of our own; the vehicle echoes the time."""
 
     companion_time_ns: int
 
 
 @dataclass(frozen=True, slots=True)
-class ReadParameter:
+class ReadParameter(Outgoing):
     """PARAM_REQUEST_READ."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class SetParameter:
+class SetParameter(Outgoing):
     """PARAM_SET; an int is sent as INT32, a float as REAL32, as PX4 has them."""
 
     name: str
@@ -352,7 +340,7 @@ class SetParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class StatusText:
+class StatusText(Outgoing):
     """STATUSTEXT, in as many packets as its length needs."""
 
     severity: Severity
@@ -360,7 +348,7 @@ class StatusText:
 
 
 @dataclass(frozen=True, slots=True)
-class NamedValue:
+class NamedValue(Outgoing):
     """NAMED_VALUE_FLOAT: a number to plot; the name has at most ten characters."""
 
     time_us: int
@@ -369,7 +357,7 @@ class NamedValue:
 
 
 @dataclass(frozen=True, slots=True)
-class DebugVector:
+class DebugVector(Outgoing):
     """DEBUG_VECT: three numbers to plot; the name has at most ten characters."""
 
     time_us: int
@@ -378,7 +366,7 @@ class DebugVector:
 
 
 @dataclass(frozen=True, slots=True)
-class ComputerStatus:
+class ComputerStatus(Outgoing):
     """ONBOARD_COMPUTER_STATUS; `at_us` since the epoch, a MiB is 2^20 bytes, a temperature nobody measures None."""
 
     at_us: int
@@ -389,21 +377,6 @@ class ComputerStatus:
     memory_total_mib: int
     disk_used_mib: int
     disk_total_mib: int
-
-
-Outgoing: TypeAlias = (
-    SendCommand
-    | PositionSetpoint
-    | OnboardHeartbeat
-    | TimeSyncReply
-    | TimeSyncAsk
-    | ReadParameter
-    | SetParameter
-    | StatusText
-    | NamedValue
-    | DebugVector
-    | ComputerStatus
-)
 
 
 # All three axes of a sensor at the end of its range at once, and a tenth more for its calibration.
