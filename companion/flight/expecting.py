@@ -3,7 +3,6 @@
 import math
 
 from companion.flight.context import Expectation, FlightContext, as_text
-from companion.messages import LocalPosition
 from companion.mission import items
 from companion.report import CollisionReport
 
@@ -37,22 +36,30 @@ def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int
     """Take up an expectation; what can be said at once is said."""
     expectation = Expectation(label, describe(item), item, now_us, len(flight.collisions))
     flight.expectations.append(expectation)
+    latest = flight.vehicle.history.latest()
+    assert latest is not None, "the flight is in the air"
+    place = flight.mission_ned_m(latest.position_ned_m)
     match item.check:
         case items.ExpectHit() | items.ExpectNoHit():
             return
         case items.ExpectHits() as hits:
             resume = flight.mission.resume
-            met, detail = _count(hits, len(flight.collisions) + (0 if resume is None else resume.hits))
+            count = len(flight.collisions) + (0 if resume is None else resume.hits)
+            met = _is_within(count, hits.at_least, hits.at_most) and hits.exactly in (None, count)
+            detail = f"{count}"
         case items.ExpectRecovered() as recovered:
             met, detail = _recovered(recovered, [record.report() for record in flight.collisions])
         case items.ExpectFlightTime(at_most_s=at_most_s):
             assert flight.armed_at_us is not None
             flown_s = (now_us - flight.armed_at_us) * 1e-6
             met, detail = flown_s <= at_most_s, f"{flown_s:.1f} s"
-        case _ as check:
-            latest = flight.vehicle.history.latest()
-            assert latest is not None, "the flight is in the air"
-            met, detail = _motion(check, flight, latest)
+        case items.ExpectPosition(ned_m=goal, within_m=within_m):
+            met, detail = math.dist(place, goal) <= within_m, as_text(place)
+        case items.ExpectHeight() as height:
+            met, detail = _is_within(-place[2], height.min_m or 0.0, height.max_m), f"{-place[2]:.2f} m"
+        case items.ExpectSpeed(max_m_s=max_m_s):
+            speed_m_s = math.hypot(*latest.velocity_ned_m_s)
+            met, detail = speed_m_s <= max_m_s, f"{speed_m_s:.2f} m/s"
     _decide(flight, expectation, met, detail, now_us)
 
 
@@ -65,7 +72,8 @@ def review(flight: FlightContext, now_us: int) -> None:
         waited_s = (now_us - expectation.began_us) * 1e-6
         match expectation.item.check:
             case items.ExpectHit() as wanted:
-                found = next((hit for hit in hits if _fits(wanted, hit)), None)
+                bounds = wanted.min_speed_m_s, wanted.max_speed_m_s
+                found = next((hit for hit in hits if _is_within(hit.impact_speed_m_s, *bounds)), None)
                 if found is not None:
                     after_s = (found.detected_at_us - expectation.began_us) * 1e-6
                     detail = f"{found.impact_speed_m_s:.2f} m/s after {after_s:.2f} s"
@@ -104,22 +112,8 @@ def _decide(flight: FlightContext, expectation: Expectation, met: bool, detail: 
     flight.tell(now_us, "expect", f"{word}: {expectation.text} ({detail})", met=met)
 
 
-def _fits(wanted: items.ExpectHit, hit: CollisionReport) -> bool:
-    low, high = wanted.min_speed_m_s or 0.0, wanted.max_speed_m_s or math.inf
-    return low <= hit.impact_speed_m_s <= high
-
-
 def _heard_of(hits: list[CollisionReport]) -> str:
     return ", ".join(f"hit at {hit.impact_speed_m_s:.2f} m/s" for hit in hits) or "no hit"
-
-
-def _count(wanted: items.ExpectHits, count: int) -> tuple[bool, str]:
-    fits = (
-        (wanted.exactly is None or count == wanted.exactly)
-        and (wanted.at_least is None or count >= wanted.at_least)
-        and (wanted.at_most is None or count <= wanted.at_most)
-    )
-    return fits, f"{count}"
 
 
 def _recovered(wanted: items.ExpectRecovered, hits: list[CollisionReport]) -> tuple[bool, str]:
@@ -128,24 +122,12 @@ def _recovered(wanted: items.ExpectRecovered, hits: list[CollisionReport]) -> tu
     settled_s, overshoot_m = hits[-1].settled_after_s, hits[-1].overshoot_m
     if settled_s is None:
         return False, "not settled"
-    in_time = wanted.within_s is None or settled_s <= wanted.within_s
-    near = wanted.max_overshoot_m is None or overshoot_m <= wanted.max_overshoot_m
-    return in_time and near, f"settled after {settled_s:.2f} s, {overshoot_m:.2f} m too far"
+    is_good = _is_within(settled_s, None, wanted.within_s) and _is_within(overshoot_m, None, wanted.max_overshoot_m)
+    return is_good, f"settled after {settled_s:.2f} s, {overshoot_m:.2f} m too far"
 
 
-def _motion(
-    wanted: items.ExpectPosition | items.ExpectHeight | items.ExpectSpeed, flight: FlightContext, latest: LocalPosition
-) -> tuple[bool, str]:
-    place = flight.mission_ned_m(latest.position_ned_m)
-    match wanted:
-        case items.ExpectPosition(ned_m=goal, within_m=within_m):
-            return math.dist(place, goal) <= within_m, as_text(place)
-        case items.ExpectHeight(min_m=min_m, max_m=max_m):
-            height_m = -place[2]
-            return (min_m or 0.0) <= height_m <= (max_m or math.inf), f"{height_m:.2f} m"
-        case items.ExpectSpeed(max_m_s=max_m_s):
-            speed_m_s = math.hypot(*latest.velocity_ned_m_s)
-            return speed_m_s <= max_m_s, f"{speed_m_s:.2f} m/s"
+def _is_within(value: float, low: float | None, high: float | None) -> bool:
+    return (low is None or value >= low) and (high is None or value <= high)
 
 
 def _bounds(low: float | None, high: float | None, unit: str) -> str:

@@ -7,11 +7,10 @@ from pydantic import Field, field_validator
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
 from companion.mission.items import LandItem, MissionItem, TakeoffItem
-from companion.mission.model import Mission
+from companion.mission.model import KnownRecovery, Mission
 from companion.mission.policy import Limits
 from companion.px4_mode import MODE_NAMES
 from companion.recovery.interface import RecoveryConfig
-from companion.recovery.registry import RECOVERY_LAWS, check_known_law
 from companion.written import Positive, Written
 
 # Modes in which PX4 itself holds a position or a height. Not AUTO.LAND: its end is a hit on the ground. Not the modes
@@ -40,7 +39,7 @@ class GuardConfig(Written):
     # From where the vehicle was armed. Nobody knows a stranger's field: as good as none until it is given.
     fence: Fence = Fence(radius_m=100_000.0, max_height_m=10_000.0)
     limits: Limits = Limits()
-    recovery: RecoveryConfig = RecoveryConfig()
+    recovery: KnownRecovery = RecoveryConfig()
     companion: CompanionConfig = CompanionConfig()
 
     @field_validator("modes")
@@ -50,12 +49,6 @@ class GuardConfig(Written):
             if mode not in MODE_NAMES:
                 raise ValueError(f"{mode!r} is no mode of PX4: choose from {', '.join(sorted(MODE_NAMES))}")
         return modes
-
-    @field_validator("recovery")
-    @classmethod
-    def _known_law(cls, recovery: RecoveryConfig) -> RecoveryConfig:
-        check_known_law(recovery.law, RECOVERY_LAWS)
-        return recovery
 
     def as_mission(self) -> Mission:
         """What the parts that the guard shares with a flight read: a mission of which nothing is ever flown."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
@@ -26,6 +26,14 @@ from companion.ways.trajectory import Chain, LineProfile, Trajectory
 from companion.written import Written
 
 
+def _known_law(recovery: RecoveryConfig) -> RecoveryConfig:
+    check_known_law(recovery.law, RECOVERY_LAWS)
+    return recovery
+
+
+KnownRecovery = Annotated[RecoveryConfig, AfterValidator(_known_law)]
+
+
 class Mission(Written):
     """A whole mission file. `sim` belongs to the simulated vehicle and is ignored in a real flight."""
 
@@ -39,7 +47,7 @@ class Mission(Written):
     """Flown in order; take-off first, land or return last."""
     on_collision: OnCollision = OnCollision()
     """What follows a hit, where the item says nothing else."""
-    recovery: RecoveryConfig = RecoveryConfig()
+    recovery: KnownRecovery = RecoveryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
     on_interrupt: Handover = "hold"
@@ -47,12 +55,6 @@ class Mission(Written):
     companion: CompanionConfig = CompanionConfig()
     resume: Resume | None = None
     sim: dict[str, object] | None = None
-
-    @field_validator("recovery")
-    @classmethod
-    def _known_law(cls, recovery: RecoveryConfig) -> RecoveryConfig:
-        check_known_law(recovery.law, RECOVERY_LAWS)
-        return recovery
 
     @model_validator(mode="after")
     def _takeoff_first_land_last(self) -> Self:
