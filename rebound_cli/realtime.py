@@ -7,12 +7,10 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-from companion.companion import Companion, StepResult
+from companion.companion import Companion, Stepped, StepResult
 from companion.errors import ReboundError
-from companion.messages import ComputerStatus
-from companion.report import Status
 from companion.shell.clock import Clock
 from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
@@ -94,28 +92,6 @@ class AskPerson:
         return self._typed.split(b"\n")[0].decode(errors="replace").strip().lower()
 
 
-class Stepped(Protocol):
-    """The companion or the guard: bytes and time in, frames and events out."""
-
-    @property
-    def armed(self) -> bool | None: ...
-
-    @property
-    def finished(self) -> bool: ...
-
-    def next_deadline_us(self) -> int: ...
-
-    def step(self, received: bytes, now_us: int) -> StepResult: ...
-
-    def stop(self, reason: str) -> None: ...
-
-    def note(self, kind: str, text: str) -> None: ...
-
-    def status(self) -> Status: ...
-
-    def tell_computer(self, computer: ComputerStatus) -> None: ...
-
-
 def waiting(connection: Connection, timeout_s: float) -> bytes:
     """All that has arrived, once something has. A loop that wakes late judges no silence before it has heard it."""
     received = connection.receive(timeout_s)
@@ -138,7 +114,7 @@ def look_for_file(companion: Companion, recorder: FlightRecorder, now_us: int) -
 class Loop:
     """Exchanges with a vehicle until what is stepped has finished."""
 
-    stepped: Stepped
+    stepped: Stepped[Any]
     connection: Connection
     clock: Clock
     recorder: FlightRecorder
