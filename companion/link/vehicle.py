@@ -10,14 +10,7 @@ AUTOPILOT_COMPONENT_ID = 1
 MAV_AUTOPILOT_PX4 = 12
 
 # MAV_TYPE: hover, sideways force and land detection are the same for all of these.
-MULTICOPTERS = {
-    2: "quadrotor",
-    13: "hexarotor",
-    14: "octorotor",
-    15: "tricopter",
-    29: "dodecarotor",
-    35: "decarotor",
-}
+MULTICOPTERS = {2: "quadrotor", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 29: "dodecarotor", 35: "decarotor"}
 # The ones most often met by mistake, named so that the message helps.
 OTHER_TYPES = {
     1: "fixed-wing aircraft",
@@ -27,11 +20,7 @@ OTHER_TYPES = {
     10: "ground rover",
     11: "boat",
     12: "submarine",
-    19: "VTOL aircraft",
-    20: "VTOL aircraft",
-    21: "VTOL aircraft",
-    22: "VTOL aircraft",
-}
+} | dict.fromkeys(range(19, 23), "VTOL aircraft")
 OTHER_AUTOPILOTS = {0: "generic autopilot", 3: "ArduPilot", 8: "component without an autopilot"}
 
 
