@@ -68,13 +68,15 @@ class FlyItems(_OnAWay):
         self._started_us, self._way_began_us = now_us, flight.way_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
-        self._waiting = Waiting(self._action, flight) if isinstance(self._action, items.WaitForItem) else None
+        self._steady_since_us: int | None = None
         self._way: Trajectory = stay(start)
         self._out_of_reach = ""
         match self._action:
             case items.TakeoffItem():
                 # tried again after a hit in the climb
                 self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
+            case items.WaitForItem(file=file):
+                flight.file_awaited, flight.file_is_there = file, False
             case items.SetSpeedItem():
                 flight.pace = flight.pace.changed_to(self._action)
         factor = flight.tally.pace_factor
@@ -148,8 +150,7 @@ class FlyItems(_OnAWay):
             case items.HoldItem(duration_s=duration_s):
                 return now_us - self._started_us >= duration_s * 1e6
             case items.WaitForItem():
-                assert self._waiting is not None
-                return self._waiting.is_over(flight, now_us)
+                return self._has_come(self._action, flight, now_us)
             case items.VelocityItem():
                 return elapsed_s >= self._way.duration_s and self._has_turned(now_us)
             case items.SetYawItem():
@@ -159,6 +160,23 @@ class FlyItems(_OnAWay):
                 if over and self._over_since_us is None:
                     self._over_since_us = now_us
                 return over and self._arrived()
+
+    def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
+        """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
+        if item.flight_time_s is not None:
+            assert flight.armed_at_us is not None
+            return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
+        if item.steady is None:
+            flight.file_awaited = None if flight.file_is_there else flight.file_awaited
+            return flight.file_is_there
+        latest, target = flight.vehicle.history.latest(), flight.target
+        assert latest is not None and target is not None, "the flight is in the air"
+        is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
+        if not (is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s):
+            self._steady_since_us = None
+        elif self._steady_since_us is None:
+            self._steady_since_us = now_us
+        return self._steady_since_us is not None and now_us - self._steady_since_us >= item.steady.for_s * 1e6
 
     def _has_turned(self, now_us: int) -> bool:
         if self._heading.is_fixed:
@@ -196,40 +214,6 @@ class HoldAfterRecovery:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         return Move(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
-
-
-class Waiting:
-    """Holds the one condition of the item."""
-
-    def __init__(self, item: items.WaitForItem, flight: FlightContext) -> None:
-        self._item = item
-        self._steady_since_us: int | None = None
-        flight.file_awaited, flight.file_is_there = item.file, False
-
-    def is_over(self, flight: FlightContext, now_us: int) -> bool:
-        item = self._item
-        if item.flight_time_s is not None:
-            assert flight.armed_at_us is not None
-            return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
-        if item.steady is not None:
-            return self._is_steady(item.steady, flight, now_us)
-        # A hit ends the step by the mission's policy, as it does every other.
-        if flight.file_is_there:
-            flight.file_awaited = None
-        return flight.file_is_there
-
-    def _is_steady(self, steady: items.SteadyCondition, flight: FlightContext, now_us: int) -> bool:
-        latest, target = flight.vehicle.history.latest(), flight.target
-        assert latest is not None and target is not None, "the flight is in the air"
-        rests = (
-            math.dist(latest.position_ned_m, target.position_ned_m) <= steady.within_m
-            and math.hypot(*latest.velocity_ned_m_s) <= steady.speed_m_s
-        )
-        if not rests:
-            self._steady_since_us = None
-        elif self._steady_since_us is None:
-            self._steady_since_us = now_us
-        return self._steady_since_us is not None and now_us - self._steady_since_us >= steady.for_s * 1e6
 
 
 # Below PX4's MC_YAWRATE_MAX (200 deg/s) and its MPC_YAWRAUTO_MAX (45 deg/s): the vehicle can follow.
