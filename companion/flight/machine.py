@@ -119,7 +119,7 @@ class Machine(StateMachine):
 
     def _let_go(self, text: str) -> None:
         self.activity = LetGo()
-        if self.state is not State.DONE:
+        if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
     def _take(self, move: Move | None, now_us: int) -> None:
