@@ -1,18 +1,20 @@
 """The companion as a step function: bytes and the time in, bytes and events out."""
 
-import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, ClassVar, Generic, TypeVar
 
-from companion.core import Core, advance, fault, next_deadline_us, start
+from companion.core import Core, FlightCore
 from companion.flight.plan import plan_text
 from companion.flight.remembering import all_known
 from companion.flight.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.mavlink.readers import READERS, Reader
 from companion.memory.patch import Patch
 from companion.messages import ComputerStatus
 from companion.mission.model import Mission
-from companion.px4_mode import mode_name
 from companion.report import Event, ExpectationReport, FlightReport, Status
 
 
@@ -28,45 +30,101 @@ class StepResult:
     events: tuple[Event, ...]
 
 
-class Companion:
-    """Joins the codec with the pure core; holds no clock and no socket. Times are microseconds, any epoch."""
+CoreT = TypeVar("CoreT", bound=Core[Any, Any])
 
-    def __init__(self, mission: Mission) -> None:
-        self._mission = mission
-        self._decoder = Decoder()
-        self._encoder = Encoder()
-        self._addressed = False
-        self._core: Core | None = None
+
+class Stepped(ABC, Generic[CoreT]):
+    """Joins the codec with a pure core; holds no clock and no socket. Times are microseconds, any epoch."""
+
+    _first_state: ClassVar = State.CONNECT.value
+
+    def __init__(self, readers: Mapping[int, Reader] = READERS) -> None:
+        self._decoder, self._encoder = Decoder(readers), Encoder()
+        self._is_addressed = False
+        self._core: CoreT | None = None
         self._stop_reason: str | None = None
-        self._confirmed = False
+
+    @abstractmethod
+    def _begun(self, now_us: int) -> CoreT:
+        """The core before its first step."""
 
     def step(self, received: bytes, now_us: int) -> StepResult:
         """Call with the bytes received since the last call, or b"" when only time has passed."""
-        core = self._core or self._begin(now_us)
+        if self._core is None:
+            self._core = self._begun(now_us)
+            self._core.stop_reason = self._stop_reason
+        core = self._core
         frames = self._decoder.feed(received) if received else []
         samples = [sample for _, sample in frames if sample is not None]
-        outputs = advance(core, samples, now_us)
-        self._address(core)
-        sent = self._encoder.all_packets(outputs.messages, lambda error: fault(core, error, now_us))
-        return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
-
-    def _begin(self, now_us: int) -> Core:
-        self._core = core = start(self._mission, now_us)
-        core.flight.plan_confirmed = self._confirmed
-        core.stop_reason = self._stop_reason
-        return core
-
-    def _address(self, core: Core) -> None:
-        """Once the vehicle is known, listen to it alone and speak to it by name."""
+        outputs = core.advance(samples, now_us)
         identity = core.flight.vehicle.identity
-        if identity is not None and not self._addressed:
-            self._addressed = True
+        if identity is not None and not self._is_addressed:
+            # From now on the vehicle alone is listened to and spoken to.
+            self._is_addressed = True
             self._decoder.listen_to(identity.system_id, identity.component_id)
             self._encoder.speak_to(identity.system_id, identity.component_id)
+        sent = self._encoder.all_packets(outputs.messages, lambda error: core.fault(error, now_us))
+        return StepResult(tuple([frame for frame, _ in frames]), sent, outputs.events)
 
     def next_deadline_us(self) -> int:
         """When `step(b"", now)` is due if nothing arrives before; in the past when it is due at once."""
-        return 0 if self._core is None else next_deadline_us(self._core)
+        return 0 if self._core is None else self._core.next_deadline_us()
+
+    def stop(self, reason: str) -> None:
+        """End: the vehicle is handed to hold or land first where it is held; done when `finished`."""
+        self._stop_reason = reason
+        if self._core is not None:
+            self._core.stop_reason = reason
+
+    @property
+    def stop_reason(self) -> str | None:
+        """What `stop` was last called with; None as long as nobody has."""
+        return self._stop_reason
+
+    @property
+    def core(self) -> CoreT | None:
+        """What is remembered between steps, for whoever studies a flight; None before the first."""
+        return self._core
+
+    def note(self, kind: str, text: str) -> None:
+        """An event of the program around this one, told with the next step's; nothing before the first."""
+        if self._core is not None:
+            self._core.flight.tell(self._core.now_us, kind, text)
+
+    def tell_computer(self, computer: ComputerStatus) -> None:
+        """How this computer is, for the ground station: sent with the next step; nothing before the first."""
+        if self._core is not None:
+            self._core.flight.outbox.append(computer)
+
+    @property
+    def armed(self) -> bool | None:
+        """As the vehicle says; None as long as it has not."""
+        return None if self._core is None else self._core.flight.vehicle.armed
+
+    @property
+    def finished(self) -> bool:
+        """Ended, and nothing left to send."""
+        return self._core is not None and self._core.machine.finished
+
+    def status(self) -> Status:
+        """For the live line."""
+        if self._core is None:
+            return Status(self._first_state, "", False, None, None, "off", None)
+        return self._core.status()
+
+
+class Companion(Stepped[FlightCore]):
+    """Of one flight of a mission."""
+
+    def __init__(self, mission: Mission) -> None:
+        super().__init__()
+        self._mission = mission
+        self._confirmed = False
+
+    def _begun(self, now_us: int) -> FlightCore:
+        core = FlightCore(self._mission, now_us)
+        core.flight.plan_confirmed = self._confirmed
+        return core
 
     def confirm_plan(self) -> None:
         """The person agrees to the plan; may be said beforehand."""
@@ -75,18 +133,8 @@ class Companion:
             self._core.flight.plan_confirmed = True
 
     @property
-    def core(self) -> Core | None:
-        """What is remembered between steps, for whoever studies a flight; None before the first."""
-        return self._core
-
-    @property
     def plan_is_confirmed(self) -> bool:
         return self._confirmed if self._core is None else self._core.flight.plan_confirmed
-
-    @property
-    def stop_reason(self) -> str | None:
-        """What `stop` was last called with; None as long as nobody has."""
-        return self._stop_reason
 
     def plan_is_ready(self) -> bool:
         """Connected, checked, waiting for nothing but the confirmation."""
@@ -106,48 +154,6 @@ class Companion:
         if self._core is not None:
             self._core.flight.file_is_there = True
 
-    def stop(self, reason: str) -> None:
-        """End the flight: hand the vehicle to hold or land, as the mission says; done when `finished`."""
-        self._stop_reason = reason
-        if self._core is not None:
-            self._core.stop_reason = reason
-
-    def note(self, kind: str, text: str) -> None:
-        """An event of the program around this one, told with the next step's; nothing before the first."""
-        if self._core is not None:
-            self._core.flight.tell(self._core.now_us, kind, text)
-
-    def tell_computer(self, computer: ComputerStatus) -> None:
-        """How this computer is, for the ground station: sent with the next step; nothing before the first."""
-        if self._core is not None:
-            self._core.flight.outbox.append(computer)
-
-    @property
-    def armed(self) -> bool | None:
-        """As the vehicle says; None as long as it has not."""
-        return None if self._core is None else self._core.flight.vehicle.armed
-
-    @property
-    def finished(self) -> bool:
-        """Done or aborted, and nothing left to send."""
-        return self._core is not None and self._core.machine.finished
-
-    def status(self) -> Status:
-        """For the live line."""
-        if self._core is None:
-            return Status(State.CONNECT.value, "", False, None, None, "off (connect)", None)
-        vehicle = self._core.flight.vehicle
-        latest = vehicle.history.latest()
-        return Status(
-            state=self._core.machine.state.value,
-            vehicle_mode="" if vehicle.custom_mode is None else mode_name(vehicle.custom_mode),
-            armed=vehicle.armed is True,
-            position_ned_m=None if latest is None else latest.position_ned_m,
-            speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
-            detector=self._core.watch.describe(),
-            round_trip_us=self._core.flight.round_trip.present_us,
-        )
-
     def obstacles(self) -> tuple[Patch, ...]:
         """What is known of the surroundings by now: from before, and from this flight's hits. Mission coordinates."""
         return self._mission.obstacles.patches() if self._core is None else all_known(self._core.flight)
@@ -162,7 +168,7 @@ class Companion:
             reason=flight.reason or f"still in state {core.machine.state.value}",
             autopilot=flight.vehicle.autopilot_text(),
             stream_rates_hz=flight.streams.rates_hz(),
-            collisions=tuple(record.report() for record in flight.collisions),
+            collisions=core.collisions(),
             origin_ned_m=flight.origin_ned_m,
             started_at_us=core.started_at_us,
             ended_at_us=core.now_us if flight.ended_at_us is None else flight.ended_at_us,

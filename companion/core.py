@@ -1,36 +1,33 @@
-"""The pure heart: (core, samples, now) -> messages to send and events. No bytes, no clock, no I/O.
+"""The pure heart of a flight and of a guard: (core, samples, now) -> messages to send and events. No bytes, no clock.
 
-A `Core` belongs to one flight and is changed only by `advance`: the same samples at the same times give the
-same outputs, which is what makes a flight replayable.
+A core is changed only by `advance`: the same samples at the same times give the same outputs, so that a flight can be
+replayed.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from companion.detection.interface import Situation
 from companion.detection.watch import Watch, start_watch
-from companion.estimate.impact import ImpactEstimate
 from companion.estimate.resets import Resets
 from companion.flight.connecting import Connect
-from companion.flight.context import FlightContext, Inputs
+from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.detecting import collisions, follow_contact
-from companion.flight.hearing import hear
-from companion.flight.leaving_ground import landed, note_height, too_low
-from companion.flight.limiting import Limiter
-from companion.flight.machine import Machine
+from companion.flight.envelope import Surroundings, bounded
+from companion.flight.hearing import hear, note_height, too_low
+from companion.flight.machine import Machine, StateMachine
 from companion.flight.operator import Texts, status_text, values
-from companion.flight.outputs import Outputs, collect
+from companion.flight.remembering import known_surfaces
 from companion.flight.states import FINAL_STATES, State
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import (
-    CommandAck,
-    LocalPosition,
-    OnboardHeartbeat,
-    Sample,
-)
+from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, Sample, Vector3
 from companion.mission.model import Mission
+from companion.px4_mode import mode_name
+from companion.report import CollisionReport, Event, Status
 
 # MAVLink's heartbeat microservice: once a second.
 HEARTBEAT_INTERVAL_US = 1_000_000
@@ -43,175 +40,273 @@ ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RE
 DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
 
 
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """What leaves a step."""
+
+    messages: tuple[Outgoing, ...]
+    events: tuple[Event, ...]
+
+
+NOTHING = Outputs((), ())
+
+
+FlightT = TypeVar("FlightT", bound=FlightContext)
+MachineT = TypeVar("MachineT", bound=StateMachine)
+
+
+class Core(ABC, Generic[FlightT, MachineT]):
+    """All that is remembered between steps, and what a flight's step and a guard's have in common."""
+
+    def __init__(self, flight: FlightT, machine: MachineT, watch: Watch, now_us: int) -> None:
+        self.flight, self.machine, self.watch = flight, machine, watch
+        self.started_at_us = self.now_us = now_us
+        self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
+        self.stop_reason: str | None = None
+        self.limiter, self.resets, self._texts = Limiter(), Resets(), Texts()
+
+    @property
+    @abstractmethod
+    def _is_active(self) -> bool:
+        """As our own HEARTBEAT tells it."""
+
+    @property
+    @abstractmethod
+    def _off_state(self) -> str | None:
+        """Why nothing is detected in this state, whatever the height; None where something is."""
+
+    @property
+    def _goes_down(self) -> bool:
+        """Whether the vehicle is to meet the ground."""
+        return False
+
+    @property
+    def _has_floor(self) -> bool:
+        """Whether the fence's floor counts."""
+        return True
+
+    @property
+    def _setpoint_hz(self) -> float:
+        return self.flight.mission.companion.flight.setpoint_hz
+
+    def advance(self, samples: Sequence[Sample], now_us: int) -> Outputs:
+        """One step: what was heard, whether it shows a hit, what follows from it, what is due to be sent."""
+        self.now_us = now_us
+        moved = self._react(samples, now_us)
+        self._stream_setpoint(moved, now_us)
+        self._beat(now_us)
+        try:
+            self._inform(now_us)
+        except Exception as error:
+            self.fault(error, now_us)
+        flight = self.flight
+        if not flight.outbox and not flight.events:
+            return NOTHING
+        outputs = Outputs(tuple(flight.outbox), tuple(flight.events))
+        flight.outbox, flight.events = [], []
+        return outputs
+
+    def fault(self, error: Exception, now_us: int) -> None:
+        """A fault in what leaves a step. The first gives the vehicle away; later ones find that under way."""
+        if not self.flight.fault:
+            self.machine.fail(error, now_us)
+
+    def _react(self, samples: Sequence[Sample], now_us: int) -> bool:
+        """All that a fault in this program could be in: whatever is raised, the vehicle is given away, and it is told.
+
+        Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
+        """
+        flight, watch = self.flight, self.watch
+        try:
+            samples, refusal = self._hear(samples, now_us)
+            note_height(flight)
+            impacts = () if flight.fault else collisions(flight, watch, samples, self.situation(), now_us)
+            acks = [sample for sample in samples if isinstance(sample, CommandAck)]
+            positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
+            follow_contact(flight, self.watch)
+        except Exception as error:
+            return self.machine.fail(error, now_us)
+        return moved
+
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
+        """The samples in the frame of this flight, and why the vehicle is refused."""
+        return samples, hear(self.flight, samples, now_us)
+
+    def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
+        """Let the state machine act; whether it moved."""
+        return self.machine.step(inputs, now_us)
+
+    def situation(self) -> Situation:
+        """What is known, for the detector; of a stranger's setpoints nothing is."""
+        flight = self.flight
+        target = flight.target if self.machine.holds else None
+        return Situation(
+            # The ground shakes a vehicle as a hit does, until it has left it and where it goes down to it.
+            off_reason=self._off_state or too_low(flight, self._goes_down),
+            armed=flight.vehicle.armed,
+            landed_state=landed(flight, self._goes_down) if self.machine.holds else flight.vehicle.landed,
+            height_m=flight.height_m,
+            descent_commanded=self._goes_down,
+            setpoint_position_ned_m=None if target is None else target.position_ned_m,
+        )
+
+    def _stream_setpoint(self, moved: bool, now_us: int) -> None:
+        """The one place setpoints leave from: at their rate, and at once when the state has changed."""
+        if not moved and now_us < self._setpoint_due_us:
+            return
+        interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
+        due_us = self._setpoint_due_us + interval_us
+        self._setpoint_due_us = due_us if not moved and due_us > now_us else now_us + interval_us
+        flight, limiter = self.flight, self.limiter
+        if not flight.vehicle.is_mode_known:
+            return
+        try:
+            target = self.machine.activity.target(now_us)
+            if target is None:
+                return
+            # What leads the way of one that others fly is the vehicle's own place, wherever they fly it.
+            if holds:
+                target = limiter.passed(flight, target, self._has_floor, moved, now_us)
+        except Exception as error:
+            self.fault(error, now_us)
+            if not holds or limiter.last is None:
+                return
+            target = limiter.last.at_rest()
+        if holds:
+            flight.target = target
+            self._note_sent(target, now_us)
+        flight.outbox.append(self.resets.sent(target.setpoint(now_us - self.started_at_us)))
+
+    def _note_sent(self, target: Target, now_us: int) -> None:
+        """A setpoint of a vehicle that is held."""
+
+    def _beat(self, now_us: int) -> None:
+        """Our own HEARTBEAT, for as long as there is anything to do."""
+        if now_us >= self._heartbeat_due_us and not self.machine.finished:
+            self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
+            self.flight.outbox.append(OnboardHeartbeat(self._is_active))
+
+    def _inform(self, now_us: int) -> None:
+        """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
+        flight, texts = self.flight, self._texts
+        if flight.vehicle.identity is None or not (flight.events or texts.waiting or now_us >= self._values_due_us):
+            return
+        operator, hits = flight.mission.companion.operator, len(flight.collisions)
+        if operator.status_texts:
+            told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
+            going = [(kind, text) for kind, text in told if text is not None]
+            flight.outbox += texts.due(going, self.machine.finished, now_us)
+        if operator.values_hz and now_us >= self._values_due_us and not self.machine.finished:
+            self._values_due_us = now_us + round(1e6 / operator.values_hz)
+            latest = flight.collisions[-1] if flight.collisions else None
+            flight.outbox += values(self.machine.state, self.watch, latest, hits, now_us - self.started_at_us)
+
+    def next_deadline_us(self) -> int:
+        """When the next step is due if nothing arrives."""
+        due_us = min(self._heartbeat_due_us, self.now_us + POLL_INTERVAL_US)
+        return min(due_us, self._setpoint_due_us) if self._setpoint_due_us > self.now_us else due_us
+
+    def status(self) -> Status:
+        """For the live line."""
+        vehicle = self.flight.vehicle
+        latest = vehicle.history.latest()
+        return Status(
+            state=self.machine.state.value,
+            vehicle_mode="" if vehicle.custom_mode is None else mode_name(vehicle.custom_mode),
+            armed=vehicle.armed is True,
+            position_ned_m=None if latest is None else latest.position_ned_m,
+            speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
+            detector=self.watch.describe(),
+            round_trip_us=self.flight.round_trip.present_us,
+        )
+
+    def collisions(self) -> tuple[CollisionReport, ...]:
+        """So far."""
+        return tuple(record.report() for record in self.flight.collisions)
+
+
+class FlightCore(Core[FlightContext, Machine]):
+    """Of one flight of a mission."""
+
+    def __init__(self, mission: Mission, now_us: int) -> None:
+        watch = start_watch(mission.companion, now_us)
+        streams = StreamMonitor(mission.companion.streams, tuple(watch.detector.losses))
+        flight = FlightContext(mission, Vehicle(), streams)
+        super().__init__(flight, Machine(flight, Connect(now_us)), watch, now_us)
+
+    @property
+    def _is_active(self) -> bool:
+        return self.machine.state not in FINAL_STATES and self.flight.armed_at_us is not None
+
+    @property
+    def _off_state(self) -> str | None:
+        return None if self.machine.state in DETECTING_STATES else self.machine.state.value
+
+    @property
+    def _goes_down(self) -> bool:
+        return self.machine.state is State.LANDING
+
+    @property
+    def _has_floor(self) -> bool:
+        return self.machine.state in ON_THE_WAY
+
+    def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
+        """The samples in a frame that goes on where the vehicle's own jumps."""
+        before = self.resets.shift_ned_m
+        samples = self.resets.follow(samples, self.flight.mission.limits.max_step_m)
+        jump_m = math.dist(self.resets.shift_ned_m, before)
+        if jump_m > 0.0:
+            text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
+            self.flight.tell(now_us, "estimate", text, jump_m=round(jump_m, 3))
+        return super()._hear(samples, now_us)
+
+    def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
+        self.stop_reason = None
+        moved = super()._act(samples, inputs, now_us)
+        if self.machine.finished and self.flight.ended_at_us is None:
+            self.flight.ended_at_us = now_us
+        return moved
+
+    def next_deadline_us(self) -> int:
+        return super().next_deadline_us() if self.stop_reason is None else self.now_us
+
+
+# A setpoint at the edge of the envelope may cross it fifty times a second.
+LEAST_BETWEEN_LIMITS_US = 1_000_000
+
+
 @dataclass(slots=True)
-class Core:
-    """All that is remembered between steps."""
+class Limiter:
+    """What was last sent, and what was last said about it."""
 
-    flight: FlightContext
-    machine: Machine
-    watch: Watch
-    started_at_us: int
-    now_us: int
-    heartbeat_due_us: int
-    setpoint_due_us: int
-    setpoint_interval_us: int
-    stop_reason: str | None = None
-    values_due_us: int = 0
-    limiter: Limiter = field(default_factory=Limiter)
-    resets: Resets = field(default_factory=Resets)
-    texts: Texts = field(default_factory=Texts)
+    last: Target | None = None
+    last_ned_m: Vector3 | None = None
+    last_us: int = 0
+    limited_by: str = ""
+    told_us: int = 0
 
+    def passed(self, flight: FlightContext, wanted: Target, has_floor: bool, moved: bool, now_us: int) -> Target:
+        """The setpoint as the fence and the limits let it pass. `moved`: the flight has turned to something else.
 
-def start(mission: Mission, now_us: int) -> Core:
-    """A flight before its first step."""
-    config = mission.companion
-    watching = start_watch(config, now_us)
-    flight = FlightContext(mission, Vehicle(), StreamMonitor(config.streams, tuple(watching.detector.losses)))
-    return Core(
-        flight=flight,
-        machine=Machine(flight, Connect(now_us)),
-        watch=watching,
-        started_at_us=now_us,
-        now_us=now_us,
-        heartbeat_due_us=now_us,
-        setpoint_due_us=now_us,
-        setpoint_interval_us=round(1e6 / config.flight.setpoint_hz),
-    )
-
-
-def advance(core: Core, samples: Sequence[Sample], now_us: int) -> Outputs:
-    """One step: what was heard, whether it shows a hit, what follows for the flight, what is due to be sent."""
-    core.now_us = now_us
-    moved = react(core, samples, now_us)
-    stream_setpoint(core, moved, now_us)
-    beat(core, now_us)
-    try:
-        inform(core, now_us)
-    except Exception as error:
-        fault(core, error, now_us)
-    return collect(core.flight)
-
-
-def fault(core: Core, error: Exception, now_us: int) -> None:
-    """A fault in what leaves a step. The first gives the vehicle away; later ones find that under way."""
-    if not core.flight.fault:
-        core.machine.fail(error, now_us)
-
-
-def react(core: Core, samples: Sequence[Sample], now_us: int) -> bool:
-    """All that a fault in this program could be in: whatever is raised, the vehicle is handed over, and it is told.
-
-    Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
-    """
-    try:
-        samples = follow_resets(core, samples, now_us)
-        refusal = hear(core.flight, samples, now_us)
-        note_height(core.flight)
-        impacts = () if core.flight.fault else collisions(core.flight, core.watch, samples, situation(core), now_us)
-        moved = fly(core, samples, impacts, refusal, now_us)
-        follow_contact(core.flight, core.watch)
-    except Exception as error:
-        return core.machine.fail(error, now_us)
-    return moved
-
-
-def follow_resets(core: Core, samples: Sequence[Sample], now_us: int) -> Sequence[Sample]:
-    """The samples in a frame that goes on where the vehicle's own jumps."""
-    before = core.resets.shift_ned_m
-    samples = core.resets.follow(samples, core.flight.mission.limits.max_step_m)
-    jump_m = math.dist(core.resets.shift_ned_m, before)
-    if jump_m > 0.0:
-        text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
-        core.flight.tell(now_us, "estimate", text, jump_m=round(jump_m, 3))
-    return samples
-
-
-def situation(core: Core) -> Situation:
-    """What the flight knows, for the detector."""
-    flight = core.flight
-    target, goes_down = flight.target, core.machine.state is State.LANDING
-    return Situation(
-        off_reason=why_not_detecting(core),
-        armed=flight.vehicle.armed,
-        landed_state=landed(flight, goes_down),
-        height_m=flight.height_m,
-        descent_commanded=goes_down,
-        setpoint_position_ned_m=None if target is None else target.position_ned_m,
-    )
-
-
-def why_not_detecting(core: Core) -> str | None:
-    """The ground shakes a vehicle as a hit does, until it has left it and where it goes down to it."""
-    state = core.machine.state
-    return too_low(core.flight, state is State.LANDING) if state in DETECTING_STATES else state.value
-
-
-def fly(
-    core: Core, samples: Sequence[Sample], impacts: Sequence[ImpactEstimate], refusal: str | None, now_us: int
-) -> bool:
-    """Let the state machine act; whether it moved."""
-    acks = [sample for sample in samples if isinstance(sample, CommandAck)]
-    positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
-    inputs = Inputs(acks, positions, impacts, core.stop_reason, refusal)
-    core.stop_reason = None
-    moved = core.machine.step(inputs, now_us)
-    flight = core.flight
-    if core.machine.finished and flight.ended_at_us is None:
-        flight.ended_at_us = now_us
-    return moved
-
-
-def stream_setpoint(core: Core, moved: bool, now_us: int) -> None:
-    """The one place setpoints leave from: at their rate, and at once when the flight has moved on."""
-    if not moved and now_us < core.setpoint_due_us:
-        return
-    due_us = core.setpoint_due_us + core.setpoint_interval_us
-    core.setpoint_due_us = due_us if not moved and due_us > now_us else now_us + core.setpoint_interval_us
-    if not core.flight.vehicle.is_mode_known:
-        return
-    try:
-        wanted = core.machine.activity.target(now_us)
-        if wanted is None:
-            return
-        has_floor = core.machine.state in ON_THE_WAY
-        target = core.flight.target = core.limiter.passed(core.flight, wanted, has_floor, moved, now_us)
-    except Exception as error:
-        fault(core, error, now_us)
-        if core.limiter.last is None:
-            return
-        target = core.flight.target = core.limiter.last.at_rest()
-    core.flight.outbox.append(core.resets.sent(target.setpoint(now_us - core.started_at_us)))
-
-
-def beat(core: Core, now_us: int) -> None:
-    """Our own HEARTBEAT, for as long as there is anything to do."""
-    if now_us < core.heartbeat_due_us or core.machine.finished:
-        return
-    core.heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
-    active = core.machine.state not in FINAL_STATES and core.flight.armed_at_us is not None
-    core.flight.outbox.append(OnboardHeartbeat(active))
-
-
-def inform(core: Core, now_us: int) -> None:
-    """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
-    flight = core.flight
-    if flight.vehicle.identity is None or not (flight.events or core.texts.waiting or now_us >= core.values_due_us):
-        return
-    operator = flight.mission.companion.operator
-    hits = len(flight.collisions)
-    if operator.status_texts:
-        told = [(event.kind, status_text(event, flight.mission.name, hits)) for event in flight.events]
-        texts = [(kind, text) for kind, text in told if text is not None]
-        flight.outbox += core.texts.due(texts, core.machine.finished, now_us)
-    if operator.values_hz and now_us >= core.values_due_us and not core.machine.finished:
-        core.values_due_us = now_us + round(1e6 / operator.values_hz)
-        latest = flight.collisions[-1] if flight.collisions else None
-        flight.outbox += values(core.machine.state, core.watch, latest, hits, now_us - core.started_at_us)
-
-
-def next_deadline_us(core: Core) -> int:
-    """When the next step is due if nothing arrives."""
-    if core.stop_reason is not None:
-        return core.now_us
-    due_us = min(core.heartbeat_due_us, core.now_us + POLL_INTERVAL_US)
-    return min(due_us, core.setpoint_due_us) if core.setpoint_due_us > core.now_us else due_us
+        Raises SetpointError where it is not finite.
+        """
+        latest = flight.vehicle.history.latest()
+        around = Surroundings(
+            vehicle_ned_m=None if latest is None else latest.position_ned_m,
+            origin_ned_m=flight.origin_ned_m,
+            has_floor=has_floor,
+            last_ned_m=None if moved else self.last_ned_m,
+            since_last_s=(now_us - self.last_us) * 1e-6,
+            velocity_ned_m_s=None if latest is None else latest.velocity_ned_m_s,
+            known=known_surfaces(flight),
+        )
+        target, reason = bounded(wanted, around, flight.mission.fence, flight.mission.limits)
+        if reason != self.limited_by and now_us - self.told_us >= LEAST_BETWEEN_LIMITS_US:
+            self.limited_by, self.told_us = reason, now_us
+            text = f"setpoint held back: {reason}" if reason else "setpoint free again"
+            flight.tell(now_us, "envelope", text, reason=reason)
+        self.last = target
+        # A place that is not asked for is no step from it to the next.
+        self.last_ned_m, self.last_us = None if target.leans_only else target.position_ned_m, now_us
+        return target

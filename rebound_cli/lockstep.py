@@ -5,8 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from companion.companion import Companion
-from companion.mission.itinerary import longest_s
-from companion.mission.model import Mission
+from companion.mission.model import Mission, longest_s
 from rebound_cli.console import Console
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts

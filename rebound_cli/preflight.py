@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from companion.errors import ConfigurationError
-from companion.preflight.checks import Finding, Verdict
-from companion.preflight.preflight import Preflight
+from companion.preflight import Finding, Preflight, Verdict
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli.console import Console, console_for
@@ -53,7 +52,7 @@ def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> Non
 
 
 def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
-    identity, version = preflight.survey.identity, preflight.survey.version
+    identity, version = preflight.survey.vehicle.identity, preflight.survey.vehicle.version
     release = "" if version is None else " " + ".".join(map(str, version))
     kind = identity.vehicle_type if identity is not None else "vehicle"
     console.print(f"\nPX4{release}, {kind}")
@@ -73,7 +72,7 @@ def _fix(
     console: Console, preflight: Preflight, connection: Connection, clock: Clock, found: list[Finding], is_agreed: bool
 ) -> list[Finding]:
     """Set what can be set, one by one as the person agrees; the findings afterwards."""
-    if preflight.survey.armed:
+    if preflight.survey.vehicle.armed:
         raise ConfigurationError("The vehicle is armed: nothing is set on a vehicle that may be flying.")
     for finding in found:
         if finding.fix is None:

@@ -7,9 +7,9 @@ import traceback
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from companion.companion import Companion, StepResult
+from companion.companion import Companion, Stepped, StepResult
 from companion.errors import ReboundError
 from companion.messages import ComputerStatus
 from companion.shell.clock import Clock
@@ -23,12 +23,9 @@ from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.status import StatusServer
 from rebound_cli.timing import Heard, Timing, undisturbed
 
-if TYPE_CHECKING:
-    from companion.guard.guard import Guard
-
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
-# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (flight.command_client).
+# Handing over is three requests at most, disarm, hold and land, each given up after 2.5 s (link.commands).
 HANDING_OVER_US = 10_000_000
 # MAVLink's heartbeat goes as often, and a person watches no faster.
 COMPUTER_EVERY_US = 1_000_000
@@ -141,7 +138,7 @@ def watched(folder: Path, is_wanted: bool) -> contextlib.AbstractContextManager[
 class Loop:
     """Exchanges with a vehicle until what is stepped has finished."""
 
-    stepped: "Companion | Guard"  # bytes and time in, frames and events out
+    stepped: Stepped[Any]
     connection: Connection
     clock: Clock
     recorder: FlightRecorder

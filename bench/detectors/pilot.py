@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from companion.flight.trajectory import LineProfile
 from companion.messages import LandedState
+from companion.ways.trajectory import LineProfile
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.setpoint import FREE, RatesSetpoint, Setpoint, TrajectorySetpoint

@@ -3,7 +3,7 @@
 import math
 
 from bench.faults.packets import SETPOINT, decoded
-from companion.core import Core
+from companion.core import FlightCore
 from companion.mavlink.packet import message_id_of
 
 # Single precision, and the fence's own nearest place.
@@ -15,7 +15,7 @@ _XY, _Z, _VELOCITY, _ACCELERATION, _YAW = 0x003, 0x004, 0x038, 0x1C0, 0x400
 _VALUES = ("x", "y", "z", "vx", "vy", "vz", "afx", "afy", "afz")
 
 
-def outside(core: Core, frame: bytes) -> str | None:
+def outside(core: FlightCore, frame: bytes) -> str | None:
     """What is wrong with a setpoint; None for one inside, and for what is none."""
     message = decoded(frame) if message_id_of(frame) == SETPOINT else None
     if message is None:

@@ -12,8 +12,7 @@ from bench.random_missions.crashes import crashes
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.memory import given_up, repeated
 from bench.random_missions.obedience import disobediences
-from companion.mission.items import GoToItem, PathItem, TakeoffItem
-from companion.mission.program import program
+from companion.mission.items import GoToItem, PathItem, TakeoffItem, program
 from companion.report import Event
 
 Floats = npt.NDArray[np.float64]

@@ -8,8 +8,7 @@ import numpy.typing as npt
 from bench.random_missions.contacts import JudgedContact, Role, same_surface
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.phases import MissionPhase
-from companion.mission.items import GoToItem
-from companion.mission.program import program
+from companion.mission.items import GoToItem, program
 from companion.report import Event
 from sim_vehicle.truth import Hit
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from bench.random_missions.flight import JudgedFlight
+from companion.mission.items import Step, program
 from companion.mission.model import Mission
 from companion.mission.policy import OnCollision
-from companion.mission.program import Step, program
 from companion.report import Event, FlightReport
 
 # To these there may be another way; a detour of anything else is over with the hit.

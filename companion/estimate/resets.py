@@ -10,8 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from companion.estimate.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US
-from companion.messages import LocalPosition, Odometry, PositionSetpoint, PositionTarget, Refused, Sample, Vector3
-from companion.messages.bounds import VELOCITY_M_S
+from companion.messages import (
+    VELOCITY_M_S,
+    LocalPosition,
+    Odometry,
+    PositionSetpoint,
+    PositionTarget,
+    Refused,
+    Sample,
+    Vector3,
+)
 
 STILL: Vector3 = (0.0, 0.0, 0.0)
 

@@ -1,79 +1,93 @@
 """States connect and ready: who is there, are its streams fast enough, does the person agree."""
 
-from collections import deque
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Generic, TypeVar
 
-from companion.flight.context import FlightContext, Inputs, Move, Target
-from companion.flight.early_end import battery_complaint
+from companion.flight.context import FlightContext, Inputs, Move, Silent
+from companion.flight.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MessageId, RequestMessage, VehicleCommand
 
+MoveT = TypeVar("MoveT")
 
-class Connect:
-    """Wait for the vehicle, ask for the streams, measure them, check what can be checked on the ground."""
+
+class Meet(Silent, ABC, Generic[MoveT]):
+    """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
 
     def __init__(self, now_us: int) -> None:
         self._started_us = now_us
-        self._requests: deque[VehicleCommand] | None = None
+        self._requests: Iterator[VehicleCommand] | None = None
         self._measuring_since_us: int | None = None
 
-    def target(self, now_us: int) -> Target | None:
-        return None
+    @abstractmethod
+    def _refused(self, text: str) -> MoveT:
+        """The vehicle, or nobody, is there."""
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        if flight.vehicle.identity is None:
-            return self._wait_for_heartbeat(flight, now_us)
+    @abstractmethod
+    def _judge(self, flight: FlightContext, now_us: int) -> MoveT | None:
+        """Once the streams have been measured."""
+
+    def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
+        """What is asked of a vehicle that has just been met."""
+        return [RequestMessage(MessageId.AUTOPILOT_VERSION), *[stream.request() for stream in flight.streams.streams]]
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> MoveT | None:
+        identity, companion = flight.vehicle.identity, flight.mission.companion
+        if identity is None:
+            wait_s = companion.link.heartbeat_wait_s
+            if now_us - self._started_us < wait_s * 1e6:
+                return None
+            return self._refused(f"no HEARTBEAT from an autopilot within {wait_s:g} s; is the address right?")
         if self._requests is None:
-            self._requests, flight.was_silent = deque(request_streams(flight)), False
-            flight.tell(now_us, "connected", _connected_text(flight), system_id=flight.vehicle.identity.system_id)
+            self._requests, flight.was_silent = iter(self._commands(flight)), False
+            text = f"connected to a PX4 {identity.vehicle_type}, system {identity.system_id}"
+            flight.tell(now_us, "connected", text, system_id=identity.system_id)
         if self._measuring_since_us is None:
-            self._send_requests(flight, self._requests, inputs, now_us)
+            self._ask(flight, self._requests, inputs, now_us)
             return None
-        window_us = flight.mission.companion.streams.window_s * 1e6
-        if flight.is_silent(now_us) or now_us - self._measuring_since_us < window_us:
-            return None
-        return self._judge(flight, now_us)
+        is_measured = now_us - self._measuring_since_us >= companion.streams.window_s * 1e6
+        return self._judge(flight, now_us) if is_measured and not flight.is_silent(now_us) else None
 
-    def _wait_for_heartbeat(self, flight: FlightContext, now_us: int) -> Move | None:
-        wait_s = flight.mission.companion.link.heartbeat_wait_s
-        if now_us - self._started_us < wait_s * 1e6:
-            return None
-        return Move(Trigger.REFUSED, f"no HEARTBEAT from an autopilot within {wait_s:g} s; is the address right?")
-
-    def _send_requests(
-        self, flight: FlightContext, requests: deque[VehicleCommand], inputs: Inputs, now_us: int
-    ) -> None:
+    def _ask(self, flight: FlightContext, requests: Iterator[VehicleCommand], inputs: Inputs, now_us: int) -> None:
         """A refused request is no reason to stop: what counts is what then arrives."""
         if flight.command_client.busy:
             flight.command_outcome(inputs, False, now_us)
         if flight.command_client.busy:
             return
-        if requests:
-            flight.command_client.begin(requests.popleft())
+        request = next(requests, None)
+        if request is not None:
+            flight.command_client.begin(request)
             flight.command_outcome(Inputs(), False, now_us)
         else:
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
 
-    def _judge(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _tell_streams(self, flight: FlightContext, now_us: int) -> None:
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         window_s = flight.mission.companion.streams.window_s
         flight.tell(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
+
+
+class Connect(Meet[Move]):
+    """On the ground, with a vehicle that nobody flies."""
+
+    def _refused(self, text: str) -> Move:
+        return Move(Trigger.REFUSED, text)
+
+    def _judge(self, flight: FlightContext, now_us: int) -> Move:
+        self._tell_streams(flight, now_us)
         complaint = flight.streams.too_slow() or ground_check(flight)
-        if complaint is not None:
-            return Move(Trigger.REFUSED, complaint)
-        return Move(Trigger.VEHICLE_READY)
+        return Move(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
 
 
-class Ready:
+class Ready(Silent):
     """Show the plan; nothing happens until it is confirmed."""
 
     def __init__(self) -> None:
         self._shown = False
-
-    def target(self, now_us: int) -> Target | None:
-        return None
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if not self._shown:
@@ -83,12 +97,6 @@ class Ready:
             return None
         complaint = ground_check(flight)
         return Move(Trigger.REFUSED, complaint) if complaint is not None else Move(Trigger.PLAN_CONFIRMED)
-
-
-def request_streams(flight: FlightContext) -> list[VehicleCommand]:
-    """What is asked of a vehicle that has just been met."""
-    version: list[VehicleCommand] = [RequestMessage(MessageId.AUTOPILOT_VERSION)]
-    return version + [stream.request() for stream in flight.streams.streams]
 
 
 def ground_check(flight: FlightContext) -> str | None:
@@ -101,9 +109,3 @@ def ground_check(flight: FlightContext) -> str | None:
     if flight.mission.abort_when.battery_below_percent is not None and vehicle.battery_percent is None:
         return "the mission ends below a battery level, and the vehicle says none (SYS_STATUS.battery_remaining)"
     return battery_complaint(flight) or flight.round_trip.complaint()
-
-
-def _connected_text(flight: FlightContext) -> str:
-    identity = flight.vehicle.identity
-    assert identity is not None
-    return f"connected to a PX4 {identity.vehicle_type}, system {identity.system_id}"

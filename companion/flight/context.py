@@ -6,24 +6,21 @@ from typing import NamedTuple, Protocol
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
-from companion.flight.command_client import CommandClient, CommandOutcome
-from companion.flight.course import Pace
 from companion.flight.leaning import Leaning
 from companion.flight.pressing import Pressing
 from companion.flight.states import State, Trigger
+from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
-from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, Vector3
-from companion.mission.expectations import ExpectItem
-from companion.mission.items import ReturnItem
-from companion.mission.itinerary import steps_to_fly
-from companion.mission.model import Mission
-from companion.mission.program import Step
+from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, PositionTarget, Sticks, Vector3
+from companion.mission.items import ExpectItem, ReturnItem, Step
+from companion.mission.model import Mission, steps_to_fly
 from companion.reflex.planner import Moving
 from companion.report import Event, JsonValue, Outcome
+from companion.ways.course import Pace
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +76,9 @@ class Inputs(NamedTuple):
     impacts: Sequence[ImpactEstimate] = ()
     stop_reason: str | None = None
     refusal: str | None = None  # why the other end cannot be flown
+    echoes: Sequence[PositionTarget] = ()  # as the next two for a guard alone
+    sticks: Sequence[Sticks] = ()
+    is_enabled: bool = False  # by a person, after it stood down
 
 
 @dataclass(slots=True)
@@ -291,6 +291,13 @@ class Activity(Protocol):
     def target(self, now_us: int) -> Target | None:
         """The setpoint for now; None while none must be sent."""
         ...
+
+
+class Silent:
+    """Of a state in which no setpoint is sent."""
+
+    def target(self, now_us: int) -> None:
+        return None
 
 
 def as_text(vector: Vector3) -> str:

@@ -3,66 +3,63 @@
 import math
 
 from companion.flight.context import Expectation, FlightContext, as_text
-from companion.messages import LocalPosition
-from companion.mission.expectations import (
-    ExpectFlightTime,
-    ExpectHeight,
-    ExpectHit,
-    ExpectHits,
-    ExpectItem,
-    ExpectNoHit,
-    ExpectPosition,
-    ExpectRecovered,
-    ExpectSpeed,
-)
+from companion.mission import items
 from companion.report import CollisionReport
 
 
-def describe(item: ExpectItem) -> str:
+def describe(item: items.ExpectItem) -> str:
     """For people, as a wish."""
     match item.check:
-        case ExpectHit() as hit:
+        case items.ExpectHit() as hit:
             return f"a hit within {hit.within_s:g} s{_bounds(hit.min_speed_m_s, hit.max_speed_m_s, 'm/s')}"
-        case ExpectNoHit(for_s=for_s):
+        case items.ExpectNoHit(for_s=for_s):
             return "no hit from here on" if for_s is None else f"no hit for {for_s:g} s"
-        case ExpectHits() as hits:
+        case items.ExpectHits() as hits:
             if hits.exactly is not None:
                 return f"{hits.exactly} {'hit' if hits.exactly == 1 else 'hits'} so far"
             return f"hits so far{_bounds(hits.at_least, hits.at_most, '')}"
-        case ExpectRecovered() as recovered:
+        case items.ExpectRecovered() as recovered:
             within = "" if recovered.within_s is None else f" within {recovered.within_s:g} s"
             past = "" if recovered.max_overshoot_m is None else f", at most {recovered.max_overshoot_m:g} m too far"
             return f"the latest hit recovered from{within}{past}"
-        case ExpectPosition(ned_m=place, within_m=within_m):
+        case items.ExpectPosition(ned_m=place, within_m=within_m):
             return f"within {within_m:g} m of {as_text(place)}"
-        case ExpectHeight() as height:
+        case items.ExpectHeight() as height:
             return f"height{_bounds(height.min_m, height.max_m, 'm')}"
-        case ExpectSpeed(max_m_s=max_m_s):
+        case items.ExpectSpeed(max_m_s=max_m_s):
             return f"speed at most {max_m_s:g} m/s"
-        case ExpectFlightTime(at_most_s=at_most_s):
+        case items.ExpectFlightTime(at_most_s=at_most_s):
             return f"at most {at_most_s:g} s since arming"
 
 
-def begin(flight: FlightContext, label: str, item: ExpectItem, now_us: int) -> None:
+def begin(flight: FlightContext, label: str, item: items.ExpectItem, now_us: int) -> None:
     """Take up an expectation; what can be said at once is said."""
     expectation = Expectation(label, describe(item), item, now_us, len(flight.collisions))
     flight.expectations.append(expectation)
+    latest = flight.vehicle.history.latest()
+    assert latest is not None, "the flight is in the air"
+    place = flight.mission_ned_m(latest.position_ned_m)
     match item.check:
-        case ExpectHit() | ExpectNoHit():
+        case items.ExpectHit() | items.ExpectNoHit():
             return
-        case ExpectHits() as hits:
+        case items.ExpectHits() as hits:
             resume = flight.mission.resume
-            met, detail = _count(hits, len(flight.collisions) + (0 if resume is None else resume.hits))
-        case ExpectRecovered() as recovered:
+            count = len(flight.collisions) + (0 if resume is None else resume.hits)
+            met = _is_within(count, hits.at_least, hits.at_most) and hits.exactly in (None, count)
+            detail = f"{count}"
+        case items.ExpectRecovered() as recovered:
             met, detail = _recovered(recovered, [record.report() for record in flight.collisions])
-        case ExpectFlightTime(at_most_s=at_most_s):
+        case items.ExpectFlightTime(at_most_s=at_most_s):
             assert flight.armed_at_us is not None
             flown_s = (now_us - flight.armed_at_us) * 1e-6
             met, detail = flown_s <= at_most_s, f"{flown_s:.1f} s"
-        case _ as check:
-            latest = flight.vehicle.history.latest()
-            assert latest is not None, "the flight is in the air"
-            met, detail = _motion(check, flight, latest)
+        case items.ExpectPosition(ned_m=goal, within_m=within_m):
+            met, detail = math.dist(place, goal) <= within_m, as_text(place)
+        case items.ExpectHeight() as height:
+            met, detail = _is_within(-place[2], height.min_m or 0.0, height.max_m), f"{-place[2]:.2f} m"
+        case items.ExpectSpeed(max_m_s=max_m_s):
+            speed_m_s = math.hypot(*latest.velocity_ned_m_s)
+            met, detail = speed_m_s <= max_m_s, f"{speed_m_s:.2f} m/s"
     _decide(flight, expectation, met, detail, now_us)
 
 
@@ -74,15 +71,16 @@ def review(flight: FlightContext, now_us: int) -> None:
         hits = [record.report() for record in flight.collisions[expectation.hits_before :]]
         waited_s = (now_us - expectation.began_us) * 1e-6
         match expectation.item.check:
-            case ExpectHit() as wanted:
-                found = next((hit for hit in hits if _fits(wanted, hit)), None)
+            case items.ExpectHit() as wanted:
+                bounds = wanted.min_speed_m_s, wanted.max_speed_m_s
+                found = next((hit for hit in hits if _is_within(hit.impact_speed_m_s, *bounds)), None)
                 if found is not None:
                     after_s = (found.detected_at_us - expectation.began_us) * 1e-6
                     detail = f"{found.impact_speed_m_s:.2f} m/s after {after_s:.2f} s"
                     _decide(flight, expectation, after_s <= wanted.within_s, detail, now_us)
                 elif waited_s > wanted.within_s:
                     _decide(flight, expectation, False, _heard_of(hits), now_us)
-            case ExpectNoHit(for_s=for_s):
+            case items.ExpectNoHit(for_s=for_s):
                 if hits:
                     _decide(flight, expectation, False, _heard_of(hits), now_us)
                 elif for_s is not None and waited_s > for_s:
@@ -94,7 +92,7 @@ def close(flight: FlightContext, now_us: int) -> None:
     review(flight, now_us)
     for expectation in flight.expectations:
         if expectation.met is None:
-            met = isinstance(expectation.item.check, ExpectNoHit)
+            met = isinstance(expectation.item.check, items.ExpectNoHit)
             _decide(flight, expectation, met, "none until the end of the flight", now_us)
 
 
@@ -114,48 +112,22 @@ def _decide(flight: FlightContext, expectation: Expectation, met: bool, detail: 
     flight.tell(now_us, "expect", f"{word}: {expectation.text} ({detail})", met=met)
 
 
-def _fits(wanted: ExpectHit, hit: CollisionReport) -> bool:
-    low, high = wanted.min_speed_m_s or 0.0, wanted.max_speed_m_s or math.inf
-    return low <= hit.impact_speed_m_s <= high
-
-
 def _heard_of(hits: list[CollisionReport]) -> str:
     return ", ".join(f"hit at {hit.impact_speed_m_s:.2f} m/s" for hit in hits) or "no hit"
 
 
-def _count(wanted: ExpectHits, count: int) -> tuple[bool, str]:
-    fits = (
-        (wanted.exactly is None or count == wanted.exactly)
-        and (wanted.at_least is None or count >= wanted.at_least)
-        and (wanted.at_most is None or count <= wanted.at_most)
-    )
-    return fits, f"{count}"
-
-
-def _recovered(wanted: ExpectRecovered, hits: list[CollisionReport]) -> tuple[bool, str]:
+def _recovered(wanted: items.ExpectRecovered, hits: list[CollisionReport]) -> tuple[bool, str]:
     if not hits:
         return False, "no hit"
     settled_s, overshoot_m = hits[-1].settled_after_s, hits[-1].overshoot_m
     if settled_s is None:
         return False, "not settled"
-    in_time = wanted.within_s is None or settled_s <= wanted.within_s
-    near = wanted.max_overshoot_m is None or overshoot_m <= wanted.max_overshoot_m
-    return in_time and near, f"settled after {settled_s:.2f} s, {overshoot_m:.2f} m too far"
+    is_good = _is_within(settled_s, None, wanted.within_s) and _is_within(overshoot_m, None, wanted.max_overshoot_m)
+    return is_good, f"settled after {settled_s:.2f} s, {overshoot_m:.2f} m too far"
 
 
-def _motion(
-    wanted: ExpectPosition | ExpectHeight | ExpectSpeed, flight: FlightContext, latest: LocalPosition
-) -> tuple[bool, str]:
-    place = flight.mission_ned_m(latest.position_ned_m)
-    match wanted:
-        case ExpectPosition(ned_m=goal, within_m=within_m):
-            return math.dist(place, goal) <= within_m, as_text(place)
-        case ExpectHeight(min_m=min_m, max_m=max_m):
-            height_m = -place[2]
-            return (min_m or 0.0) <= height_m <= (max_m or math.inf), f"{height_m:.2f} m"
-        case ExpectSpeed(max_m_s=max_m_s):
-            speed_m_s = math.hypot(*latest.velocity_ned_m_s)
-            return speed_m_s <= max_m_s, f"{speed_m_s:.2f} m/s"
+def _is_within(value: float, low: float | None, high: float | None) -> bool:
+    return (low is None or value >= low) and (high is None or value <= high)
 
 
 def _bounds(low: float | None, high: float | None, unit: str) -> str:

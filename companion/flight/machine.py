@@ -1,29 +1,85 @@
 """Runs the state table: looks for triggers, moves between states, makes each state's activity."""
 
 import traceback
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from enum import Enum
+from typing import Any, ClassVar
 
 from companion.flight import expecting
 from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
-from companion.flight.early_end import ON_THE_GROUND, early_end
-from companion.flight.handover import HandOver, LetGo
-from companion.flight.landing import Land, TakeBack
-from companion.flight.progress import FlyItems, HoldAfterRecovery
+from companion.flight.ending import ON_THE_GROUND, HandOver, LetGo, early_end
+from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.remembering import remember
-from companion.flight.returning import FlyHome
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
-from companion.flight.takeoff import TakeOff
+from companion.flight.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.mission.items import TakeoffItem
 from companion.px4_mode import OFFBOARD
 
 
-@dataclass(slots=True)
-class Machine:
-    """The present state and what is being done in it. The same inputs always give the same moves."""
+class StateMachine(ABC):
+    """What a flight's and a guard's have in common. The same inputs always give the same moves."""
 
+    program: ClassVar[str]
+    flight: FlightContext
+    state: Enum
+    activity: Any
+
+    @property
+    @abstractmethod
+    def finished(self) -> bool:
+        """Nothing is left to send."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vehicle flies, or is about to fly, by this program's setpoints; of a flight all are its own."""
+        return True
+
+    @abstractmethod
+    def step(self, inputs: Inputs, now_us: int) -> bool:
+        """Take all moves that are due; whether there were any."""
+
+    @abstractmethod
+    def _give_away(self, text: str, now_us: int) -> None:
+        """Begin to give the vehicle away."""
+
+    @property
+    @abstractmethod
+    def _gives_away(self) -> bool:
+        """Whether that has begun."""
+
+    @abstractmethod
+    def _let_go(self, text: str) -> None:
+        """Even giving away fails: silence lets the vehicle's own failsafe act."""
+
+    def fail(self, error: Exception, now_us: int) -> bool:
+        """This program is at fault: give the vehicle away while that can still be done, and say what happened.
+
+        Whether that is a move.
+        """
+        flight, before = self.flight, self.activity
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = f"fault of the {self.program}, please report it: {type(error).__name__} in {place.name}: {error}"
+        flight.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
+        if flight.fault or self._gives_away:
+            self._let_go(text)
+        flight.fault = text
+        try:
+            self._give_away(text, now_us)
+        except Exception as second:
+            flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
+            self._let_go(text)
+        return self.activity is not before
+
+
+@dataclass
+class Machine(StateMachine):
+    """The present state and what is being done in it."""
+
+    program = "companion"
     flight: FlightContext
     activity: Activity
     state: State = State.CONNECT
@@ -34,7 +90,6 @@ class Machine:
         return self.state in FINAL_STATES and not handing_over
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
-        """Take all moves that are due; whether there were any."""
         before = self.activity
         if self.state not in FINAL_STATES:
             self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
@@ -55,24 +110,17 @@ class Machine:
             expecting.review(self.flight, now_us)
         return self.activity is not before
 
-    def fail(self, error: Exception, now_us: int) -> bool:
-        """This program is at fault: hand the vehicle over while that can still be done, and say what happened."""
-        flight, before = self.flight, self.activity
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        text = f"fault of the companion, please report it: {type(error).__name__} in {place.name}: {error}"
-        flight.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
-        if flight.fault or self.state in FINAL_STATES:
-            # even handing over fails: silence lets the vehicle's own failsafe act
-            self.activity = LetGo()
-        flight.fault = text
-        try:
-            self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
-        except Exception as second:
-            # what ends a flight fails, too
-            flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
-            self.state, self.activity = State.ABORTED, LetGo()
-            flight.outcome, flight.reason = "failed", text
-        return self.activity is not before
+    @property
+    def _gives_away(self) -> bool:
+        return self.state in FINAL_STATES
+
+    def _give_away(self, text: str, now_us: int) -> None:
+        self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
+
+    def _let_go(self, text: str) -> None:
+        self.activity = LetGo()
+        if self.state not in FINAL_STATES or self.flight.outcome is None:
+            self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
     def _take(self, move: Move | None, now_us: int) -> None:
         if move is None or not TABLE.moves(self.state, move.trigger):

@@ -5,7 +5,7 @@ on links with MAV_x_FORWARD, or over the ground station's own link to the compan
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -50,72 +50,43 @@ class Texts:
         return kind not in self.sent or now_us - self.sent[kind][0] >= TEXT_INTERVAL_US
 
 
+# Kinds of events that are told in their own words.
+_AS_THEY_STAND = frozenset(
+    (
+        *("in_the_way", "policy", "unreachable", "timeout", "envelope", "link", "implausible", "unconfirmed"),
+        *("take_over", "given_back", "let_go", "refused", "crossed", "left_alone", "lost", "late", "round_trip"),
+    )
+)
+
+
 def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
     """The event in 50 characters or a little more, or None when it is not for the operator."""
-    words = _WORDS.get(event.kind)
-    return None if words is None else words(event, mission, hits)
-
-
-def _hit(event: Event, mission: str, hits: int) -> StatusText:
     data = event.data
-    speed_m_s, force_m_s2 = _number(data, "impact_speed_m_s"), _number(data, "specific_force_m_s2")
-    moving = speed_m_s >= _LEAST_SPEED_M_S
-    towards = _direction(data["impact_velocity_ned_m_s"]) if moving else _direction(data["normal_ned"])
-    how = f"at {speed_m_s:.2f} m/s going {towards}" if moving else f"pushed {towards}"
-    return StatusText(Severity.WARNING, f"Hit {hits}: {how}, {force_m_s2:.0f} m/s2")
-
-
-def _recovered(event: Event, mission: str, hits: int) -> StatusText:
-    if event.data.get("settled_after_s") is None:
-        return StatusText(Severity.WARNING, "Not recovered in time, going on")
-    settled_s, overshoot_m = _number(event.data, "settled_after_s"), _number(event.data, "overshoot_m")
-    return StatusText(Severity.NOTICE, f"Recovered in {settled_s:.2f} s, {100.0 * overshoot_m:.1f} cm too far")
-
-
-def _ended(event: Event, mission: str, hits: int) -> StatusText:
-    outcome = str(event.data["outcome"])
-    severity = Severity.INFO if outcome == "completed" else Severity.ERROR
-    why = "" if outcome == "completed" else f": {event.data.get('reason', '')}"
-    return StatusText(severity, f"Mission {mission} {outcome}, hits: {hits}{why}")
-
-
-def _began(event: Event, mission: str, hits: int) -> StatusText:
-    return StatusText(Severity.INFO, f"Mission {mission} begins")
-
-
-def _as_it_stands(event: Event, mission: str, hits: int) -> StatusText:
-    return StatusText(Severity.WARNING, event.text[:1].upper() + event.text[1:])
-
-
-def _fault(event: Event, mission: str, hits: int) -> StatusText:
-    return StatusText(Severity.ERROR, "Fault in the companion, vehicle handed over")
-
-
-_WORDS: Mapping[str, Callable[[Event, str, int], StatusText]] = {
-    "armed": _began,
-    "detection": _hit,
-    "in_the_way": _as_it_stands,
-    "recovered": _recovered,
-    "policy": _as_it_stands,
-    "unreachable": _as_it_stands,
-    "timeout": _as_it_stands,
-    "envelope": _as_it_stands,
-    "link": _as_it_stands,
-    "implausible": _as_it_stands,
-    "unconfirmed": _as_it_stands,
-    "take_over": _as_it_stands,
-    "given_back": _as_it_stands,
-    "let_go": _as_it_stands,
-    "refused": _as_it_stands,
-    "crossed": _as_it_stands,
-    "left_alone": _as_it_stands,
-    "lost": _as_it_stands,
-    "late": _as_it_stands,
-    "round_trip": _as_it_stands,
-    "fault": _fault,
-    "done": _ended,
-    "aborted": _ended,
-}
+    match event.kind:
+        case "armed":
+            return StatusText(Severity.INFO, f"Mission {mission} begins")
+        case "detection":
+            speed_m_s, force_m_s2 = _number(data, "impact_speed_m_s"), _number(data, "specific_force_m_s2")
+            moving = speed_m_s >= _LEAST_SPEED_M_S
+            towards = _direction(data["impact_velocity_ned_m_s" if moving else "normal_ned"])
+            how = f"at {speed_m_s:.2f} m/s going {towards}" if moving else f"pushed {towards}"
+            return StatusText(Severity.WARNING, f"Hit {hits}: {how}, {force_m_s2:.0f} m/s2")
+        case "recovered" if data.get("settled_after_s") is None:
+            return StatusText(Severity.WARNING, "Not recovered in time, going on")
+        case "recovered":
+            past_cm = 100.0 * _number(data, "overshoot_m")
+            settled_s = _number(data, "settled_after_s")
+            return StatusText(Severity.NOTICE, f"Recovered in {settled_s:.2f} s, {past_cm:.1f} cm too far")
+        case "fault":
+            return StatusText(Severity.ERROR, "Fault in the companion, vehicle handed over")
+        case "done" | "aborted":
+            is_good = data["outcome"] == "completed"
+            why = "" if is_good else f": {data.get('reason', '')}"
+            severity = Severity.INFO if is_good else Severity.ERROR
+            return StatusText(severity, f"Mission {mission} {data['outcome']}, hits: {hits}{why}")
+        case kind if kind in _AS_THEY_STAND:
+            return StatusText(Severity.WARNING, event.text[:1].upper() + event.text[1:])
+    return None
 
 
 def values(

@@ -3,63 +3,48 @@
 import math
 
 from companion.flight.context import FlightContext, as_text
+from companion.flight.envelope import unattended_text
 from companion.flight.expecting import describe
-from companion.flight.held import unattended_text
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.stored import describe as describe_patch
-from companion.mission.expectations import ExpectItem
+from companion.mission import items
 from companion.mission.fence import Fence
-from companion.mission.items import (
-    Action,
-    GoToItem,
-    HoldItem,
-    LandItem,
-    OrbitItem,
-    PathItem,
-    ReturnItem,
-    SetSpeedItem,
-    SetYawItem,
-    TakeoffItem,
-    VelocityItem,
-    WaitForItem,
-)
 from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision
-from companion.mission.program import MissionItem, program
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05
 
 
-def describe_item(action: Action) -> str:
+def describe_item(action: items.Action) -> str:
     match action:
-        case TakeoffItem():
+        case items.TakeoffItem():
             return f"take off to {action.height_m:g} m"
-        case GoToItem():
+        case items.GoToItem():
             return f"go to {as_text(action.position_ned_m)}{_speed(action.speed_m_s)}{_yaw(action.yaw_deg)}"
-        case VelocityItem():
+        case items.VelocityItem():
             return f"fly with {as_text(action.velocity_ned_m_s)} m/s for {action.duration_s:g} s{_yaw(action.yaw_deg)}"
-        case PathItem():
+        case items.PathItem():
             last = f"{len(action.points_ned_m)} points to {as_text(action.points_ned_m[-1])}"
             return f"fly a smooth path through {last}{_speed(action.speed_m_s)}{_yaw(action.yaw_deg)}"
-        case OrbitItem():
+        case items.OrbitItem():
             sense = "clockwise" if action.clockwise else "anticlockwise"
             circle = f"{as_text(action.centre_ned_m)} at {action.radius_m:g} m, {action.turns:g} times {sense}"
             return f"orbit {circle}{_speed(action.speed_m_s)}{_yaw(action.yaw_deg)}"
-        case HoldItem():
+        case items.HoldItem():
             return f"hold for {action.duration_s:g} s"
-        case WaitForItem():
+        case items.WaitForItem():
             return f"wait {_condition(action)}"
-        case SetSpeedItem():
+        case items.SetSpeedItem():
             return f"from here on fly at {action.speed_m_s:g} m/s"
-        case SetYawItem():
+        case items.SetYawItem():
             return f"turn to {action.yaw_deg:g} deg"
-        case ExpectItem():
+        case items.ExpectItem():
             return f"expect {describe(action)}"
-        case ReturnItem():
+        case items.ReturnItem():
             height = "" if action.height_m is None else f" at {action.height_m:g} m or higher"
             return f"return to above the start{height}{_speed(action.speed_m_s)} and land"
-        case LandItem():
+        case items.LandItem():
             return "land"
 
 
@@ -73,7 +58,7 @@ def _yaw(yaw: float | str | None) -> str:
     return "" if yaw is None else f", heading {yaw:g} deg"
 
 
-def _condition(item: WaitForItem) -> str:
+def _condition(item: items.WaitForItem) -> str:
     if item.flight_time_s is not None:
         return f"until {item.flight_time_s:g} s after arming"
     if item.steady is not None:
@@ -102,7 +87,7 @@ def describe_limit(on_collision: OnCollision) -> str:
     return f"hit {on_collision.max_hits}: {after}"
 
 
-def describe_modifiers(item: MissionItem) -> str:
+def describe_modifiers(item: items.MissionItem) -> str:
     """What an item has of its own beside its action, or nothing."""
     parts = []
     if item.on_collision is not None:
@@ -158,11 +143,11 @@ def mission_lines(mission: Mission) -> list[str]:
 def _fastest_m_s(mission: Mission) -> float:
     """The highest speed that an item asks for."""
     speeds = []
-    for step in program(mission.items):
+    for step in items.program(mission.items):
         match step.action:
-            case VelocityItem(velocity_ned_m_s=velocity):
+            case items.VelocityItem(velocity_ned_m_s=velocity):
                 speeds.append(math.hypot(*velocity))
-            case GoToItem() | PathItem() | OrbitItem() | ReturnItem() | SetSpeedItem():
+            case items.GoToItem() | items.PathItem() | items.OrbitItem() | items.ReturnItem() | items.SetSpeedItem():
                 speeds.append(step.action.speed_m_s or mission.companion.flight.cruise_speed_m_s)
     return max(speeds, default=mission.companion.flight.takeoff_speed_m_s)
 
@@ -173,7 +158,7 @@ def _obstacle_lines(obstacles: ObstaclesConfig) -> list[str]:
     return lines + [f"Known      {describe_patch(patch)}" for patch in obstacles.patches()]
 
 
-def _item_lines(number: str, item: MissionItem, lead: str = "") -> list[str]:
+def _item_lines(number: str, item: items.MissionItem, lead: str = "") -> list[str]:
     if item.repeat is not None:
         lines = [f"{lead:<10} {number} {item.repeat.times} times:"]
         for inner, below in enumerate(item.repeat.items, start=1):

@@ -1,34 +1,17 @@
-"""State mission: one step after the other; state holding: the pause after a recovery."""
+"""State mission: one step after the other; holding: a pause after a recovery; returning: home. All watch for hits."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from companion.flight import expecting
-from companion.flight.around import passed, way_around
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.course import LEAST_TRY_M_S, climb, first_leg, stay
-from companion.flight.heading import Heading
 from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
-from companion.flight.trajectory import Trajectory
-from companion.flight.waiting import Waiting
 from companion.messages import Vector3
-from companion.mission.expectations import ExpectItem
-from companion.mission.items import (
-    GoToItem,
-    HoldItem,
-    LandItem,
-    Motion,
-    OrbitItem,
-    PathItem,
-    ReturnItem,
-    SetSpeedItem,
-    SetYawItem,
-    TakeoffItem,
-    VelocityItem,
-    WaitForItem,
-)
+from companion.mission import items
+from companion.ways.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
+from companion.ways.trajectory import Motion, Trajectory
 
 # Of a time-out, and of a goal out of reach; "continue" is no move.
 _TRIGGERS = {
@@ -38,7 +21,38 @@ _TRIGGERS = {
 }
 
 
-class FlyItems:
+class _OnAWay:
+    """A way in mission coordinates, begun at a time on the clock of ways."""
+
+    _flight: FlightContext
+    _way: Trajectory
+    _way_began_us: int
+
+    @property
+    def _elapsed_s(self) -> float:
+        return (self._flight.way_us - self._way_began_us) * 1e-6
+
+    def _turned(self, motion: Motion, now_us: int) -> float | None:
+        """The heading at this motion."""
+        return self._flight.yaw_rad
+
+    def target(self, now_us: int) -> Target | None:
+        elapsed_s = self._elapsed_s
+        motion = self._way.at(elapsed_s)
+        yaw_rad, place = self._turned(motion, now_us), self._flight.local_ned_m(motion[0])
+        if elapsed_s >= self._way.duration_s:
+            return Target(place, yaw_rad)
+        # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
+        return self._flight.under_way(place, yaw_rad, *motion[1:])
+
+    def _arrived(self) -> bool:
+        flight = self._flight
+        latest, goal = flight.vehicle.history.latest(), flight.local_ned_m(self._way.target_m)
+        radius_m = flight.mission.companion.flight.acceptance_radius_m
+        return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
+
+
+class FlyItems(_OnAWay):
     """From `flight.step_index` on, until the step is land or return. Every step starts where the last setpoint was."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
@@ -54,30 +68,32 @@ class FlyItems:
         self._started_us, self._way_began_us = now_us, flight.way_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
-        self._waiting = Waiting(self._action, flight) if isinstance(self._action, WaitForItem) else None
+        self._steady_since_us: int | None = None
         self._way: Trajectory = stay(start)
         self._out_of_reach = ""
         match self._action:
-            case TakeoffItem():
+            case items.TakeoffItem():
                 # tried again after a hit in the climb
                 self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
-            case SetSpeedItem():
+            case items.WaitForItem(file=file):
+                flight.file_awaited, flight.file_is_there = file, False
+            case items.SetSpeedItem():
                 flight.pace = flight.pace.changed_to(self._action)
         factor = flight.tally.pace_factor
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
         flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
-        if isinstance(self._action, ExpectItem):
+        if isinstance(self._action, items.ExpectItem):
             expecting.begin(flight, step.label, self._action, now_us)
-        elif isinstance(self._action, GoToItem | VelocityItem | PathItem | OrbitItem):
+        elif isinstance(self._action, items.GoToItem | items.VelocityItem | items.PathItem | items.OrbitItem):
             self._plan(self._action, start, now_us)
 
-    def _plan(self, action: Motion, start_m: Vector3, now_us: int) -> None:
+    def _plan(self, action: items.Motion, start_m: Vector3, now_us: int) -> None:
         """The item's own way, or one round what is known; what is left of a path that was interrupted."""
         flight = self._flight
         behind = flight.tally.points_passed if flight.after_recovery.trigger is Trigger.RECOVERED_TO_DETOUR else 0
-        if isinstance(action, PathItem) and 0 < behind < len(action.points_ned_m):
+        if isinstance(action, items.PathItem) and 0 < behind < len(action.points_ned_m):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
         pace = replace(flight.pace, factor=flight.tally.pace_factor)
@@ -97,30 +113,19 @@ class FlyItems:
 
     def interrupt(self, now_us: int) -> None:
         """A hit ends the present way: how much of a path has been flown?"""
-        if isinstance(self._action, PathItem):
+        if isinstance(self._action, items.PathItem):
             tally = self._flight.tally
-            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._on_the_way_s))
+            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._elapsed_s))
 
-    @property
-    def _on_the_way_s(self) -> float:
-        return (self._flight.way_us - self._way_began_us) * 1e-6
-
-    def target(self, now_us: int) -> Target | None:
-        elapsed_s = self._on_the_way_s
-        position, velocity, acceleration = self._way.at(elapsed_s)
-        yaw_rad = self._heading.turn(position, velocity, now_us)
-        place = self._flight.local_ned_m(position)
-        if elapsed_s >= self._way.duration_s:
-            return Target(place, yaw_rad)
-        # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
-        return self._flight.under_way(place, yaw_rad, velocity, acceleration)
+    def _turned(self, motion: Motion, now_us: int) -> float | None:
+        return self._heading.turn(motion[0], motion[1], now_us)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         while True:
-            if isinstance(self._action, ReturnItem):
+            if isinstance(self._action, items.ReturnItem):
                 flight.returning_as = self._action
                 return Move(Trigger.RETURN_DUE)
-            if isinstance(self._action, LandItem):
+            if isinstance(self._action, items.LandItem):
                 return Move(Trigger.LAND_DUE)
             if self._out_of_reach:
                 trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
@@ -138,35 +143,45 @@ class FlyItems:
         self._begin(flight, now_us)
 
     def _is_done(self, flight: FlightContext, now_us: int) -> bool:
-        elapsed_s = self._on_the_way_s
+        elapsed_s = self._elapsed_s
         match self._action:
-            case SetSpeedItem() | ExpectItem():
+            case items.SetSpeedItem() | items.ExpectItem():
                 return True
-            case HoldItem(duration_s=duration_s):
+            case items.HoldItem(duration_s=duration_s):
                 return now_us - self._started_us >= duration_s * 1e6
-            case WaitForItem():
-                assert self._waiting is not None
-                return self._waiting.is_over(flight, now_us)
-            case VelocityItem():
+            case items.WaitForItem():
+                return self._has_come(self._action, flight, now_us)
+            case items.VelocityItem():
                 return elapsed_s >= self._way.duration_s and self._has_turned(now_us)
-            case SetYawItem():
+            case items.SetYawItem():
                 return self._has_turned(now_us)
             case _:
                 over = elapsed_s >= self._way.duration_s and self._has_turned(now_us)
                 if over and self._over_since_us is None:
                     self._over_since_us = now_us
-                return over and self._arrived(flight)
+                return over and self._arrived()
+
+    def _has_come(self, item: items.WaitForItem, flight: FlightContext, now_us: int) -> bool:
+        """What is waited for. A hit ends the step by the mission's policy, as it does every other."""
+        if item.flight_time_s is not None:
+            assert flight.armed_at_us is not None
+            return now_us - flight.armed_at_us >= item.flight_time_s * 1e6
+        if item.steady is None:
+            flight.file_awaited = None if flight.file_is_there else flight.file_awaited
+            return flight.file_is_there
+        latest, target = flight.vehicle.history.latest(), flight.target
+        assert latest is not None and target is not None, "the flight is in the air"
+        is_near = math.dist(latest.position_ned_m, target.position_ned_m) <= item.steady.within_m
+        if not (is_near and math.hypot(*latest.velocity_ned_m_s) <= item.steady.speed_m_s):
+            self._steady_since_us = None
+        elif self._steady_since_us is None:
+            self._steady_since_us = now_us
+        return self._steady_since_us is not None and now_us - self._steady_since_us >= item.steady.for_s * 1e6
 
     def _has_turned(self, now_us: int) -> bool:
         if self._heading.is_fixed:
             self._heading.turn(self._way.target_m, (0.0, 0.0, 0.0), now_us)
         return self._heading.is_reached
-
-    def _arrived(self, flight: FlightContext) -> bool:
-        latest = flight.vehicle.history.latest()
-        goal = flight.local_ned_m(self._way.target_m)
-        radius_m = flight.mission.companion.flight.acceptance_radius_m
-        return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Move | None:
         item, began_us = flight.step.item, flight.tally.began_us
@@ -199,3 +214,98 @@ class HoldAfterRecovery:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         return Move(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
+
+
+# Below PX4's MC_YAWRATE_MAX (200 deg/s) and its MPC_YAWRAUTO_MAX (45 deg/s): the vehicle can follow.
+YAW_RATE_RAD_S = math.radians(45.0)
+# Slower, or nearer, than this there is no direction that noise in the last digits could not have made.
+_LEAST_SPEED_M_S = 0.05
+_LEAST_DISTANCE_M = 0.05
+
+
+@dataclass(slots=True)
+class Heading:
+    """A heading on its way to another. Radians clockwise from north; None: the vehicle's own affair."""
+
+    yaw_rad: float | None
+    at_us: int
+    rate_rad_s: float
+    fixed_rad: float | None
+    centre_m: Vector3 | None = None
+    along: bool = False
+
+    @classmethod
+    def of_step(cls, step: items.Step, yaw_rad: float | None, now_us: int) -> "Heading":
+        """The heading that the step asks for, beginning with the present one."""
+        action = step.action
+        rate_rad_s = math.radians(action.rate_deg_s) if isinstance(action, items.SetYawItem) else YAW_RATE_RAD_S
+        asked = getattr(action, "yaw_deg", None)
+        fixed_rad = math.radians(asked) if isinstance(asked, float | int) else yaw_rad
+        centre = action.centre_ned_m if isinstance(action, items.OrbitItem) and asked == "centre" else None
+        along = isinstance(action, items.PathItem | items.OrbitItem) and asked == "along"
+        return cls(yaw_rad, now_us, rate_rad_s, fixed_rad, centre, along)
+
+    @property
+    def is_fixed(self) -> bool:
+        return self.centre_m is None and not self.along
+
+    @property
+    def is_reached(self) -> bool:
+        """Of a fixed heading; one that follows the way is never late."""
+        return not self.is_fixed or self.yaw_rad == self.fixed_rad
+
+    def turn(self, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
+        """Turn on until now, the shorter way."""
+        wanted = self._wanted(position_m, velocity_m_s)
+        elapsed_s, self.at_us = (now_us - self.at_us) * 1e-6, now_us
+        if wanted is None or self.yaw_rad is None:
+            self.yaw_rad = wanted
+            return wanted
+        way = math.remainder(wanted - self.yaw_rad, math.tau)
+        step = self.rate_rad_s * elapsed_s
+        self.yaw_rad = wanted if abs(way) <= step else self.yaw_rad + math.copysign(step, way)
+        return self.yaw_rad
+
+    def _wanted(self, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
+        if self.centre_m is not None:
+            north, east = self.centre_m[0] - position_m[0], self.centre_m[1] - position_m[1]
+            return math.atan2(east, north) if math.hypot(north, east) > _LEAST_DISTANCE_M else self.yaw_rad
+        if self.along:
+            north, east, _ = velocity_m_s
+            return math.atan2(east, north) if math.hypot(north, east) > _LEAST_SPEED_M_S else self.yaw_rad
+        return self.fixed_rad
+
+
+class FlyHome(_OnAWay):
+    """Up where that is asked for, then straight; begun anew after each recovery on the way."""
+
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        assert flight.target is not None, "the flight is in the air"
+        self._flight = flight
+        self._way_began_us = flight.way_us
+        flight.going_home = True
+        flight.yaw_rad = flight.target.yaw_rad
+        start = flight.mission_ned_m(flight.target.position_ned_m)
+        pace = replace(flight.pace, factor=1.0).against(flight.leaning.wind_m_s2, (-start[0], -start[1], 0.0))
+        planned = home_around(start, flight.returning_as, pace, surroundings(flight))
+        self._is_cut_off = planned.way is None
+        self._way: Trajectory = planned.way or stay(start)
+        if self._is_cut_off:
+            flight.unreachable.append("home")
+            flight.tell(now_us, "unreachable", "home out of reach: no way round what is known; landing here")
+            return
+        round_it = " round what is known" if planned.is_detour else ""
+        text = f"returning over {self._way.distance_m:.1f} m{round_it}"
+        flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if self._is_cut_off:
+            return Move(Trigger.LAND_DUE)
+        overdue_s = self._elapsed_s - self._way.duration_s
+        if overdue_s < 0.0:
+            return None
+        if self._arrived():
+            return Move(Trigger.HOME_REACHED)
+        if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
+            return Move(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
+        return None

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
-from companion.flight.held import Known, touched
+from companion.flight.envelope import Known, touched
 from companion.flight.states import Trigger
-from companion.memory.merging import is_same, remembered
-from companion.memory.patch import Patch, Touch
+from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
 from companion.memory.surroundings import Surroundings
-from companion.memory.touching import touch_of
 from companion.messages import Vector3
 from companion.reflex.halfspace import Surface, plus
 from companion.reflex.laws import Contact
@@ -92,7 +90,7 @@ def _with_hits(flight: FlightContext, hits: int) -> tuple[Patch, ...]:
     return remembered(flight.mission.obstacles.patches(), touches, _clearance_m(flight))
 
 
-def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Touch]:
+def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[Patch]:
     reach_m = flight.mission.companion.estimate.reach_m
     touches = []
     for record in records:

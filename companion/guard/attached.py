@@ -1,19 +1,34 @@
 """The guard on a program's own connection: messages as names and fields in and out, and a gate for what passes."""
 
+import math
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
+from companion.core import POLL_INTERVAL_US
 from companion.estimate.normal import Search, further
 from companion.guard.config import GuardConfig
-from companion.guard.core import POLL_INTERVAL_US, GuardCore, advance, next_deadline_us, start
-from companion.guard.gate import SETPOINTS, Gate
-from companion.guard.states import State
-from companion.link.identity import AUTOPILOT_COMPONENT_ID
+from companion.guard.core import GuardCore
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.encode import Encoder
-from companion.mavlink.fields import fields_from, sample_from
+from companion.mavlink.readers import sample_from
 from companion.messages import OnboardHeartbeat, Sample, TimeSyncAsk, TimeSyncReply
 from companion.report import Event
+
+# Whatever PX4 flies by in OFFBOARD (MavlinkReceiver's handlers).
+SETPOINTS = frozenset(
+    {
+        "SET_POSITION_TARGET_LOCAL_NED",
+        "SET_POSITION_TARGET_GLOBAL_INT",
+        "SET_ATTITUDE_TARGET",
+        "SET_ACTUATOR_CONTROL_TARGET",
+    }
+)
+# Setpoints on their way at once; more than a few have been lost before they came by.
+_MOST_ON_THE_WAY = 32
+
+Mark: TypeAlias = tuple[object, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +53,7 @@ class AttachedGuard:
     def __init__(
         self, config: GuardConfig, system_id: int, now_us: int, seek: Callable[[Search], Search] = further
     ) -> None:
-        self.core: GuardCore = start(config, True, now_us)
+        self.core = GuardCore(config, True, now_us)
         self.core.watch.estimator.seek = seek
         self._source = (system_id, AUTOPILOT_COMPONENT_ID)
         self._encoder = Encoder()
@@ -59,12 +74,12 @@ class AttachedGuard:
         if self._is_draining(now_us):
             self._arrived += samples
             return AttachedStep((), ())
-        outputs = advance(self.core, [*self._arrived, *samples], now_us)
+        outputs = self.core.advance([*self._arrived, *samples], now_us)
         self._arrived.clear()
         sent: list[tuple[str, Mapping[str, Any]]] = []
         for message in outputs.messages:
             if not isinstance(message, OnboardHeartbeat | TimeSyncAsk | TimeSyncReply):
-                sent += fields_from(self._encoder, message)
+                sent += self._encoder.fields(message)
         for name, fields in sent:
             if name in SETPOINTS:
                 self._gate.sends(fields)
@@ -72,7 +87,7 @@ class AttachedGuard:
 
     def _is_draining(self, now_us: int) -> bool:
         if self._drained_us is None:
-            if now_us - next_deadline_us(self.core) >= POLL_INTERVAL_US:
+            if now_us - self.core.next_deadline_us() >= POLL_INTERVAL_US:
                 self._drained_us = now_us + POLL_INTERVAL_US
         elif now_us >= self._drained_us:
             self._drained_us = None
@@ -82,7 +97,7 @@ class AttachedGuard:
         """Whether a message on its way to the vehicle may go on: all but others' setpoints while the guard holds."""
         if name not in SETPOINTS or self._gate.is_own(fields):
             return True
-        self.core.guard.others_setpoint_us = now_us
+        self.core.flight.others_setpoint_us = now_us
         if not self.core.machine.holds:
             return True
         self._gate.kept_out += 1
@@ -95,7 +110,37 @@ class AttachedGuard:
 
     @property
     def finished(self) -> bool:
-        return self.core.machine.state is State.ENDED
+        return self.core.machine.finished
 
     def next_deadline_us(self) -> int:
-        return next_deadline_us(self.core) if self._drained_us is None else self._drained_us
+        return self.core.next_deadline_us() if self._drained_us is None else self._drained_us
+
+
+class Gate:
+    """Knows the guard's own setpoints again by what is in them, in the order in which they were sent."""
+
+    def __init__(self) -> None:
+        self._own: deque[Mark] = deque(maxlen=_MOST_ON_THE_WAY)
+        self.kept_out = 0
+
+    def sends(self, fields: Mapping[str, object]) -> None:
+        """The guard is about to send this one."""
+        self._own.append(_mark(fields))
+
+    def is_own(self, fields: Mapping[str, object]) -> bool:
+        """Whether a setpoint on its way is the guard's; asked once for each."""
+        mark = _mark(fields)
+        if mark not in self._own:
+            return False
+        while self._own.popleft() != mark:
+            pass
+        return True
+
+
+def _mark(fields: Mapping[str, object]) -> Mark:
+    """Time, mask and place, which may be NaN; two setpoints with the same of these are the same."""
+    place = tuple(
+        round(value, 3) if isinstance(value, float | int) and math.isfinite(value) else None
+        for value in map(fields.get, "xyz")
+    )
+    return (fields.get("time_boot_ms"), fields.get("type_mask"), *place)

@@ -6,13 +6,11 @@ from pydantic import Field, field_validator
 
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
-from companion.mission.items import LandItem, TakeoffItem
-from companion.mission.model import Mission
+from companion.mission.items import LandItem, MissionItem, TakeoffItem
+from companion.mission.model import KnownRecovery, Mission
 from companion.mission.policy import Limits
-from companion.mission.program import MissionItem
 from companion.px4_mode import MODE_NAMES
 from companion.reflex.config import RecoveryConfig
-from companion.reflex.laws import RECOVERY_LAWS, check_known_law
 from companion.written import Positive, Written
 
 # Modes in which PX4 itself holds a position or a height. Not AUTO.LAND: its end is a hit on the ground. Not the modes
@@ -32,7 +30,7 @@ class GuardConfig(Written):
     # With `then: previous` a mission flies into the same wall again. Three hits in one flight are no accident.
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
     # A hit while a program on a link of its own sends setpoints. `reposition` leads the vehicle clear by a command; a
-    # real PX4 that gets it while the contact lasts flies off backwards (see guard.aside): not done unasked.
+    # real PX4 that gets it while the contact lasts flies off backwards (see guard.holding): not done unasked.
     beside_program: Literal["tell", "reposition"] = "tell"
     # The answer takes 10 ms, CURRENT_MODE at 10 Hz 100 ms; a command lost on the way is repeated after 500 ms.
     confirm_within_s: Annotated[Positive, Field(ge=0.2)] = 1.0
@@ -41,7 +39,7 @@ class GuardConfig(Written):
     # From where the vehicle was armed. Nobody knows a stranger's field: as good as none until it is given.
     fence: Fence = Fence(radius_m=100_000.0, max_height_m=10_000.0)
     limits: Limits = Limits()
-    recovery: RecoveryConfig = RecoveryConfig()
+    recovery: KnownRecovery = RecoveryConfig()
     companion: CompanionConfig = CompanionConfig()
 
     @field_validator("modes")
@@ -51,12 +49,6 @@ class GuardConfig(Written):
             if mode not in MODE_NAMES:
                 raise ValueError(f"{mode!r} is no mode of PX4: choose from {', '.join(sorted(MODE_NAMES))}")
         return modes
-
-    @field_validator("recovery")
-    @classmethod
-    def _known_law(cls, recovery: RecoveryConfig) -> RecoveryConfig:
-        check_known_law(recovery.law, RECOVERY_LAWS)
-        return recovery
 
     def as_mission(self) -> Mission:
         """What the parts that the guard shares with a flight read: a mission of which nothing is ever flown."""

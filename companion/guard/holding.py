@@ -1,14 +1,13 @@
-"""States taking over, recovering and giving back: the vehicle flies, or is about to fly, by the guard's setpoints."""
+"""States in which the vehicle flies by the guard's setpoints, or is about to, and stood down, which may end so."""
 
 import math
 
 from companion.flight.context import Inputs, Target
 from companion.flight.recovering import Recover
-from companion.guard.aside import StepAside
-from companion.guard.context import GuardContext, GuardInputs, Move
+from companion.guard.context import GuardContext, Move
 from companion.guard.states import Trigger
-from companion.messages import PositionTarget, SetMode
-from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, mode_name
+from companion.messages import GlobalPosition, PositionTarget, Reposition, SetMode, Vector3
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
 
 # The vehicle tells what it flies to. Further than this from all that was sent it is somebody else's: a moving
 # setpoint of ours is 0.24 m further on at most from one to the next, at 12 m/s.
@@ -19,6 +18,17 @@ CROSSED_TIMES = 3
 ECHO_AGE_US = 400_000
 # The first echoes may still be of the mode before.
 ECHO_STALE_US = 200_000
+# Mean radius: over the metre in question any earth is a ball.
+EARTH_RADIUS_M = 6_371_000.0
+# PX4's AUTO modes begin with the acceleration that the estimator shows at that moment (FlightTaskAuto::activate) and
+# change it by MPC_JERK_AUTO = 4 m/s^3. Asked for at the hit itself, a real PX4 began with -64 m/s^2 and flew off
+# backwards at its greatest speed; asked for 0.3 s later, the program's setpoints had pushed it into the wall again.
+# So as soon as the contact is over: nothing pushes for 40 ms, ten samples of a fast IMU stream.
+CONTACT_OVER_US = 40_000
+# A contact that never ends is no reason to wait for ever.
+LONGEST_WAIT_US = 300_000
+# PX4 answers in 10 ms; when it does not take the mode its own action for lost setpoints is the next best.
+HAND_OVER_US = 500_000
 
 
 class TakeOver:
@@ -27,24 +37,22 @@ class TakeOver:
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
         self.recover = recover
         self._began_us = now_us
-        flight = guard.flight
-        if flight.vehicle.custom_mode != OFFBOARD:
-            flight.command_client.begin(SetMode(OFFBOARD))
+        if guard.vehicle.custom_mode != OFFBOARD:
+            guard.command_client.begin(SetMode(OFFBOARD))
 
     def target(self, now_us: int) -> Target | None:
         return self.recover.target(now_us)
 
-    def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
-        flight = guard.flight
-        is_seen = flight.vehicle.custom_mode == OFFBOARD
-        outcome = flight.command_outcome(inputs.flight, is_seen, now_us)
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+        is_seen = guard.vehicle.custom_mode == OFFBOARD
+        outcome = guard.command_outcome(inputs, is_seen, now_us)
         took_ms = (now_us - self._began_us) / 1e3
         if is_seen:
-            flight.expected_mode = OFFBOARD
+            guard.expected_mode = OFFBOARD
             text = "OFFBOARD already, the program's setpoints kept out" if outcome is None else "OFFBOARD confirmed"
-            flight.tell(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
+            guard.tell(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
             return Move(Trigger.CONFIRMED)
-        recovered(guard, self.recover, inputs.flight, now_us)
+        recovered(guard, self.recover, inputs, now_us)
         if outcome is not None:
             return Move(Trigger.NOT_CONFIRMED, outcome.text)
         if took_ms > guard.config.confirm_within_s * 1e3:
@@ -63,20 +71,20 @@ class Recovering:
     def target(self, now_us: int) -> Target | None:
         return self._recover.target(now_us)
 
-    def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
         if now_us - self._began_us > ECHO_STALE_US:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES:
             guard.program_elsewhere = True
             return Move(Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own")
-        return Move(Trigger.SETTLED) if recovered(guard, self._recover, inputs.flight, now_us) else None
+        return Move(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
 
 
 def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int) -> bool:
     """One step of the recovery; whether it is over, be it that the hit was none, which then does not count."""
-    before = guard.flight.unconfirmed
-    is_over = recover.step(guard.flight, inputs, now_us) is not None
-    guard.hits -= guard.flight.unconfirmed - before
+    before = guard.unconfirmed
+    is_over = recover.step(guard, inputs, now_us) is not None
+    guard.hits -= guard.unconfirmed - before
     return is_over
 
 
@@ -86,6 +94,48 @@ def is_foreign(guard: GuardContext, echo: PositionTarget, now_us: int) -> bool:
     if echo.position_ned_m is None:
         return None not in recent
     return all(place is None or math.dist(place, echo.position_ned_m) > CROSSED_M for place in recent)
+
+
+class StepAside:
+    """AUTO.LOITER alone would hold where the vehicle, going at the hit's speed, could have stopped: behind the wall."""
+
+    def __init__(self, now_us: int) -> None:
+        self._due_us = now_us + LONGEST_WAIT_US
+        self._is_begun = self.is_over = False
+
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> None:
+        """Until the vehicle has answered, one way or the other; over at once where nothing is known of the place."""
+        here = guard.global_position
+        latest = guard.vehicle.history.latest()
+        if now_us < self._due_us and not self._is_begun and not _is_free(guard):
+            return
+        if self._is_begun:
+            self.is_over = guard.command_outcome(inputs, False, now_us) is not None
+        elif here is None or latest is None or not guard.collisions:
+            self.is_over = True
+        else:
+            self._is_begun = True
+            goal = guard.collisions[-1].setpoint_ned_m
+            guard.command_client.begin(place_of(here, latest.position_ned_m, goal))
+            guard.command_outcome(Inputs(), False, now_us)
+
+
+def _is_free(guard: GuardContext) -> bool:
+    latest = guard.vehicle.history.latest()
+    if latest is None or not guard.collisions:
+        return True
+    return latest.time_boot_us - guard.collisions[-1].contact_ended_boot_us >= CONTACT_OVER_US
+
+
+def place_of(here: GlobalPosition, here_ned_m: Vector3, goal_ned_m: Vector3) -> Reposition:
+    """The goal, a few metres from here, on the globe."""
+    north, east, down = (g - h for g, h in zip(goal_ned_m, here_ned_m, strict=True))
+    parallel_m = EARTH_RADIUS_M * math.cos(math.radians(here.latitude_deg))
+    return Reposition(
+        here.latitude_deg + math.degrees(north / EARTH_RADIUS_M),
+        here.longitude_deg + math.degrees(east / parallel_m),
+        here.altitude_m - down,
+    )
 
 
 class GiveBack:
@@ -100,12 +150,12 @@ class GiveBack:
     """
 
     def __init__(self, guard: GuardContext, beside_program: bool, now_us: int) -> None:
-        flight, previous = guard.flight, guard.previous_mode
+        previous = guard.previous_mode
         self._wishes: list[int] = []
         if guard.config.then == "previous" and not guard.then_hold and previous is not None:
             self._wishes.append(previous)
         self._wishes += [AUTO_LOITER, AUTO_LAND]
-        self._target = flight.target.at_rest() if flight.target else None
+        self._target = guard.target.at_rest() if guard.target else None
         self._aside: StepAside | None = None
         if beside_program:
             self._target = None
@@ -121,11 +171,10 @@ class GiveBack:
         return self._wishes[0]
 
     def _ask(self, guard: GuardContext) -> None:
-        if guard.flight.vehicle.custom_mode != self.wish:
-            guard.flight.command_client.begin(SetMode(self.wish))
+        if guard.vehicle.custom_mode != self.wish:
+            guard.command_client.begin(SetMode(self.wish))
 
-    def step(self, guard: GuardContext, inputs: GuardInputs, now_us: int) -> Move | None:
-        flight = guard.flight
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
         if self._aside is not None and not self._aside.is_over:
             self._aside.step(guard, inputs, now_us)
             if not self._aside.is_over:
@@ -133,18 +182,18 @@ class GiveBack:
             # It asked for the first of these modes, too.
             self._is_asked = True
             self._ask(guard)
-            inputs = GuardInputs()
+            inputs = Inputs()
         if not self._is_asked:
-            if not flight.is_time_to_give_away(self._began_us, now_us):
+            if not guard.is_time_to_give_away(self._began_us, now_us):
                 return None
             self._is_asked = True
             self._ask(guard)
-        is_seen = flight.vehicle.custom_mode == self.wish
-        outcome = flight.command_outcome(inputs.flight, is_seen, now_us)
+        is_seen = guard.vehicle.custom_mode == self.wish
+        outcome = guard.command_outcome(inputs, is_seen, now_us)
         if is_seen:
             took_ms = (now_us - self._began_us) / 1e3
             text = f"given back to {mode_name(self.wish)} after {took_ms:.0f} ms"
-            flight.tell(now_us, "given_back", text, mode=mode_name(self.wish), after_ms=took_ms)
+            guard.tell(now_us, "given_back", text, mode=mode_name(self.wish), after_ms=took_ms)
             return Move(Trigger.GIVEN_BACK)
         if outcome is None:
             return None
@@ -153,4 +202,35 @@ class GiveBack:
             return Move(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
         self._ask(guard)
         # The answers of this step were to the mode before.
-        return self.step(guard, GuardInputs(Inputs(positions=inputs.flight.positions)), now_us)
+        return self.step(guard, Inputs(positions=inputs.positions), now_us)
+
+
+class StandDown:
+    """A pilot who moved the sticks is given the position mode, as PX4's own stick override does.
+
+    OFFBOARD would go on without a word of the pilot's otherwise. Setpoints go on until the mode is seen.
+    """
+
+    def __init__(self, guard: GuardContext, for_sticks: bool, now_us: int) -> None:
+        self._until_us = now_us + HAND_OVER_US
+        self._target: Target | None = None
+        if for_sticks and guard.vehicle.custom_mode == OFFBOARD and guard.target is not None:
+            self._target = guard.target.at_rest()
+            guard.command_client.begin(SetMode(POSCTL))
+
+    @property
+    def hands_over(self) -> bool:
+        """Whether the pilot does not have the vehicle yet."""
+        return self._target is not None
+
+    def target(self, now_us: int) -> Target | None:
+        return self._target
+
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+        if self._target is not None:
+            is_seen = guard.vehicle.custom_mode != OFFBOARD
+            outcome = guard.command_outcome(inputs, is_seen, now_us)
+            if outcome is not None or now_us > self._until_us:
+                self._target = None
+                guard.command_client.cancel()
+        return Move(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None

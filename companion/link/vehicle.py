@@ -1,20 +1,51 @@
-"""What the vehicle has last said about itself, and when."""
+"""Who the vehicle is, what it has last said about itself, and when."""
 
 from dataclasses import dataclass, field
 
+from companion import messages
 from companion.estimate.history import MotionHistory
-from companion.link.identity import Identity
-from companion.messages import (
-    Attitude,
-    AutopilotVersion,
-    Battery,
-    CurrentMode,
-    ExtendedState,
-    Heartbeat,
-    ImuSample,
-    LandedState,
-    LocalPosition,
-)
+
+# MAV_COMP_ID_AUTOPILOT1: gimbals, cameras and ground stations on the same link have other numbers.
+AUTOPILOT_COMPONENT_ID = 1
+MAV_AUTOPILOT_PX4 = 12
+
+# MAV_TYPE: hover, sideways force and land detection are the same for all of these.
+MULTICOPTERS = {2: "quadrotor", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 29: "dodecarotor", 35: "decarotor"}
+# The ones most often met by mistake, named so that the message helps.
+OTHER_TYPES = {
+    1: "fixed-wing aircraft",
+    3: "coaxial helicopter",
+    4: "helicopter",
+    6: "ground station",
+    10: "ground rover",
+    11: "boat",
+    12: "submarine",
+} | dict.fromkeys(range(19, 23), "VTOL aircraft")
+OTHER_AUTOPILOTS = {0: "generic autopilot", 3: "ArduPilot", 8: "component without an autopilot"}
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    system_id: int
+    component_id: int
+    vehicle_type: str
+
+
+def is_autopilot(heartbeat: messages.Heartbeat) -> bool:
+    return heartbeat.component_id == AUTOPILOT_COMPONENT_ID
+
+
+def identify(heartbeat: messages.Heartbeat) -> Identity | str:
+    """The vehicle, or one sentence saying why it is not one that can be flown."""
+    if heartbeat.autopilot != MAV_AUTOPILOT_PX4:
+        name = OTHER_AUTOPILOTS.get(heartbeat.autopilot, "unknown autopilot")
+        return f"the vehicle's autopilot is not PX4 but {name} (MAV_AUTOPILOT {heartbeat.autopilot})"
+    vehicle_type = MULTICOPTERS.get(heartbeat.vehicle_type)
+    if vehicle_type is None:
+        name = OTHER_TYPES.get(heartbeat.vehicle_type, "unknown type")
+        return f"the vehicle is not a multicopter but: {name} (MAV_TYPE {heartbeat.vehicle_type})"
+    return Identity(heartbeat.system_id, heartbeat.component_id, vehicle_type)
+
 
 # MAV_STATE_CRITICAL and above: PX4 says so while a failsafe acts.
 FAILSAFE_STATUS = 5
@@ -47,8 +78,8 @@ class Vehicle:
     armed: bool | None = None
     mode: ModeReport | None = None
     failsafe: bool = False
-    landed: LandedState = LandedState.UNDEFINED
-    attitude: Attitude | None = None
+    landed: messages.LandedState = messages.LandedState.UNDEFINED
+    attitude: messages.Attitude | None = None
     battery_percent: int | None = None
     history: MotionHistory = field(default_factory=MotionHistory)
     last_heard_us: int = 0
@@ -75,32 +106,32 @@ class Vehicle:
         """Take in one sample of the identified vehicle. Without `own_modes` every mode is believed at once."""
         self.last_heard_us = now_us
         match sample:
-            case ImuSample():
+            case messages.ImuSample():
                 pass  # the most frequent of all: first, and nothing of it is kept here
-            case LocalPosition():
+            case messages.LocalPosition():
                 if self.history.add(sample):
                     self.last_position_us = now_us
-            case Attitude():
+            case messages.Attitude():
                 self.attitude = sample
-            case Heartbeat():
+            case messages.Heartbeat():
                 self._hear_armed(sample.armed)
                 self.failsafe = sample.system_status >= FAILSAFE_STATUS
                 self._hear_mode(ModeReport(sample.custom_mode, None, self.failsafe), own_modes, now_us)
-            case CurrentMode():
+            case messages.CurrentMode():
                 # The intended mode is newer than the last HEARTBEAT's status, where it is given.
                 failsafe = self.failsafe and sample.intended_custom_mode is None
                 report = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
                 self._hear_mode(report, own_modes, now_us)
-            case ExtendedState():
+            case messages.ExtendedState():
                 self.landed = sample.landed_state
-                if self.is_disarm_doubted and self.landed is LandedState.ON_GROUND:
+                if self.is_disarm_doubted and self.landed is messages.LandedState.ON_GROUND:
                     self._believe_armed(False)
-                elif self.is_disarm_unexplained and self.landed is LandedState.IN_AIR:
+                elif self.is_disarm_unexplained and self.landed is messages.LandedState.IN_AIR:
                     self.is_disarm_unexplained = False
                     self.conflicts += 1
-            case Battery():
+            case messages.Battery():
                 self.battery_percent = sample.remaining_percent
-            case AutopilotVersion():
+            case messages.AutopilotVersion():
                 self.version = sample.flight_version
             case _:
                 pass
@@ -115,7 +146,7 @@ class Vehicle:
             self.doubted_mode = report
 
     def _hear_armed(self, armed: bool) -> None:
-        if armed or self.armed is not True or self.is_disarm_doubted or self.landed is LandedState.ON_GROUND:
+        if armed or self.armed is not True or self.is_disarm_doubted or self.landed is messages.LandedState.ON_GROUND:
             self.conflicts += armed and self.is_disarm_unexplained
             self._believe_armed(armed)
         else:

@@ -1,31 +1,14 @@
 """Typed commands to MAVLink 2 bytes. Sequence numbers, type masks and NaN exist only here."""
 
+import math
 import struct
 from collections.abc import Callable, Iterable
-from typing import Any, TypeAlias
+from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.messages import (
-    ComputerStatus,
-    DebugVector,
-    NamedValue,
-    OnboardHeartbeat,
-    Outgoing,
-    PositionSetpoint,
-    ReadParameter,
-    Reposition,
-    RequestMessage,
-    SendCommand,
-    SetArmed,
-    SetMessageInterval,
-    SetMode,
-    SetParameter,
-    StatusText,
-    TimeSyncAsk,
-    TimeSyncReply,
-    VehicleCommand,
-)
+from companion import messages
+from companion.messages import ComputerStatus, Outgoing, PositionSetpoint, Reposition, SendCommand, StatusText
 
 COMPONENT_ID = dialect.MAV_COMP_ID_ONBOARD_COMPUTER
 # Before the vehicle is known: PX4's own default MAV_SYS_ID.
@@ -39,7 +22,7 @@ IGNORE_ACCELERATION = 0x1C0
 IGNORE_YAW = 0x400
 IGNORE_YAW_RATE = 0x800
 
-NAN = float("nan")
+NAN = math.nan
 
 # ONBOARD_COMPUTER_STATUS: the largest number of a field says that it is not used.
 _UNUSED_INT8, _UNUSED_UINT8, _UNUSED_INT16, _UNUSED_UINT32 = 0x7F, 0xFF, 0x7FFF, 0xFFFFFFFF
@@ -47,19 +30,6 @@ _CORES = 8
 
 # STATUSTEXT's field.
 TEXT_LENGTH = 50
-
-SinglePacket: TypeAlias = (
-    SendCommand
-    | PositionSetpoint
-    | OnboardHeartbeat
-    | TimeSyncReply
-    | TimeSyncAsk
-    | ReadParameter
-    | SetParameter
-    | NamedValue
-    | DebugVector
-    | ComputerStatus
-)
 
 
 class Encoder:
@@ -77,7 +47,7 @@ class Encoder:
 
     def packets(self, outgoing: Outgoing) -> list[bytes]:
         """All that it takes; of most messages one."""
-        return [self._pack(message) for message in self.messages(outgoing)]
+        return [self._pack(message) for message in self._messages(outgoing)]
 
     def all_packets(self, outgoing: Iterable[Outgoing], on_fault: Callable[[Exception], None]) -> tuple[bytes, ...]:
         """Of all messages that can be packed; what cannot be is left out and told to `on_fault`."""
@@ -89,13 +59,14 @@ class Encoder:
                 on_fault(error)
         return tuple(packets)
 
-    def messages(self, outgoing: Outgoing) -> list[Any]:
+    def _messages(self, outgoing: Outgoing) -> list[Any]:
         """The same, as pymavlink has them before they are bytes."""
         return self._chunks(outgoing) if isinstance(outgoing, StatusText) else [self._message(outgoing)]
 
-    def encode(self, outgoing: SinglePacket) -> bytes:
-        """One packet."""
-        return self._pack(self._message(outgoing))
+    def fields(self, outgoing: Outgoing) -> list[tuple[str, dict[str, Any]]]:
+        """The same as name and fields, for programs that hand them over so; NaN as None."""
+        found = self._messages(outgoing)
+        return [(one.get_type(), {name: _plain(getattr(one, name)) for name in one.fieldnames}) for one in found]
 
     def _pack(self, message: Any) -> bytes:
         packet = bytes(message.pack(self._mavlink))
@@ -116,7 +87,7 @@ class Encoder:
             for sequence, part in enumerate(parts)
         ]
 
-    def _message(self, outgoing: SinglePacket) -> Any:
+    def _message(self, outgoing: Outgoing) -> Any:
         match outgoing:
             case PositionSetpoint():
                 return self._setpoint(outgoing)
@@ -126,24 +97,24 @@ class Encoder:
                 return dialect.MAVLink_command_long_message(
                     *self._target, command.command_id, confirmation, *_parameters(command)
                 )
-            case OnboardHeartbeat(active):
+            case messages.OnboardHeartbeat(active):
                 status = dialect.MAV_STATE_ACTIVE if active else dialect.MAV_STATE_STANDBY
                 return dialect.MAVLink_heartbeat_message(
                     dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, status, 3
                 )
-            case NamedValue(time_us, name, value):
+            case messages.NamedValue(time_us, name, value):
                 return dialect.MAVLink_named_value_float_message(time_us // 1000 & 0xFFFFFFFF, name.encode(), value)
-            case DebugVector(time_us, name, vector):
+            case messages.DebugVector(time_us, name, vector):
                 return dialect.MAVLink_debug_vect_message(name.encode(), time_us, *vector)
             case ComputerStatus():
                 return _computer(outgoing)
-            case TimeSyncReply(vehicle_time_ns, companion_time_ns):
+            case messages.TimeSyncReply(vehicle_time_ns, companion_time_ns):
                 return dialect.MAVLink_timesync_message(companion_time_ns, vehicle_time_ns)
-            case TimeSyncAsk(companion_time_ns):
+            case messages.TimeSyncAsk(companion_time_ns):
                 return dialect.MAVLink_timesync_message(0, companion_time_ns)
-            case ReadParameter(name):
+            case messages.ReadParameter(name):
                 return dialect.MAVLink_param_request_read_message(*self._target, name.encode(), -1)
-            case SetParameter(name, value):
+            case messages.SetParameter(name, value):
                 return dialect.MAVLink_param_set_message(*self._target, name.encode(), *_as_float(value))
 
     def _reposition(self, command: Reposition) -> Any:
@@ -187,6 +158,18 @@ class Encoder:
         )
 
 
+def command_name(number: int) -> str:
+    """A command as MAVLink calls it, for people: "176 (DO_SET_MODE)"."""
+    entry = dialect.enums["MAV_CMD"].get(number)
+    return str(number) if entry is None else f"{number} ({entry.name.removeprefix('MAV_CMD_')})"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value.decode() if isinstance(value, bytes) else value
+
+
 def _computer(status: ComputerStatus) -> Any:
     """The cores by themselves, the first eight; one temperature, one memory, one disk, no link."""
     cores = (*status.cpu_percent, *[_UNUSED_UINT8] * _CORES)[:_CORES]
@@ -224,18 +207,18 @@ def _as_float(value: int | float) -> tuple[float, int]:
     return value, dialect.MAV_PARAM_TYPE_REAL32
 
 
-def _parameters(command: VehicleCommand) -> tuple[float, ...]:
+def _parameters(command: messages.VehicleCommand) -> tuple[float, ...]:
     """COMMAND_LONG's seven parameters; those without a meaning are 0, as PX4 wants them."""
     match command:
-        case SetMode(custom_mode):
+        case messages.SetMode(custom_mode):
             # param1 says that param2 and param3 hold PX4's main and sub mode
             main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
             used: tuple[float, ...] = (dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
-        case SetArmed(armed):
+        case messages.SetArmed(armed):
             used = (1.0 if armed else 0.0,)
-        case SetMessageInterval(message_id, interval_us):
+        case messages.SetMessageInterval(message_id, interval_us):
             used = (message_id, interval_us)
-        case RequestMessage(message_id):
+        case messages.RequestMessage(message_id):
             used = (message_id,)
         case Reposition():
             raise AssertionError("not a COMMAND_LONG")

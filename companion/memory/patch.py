@@ -1,11 +1,15 @@
-"""A patch: what touches have shown of one surface, and how far it is believed to go on. Mission coordinates, metres."""
+"""Touches and patches: what a hit says of a surface, what touches of one say together, how far it is believed to go on.
+
+Mission coordinates, metres.
+"""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.messages import Vector3
 from companion.reflex.config import STEEP
+from companion.reflex.halfspace import away_from
 
 # One touch shows one place. Half a metre to every side is believed: the way round then passes a metre beside the touch,
 # clear of a pole, a post or the leaf of a door, and a surface that goes on costs one hit more.
@@ -18,24 +22,11 @@ GOES_ON_MOST_M = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Touch:
-    """One hit: the place on the surface, the unit normal out of it and its standard deviation.
-
-    `reaches_m` is how far the surface is believed to reach beyond this place, whatever else is known.
-    """
-
-    place_ned_m: Vector3
-    normal_ned: Vector3
-    normal_error_rad: float
-    reaches_m: float
-    found_at_us: int
-
-
-@dataclass(frozen=True, slots=True)
 class Patch:
     """One surface: all touches of it, the unit normal that they agree on and its standard deviation.
 
-    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `found_at_us`: first touch.
+    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `reaches_m` is how far it is
+    believed to reach beyond its touches, whatever else is known; `found_at_us` the first touch.
     """
 
     touches_ned_m: tuple[Vector3, ...]
@@ -115,3 +106,162 @@ def _grown(touched: tuple[float, float], reaches_m: float) -> tuple[float, float
     low, high = touched
     beyond_m = goes_on_m(high - low, reaches_m)
     return low - beyond_m, high + beyond_m
+
+
+# Of the normals that one whole contact gives, 61 % are within 10 degrees and 94 % within 20 (docs/detection.md).
+ERROR_RAD = math.radians(15.0)
+# A clipped sample tilts the push by what it lacks; a stiff hit is one such sample, and has been 50 degrees off.
+CLIPPED_ERROR_RAD = math.radians(30.0)
+# Where nothing but the approach says from where the hit came.
+APPROACH_ERROR_RAD = math.radians(45.0)
+# A surface pushes against the way into it. Its normal lies at most this (cosine) beside square to the approach, which
+# is what its error makes of a grazing hit.
+LEAST_AGAINST = -0.2
+# A hit hard enough to clip the sensor goes into the surface, not along it: within 60 degrees of its normal.
+LEAST_CLIPPED = 0.5
+# Slower than this a hit came to the vehicle: it moves, or blew past, and will not stand there as a wall does. It is
+# remembered where it was, and believed to be no larger.
+LEAST_SPEED_M_S = 0.3
+# So does what pushes the vehicle on the way it flies: within 60 degrees of it no obstacle that stands can push, and a
+# push of which clipping left no direction has been turned round by then (see estimate.facing).
+FROM_BEHIND = -0.5
+
+
+def touch_of(
+    centre_ned_m: Vector3,
+    velocity_ned_m_s: Vector3,
+    normal_ned: Vector3,
+    is_clipped: bool,
+    reach_m: float,
+    found_at_us: int,
+    is_behind: bool = False,
+) -> Patch | None:
+    """The one touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
+
+    ``normal_ned`` is horizontal, steep or zero (see recovery.direction). ``reach_m``: centre to the guards' rim.
+    ``is_behind``: what was hit is known to have come after the vehicle.
+    """
+    n, e, d = velocity_ned_m_s
+    is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
+    against = away_from((-n, -e, -d)) if is_fast else (0.0, 0.0, 0.0)
+    is_behind = is_behind or _agreement(normal_ned, against) < FROM_BEHIND
+    normal, error_rad = (normal_ned, ERROR_RAD) if is_behind else _direction(normal_ned, against, is_clipped)
+    if normal == (0.0, 0.0, 0.0):
+        return None
+    n, e, d = (c - reach_m * x for c, x in zip(centre_ned_m, normal, strict=True))
+    reaches_m = REACHES_M if is_fast and not is_behind else 0.0
+    return Patch(((n, e, d),), normal, error_rad, reaches_m, found_at_us)
+
+
+def _agreement(a: Vector3, b: Vector3) -> float:
+    """The cosine between unit vectors; 0 where one is zero."""
+    return max(-1.0, min(1.0, sum(x * y for x, y in zip(a, b, strict=True))))
+
+
+def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vector3, float]:
+    """The normal to believe and its error: between the push and the way back where the push is not to be trusted."""
+    if against == (0.0, 0.0, 0.0):
+        return normal, CLIPPED_ERROR_RAD
+    agreement = _agreement(normal, against)
+    if normal == (0.0, 0.0, 0.0) or agreement < (LEAST_CLIPPED if is_clipped else LEAST_AGAINST):
+        return against, APPROACH_ERROR_RAD
+    if not is_clipped:
+        return normal, ERROR_RAD
+    # Either may be right: half way between both is at most half of the angle wrong.
+    middle = away_from((normal[0] + against[0], normal[1] + against[1], normal[2] + against[2]))
+    half_rad = 0.5 * math.acos(agreement)
+    return middle, max(CLIPPED_ERROR_RAD, half_rad)
+
+
+# A place is good to this: the estimate wanders by some centimetres between two hits, and which part of which guard
+# touched is not known.
+PLACE_ERROR_M = 0.1
+# Normals this near to each other may be one surface's however sure each is of itself: a wall is not quite plane.
+LEAST_ANGLE_RAD = math.radians(25.0)
+# Walls of a corner stand at 90 degrees: normals that differ by more than this are never one surface's.
+MOST_ANGLE_RAD = math.radians(60.0)
+# Two places nearer to each other than this give no direction that is better than the normals.
+LEAST_BASE_M = 0.4
+
+
+def remembered(known: Sequence[Patch], touches: Sequence[Patch], clearance_m: float) -> tuple[Patch, ...]:
+    """The known patches and what the touches, in their order, add to them.
+
+    ``clearance_m``: how far the vehicle's centre stays off a surface. Through a gap of less than twice that it cannot
+    pass, so what lies on both sides of such a gap may as well be one.
+    """
+    patches = list(known)
+    for touch in touches:
+        fitting = [patch for patch in patches if is_same(patch, touch, clearance_m)]
+        patches = [patch for patch in patches if patch not in fitting]
+        patches.append(_joined(fitting, touch))
+    return tuple(patches)
+
+
+def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
+    """Whether the touch is one more of the patch's surface."""
+    place = touch.centre_ned_m
+    if patch.is_steep != touch.is_steep:
+        return False
+    errors_rad = math.hypot(patch.normal_error_rad, touch.normal_error_rad)
+    if math.acos(_agreement(patch.normal_ned, touch.normal_ned)) > min(
+        MOST_ANGLE_RAD, max(LEAST_ANGLE_RAD, 2.0 * errors_rad)
+    ):
+        return False
+    if patch.is_steep:
+        beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
+        is_near = beside_m <= patch.believed_beyond_m() + 2.0 * clearance_m
+    else:
+        along_m, height_m = patch.along_m(place), -place[2]
+        beside_m = _outside_m(along_m, patch.touched_along_m())
+        is_near = (
+            _outside_m(along_m, patch.believed_along_m()) <= 2.0 * clearance_m
+            and _outside_m(height_m, patch.believed_heights_m()) <= 2.0 * clearance_m
+        )
+    bends_m = beside_m * math.tan(min(patch.normal_error_rad, MOST_ANGLE_RAD))
+    return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + bends_m
+
+
+def _joined(patches: Sequence[Patch], touch: Patch) -> Patch:
+    """One patch of all; the normal by the means of the normals, then by the places where those lie far apart."""
+    parts = [*patches, touch]
+    weights = [part.hits / max(part.normal_error_rad, 1e-3) ** 2 for part in parts]
+    total = sum(weights)
+    n, e, d = (
+        sum(weight * part.normal_ned[axis] for weight, part in zip(weights, parts, strict=True)) for axis in range(3)
+    )
+    size = math.sqrt(n * n + e * e + d * d)
+    # Normals of one surface have errors in common (friction leans all alike): the mean is no better than the best.
+    error_rad = min(part.normal_error_rad for part in parts)
+    joined = Patch(
+        touches_ned_m=tuple(place for part in parts for place in part.touches_ned_m),
+        normal_ned=(n / size, e / size, d / size) if size > 1e-6 * total else touch.normal_ned,
+        normal_error_rad=error_rad,
+        reaches_m=max(part.reaches_m for part in parts),
+        found_at_us=min(part.found_at_us for part in parts),
+    )
+    return joined if joined.is_steep else _turned_to_places(joined)
+
+
+def _turned_to_places(patch: Patch) -> Patch:
+    """A wall's normal square to the line through its touches (least squares), as far as those are apart enough."""
+    (north, east, _), places = mean_of(patch.touches_ned_m), patch.touches_ned_m
+    nn = sum((n - north) ** 2 for n, _, _ in places)
+    ee = sum((e - east) ** 2 for _, e, _ in places)
+    ne = sum((n - north) * (e - east) for n, e, _ in places)
+    low_m, high_m = patch.touched_along_m()
+    base_m = high_m - low_m
+    if base_m < LEAST_BASE_M:
+        return patch
+    error_rad = math.atan(2.0 * PLACE_ERROR_M / base_m)
+    if error_rad >= patch.normal_error_rad:
+        return patch
+    along_rad = 0.5 * math.atan2(2.0 * ne, nn - ee)
+    normal = (-math.sin(along_rad), math.cos(along_rad), 0.0)
+    if normal[0] * patch.normal_ned[0] + normal[1] * patch.normal_ned[1] < 0.0:
+        normal = (-normal[0], -normal[1], 0.0)
+    return replace(patch, normal_ned=normal, normal_error_rad=error_rad)
+
+
+def _outside_m(value: float, bounds: tuple[float, float]) -> float:
+    return max(0.0, bounds[0] - value, value - bounds[1])

@@ -1,19 +1,37 @@
-"""The mission file as a model. Coordinates: NED, relative to the arming position, aligned north."""
+"""The mission file as a model, and its ways worked out beforehand: where each step begins, how it goes, how long.
+
+Coordinates: NED, relative to the arming position, aligned north.
+"""
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
+from companion.memory.surroundings import Surroundings
+from companion.messages import Vector3
+from companion.mission import items
 from companion.mission.config import CompanionConfig
 from companion.mission.fence import Fence
-from companion.mission.itinerary import first_complaint
+from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, Resume
-from companion.mission.program import MissionItem
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.laws import RECOVERY_LAWS, check_known_law
+from companion.ways.course import Pace, Planned, climb, home_around, way_around
+from companion.ways.trajectory import Chain, LineProfile, Trajectory
 from companion.written import Written
+
+
+def _known_law(recovery: RecoveryConfig) -> RecoveryConfig:
+    check_known_law(recovery.law, RECOVERY_LAWS)
+    return recovery
+
+
+KnownRecovery = Annotated[RecoveryConfig, AfterValidator(_known_law)]
 
 
 class Mission(Written):
@@ -29,7 +47,7 @@ class Mission(Written):
     """Flown in order; take-off first, land or return last."""
     on_collision: OnCollision = OnCollision()
     """What follows a hit, where the item says nothing else."""
-    recovery: RecoveryConfig = RecoveryConfig()
+    recovery: KnownRecovery = RecoveryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
     on_interrupt: Handover = "hold"
@@ -37,12 +55,6 @@ class Mission(Written):
     companion: CompanionConfig = CompanionConfig()
     resume: Resume | None = None
     sim: dict[str, object] | None = None
-
-    @field_validator("recovery")
-    @classmethod
-    def _known_law(cls, recovery: RecoveryConfig) -> RecoveryConfig:
-        check_known_law(recovery.law, RECOVERY_LAWS)
-        return recovery
 
     @model_validator(mode="after")
     def _takeoff_first_land_last(self) -> Self:
@@ -81,3 +93,142 @@ class Mission(Written):
         if complaint is not None:
             raise ValueError(complaint)
         return self
+
+
+# Setpoints this far apart in time are looked at for the fence: 4 cm at 2 m/s, as they are sent.
+_LOOK_EVERY_S = 0.02
+_MOST_LOOKS = 20_000
+# A point on the boundary, computed, may lie outside by a rounding error.
+_ROUNDING_M = 1e-6
+# PX4's MPC_LAND_SPEED, and the second and two it takes to be sure and to disarm.
+LANDING_SPEED_M_S = 0.7
+LANDING_EXTRA_S = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One step in mission coordinates. `lasts_s` is None for a wait without a known end.
+
+    `is_cut_off`: what is known beforehand leaves no way there; `is_detour`: the way leads round it.
+    """
+
+    step: items.Step
+    start_ned_m: Vector3
+    way: Trajectory | None
+    lasts_s: float | None
+    is_cut_off: bool = False
+    is_detour: bool = False
+
+    @property
+    def end_ned_m(self) -> Vector3:
+        return self.start_ned_m if self.way is None else self.way.target_m
+
+
+def itinerary(mission: Mission) -> tuple[Leg, ...]:
+    """The mission when nothing is hit, round what is known beforehand."""
+    return tuple(_legs(mission, mission.obstacles.patches()))
+
+
+def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
+    """The program, or what of it an interrupted flight has left: up, to where its step begins, and on from there.
+
+    Raises ValueError for a step that there is not.
+    """
+    steps = items.program(mission.items)
+    if mission.resume is None:
+        return steps
+    at = mission.resume.at_step
+    if at >= len(steps):
+        raise ValueError(f"resume.at_step: the mission has {len(steps)} steps, counted from 0; there is no {at}")
+    begin = tuple(_legs(mission))[at]
+    there = items.GoToItem(position_ned_m=begin.start_ned_m)
+    back = items.Step(at, begin.step.label, items.MissionItem(go_to=there), there)
+    paces = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, items.SetSpeedItem)]
+    return (steps[0], *paces[-1:], back, *steps[at:])
+
+
+def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
+    place: Vector3 = (0.0, 0.0, 0.0)
+    known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    flight = mission.companion.flight
+    pace = Pace.of(flight)
+    for step in items.program(mission.items):
+        action = step.action
+        way: Trajectory | None = None
+        lasts_s: float | None = 0.0
+        planned: Planned | None = None
+        match action:
+            case items.TakeoffItem():
+                way = climb(place, action.height_m, flight)
+            case items.HoldItem():
+                lasts_s = action.duration_s
+            case items.WaitForItem():
+                lasts_s = step.item.timeout_s
+            case items.SetSpeedItem():
+                pace = pace.changed_to(action)
+            case items.SetYawItem():
+                lasts_s = 180.0 / action.rate_deg_s
+            case items.ExpectItem():
+                pass
+            case items.ReturnItem():
+                planned = home_around(place, action, pace, known)
+                lasts_s = _landing_s(place if planned.way is None else planned.way.target_m)
+            case items.LandItem():
+                lasts_s = _landing_s(place)
+            case _:
+                planned = way_around(action, place, pace, known)
+        way = way if planned is None else planned.way
+        if way is not None:
+            assert lasts_s is not None
+            lasts_s += way.duration_s
+        is_cut_off = planned is not None and planned.way is None
+        leg = Leg(step, place, way, lasts_s, is_cut_off, planned is not None and planned.is_detour)
+        yield leg
+        place = leg.end_ned_m
+
+
+def _landing_s(place: Vector3) -> float:
+    return -place[2] / LANDING_SPEED_M_S + LANDING_EXTRA_S
+
+
+def first_complaint(mission: Mission) -> str | None:
+    """What is wrong with the first way that leaves the fence, or None. Raises ValueError, too."""
+    steps_to_fly(mission)
+    seen: set[tuple[int, Vector3]] = set()
+    for leg in _legs(mission):
+        # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.
+        if leg.way is None or (id(leg.step.action), leg.start_ned_m) in seen:
+            continue
+        seen.add((id(leg.step.action), leg.start_ned_m))
+        number = leg.step.label.partition(" ")[0]
+        complaint = mission.fence.complaint(leg.end_ned_m)
+        if complaint is not None:
+            return f"items: the position of item {number} ({leg.step.name}) {complaint}"
+        if not isinstance(leg.step.action, items.TakeoffItem):
+            complaint = _way_complaint(mission.fence, leg.way)
+        if complaint is not None:
+            return f"items: on its way item {number} ({leg.step.name}) {complaint}"
+    return None
+
+
+def _way_complaint(fence: Fence, way: Trajectory) -> str | None:
+    if isinstance(way, Chain):
+        return next((complaint for part in way.parts if (complaint := _way_complaint(fence, part))), None)
+    if isinstance(way, LineProfile):
+        # Between two heights that are allowed, and two places in a round fence, a line is allowed too.
+        start, end = way.start_m[:2], way.target_m[:2]
+        leaves = fence.shortened(start, end)
+        is_out = math.dist(leaves, end) > _ROUNDING_M
+        return f"leaves fence.polygon_ne_m at [{leaves[0]:.2f}, {leaves[1]:.2f}]" if is_out else None
+    looks = min(_MOST_LOOKS, math.ceil(way.duration_s / _LOOK_EVERY_S))
+    for look in range(looks):
+        position = way.at(way.duration_s * look / looks)[0]
+        beyond_m = max(fence.outside_by_m(position), position[2] + fence.min_height_m)
+        if beyond_m > _ROUNDING_M:
+            return fence.complaint(position)
+    return None
+
+
+def longest_s(mission: Mission, wait_s: float) -> float:
+    """Time of all steps, `wait_s` for each wait without a known end."""
+    return sum(wait_s if leg.lasts_s is None else leg.lasts_s for leg in itinerary(mission))

@@ -13,12 +13,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from companion.estimate.normal import Search, further
-from companion.guard.attached import AttachedGuard, AttachedStep
+from companion.guard.attached import SETPOINTS, AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
-from companion.guard.gate import SETPOINTS
-from companion.guard.guard import collisions
 from companion.guard.states import State
-from companion.mavlink.fields import HEARD
+from companion.mavlink.readers import HEARD
 from companion.report import CollisionReport, Event
 from companion.shell.clock import Clock
 from companion.shell.mavsdk_link import GuardError, MavsdkLink
@@ -31,7 +29,7 @@ START_TIMEOUT_S = 20.0
 # How long a thread of the program's that computes may keep Python from MAVSDK's: between the datagram that shows a hit
 # and the setpoint it is waited for up to three times. Python's own 5 ms would be 15; this costs such a thread some 1 %.
 SWITCH_INTERVAL_S = 0.0001
-# Giving back takes 10 ms. At most three modes are asked for, each given up after 2.5 s (flight.command_client), after a
+# Giving back takes 10 ms. At most three modes are asked for, each given up after 2.5 s (link.commands), after a
 # wait for a report of the present one.
 GIVING_BACK_US = 10_000_000
 # A setpoint's interval.
@@ -126,7 +124,7 @@ class CollisionGuard:
     @property
     def collisions(self) -> tuple[CollisionReport, ...]:
         with self._changed:
-            return collisions(self._guard.core)
+            return self._guard.core.collisions()
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Block until the condition holds; looked at whenever something has happened."""

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import TypeAlias
 
-from companion.link.identity import AUTOPILOT_COMPONENT_ID
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
 from companion.mavlink.decode import KNOWN_IDS, checksum_holds
 from companion.mavlink.packet import message_id_of, packet_length, source_of
 

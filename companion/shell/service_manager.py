@@ -7,79 +7,52 @@ loop that hangs.
 import os
 import socket
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 # As often as a person reads a line, and as PX4 sends its heartbeat.
 STATUS_EVERY_US = 1_000_000
 
 
-@dataclass(slots=True)
-class Notices:
-    """What is due after a step; times in microseconds, any epoch. What was not sent is due again."""
-
-    watchdog_us: int | None  # how long systemd waits for a sign of life; None: it does not
-    is_ready: bool = False
-    is_stopping: bool = False
-    status: str = ""
-    _fed_us: int | None = None
-    _looked_us: int | None = None  # at the status
-
-    def due(self, is_heard: bool, is_ending: bool, status: Callable[[], str], now_us: int) -> list[str]:
-        lines = ["READY=1"] if is_heard and not self.is_ready else []
-        if is_ending and not self.is_stopping:
-            lines.append("STOPPING=1")
-        # Half of the time that systemd waits, as sd_watchdog_enabled(3) asks.
-        if self.watchdog_us is not None and _has_passed(self._fed_us, self.watchdog_us // 2, now_us):
-            lines.append("WATCHDOG=1")
-        if _has_passed(self._looked_us, STATUS_EVERY_US, now_us):
-            self._looked_us = now_us
-            if (text := status()) != self.status:
-                lines.append(f"STATUS={text}")
-        return lines
-
-    def told(self, lines: list[str], now_us: int) -> None:
-        """These have been sent."""
-        for line in lines:
-            name, _, value = line.partition("=")
-            if name == "READY":
-                self.is_ready = True
-            elif name == "STOPPING":
-                self.is_stopping = True
-            elif name == "WATCHDOG":
-                self._fed_us = now_us
-            else:
-                self.status = value
-
-
-def _has_passed(since_us: int | None, interval_us: int, now_us: int) -> bool:
-    return since_us is None or now_us - since_us >= interval_us
-
-
 class ServiceManager:
-    """The socket of $NOTIFY_SOCKET. No call waits or raises; what could not be sent is due again at the next step."""
+    """The socket of $NOTIFY_SOCKET. No call waits or raises; what could not be sent is due again at the next step.
+
+    Times in microseconds, any epoch. `watchdog_us`: how long systemd waits for a sign of life; None: it does not.
+    """
 
     def __init__(self, address: str, watchdog_us: int | None) -> None:
         self._address = "\0" + address[1:] if address.startswith("@") else address
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._notices = Notices(watchdog_us)
+        self._watchdog_us = watchdog_us
+        self._told: dict[str, str] = {}
+        self._fed_us: int | None = None
+        self._looked_us: int | None = None  # at the status
         self._error: OSError | None = None
         self._is_told = False
 
     def stepped(self, is_heard: bool, is_ending: bool, status: Callable[[], str], now_us: int) -> None:
         """After each step that decides: whether the vehicle is heard, and whether this is the beginning of the end."""
-        lines = self._notices.due(is_heard, is_ending, status, now_us)
-        if not lines:
+        due = {"READY": "1"} if is_heard else {}
+        if is_ending:
+            due["STOPPING"] = "1"
+        if _has_passed(self._looked_us, STATUS_EVERY_US, now_us):
+            self._looked_us, due["STATUS"] = now_us, status()
+        due = {name: value for name, value in due.items() if self._told.get(name, "") != value}
+        # Half of the time that systemd waits, as sd_watchdog_enabled(3) asks.
+        is_hungry = self._watchdog_us is not None and _has_passed(self._fed_us, self._watchdog_us // 2, now_us)
+        if is_hungry:
+            due["WATCHDOG"] = "1"
+        if not due:
             return
         try:
-            self._socket.sendto("\n".join(lines).encode(), self._address)
+            self._socket.sendto("\n".join(f"{name}={value}" for name, value in due.items()).encode(), self._address)
         except BlockingIOError:
             # systemd is busy: the next step tries again.
             return
         except OSError as error:
             self._error = error
             return
-        self._notices.told(lines, now_us)
+        self._told |= due
+        self._fed_us = now_us if is_hungry else self._fed_us
 
     def news(self) -> str | None:
         """Why systemd is not told, once."""
@@ -87,6 +60,10 @@ class ServiceManager:
             return None
         self._is_told = True
         return f"systemd is not told: {self._error.strerror or self._error}"
+
+
+def _has_passed(since_us: int | None, interval_us: int, now_us: int) -> bool:
+    return since_us is None or now_us - since_us >= interval_us
 
 
 def service_manager(environment: Mapping[str, str] | None = None) -> ServiceManager | None:

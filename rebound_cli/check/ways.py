@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from companion.mission.itinerary import Leg, itinerary
-from companion.mission.model import Mission
+from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.inputs import SimulatedWorld
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene

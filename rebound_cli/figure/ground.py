@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 from shapely import MultiPoint, get_coordinates
 
 from companion.memory.patch import Patch
-from companion.memory.shape import outline
+from companion.memory.surroundings import outline
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import Box, Obstacle, Pole
 

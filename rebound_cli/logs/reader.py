@@ -5,7 +5,7 @@ import struct
 from collections import Counter
 from pathlib import Path
 
-from companion.link.identity import Identity, identify, is_autopilot
+from companion.link.vehicle import Identity, identify, is_autopilot
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId

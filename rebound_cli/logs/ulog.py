@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pyulog import ULog
 
 from companion import messages
-from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
+from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
 from rebound_cli.logs.log import Demand, Heard, Log, LogError, other_arms, vector
 
 Floats = npt.NDArray[np.float64]

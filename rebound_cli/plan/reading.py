@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from companion.errors import ConfigurationError
-from companion.mavlink.fields import command_name
+from companion.mavlink.encode import command_name
 from companion.messages import Vector3
 from companion.mission.items import MAX_SPEED_M_S
 from rebound_cli.plan import shape

@@ -6,10 +6,9 @@ from typing import Any
 
 from companion.messages import Vector3
 from companion.mission import items
-from companion.mission.expectations import ExpectItem
 from companion.mission.fence import Fence
-from companion.mission.itinerary import Leg, itinerary
-from companion.mission.model import Mission
+from companion.mission.items import ExpectItem
+from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.plan import shape
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place

@@ -13,10 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from companion.companion import Companion
-from companion.core import situation
 from companion.detection.interface import Situation
 from companion.guard.config import GuardConfig
-from companion.guard.core import situation as guard_situation
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
@@ -186,6 +184,4 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
 
 
 def _known(stepped: Companion | Guard) -> Situation:
-    if stepped.core is None:
-        return Situation(off_reason="connect")
-    return guard_situation(stepped.core) if isinstance(stepped, Guard) else situation(stepped.core)
+    return Situation(off_reason="connect") if stepped.core is None else stepped.core.situation()

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from companion.errors import ConfigurationError
-from companion.preflight.checks import Finding, Verdict
+from companion.preflight import Finding, Verdict
 from rebound_cli.preflight import show_findings
 from rebound_cli.service.files import UNIT, UNIT_NAME, USER, PlannedFile, ServiceSettings
 from rebound_cli.service.system import System, answer, hidden_program

@@ -7,11 +7,10 @@ from collections.abc import Iterable
 from pymavlink.dialects.v20 import development as mav
 
 from bench.faults.envelope import outside
-from companion.mavlink.decode import CONVERTERS
-from companion.mavlink.frequent import FREQUENT
+from companion.mavlink.readers import READERS
 from tests.companion.fake_vehicle import INTERVAL_US, FakeVehicle, Flight, flight
 
-HEARD = sorted({*CONVERTERS, *FREQUENT})
+HEARD = sorted(READERS)
 # The states of a flight, and a mission that passes them all: into a wall, home and down.
 STATES = ("connect", "takeoff", "mission", "recovering", "holding", "returning", "landing")
 ITEMS = [

@@ -6,11 +6,9 @@ import random
 import pytest
 
 from companion.estimate.settling import SettlingMonitor
-from companion.flight.authority import Holder, who_decided
-from companion.flight.command_client import ATTEMPTS, CommandClient
-from companion.flight.trajectory import LineProfile
-from companion.link.identity import Identity, identify
-from companion.link.vehicle import ModeReport, Vehicle
+from companion.flight.ending import Holder, who_decided
+from companion.link.commands import ATTEMPTS, CommandClient
+from companion.link.vehicle import Identity, ModeReport, Vehicle, identify
 from companion.messages import (
     CommandAck,
     CommandResult,
@@ -23,6 +21,7 @@ from companion.messages import (
 )
 from companion.mission.config import SettledConfig
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, mode_name
+from companion.ways.trajectory import LineProfile
 
 # --- trajectory
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from companion.flight.context import Expectation
 from companion.flight.expecting import review
-from companion.mission.expectations import ExpectItem
+from companion.mission.items import ExpectItem
 from tests.companion.fake_vehicle import FakeVehicle, Flight, flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}

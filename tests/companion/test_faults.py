@@ -53,7 +53,7 @@ def broken_target(self, now_us):
     ("place", "does"),
     [
         ("companion.flight.progress.FlyItems.target", broken_target),
-        ("companion.flight.limiting.bounded", breaks),
+        ("companion.core.bounded", breaks),
         ("companion.core.status_text", breaks),
         ("companion.mavlink.encode.Encoder._setpoint", breaks),
     ],
@@ -92,7 +92,7 @@ def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
 def test_when_even_the_hand_over_breaks_silence_leaves_the_vehicle_to_its_failsafe(monkeypatch):
     f = in_mission()
     monkeypatch.setattr(FlyItems, "step", breaks)
-    monkeypatch.setattr("companion.flight.handover.HandOver.step", breaks)
+    monkeypatch.setattr("companion.flight.ending.HandOver.step", breaks)
     f.run_to_end(1.0)
     since = f.now_us
     f.run_for(2.0)

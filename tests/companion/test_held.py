@@ -7,10 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from companion.core import Limiter
 from companion.flight.context import Target
-from companion.flight.envelope import Surroundings, bounded
-from companion.flight.held import HELD_S, NOTICED_S, Known, held_way, touched, unattended_text
-from companion.flight.limiting import Limiter
+from companion.flight.envelope import (
+    HELD_S,
+    NOTICED_S,
+    Known,
+    Surroundings,
+    bounded,
+    held_way,
+    touched,
+    unattended_text,
+)
 from companion.flight.plan import mission_lines
 from companion.flight.remembering import known_surfaces
 from companion.memory.patch import Patch

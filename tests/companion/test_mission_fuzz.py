@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from companion.mission.itinerary import itinerary, longest_s, steps_to_fly
-from companion.mission.model import Mission
+from companion.mission.model import Mission, itinerary, longest_s, steps_to_fly
 
 WHOLE = {
     "name": "t",

@@ -6,8 +6,8 @@ import math
 import pytest
 from pydantic import ValidationError
 
+from companion.mission.items import program
 from companion.mission.model import Mission
-from companion.mission.program import program
 from tests.companion.fake_vehicle import LOITER, Flight, flight
 
 TAKEOFF, LAND = {"takeoff": {"height_m": 1.5}}, {"land": {}}

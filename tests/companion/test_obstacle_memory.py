@@ -4,10 +4,16 @@ import math
 
 import pytest
 
-from companion.memory.merging import is_same, patch_of, remembered
-from companion.memory.patch import GOES_ON_MOST_M, REACHES_M, Touch
+from companion.memory.patch import (
+    GOES_ON_MOST_M,
+    LEAST_SPEED_M_S,
+    REACHES_M,
+    Patch,
+    is_same,
+    remembered,
+    touch_of,
+)
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, describe, file_data
-from companion.memory.touching import LEAST_SPEED_M_S, touch_of
 
 CLEARANCE_M = 0.55
 SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
@@ -15,8 +21,8 @@ SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
 
 def wall_touch(
     east_m: float, height_m: float = 1.5, normal=SOUTH, error_deg: float = 15.0, north_m: float = 4.0
-) -> Touch:
-    return Touch((north_m, east_m, -height_m), normal, math.radians(error_deg), REACHES_M, 1)
+) -> Patch:
+    return Patch(((north_m, east_m, -height_m),), normal, math.radians(error_deg), REACHES_M, 1)
 
 
 def turned(deg: float):
@@ -32,7 +38,7 @@ def deg(rad: float) -> float:
 
 def test_the_surface_is_a_guards_reach_ahead_of_the_centre():
     touch = touch_of((3.8, 1.0, -1.5), (2.0, 0.0, 0.0), SOUTH, False, 0.2, 7)
-    assert touch.place_ned_m == pytest.approx((4.0, 1.0, -1.5))
+    assert touch.centre_ned_m == pytest.approx((4.0, 1.0, -1.5))
     assert touch.normal_ned == SOUTH and touch.reaches_m == REACHES_M and touch.found_at_us == 7
 
 
@@ -46,7 +52,7 @@ def test_a_normal_that_points_across_the_approach_and_beyond_is_not_believed():
 def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
     """A screen that overtakes is behind the vehicle, where it comes from, and not in its way."""
     touch = touch_of((3.0, 1.0, -1.5), (1.0, 0.0, 0.0), NORTH, True, 0.2, 0)
-    assert touch.place_ned_m == pytest.approx((2.8, 1.0, -1.5))
+    assert touch.centre_ned_m == pytest.approx((2.8, 1.0, -1.5))
     assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
 
 
@@ -54,7 +60,7 @@ def test_what_is_known_to_have_come_after_the_vehicle_keeps_its_side():
     """Pushed off to the north by a cart the vehicle drifts east, fast: the cart is south of it all the same."""
     touch = touch_of((3.0, 1.0, -1.5), (0.2, 1.0, 0.0), NORTH, False, 0.2, 0, is_behind=True)
     assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
-    assert touch.place_ned_m == pytest.approx((2.8, 1.0, -1.5))
+    assert touch.centre_ned_m == pytest.approx((2.8, 1.0, -1.5))
 
 
 def test_a_clipped_normal_is_met_half_way_and_less_sure():
@@ -122,7 +128,7 @@ def test_the_places_give_a_better_normal_than_the_pushes():
 )
 def test_another_surface_is_another_patch(other):
     assert len(remembered((), [wall_touch(0.0), other], CLEARANCE_M)) == 2
-    assert not is_same(patch_of(wall_touch(0.0)), other, CLEARANCE_M)
+    assert not is_same(wall_touch(0.0), other, CLEARANCE_M)
 
 
 def test_a_touch_between_two_patches_joins_them():
@@ -139,7 +145,7 @@ def test_an_uncertain_normal_does_not_split_a_wall():
 
 
 def test_a_ceiling_is_believed_upwards_without_an_end():
-    lid = Touch((1.0, 1.0, -2.5), (0.0, 0.0, 1.0), math.radians(15.0), REACHES_M, 0)
+    lid = Patch(((1.0, 1.0, -2.5),), (0.0, 0.0, 1.0), math.radians(15.0), REACHES_M, 0)
     (patch,) = remembered((), [lid], CLEARANCE_M)
     assert patch.is_steep and patch.believed_heights_m() == (2.5, math.inf)
 

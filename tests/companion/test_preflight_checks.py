@@ -17,8 +17,7 @@ from companion.messages import (
     Vibration,
 )
 from companion.mission.config import CompanionConfig
-from companion.preflight.checks import Verdict, findings
-from companion.preflight.survey import PARAMETERS, Survey, advance, start_survey
+from companion.preflight import PARAMETERS, Survey, Verdict, advance, findings, start_survey
 
 PX4 = Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {

@@ -3,8 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from companion.mission.itinerary import steps_to_fly
-from companion.mission.model import Mission
+from companion.mission.model import Mission, steps_to_fly
 from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
 
 ITEMS = [

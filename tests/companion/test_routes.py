@@ -6,17 +6,13 @@ from itertools import pairwise
 import pytest
 from shapely import LineString, Point
 
-from companion.flight.around import home_around, passed, way_around
-from companion.flight.course import Pace
-from companion.flight.curve import CurveProfile
-from companion.memory.merging import remembered
-from companion.memory.patch import REACHES_M, Patch, Touch
+from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
-from companion.memory.shape import believed, core
-from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings
-from companion.memory.touching import touch_of
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings, believed, core
 from companion.mission.fence import Fence
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
+from companion.ways.course import Pace, home_around, passed, way_around
+from companion.ways.trajectory import CurveProfile
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M
@@ -210,7 +206,7 @@ def test_what_has_been_flown_of_a_path_is_not_flown_again():
 # --- touch after touch
 
 
-def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) -> tuple[list[Touch], bool]:
+def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) -> tuple[list[Patch], bool]:
     """A point with the vehicle's reach, a wall 4 m north, and a memory; touches until it is through or gives up."""
     fence, touches, start = Fence(radius_m=11, max_height_m=2.4), [], START
     while len(touches) < limit:
@@ -228,7 +224,7 @@ def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) 
         touch = touch_of(place, velocity, seen, error_deg > 25.0, REACH_M, 0)
         # Then no touch is made where a wall is remembered
         for patch in known.patches:
-            assert core(patch).distance(Point(touch.place_ned_m[:2])) > 0.1
+            assert core(patch).distance(Point(touch.centre_ned_m[:2])) > 0.1
         touches.append(touch)
         start = tuple(p + 0.4 * x for p, x in zip(place, normal, strict=True))
     return touches, False

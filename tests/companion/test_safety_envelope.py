@@ -13,9 +13,9 @@ from bench.faults.packets import made
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
 from companion.flight.envelope import SetpointError, Surroundings, bounded
-from companion.flight.trajectory import LineProfile
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
+from companion.ways.trajectory import LineProfile
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked
 

@@ -8,7 +8,7 @@ import uuid
 
 import pytest
 
-from companion.shell.service_manager import STATUS_EVERY_US, Notices, ServiceManager, service_manager
+from companion.shell.service_manager import STATUS_EVERY_US, ServiceManager, service_manager
 
 SECOND_US = 1_000_000
 
@@ -47,21 +47,22 @@ def test_ready_at_the_first_heartbeat_and_the_end_is_told_once(systemd):
     assert manager.news() is None
 
 
-def test_the_watchdog_is_fed_by_each_step_that_is_due_at_half_its_time():
-    notices = Notices(watchdog_us=5 * SECOND_US)
+def test_the_watchdog_is_fed_by_each_step_that_is_due_at_half_its_time(systemd):
+    bound, address = systemd
+    manager = ServiceManager(address, watchdog_us=5 * SECOND_US)
     fed_at_us = []
     # When steps come every 50 ms for 20 s
     for now_us in range(0, 20 * SECOND_US, 50_000):
-        lines = notices.due(True, False, lambda: "", now_us)
-        notices.told(lines, now_us)
-        if "WATCHDOG=1" in lines:
+        manager.stepped(True, False, lambda: "", now_us)
+        if "WATCHDOG=1" in heard(bound):
             fed_at_us.append(now_us)
     # Then it is fed twice in its time; where no step comes, nothing feeds it
     assert fed_at_us == list(range(0, 20 * SECOND_US, 2_500_000))
 
 
-def test_a_status_is_told_once_a_second_where_it_has_changed():
-    notices, asked = Notices(None), []
+def test_a_status_is_told_once_a_second_where_it_has_changed(systemd):
+    bound, address = systemd
+    manager, asked = ServiceManager(address, None), []
 
     def status():
         asked.append(True)
@@ -69,9 +70,8 @@ def test_a_status_is_told_once_a_second_where_it_has_changed():
 
     told = []
     for now_us in range(0, 9 * SECOND_US, 4_000):
-        lines = notices.due(False, False, status, now_us)
-        notices.told(lines, now_us)
-        told += [(now_us, line) for line in lines]
+        manager.stepped(False, False, status, now_us)
+        told += [(now_us, line) for line in heard(bound)]
     assert [line for _, line in told] == [f"STATUS={count} kB/s" for count in range(len(told))]
     assert len(told) == 5 and len(asked) == 9
     assert all(b - a >= STATUS_EVERY_US for (a, _), (b, _) in itertools.pairwise(told))

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.guard.core import POLL_INTERVAL_US
+from companion.core import POLL_INTERVAL_US
 from companion.guard.states import State
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER
 from companion.shell import mavsdk_guard

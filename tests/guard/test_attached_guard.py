@@ -2,8 +2,8 @@
 
 import pytest
 
+from companion.guard.attached import Gate
 from companion.guard.config import GuardConfig
-from companion.guard.gate import Gate
 from companion.guard.holding import is_foreign
 from companion.guard.states import State
 from companion.messages import PositionTarget, Refused
@@ -111,15 +111,15 @@ def test_the_gate_knows_its_own_by_content_and_each_but_once():
 def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
     from pymavlink.dialects.v20 import development as dialect
 
-    from companion.mavlink.decode import GUARD_CONVERTERS, Decoder
-    from companion.mavlink.fields import sample_from
+    from companion.mavlink.decode import Decoder
+    from companion.mavlink.readers import GUARD_READERS, sample_from
     from sim_vehicle.airframe import load_built_in
     from sim_vehicle.scene import Scene
     from sim_vehicle.vehicle import SimulatedVehicle
     from tests.guard.attached_air import fields_of
 
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), 1)
-    decoder, parser = Decoder(GUARD_CONVERTERS), dialect.MAVLink(None)
+    decoder, parser = Decoder(GUARD_READERS), dialect.MAVLink(None)
     decoder.listen_to(1, 1)
     kinds = set()
     for _ in range(1000):
@@ -133,7 +133,7 @@ def test_what_the_samples_say_is_the_same_by_fields_as_by_bytes():
 
 
 def test_fields_of_another_dialect_make_no_sample_and_no_error():
-    from companion.mavlink.fields import sample_from
+    from companion.mavlink.readers import sample_from
 
     assert sample_from("HIGHRES_IMU", (1, 1), {"message_id": 105}) is None
     assert sample_from("HEARTBEAT", (1, 1), {"type": None, "custom_mode": None}) is None
@@ -143,7 +143,7 @@ def test_fields_of_another_dialect_make_no_sample_and_no_error():
 
 
 def test_an_echo_is_a_strangers_unless_the_guard_asked_for_that_place_or_for_a_lean_of_late():
-    guard = AttachedAir().guard.core.guard
+    guard = AttachedAir().guard.core.flight
     there, elsewhere, no_place = (PositionTarget(place) for place in ((1.0, 0.0, -2.0), (2.0, 0.0, -2.0), None))
     guard.sent_ned_m.append((1_000_000, (1.1, 0.0, -2.0)))
     assert [is_foreign(guard, echo, 1_100_000) for echo in (there, elsewhere, no_place)] == [False, True, True]

@@ -3,7 +3,6 @@
 import pytest
 from pymavlink.dialects.v20 import development as dialect
 
-from companion.guard.core import situation
 from companion.guard.states import State
 from tests.guard.flying import EPOCH_US, MANUAL_POSITION, Air
 from tests.guard.test_guard_flights import pushed_into_the_wall
@@ -23,10 +22,10 @@ def test_a_vehicle_that_a_hit_throws_down_is_watched_until_it_scrapes_along_the_
     north, east, down = air.position()
     core.flight.origin_ned_m = (north, east, down + 0.3)
     air.step()
-    assert situation(core).off_reason is None
+    assert core.situation().off_reason is None
     core.flight.origin_ned_m = (north, east, down + 0.05)
     air.step()
-    assert situation(core).off_reason == "below 0.1 m"
+    assert core.situation().off_reason == "below 0.1 m"
 
 
 def test_a_mode_that_a_person_chose_just_before_the_vehicle_is_given_back_is_not_overruled():

@@ -170,11 +170,11 @@ def test_the_next_flight_is_guarded_again():
     assert air.state is State.RECOVERING
     air.mode(LAND)
     air.until(lambda: air.state is State.STOOD_DOWN, 1.0)
-    assert air.guard.core.guard.hits > 0
+    assert air.guard.core.flight.hits > 0
     air.until(lambda: air.state is State.STANDING_BY, 30.0)
     assert air.guard.status().armed is False
     # the hits allowed are those of a flight
-    assert air.guard.core.guard.hits == 0
+    assert air.guard.core.flight.hits == 0
 
 
 def test_a_vehicle_that_refuses_offboard_is_asked_to_hold():
@@ -307,4 +307,4 @@ def test_one_forged_packet_is_no_hit_and_the_mode_before_is_given_back():
     assert air.until(lambda: air.state is State.WATCHING, 3.0) < 1.0
     air.until(lambda: air.vehicle_mode() == "POSCTL", 1.0)
     assert [event.kind for event in air.events].count("unconfirmed") == 1
-    assert air.guard.core.machine.guard.hits == 0
+    assert air.guard.core.flight.hits == 0

@@ -7,8 +7,8 @@ from pathlib import Path
 from shapely import Point
 
 from companion.memory.patch import Patch
-from companion.memory.shape import core
 from companion.memory.stored import KnownPatch
+from companion.memory.surroundings import core
 from companion.report import FlightReport
 from rebound_cli.inputs import mission_from, world_from
 from rebound_cli.interrupts import Interrupts

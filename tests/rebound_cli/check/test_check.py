@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from companion.mission.program import ACTIONS
+from companion.mission.items import ACTIONS
 from rebound_cli.check.command import mission_schema
 from rebound_cli.check.picture import ends
 from rebound_cli.check.ways import planned_ways

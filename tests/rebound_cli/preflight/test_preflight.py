@@ -1,8 +1,7 @@
 """`rebound preflight` on the simulated vehicle, through the wire."""
 
 from companion.mission.config import CompanionConfig
-from companion.preflight.checks import Verdict
-from companion.preflight.preflight import Preflight
+from companion.preflight import Preflight, Verdict
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
@@ -27,7 +26,7 @@ def exchange(preflight: Preflight, vehicle: SimulatedVehicle, sending: tuple[byt
 def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_open():
     preflight, _ = surveyed()
     found = {finding.item: finding for finding in preflight.findings()}
-    assert preflight.survey.identity is not None
+    assert preflight.survey.vehicle.identity is not None
     assert not [item for item, finding in found.items() if finding.verdict is Verdict.BAD]
     assert [item for item, finding in found.items() if finding.fix] == [
         "COM_OBL_RC_ACT",

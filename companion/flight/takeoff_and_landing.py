@@ -1,15 +1,14 @@
-"""State takeoff: setpoints, OFFBOARD, arm, climb."""
+"""State takeoff: setpoints, OFFBOARD, arm, climb. State landing: PX4's own land mode, and out of it after a hit."""
 
 import math
-from enum import Enum
 
 from companion.estimate.rotation import yaw_rad
-from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
+from companion.flight.context import Activity, FlightContext, Inputs, Move, Target, as_text
 from companion.flight.states import Trigger
-from companion.flight.trajectory import LineProfile
 from companion.messages import SetArmed, SetMode, Vector3
 from companion.mission.items import TakeoffItem
-from companion.px4_mode import OFFBOARD
+from companion.px4_mode import AUTO_LAND, OFFBOARD
+from companion.ways.trajectory import LineProfile
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
 ORIGIN_MEAN_US = 1_000_000
@@ -24,19 +23,13 @@ BOOT_CLOCK_SLACK_US = 3_000_000
 MOST_AHEAD_M = 0.15
 
 
-class Step(Enum):
-    LEAD = "streaming setpoints"
-    MODE = "switching to OFFBOARD"
-    ARM = "arming"
-    CLIMB = "climbing"
-
-
 class TakeOff:
     """In OFFBOARD from the start, so that the same setpoint stream carries the whole flight."""
 
     def __init__(self, flight: FlightContext, item: TakeoffItem, now_us: int) -> None:
         self._flight, self._item = flight, item
-        self._step = Step.LEAD
+        # Streaming setpoints, switching to OFFBOARD, arming, climbing: one after the other.
+        self._now = self._lead
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
@@ -54,19 +47,11 @@ class TakeOff:
         return self._flight.under_way(position, self._yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        match self._step:
-            case Step.LEAD:
-                return self._lead(flight, now_us)
-            case Step.MODE:
-                return self._switch(flight, inputs, now_us)
-            case Step.ARM:
-                return self._arm(flight, inputs, now_us)
-            case Step.CLIMB:
-                return self._climb(flight, now_us)
+        return self._now(flight, inputs, now_us)
 
-    def _lead(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _lead(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
-            self._step = Step.MODE
+            self._now = self._switch
             flight.expected_mode = flight.vehicle.custom_mode
             flight.command_client.begin(SetMode(OFFBOARD))
             return self._switch(flight, Inputs(), now_us)
@@ -79,7 +64,7 @@ class TakeOff:
         if not outcome.succeeded:
             return Move(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
         flight.expected_mode = OFFBOARD
-        self._step = Step.ARM
+        self._now = self._arm
         flight.arming_requested = True
         flight.command_client.begin(SetArmed(True))
         return self._arm(flight, Inputs(), now_us)
@@ -90,7 +75,7 @@ class TakeOff:
             return None
         if not outcome.succeeded:
             return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
-        self._step = Step.CLIMB
+        self._now = self._climb
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.way_us
         self._ground_ned_m = mean_position(flight)
@@ -105,7 +90,7 @@ class TakeOff:
         flight.tell(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
 
-    def _climb(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         profile, latest = self._profile, flight.vehicle.history.latest()
         assert profile is not None
         limits = flight.mission.companion.flight
@@ -143,3 +128,74 @@ def mean_position(flight: FlightContext) -> Vector3:
     samples = flight.vehicle.history.between(latest.time_boot_us - ORIGIN_MEAN_US, latest.time_boot_us + 1)
     n, e, d = (sum(s.position_ned_m[axis] for s in samples) / len(samples) for axis in range(3))
     return (n, e, d)
+
+
+# From 12 m at PX4's MPC_LAND_SPEED of 0.7 m/s it takes under 30 s with detection and disarming; this allows for
+# the slowest speed it can be set to (0.6 m/s) from 60 m.
+LANDING_TIMEOUT_US = 120_000_000
+
+
+class Land:
+    """Ask for the mode, keep the setpoints going until the vehicle has taken it, then wait."""
+
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        self._started_us = now_us
+        self._target = flight.target
+        self._landing = False
+        flight.is_landing = True
+        flight.command_client.begin(SetMode(AUTO_LAND))
+
+    def target(self, now_us: int) -> Target | None:
+        return None if self._landing else self._target
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if flight.vehicle.armed is False:
+            return Move(Trigger.DISARMED)
+        if not self._landing:
+            outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == AUTO_LAND, now_us)
+            if outcome is None:
+                return None
+            if not outcome.succeeded:
+                return Move(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
+            self._landing = True
+            flight.expected_mode = AUTO_LAND
+            flight.tell(now_us, "landing", "landing here")
+        if now_us - self._started_us > LANDING_TIMEOUT_US:
+            seconds = LANDING_TIMEOUT_US // 1_000_000
+            return Move(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land")
+        return None
+
+
+# Two setpoints ahead of the mode that needs them: PX4 takes OFFBOARD once it has heard one.
+LEAD_US = 40_000
+
+
+class TakeBack:
+    """A recovery out of the land mode: its setpoints first, then OFFBOARD, in which alone they are flown.
+
+    A vehicle that does not take the mode goes on landing by itself, and is left to it.
+    """
+
+    def __init__(self, flight: FlightContext, recovery: Activity, now_us: int) -> None:
+        self._recovery = recovery
+        self._is_taken = False
+        # Of a second hit the first one's request may be on its way.
+        self._is_asked = flight.command_client.requested_mode == OFFBOARD
+        self._ask_us = now_us + (0 if self._is_asked else LEAD_US)
+        if not self._is_asked:
+            flight.command_client.cancel()
+
+    def target(self, now_us: int) -> Target | None:
+        return self._recovery.target(now_us)
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if not self._is_taken and now_us >= self._ask_us:
+            if not self._is_asked:
+                self._is_asked = True
+                flight.command_client.begin(SetMode(OFFBOARD))
+            outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
+            if outcome is not None and not outcome.succeeded:
+                return Move(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
+            if outcome is not None:
+                self._is_taken, flight.expected_mode = True, OFFBOARD
+        return self._recovery.step(flight, inputs, now_us)

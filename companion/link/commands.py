@@ -1,19 +1,10 @@
 """Commands to the vehicle: one at a time, repeated until answered, given up in the end."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from companion.messages import (
-    CommandAck,
-    CommandResult,
-    Reposition,
-    RequestMessage,
-    SendCommand,
-    SetArmed,
-    SetMessageInterval,
-    SetMode,
-    VehicleCommand,
-)
+from companion import messages
+from companion.messages import CommandResult
 from companion.px4_mode import AUTO_LOITER, mode_name
 
 # PX4 answers in 2 to 10 ms on UDP; a telemetry radio's round trip stays below half a second.
@@ -28,14 +19,14 @@ TAKEN_UP = (CommandResult.ACCEPTED, CommandResult.IN_PROGRESS)
 ATTEMPTS = 5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Pending:
     """A command on its way: sent `attempts` times, to be sent again at `repeat_at_us`."""
 
-    command: VehicleCommand
-    attempts: int
-    repeat_at_us: int
-    last_result: CommandResult | None
+    command: messages.VehicleCommand
+    attempts: int = 0
+    repeat_at_us: int = 0
+    last_result: CommandResult | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,39 +36,38 @@ class CommandOutcome:
     `refused`: it failed and the last that the vehicle said was no, rather than nothing.
     """
 
-    command: VehicleCommand
     succeeded: bool
     text: str
     refused: bool = False
 
 
-def describe(command: VehicleCommand) -> str:
+def describe(command: messages.VehicleCommand) -> str:
     match command:
-        case SetMode(custom_mode):
+        case messages.SetMode(custom_mode):
             return f"mode {mode_name(custom_mode)}"
-        case SetArmed(armed):
+        case messages.SetArmed(armed):
             return "arm" if armed else "disarm"
-        case SetMessageInterval(message_id, interval_us):
+        case messages.SetMessageInterval(message_id, interval_us):
             return f"message {message_id} every {interval_us / 1000:g} ms"
-        case RequestMessage(message_id):
+        case messages.RequestMessage(message_id):
             return f"message {message_id}"
-        case Reposition():
+        case messages.Reposition():
             return "reposition"
 
 
-def needs_confirmation(command: VehicleCommand) -> bool:
+def needs_confirmation(command: messages.VehicleCommand) -> bool:
     """PX4 may accept a mode and reject it in a second answer: modes and arming count when they are seen.
 
     Disarming does not: before the next HEARTBEAT a vehicle that has just armed still looks disarmed.
     """
-    return isinstance(command, SetMode) or (isinstance(command, SetArmed) and command.armed)
+    return isinstance(command, messages.SetMode) or (isinstance(command, messages.SetArmed) and command.armed)
 
 
-def is_final(command: VehicleCommand, result: CommandResult) -> bool:
+def is_final(command: messages.VehicleCommand, result: CommandResult) -> bool:
     """Whether asking again is useless; a disarm is refused because the vehicle flies, which will not pass soon."""
     if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
         return True
-    return result is CommandResult.TEMPORARILY_REJECTED and command == SetArmed(False)
+    return result is CommandResult.TEMPORARILY_REJECTED and command == messages.SetArmed(False)
 
 
 class CommandClient:
@@ -93,29 +83,26 @@ class CommandClient:
     @property
     def requested_mode(self) -> int | None:
         """The mode asked for and not yet confirmed."""
-        match None if self._pending is None else self._pending.command:
-            case SetMode(custom_mode):
-                return custom_mode
-            case Reposition():
-                return AUTO_LOITER
-            case _:
-                return None
+        command = None if self._pending is None else self._pending.command
+        if isinstance(command, messages.SetMode):
+            return command.custom_mode
+        return AUTO_LOITER if isinstance(command, messages.Reposition) else None
 
     @property
     def is_unsaid(self) -> bool:
         """Whether there is a command that has not been sent once."""
         return self._pending is not None and self._pending.attempts == 0
 
-    def begin(self, command: VehicleCommand) -> None:
+    def begin(self, command: messages.VehicleCommand) -> None:
         """Take up a command, dropping any other; it goes out in the next `step`."""
-        self._pending = Pending(command, 0, 0, None)
+        self._pending = Pending(command)
 
     def cancel(self) -> None:
         self._pending = None
 
     def step(
-        self, acks: Sequence[CommandAck], seen: bool, now_us: int, may_send: bool = True
-    ) -> tuple[SendCommand | None, CommandOutcome | None]:
+        self, acks: Sequence[messages.CommandAck], seen: bool, now_us: int, may_send: bool = True
+    ) -> tuple[messages.SendCommand | None, CommandOutcome | None]:
         """`seen`: the command's effect shows in the vehicle's own messages.
 
         What may not be sent when its time has come is as good as lost on the way: it counts as an attempt.
@@ -123,37 +110,29 @@ class CommandClient:
         pending = self._pending
         if pending is None:
             return None, None
-        if needs_confirmation(pending.command) and seen:
-            return self._end(True, "confirmed")
+        is_confirmed_by_sight = needs_confirmation(pending.command)
+        if is_confirmed_by_sight and seen:
+            return self._end(pending, True, "confirmed")
         for ack in acks:
             if ack.command == pending.command.command_id and pending.attempts > 0:
-                pending = self._pending = _answered(pending, ack.result, now_us)
-                if ack.result is CommandResult.ACCEPTED and not needs_confirmation(pending.command):
-                    return self._end(True, "accepted")
+                wait_us = CONFIRMATION_TIMEOUT_US if ack.result in TAKEN_UP else REFUSAL_PAUSE_US
+                pending.last_result, pending.repeat_at_us = ack.result, now_us + wait_us
+                if ack.result is CommandResult.ACCEPTED and not is_confirmed_by_sight:
+                    return self._end(pending, True, "accepted")
                 if is_final(pending.command, ack.result):
-                    return self._end(False, f"the vehicle answered {ack.result.name}")
+                    return self._end(pending, False, f"the vehicle answered {ack.result.name}")
         if now_us < pending.repeat_at_us:
             return None, None
         if pending.attempts >= ATTEMPTS:
-            return self._end(False, _why_given_up(pending))
-        self._pending = replace(pending, attempts=pending.attempts + 1, repeat_at_us=now_us + ACK_TIMEOUT_US)
-        return SendCommand(pending.command, pending.attempts) if may_send else None, None
+            return self._end(pending, False, _why_given_up(pending))
+        attempt, pending.repeat_at_us = pending.attempts, now_us + ACK_TIMEOUT_US
+        pending.attempts += 1
+        return messages.SendCommand(pending.command, attempt) if may_send else None, None
 
-    def _end(self, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
-        assert self._pending is not None
-        command, last_result = self._pending.command, self._pending.last_result
+    def _end(self, pending: Pending, succeeded: bool, text: str) -> tuple[None, CommandOutcome]:
         self._pending = None
-        refused = not succeeded and last_result is not None and last_result not in TAKEN_UP
-        return None, CommandOutcome(command, succeeded, f"{describe(command)}: {text}", refused)
-
-
-def _answered(pending: Pending, result: CommandResult, now_us: int) -> Pending:
-    waits_us = {
-        CommandResult.ACCEPTED: CONFIRMATION_TIMEOUT_US,
-        CommandResult.IN_PROGRESS: CONFIRMATION_TIMEOUT_US,
-    }
-    wait_us = waits_us.get(result, REFUSAL_PAUSE_US)
-    return replace(pending, last_result=result, repeat_at_us=now_us + wait_us)
+        refused = not succeeded and pending.last_result is not None and pending.last_result not in TAKEN_UP
+        return None, CommandOutcome(succeeded, f"{describe(pending.command)}: {text}", refused)
 
 
 def _why_given_up(pending: Pending) -> str:

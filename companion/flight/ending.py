@@ -1,0 +1,244 @@
+"""What ends a flight from outside, whatever it is doing, and how the vehicle is then given away; then silence."""
+
+import math
+from enum import Enum
+
+from companion.flight.context import FlightContext, Inputs, Move, Silent, Target
+from companion.flight.states import State, Trigger
+from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
+from companion.link.vehicle import ModeReport
+from companion.messages import LandedState, SetArmed, SetMode, Vector3
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, mode_name
+
+ON_THE_GROUND = (State.CONNECT, State.READY)
+ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING)
+
+# After a hit the setpoint jumps, and the vehicle takes its time.
+FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
+
+HEARD_AGAIN = "the vehicle was silent: its streams are asked for again"
+# HEARTBEAT, which alone tells that the vehicle has disarmed, comes once a second; half a second for delays.
+DISARM_NEWS_US = 1_500_000
+
+
+def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
+    """The first reason to end, the pilot's before all others."""
+    lost = _control_lost(flight, state, now_us)
+    if lost is not None:
+        return lost
+    if inputs.refusal is not None:
+        return Move(Trigger.REFUSED, inputs.refusal)
+    if inputs.stop_reason is not None:
+        return Move(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
+    silent = _link_silent(flight, state, now_us)
+    if silent is not None or state not in ON_SETPOINTS:
+        return silent
+    reason = silent_position(flight)
+    # The mission's own conditions are looked at with each new position, so that a silent link is not one of them.
+    if reason is None and inputs.positions and flight.armed_at_us is not None:
+        reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
+    return None if reason is None else Move(Trigger.INTERRUPTED, reason, hand_over=True)
+
+
+def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | None:
+    vehicle = flight.vehicle
+    if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
+        return Move(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
+    if flight.expected_mode is None or vehicle.mode is None:
+        return None
+    holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
+    if holder is Holder.COMPANION:
+        flight.foreign_mode_since_us = None
+        return None
+    if state is State.LANDING and _may_be_down(flight, now_us):
+        return None
+    mode = mode_name(vehicle.mode.custom_mode)
+    if holder is Holder.FAILSAFE:
+        return Move(Trigger.CONTROL_LOST, f"a failsafe of the vehicle took over in {mode}; setpoints stopped")
+    return Move(Trigger.CONTROL_LOST, f"the pilot took over in {mode}; setpoints stopped")
+
+
+def _may_be_down(flight: FlightContext, now_us: int) -> bool:
+    """PX4 leaves the land mode by itself when it is down and disarms; the heartbeat that says so may be yet to come.
+
+    Nothing is sent meanwhile: the setpoints ended when the land mode was confirmed.
+    """
+    vehicle = flight.vehicle
+    if flight.expected_mode != AUTO_LAND:
+        return False
+    if vehicle.armed is False or vehicle.landed is LandedState.ON_GROUND:
+        return True
+    if flight.foreign_mode_since_us is None:
+        flight.foreign_mode_since_us = now_us
+    return now_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
+
+
+def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | None:
+    link = flight.mission.companion.link
+    if flight.vehicle.identity is None:
+        return None
+    silent_s = flight.silent_s(now_us)
+    if state in ON_THE_GROUND:
+        if silent_s > link.heartbeat_wait_s:
+            return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
+        flight.note_silence(now_us)
+        if flight.is_silent(now_us) or not flight.was_silent:
+            return None
+        flight.tell(now_us, "link", HEARD_AGAIN)
+        return Move(Trigger.HEARD_AGAIN)
+    text = silent_link(flight, now_us)
+    if text is None:
+        return None
+    # A vehicle that has been told to land is already doing what is safe.
+    landing = state is State.LANDING and flight.expected_mode == AUTO_LAND
+    flight.tell(now_us, "link", text, silent_s=round(silent_s, 3))
+    return Move(Trigger.INTERRUPTED, text, hand_over=not landing)
+
+
+def silent_link(flight: FlightContext, now_us: int) -> str | None:
+    """What is wrong with a link on which nothing comes any more; None where something does."""
+    silent_s = flight.silent_s(now_us)
+    is_silent = silent_s > flight.mission.companion.link.silence_s
+    return f"the link has been silent for {silent_s:.1f} s" if is_silent else None
+
+
+def silent_position(flight: FlightContext) -> str | None:
+    """The same of positions, on a link that is alive."""
+    silent_s = flight.position_silent_s
+    is_silent = silent_s > flight.mission.companion.link.position_silence_s
+    return f"no LOCAL_POSITION_NED for {silent_s:.1f} s, though the link is alive" if is_silent else None
+
+
+def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
+    when, newest = flight.mission.abort_when, flight.vehicle.history.newest(2)
+    # Two positions in a row have to say so: one forged or broken packet ends no flight.
+    if when.outside_fence_by_m is not None and len(newest) == 2:
+        fence = flight.mission.fence
+        outside_m = min(fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in newest)
+        if outside_m > when.outside_fence_by_m:
+            return f"the vehicle is {outside_m:.2f} m outside the fence"
+    flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
+    if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
+        return f"flight time above {when.flight_time_above_s:g} s"
+    since_us = flight.blind_since_us
+    if when.blind_for_s is not None and since_us is not None and now_us - since_us > when.blind_for_s * 1e6:
+        return f"the detector has been blind for {when.blind_for_s:g} s"
+    if when.setpoint_missed_by_m is not None and state in FOLLOWING and flight.target is not None:
+        missed_m = math.dist(place_ned_m, flight.target.position_ned_m)
+        if missed_m > when.setpoint_missed_by_m:
+            return f"the vehicle is {missed_m:.2f} m from its setpoint"
+    return battery_complaint(flight)
+
+
+def battery_complaint(flight: FlightContext) -> str | None:
+    """What is wrong with the battery by the mission's condition; None where there is none."""
+    least, percent = flight.mission.abort_when.battery_below_percent, flight.vehicle.battery_percent
+    if least is None or percent is None or percent >= least:
+        return None
+    return f"battery at {percent} %, below abort_when.battery_below_percent = {least:g}"
+
+
+class Holder(Enum):
+    COMPANION = "companion"
+    FAILSAFE = "failsafe"
+    PILOT = "pilot"
+
+
+def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | None) -> Holder:
+    """Tell the three apart from one report of the mode.
+
+    `expected_mode` is the one the companion has been seen to hold; `requested_mode` one it has asked for and not
+    yet seen. In a failsafe PX4 keeps the user's intended mode (CURRENT_MODE) and reports MAV_STATE_CRITICAL
+    (HEARTBEAT); a pilot's change moves the intended mode too.
+    """
+    if report.custom_mode in (expected_mode, requested_mode):
+        return Holder.COMPANION
+    still_intended = report.intended_custom_mode is not None and report.intended_custom_mode in (
+        expected_mode,
+        requested_mode,
+    )
+    return Holder.FAILSAFE if report.failsafe or still_intended else Holder.PILOT
+
+
+# As long as it takes to ask for two modes in vain: nobody is to be kept in OFFBOARD by a hand-over that does not end.
+LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
+
+
+class LetGo(Silent):
+    """Nothing more to do: the vehicle is not ours, or it was never taken."""
+
+    finished = True
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> None:
+        return None
+
+
+class HandOver:
+    """Disarm if the climb has not begun, then request the mode; setpoints go on until it is seen to hold.
+
+    The mode is asked for straight after a report of the present one, so that whoever has taken the vehicle by then is
+    seen first; whoever takes it later may have it, too. A vehicle that refuses to hold is asked to land. When the
+    command client gives up (about 2.5 s without an answer), and after LONGEST_US at the latest, the setpoints stop all
+    the same, and PX4's own loss-of-offboard action takes over.
+    """
+
+    def __init__(self, flight: FlightContext, now_us: int) -> None:
+        self._began_us = now_us
+        self._is_asked = False
+        self.finished = False
+        self._target = None if flight.target is None else flight.target.at_rest()
+        self._previous_mode = flight.expected_mode
+        self._mode = AUTO_LAND if flight.mission.on_interrupt == "land" else AUTO_LOITER
+        # Asked to arm and not yet seen armed: it has not climbed, and may arm any moment.
+        self._disarming = flight.arming_requested and flight.armed_at_us is None
+        flight.command_client.cancel()
+        if self._disarming:
+            flight.command_client.begin(SetArmed(False))
+
+    def target(self, now_us: int) -> Target | None:
+        return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target
+
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if self.finished:
+            return None
+        if self._taken_by_another(flight, now_us):
+            self._finish(flight)
+            return None
+        if self._disarming:
+            outcome = flight.command_outcome(inputs, False, now_us)
+            if outcome is None:
+                return None
+            self._disarming = False
+            inputs = Inputs()
+        if not self._is_asked:
+            if not flight.is_time_to_give_away(self._began_us, now_us):
+                return None
+            self._is_asked = True
+            flight.command_client.begin(SetMode(self._mode))
+        outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == self._mode, now_us)
+        if outcome is None:
+            return None
+        if outcome.succeeded:
+            flight.tell(now_us, "mode", f"handed over to {mode_name(self._mode)}")
+        elif outcome.refused and self._mode == AUTO_LOITER:
+            # PX4 holds only with a global position; without one (motion capture alone) it still lands.
+            self._mode = AUTO_LAND
+            flight.tell(now_us, "mode", "the vehicle does not hold: asking it to land")
+            flight.command_client.begin(SetMode(self._mode))
+            return None
+        self._finish(flight)
+        return None
+
+    def _taken_by_another(self, flight: FlightContext, now_us: int) -> bool:
+        report = flight.vehicle.mode
+        if report is None or self._previous_mode is None:
+            return False
+        holder = who_decided(report, self._previous_mode, self._mode)
+        if holder is Holder.COMPANION:
+            return False
+        flight.tell(now_us, "mode", f"{holder.value} took over in {mode_name(report.custom_mode)}")
+        return True
+
+    def _finish(self, flight: FlightContext) -> None:
+        self.finished = True
+        flight.command_client.cancel()

@@ -1,0 +1,275 @@
+"""MAVLink messages to typed samples: one function a message, whose parameters are the fields that it reads.
+
+The layout is pymavlink's own; its message objects, which take most of the time, are left out.
+"""
+
+import math
+import struct
+from collections.abc import Callable, Mapping
+from inspect import signature
+from operator import itemgetter
+from typing import Any
+
+from pymavlink.dialects.v20 import development as dialect
+
+from companion import messages
+from companion.mavlink.encode import COMPONENT_ID
+from companion.messages import (
+    ANGULAR_VELOCITY_RAD_S,
+    POSITION_M,
+    SPECIFIC_FORCE_M_S2,
+    TIME_US,
+    VELOCITY_M_S,
+    Refused,
+    Sample,
+    is_rotation,
+    within,
+)
+
+# HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
+ACCELEROMETER_UPDATED = 0x7
+# POSITION_TARGET_TYPEMASK: x, y or z.
+POSITION_IGNORED = 0x7
+
+
+class Reader:
+    """Of one message: the fields that a function names, handed over to it; before them who sent it, where it asks."""
+
+    def __init__(self, message: Any, make: Callable[..., Sample | None]) -> None:
+        names = list(signature(make).parameters)
+        self._takes_source = names[0] == "source"
+        self._names = names[self._takes_source :]
+        # One name may stand for several values: q[4].
+        places, count = dict[str, int | slice](), 0
+        for name, length in zip(message.ordered_fieldnames, message.lengths, strict=True):
+            places[name] = count if length == 1 else slice(count, count + length)
+            count += length
+        picked = [places[name] for name in self._names]
+        self._pick = itemgetter(*picked) if len(picked) > 1 else lambda values: (values[picked[0]],)
+        self._unpacker, self._make, self.name = message.unpacker, make, str(message.msgname)
+
+    def from_payload(self, payload: bytes, source: tuple[int, int]) -> Sample | None:
+        """MAVLink 2 leaves out the zeros at a payload's end."""
+        unpacker = self._unpacker
+        fields = self._pick(unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size]))
+        return self._make(source, *fields) if self._takes_source else self._make(*fields)
+
+    def from_fields(self, values: Mapping[str, Any], source: tuple[int, int]) -> Sample | None:
+        """Raises KeyError, TypeError, ValueError where the fields are not those of this dialect."""
+        fields = [values[name] for name in self._names]
+        return self._make(source, *fields) if self._takes_source else self._make(*fields)
+
+
+def _imu(
+    time_usec: int,
+    xacc: float,
+    yacc: float,
+    zacc: float,
+    xgyro: float,
+    ygyro: float,
+    zgyro: float,
+    fields_updated: int,
+) -> Sample | None:
+    if fields_updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED:
+        return None
+    force, rates = (xacc, yacc, zacc), (xgyro, ygyro, zgyro)
+    if within(messages.ZERO_G_OFFSET_M_S2, *force):
+        return Refused("HIGHRES_IMU", "the accelerometer reads zero on all axes")
+    if not (within(SPECIFIC_FORCE_M_S2, *force) and within(ANGULAR_VELOCITY_RAD_S, *rates) and time_usec < TIME_US):
+        text = f"specific force {_text(*force)} m/s^2, rates {_text(*rates)} rad/s at {time_usec} us"
+        return Refused("HIGHRES_IMU", text)
+    return messages.ImuSample(time_usec, force, rates)
+
+
+def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:
+    if not (within(POSITION_M, x, y, z) and within(VELOCITY_M_S, vx, vy, vz)):
+        return _moves_too_far("LOCAL_POSITION_NED", x, y, z, vx, vy, vz)
+    return messages.LocalPosition(time_boot_ms * 1000, (x, y, z), (vx, vy, vz))
+
+
+def _attitude(
+    time_boot_ms: int, q1: float, q2: float, q3: float, q4: float, rollspeed: float, pitchspeed: float, yawspeed: float
+) -> Sample:
+    turn, rates = (q1, q2, q3, q4), (rollspeed, pitchspeed, yawspeed)
+    if not (is_rotation(*turn) and within(ANGULAR_VELOCITY_RAD_S, *rates)):
+        return Refused("ATTITUDE_QUATERNION", f"quaternion {_text(*turn)}, rates {_text(*rates)} rad/s")
+    return messages.Attitude(time_boot_ms * 1000, turn, rates)
+
+
+def _odometry(
+    time_usec: int,
+    frame_id: int,
+    child_frame_id: int,
+    x: float,
+    y: float,
+    z: float,
+    vx: float,
+    vy: float,
+    vz: float,
+    reset_counter: int,
+) -> Sample | None:
+    # PX4 sends NED velocity under child frame LOCAL_NED; any other frame would have to be turned first.
+    if frame_id != dialect.MAV_FRAME_LOCAL_NED or child_frame_id != dialect.MAV_FRAME_LOCAL_NED:
+        return None
+    if not (within(POSITION_M, x, y, z) and within(VELOCITY_M_S, vx, vy, vz) and time_usec < TIME_US):
+        return _moves_too_far("ODOMETRY", x, y, z, vx, vy, vz)
+    return messages.Odometry(time_usec, (x, y, z), (vx, vy, vz), reset_counter)
+
+
+def _moves_too_far(message: str, *motion: float) -> Refused:
+    return Refused(message, f"position {_text(*motion[:3])} m, velocity {_text(*motion[3:])} m/s")
+
+
+def _text(*values: float) -> str:
+    return " ".join(f"{value:g}" for value in values)
+
+
+def _heartbeat(
+    source: tuple[int, int], type: int, autopilot: int, base_mode: int, custom_mode: int, system_status: int
+) -> Sample:
+    armed = bool(base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+    return messages.Heartbeat(*source, type, autopilot, armed, custom_mode, system_status)
+
+
+def _attitude_target(time_boot_ms: int, type_mask: int, q: tuple[float, ...], thrust: float) -> Sample | None:
+    if type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE:
+        return None
+    if not 0.0 <= thrust <= messages.THRUST_FRACTION:
+        return Refused("ATTITUDE_TARGET", f"thrust {thrust:g}")
+    w, x, y, z = q
+    given = not type_mask & dialect.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE and is_rotation(w, x, y, z)
+    return messages.AttitudeTarget(time_boot_ms * 1000, thrust, (w, x, y, z) if given else None)
+
+
+def _vibration(
+    time_usec: int, vibration_y: float, vibration_z: float, clipping_0: int, clipping_1: int, clipping_2: int
+) -> Sample:
+    # How much a sample may differ from the one before: no more than the ranges.
+    turns, shakes = within(2.0 * ANGULAR_VELOCITY_RAD_S, vibration_y), within(2.0 * SPECIFIC_FORCE_M_S2, vibration_z)
+    if not (turns and shakes) or time_usec >= TIME_US:
+        return Refused("VIBRATION", f"{vibration_y:g} rad/s, {vibration_z:g} m/s^2")
+    return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))
+
+
+def _battery(battery_remaining: int) -> Sample | None:
+    # -1: the autopilot does not know.
+    return messages.Battery(battery_remaining) if 0 <= battery_remaining <= 100 else None
+
+
+def _extended_state(landed_state: int) -> Sample | None:
+    known = landed_state in messages.LandedState.__members__.values()
+    return messages.ExtendedState(messages.LandedState(landed_state)) if known else None
+
+
+def _current_mode(custom_mode: int, intended_custom_mode: int) -> Sample:
+    # 0 stands for "not known" in the intended mode.
+    return messages.CurrentMode(custom_mode, intended_custom_mode or None)
+
+
+def _command_ack(command: int, result: int, target_component: int) -> Sample | None:
+    # PX4 names whom it answers; other components' conversations pass over the same link.
+    ours = target_component in (0, COMPONENT_ID)
+    known = result in messages.CommandResult.__members__.values()
+    return messages.CommandAck(command, messages.CommandResult(result)) if ours and known else None
+
+
+def _timesync(tc1: int, ts1: int) -> Sample:
+    return messages.TimeSyncRequest(ts1) if tc1 == 0 else messages.TimeSyncAnswer(ts1, tc1)
+
+
+def _parameter(param_id: bytes | str, param_value: float, param_type: int) -> Sample | None:
+    name = param_id if isinstance(param_id, str) else param_id.split(b"\0", 1)[0].decode("ascii", errors="replace")
+    # PX4 has two kinds; the bytes of a whole number travel in the float's place.
+    if param_type == dialect.MAV_PARAM_TYPE_INT32:
+        return messages.Parameter(name, struct.unpack("<i", struct.pack("<f", param_value))[0])
+    is_real = param_type == dialect.MAV_PARAM_TYPE_REAL32 and math.isfinite(param_value)
+    return messages.Parameter(name, param_value) if is_real else None
+
+
+def _estimator_status(flags: int, vel_ratio: float, pos_horiz_ratio: float, pos_vert_ratio: float) -> Sample:
+    ratios = (vel_ratio, pos_horiz_ratio, pos_vert_ratio)
+    if any(map(math.isinf, ratios)):
+        return Refused("ESTIMATOR_STATUS", f"ratios {_text(*ratios)}")
+    return messages.EstimatorStatus(
+        # NaN is PX4's word for what no sensor measures: the velocity, by motion capture.
+        tuple(ratio for ratio in ratios if not math.isnan(ratio)),
+        bool(flags & dialect.ESTIMATOR_VELOCITY_HORIZ),
+        bool(flags & dialect.ESTIMATOR_ACCEL_ERROR),
+    )
+
+
+def _autopilot_version(flight_sw_version: int) -> Sample:
+    # major, minor, patch, type: one byte each, from the top
+    version = flight_sw_version
+    return messages.AutopilotVersion((version >> 24 & 0xFF, version >> 16 & 0xFF, version >> 8 & 0xFF))
+
+
+def _position_target(type_mask: int, x: float, y: float, z: float) -> Sample:
+    known = not type_mask & POSITION_IGNORED and within(POSITION_M, x, y, z)
+    return messages.PositionTarget((x, y, z) if known else None)
+
+
+def _global_position(lat: int, lon: int, alt: int) -> Sample:
+    if not (within(90e7, lat) and within(180e7, lon)):
+        return Refused("GLOBAL_POSITION_INT", f"latitude {lat}, longitude {lon} (1e-7 deg)")
+    return messages.GlobalPosition(lat * 1e-7, lon * 1e-7, alt * 1e-3)
+
+
+def _sticks(x: int, y: int, z: int, r: int) -> Sample:
+    # The throttle goes from 0 to 1000 (PX4's streams/MANUAL_CONTROL.hpp).
+    if not (max(abs(x), abs(y), abs(r)) <= 1000 and 0 <= z <= 1000):
+        return Refused("MANUAL_CONTROL", f"sticks {x} {y} {z} {r}")
+    return messages.Sticks((x / 1000.0, y / 1000.0, z / 500.0 - 1.0, r / 1000.0))
+
+
+def _readers(makers: Mapping[Any, Callable[..., Sample | None]]) -> dict[int, Reader]:
+    return {message.id: Reader(message, make) for message, make in makers.items()}
+
+
+READERS = _readers(
+    {
+        dialect.MAVLink_highres_imu_message: _imu,
+        dialect.MAVLink_local_position_ned_message: _local_position,
+        dialect.MAVLink_attitude_quaternion_message: _attitude,
+        dialect.MAVLink_odometry_message: _odometry,
+        dialect.MAVLink_heartbeat_message: _heartbeat,
+        dialect.MAVLink_attitude_target_message: _attitude_target,
+        dialect.MAVLink_vibration_message: _vibration,
+        dialect.MAVLink_sys_status_message: _battery,
+        dialect.MAVLink_extended_sys_state_message: _extended_state,
+        dialect.MAVLink_current_mode_message: _current_mode,
+        dialect.MAVLink_command_ack_message: _command_ack,
+        dialect.MAVLink_timesync_message: _timesync,
+        dialect.MAVLink_param_value_message: _parameter,
+        dialect.MAVLink_estimator_status_message: _estimator_status,
+        dialect.MAVLink_autopilot_version_message: _autopilot_version,
+    }
+)
+# What only a guard looks at: another's setpoints and the pilot's hands.
+GUARD_READERS = READERS | _readers(
+    {
+        dialect.MAVLink_position_target_local_ned_message: _position_target,
+        dialect.MAVLink_manual_control_message: _sticks,
+    }
+)
+# And one on a link of its own, which cannot always send setpoints: where on earth that is.
+LONE_GUARD_READERS = GUARD_READERS | _readers({dialect.MAVLink_global_position_int_message: _global_position})
+
+_BY_NAME = {reader.name: reader for reader in GUARD_READERS.values()}
+# Names of the messages that become samples.
+HEARD = frozenset(_BY_NAME)
+
+
+def sample_from(name: str, source: tuple[int, int], fields: Mapping[str, Any]) -> Sample | None:
+    """Of a message handed over as name and fields; None where it has no sample, or its fields are not of this dialect.
+
+    A None field is NaN. An answer to a command is taken as one to ours: who asked is not told apart here.
+    """
+    reader = _BY_NAME.get(name)
+    if reader is None:
+        return None
+    values = {key: math.nan if value is None else value for key, value in fields.items()}
+    try:
+        return reader.from_fields({**values, "target_component": 0}, source)
+    except (KeyError, TypeError, ValueError):
+        return None

@@ -1,0 +1,409 @@
+"""Typed samples in and typed commands out: the only language between the codec and the core.
+
+World frame NED, body frame FRD, SI units, quaternions (w, x, y, z) body to NED. Times named `time_boot_us`
+are the vehicle's own boot clock. None means "not given"; MAVLink's NaN and type masks stay in the codec.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import ClassVar, TypeAlias
+
+Vector3: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+
+
+class Sample:
+    """Something that was heard."""
+
+    __slots__ = ()
+
+
+class Outgoing:
+    """Something that is to be sent."""
+
+    __slots__ = ()
+
+
+class CommandResult(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+    CANCELLED = 6
+
+
+class LandedState(IntEnum):
+    """MAV_LANDED_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class Severity(IntEnum):
+    """MAV_SEVERITY, as far as the companion has something to say."""
+
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+
+
+class MessageId(IntEnum):
+    """MAVLink ids of the streams the companion asks for and of the messages it requests."""
+
+    ATTITUDE_QUATERNION = 31
+    LOCAL_POSITION_NED = 32
+    MANUAL_CONTROL = 69
+    ATTITUDE_TARGET = 83
+    POSITION_TARGET_LOCAL_NED = 85
+    HIGHRES_IMU = 105
+    AUTOPILOT_VERSION = 148
+    ESTIMATOR_STATUS = 230
+    VIBRATION = 241
+    EXTENDED_SYS_STATE = 245
+    ODOMETRY = 331
+    CURRENT_MODE = 436
+
+
+@dataclass(frozen=True, slots=True)
+class Refused(Sample):
+    """A message of the vehicle's that was not believed: a value that is not finite, or that no vehicle can have."""
+
+    message: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat(Sample):
+    system_id: int
+    component_id: int
+    vehicle_type: int  # MAV_TYPE
+    autopilot: int  # MAV_AUTOPILOT
+    armed: bool
+    custom_mode: int
+    system_status: int  # MAV_STATE
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSample(Sample):
+    """HIGHRES_IMU: mean over the vehicle's integration interval that ends at `time_boot_us`."""
+
+    time_boot_us: int
+    specific_force_frd_m_s2: Vector3
+    angular_velocity_frd_rad_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class LocalPosition(Sample):
+    time_boot_us: int
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry(Sample):
+    """ODOMETRY: what LOCAL_POSITION_NED says, and how often the estimator has let it jump (modulo 256)."""
+
+    time_boot_us: int
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    reset_counter: int
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude(Sample):
+    """ATTITUDE_QUATERNION; the rates are those of the moment, not a mean."""
+
+    time_boot_us: int
+    attitude_wxyz: Quaternion
+    angular_velocity_frd_rad_s: Vector3 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeTarget(Sample):
+    """ATTITUDE_TARGET: what the vehicle's position control asks of its attitude control."""
+
+    time_boot_us: int
+    thrust_fraction: float  # collective over the greatest, 0 to 1
+    attitude_wxyz: Quaternion | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PositionTarget(Sample):
+    """POSITION_TARGET_LOCAL_NED: the place that the vehicle's position control flies to; None where there is none."""
+
+    position_ned_m: Vector3 | None
+
+
+@dataclass(frozen=True, slots=True)
+class GlobalPosition(Sample):
+    """GLOBAL_POSITION_INT; altitude above mean sea level."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks(Sample):
+    """MANUAL_CONTROL as PX4 tells it: the pilot's pitch, roll, throttle and yaw sticks, -1 to 1, 0 in the middle."""
+
+    deflections: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Vibration(Sample):
+    """VIBRATION as PX4 fills it: the mean change from sample to sample, and clipped samples since boot.
+
+    `clipping_counts` has one count for each accelerometer, its three axes together.
+    """
+
+    time_boot_us: int
+    gyroscope_rad_s: float
+    accelerometer_m_s2: float
+    clipping_counts: tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Battery(Sample):
+    """SYS_STATUS of a vehicle that knows its charge."""
+
+    remaining_percent: int
+
+
+@dataclass(frozen=True, slots=True)
+class ExtendedState(Sample):
+    landed_state: LandedState
+
+
+@dataclass(frozen=True, slots=True)
+class CurrentMode(Sample):
+    custom_mode: int
+    intended_custom_mode: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAck(Sample):
+    command: int  # MAV_CMD
+    result: CommandResult
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncRequest(Sample):
+    """TIMESYNC with tc1 = 0: the vehicle asks for our time."""
+
+    vehicle_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncAnswer(Sample):
+    """TIMESYNC that answers ours: the time we sent, and the vehicle's when it answered."""
+
+    companion_time_ns: int
+    vehicle_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Sample):
+    """PARAM_VALUE; whole numbers are int."""
+
+    name: str
+    value: int | float
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorStatus(Sample):
+    """ESTIMATOR_STATUS: innovations against their gates (1 is turned down), and what is estimated."""
+
+    ratios: tuple[float, ...]  # of velocity and place, as far as a sensor measures them
+    horizontal_velocity_is_good: bool
+    accelerometer_is_doubted: bool
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotVersion(Sample):
+    flight_version: tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """MAV_CMD_DO_SET_MODE; `custom_mode` in PX4's packing (main << 16 | sub << 24)."""
+
+    command_id: ClassVar[int] = 176
+    custom_mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetArmed:
+    """MAV_CMD_COMPONENT_ARM_DISARM, never forced."""
+
+    command_id: ClassVar[int] = 400
+    armed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetMessageInterval:
+    """MAV_CMD_SET_MESSAGE_INTERVAL."""
+
+    command_id: ClassVar[int] = 511
+    message_id: int
+    interval_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class RequestMessage:
+    """MAV_CMD_REQUEST_MESSAGE."""
+
+    command_id: ClassVar[int] = 512
+    message_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reposition:
+    """MAV_CMD_DO_REPOSITION with a change to AUTO.LOITER: hold there. Altitude above mean sea level."""
+
+    command_id: ClassVar[int] = 192
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+
+
+VehicleCommand: TypeAlias = SetMode | SetArmed | SetMessageInterval | RequestMessage | Reposition
+
+
+@dataclass(frozen=True, slots=True)
+class SendCommand(Outgoing):
+    """A command with its transmission count, as COMMAND_LONG.confirmation wants it."""
+
+    command: VehicleCommand
+    confirmation: int
+
+
+@dataclass(frozen=True, slots=True)
+class PositionSetpoint(Outgoing):
+    """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
+
+    `leans_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
+    `is_height_free`: down by velocity and acceleration, whatever height is given.
+    """
+
+    time_us: int
+    position_ned_m: Vector3
+    yaw_rad: float | None
+    velocity_ned_m_s: Vector3 | None = None
+    acceleration_ned_m_s2: Vector3 | None = None
+    leans_only: bool = False
+    is_height_free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OnboardHeartbeat(Outgoing):
+    """Our own HEARTBEAT as an onboard computer; `active` while a flight is under way."""
+
+    active: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncReply(Outgoing):
+    vehicle_time_ns: int
+    companion_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSyncAsk(Outgoing):
+    """TIMESYNC of our own; the vehicle echoes the time."""
+
+    companion_time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReadParameter(Outgoing):
+    """PARAM_REQUEST_READ."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetParameter(Outgoing):
+    """PARAM_SET; an int is sent as INT32, a float as REAL32, as PX4 has them."""
+
+    name: str
+    value: int | float
+
+
+@dataclass(frozen=True, slots=True)
+class StatusText(Outgoing):
+    """STATUSTEXT, in as many packets as its length needs."""
+
+    severity: Severity
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NamedValue(Outgoing):
+    """NAMED_VALUE_FLOAT: a number to plot; the name has at most ten characters."""
+
+    time_us: int
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class DebugVector(Outgoing):
+    """DEBUG_VECT: three numbers to plot; the name has at most ten characters."""
+
+    time_us: int
+    name: str
+    vector: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class ComputerStatus(Outgoing):
+    """ONBOARD_COMPUTER_STATUS; `at_us` since the epoch, a MiB is 2^20 bytes, a temperature nobody measures None."""
+
+    at_us: int
+    uptime_ms: int
+    cpu_percent: tuple[int, ...]  # of each core
+    temperature_deg_c: int | None
+    memory_used_mib: int
+    memory_total_mib: int
+    disk_used_mib: int
+    disk_total_mib: int
+
+
+# All three axes of a sensor at the end of its range at once, and a tenth more for its calibration.
+_OF_RANGE = 1.1 * math.sqrt(3.0)
+# 40 g is the widest range among PX4's accelerometer drivers (ADIS16470, ADIS16507).
+SPECIFIC_FORCE_M_S2 = _OF_RANGE * 40.0 * 9.80665
+# The widest zero-g offset among PX4's accelerometers (MPU-6000, z: 80 mg). A sensor that is off reads no more; thrust
+# is more in all but free fall, which shows no contact.
+ZERO_G_OFFSET_M_S2 = 0.08 * 9.80665
+# 4000 deg/s is the widest range among PX4's gyroscope drivers (ICM-45686).
+ANGULAR_VELOCITY_RAD_S = _OF_RANGE * math.radians(4000.0)
+# EKF2 holds its own states within these: velocity_limit, and Ekf::constrainStates.
+VELOCITY_M_S = 100.0
+POSITION_M = 1.0e6
+# Thrust is the length of a vector with three parts of at most 1 (PX4's streams/ATTITUDE_TARGET.hpp).
+THRUST_FRACTION = math.sqrt(3.0)
+# Microseconds are exact in double precision up to here: 285 years.
+TIME_US = 1 << 53
+# PX4 sends rotations in single precision, good to 1e-6; one that is further from length 1 than this is no rotation.
+QUATERNION_ERROR = 1.0e-3
+
+
+def within(most: float, *values: float) -> bool:
+    """Whether the vector is no longer than `most`. One with NaN or an infinity is not."""
+    return math.hypot(*values) <= most
+
+
+def is_rotation(w: float, x: float, y: float, z: float) -> bool:
+    """Whether a quaternion has length 1."""
+    return abs(w * w + x * x + y * y + z * z - 1.0) <= QUATERNION_ERROR

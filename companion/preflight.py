@@ -1,0 +1,409 @@
+"""Before the first flight: asks a vehicle that stands for streams and parameters, listens, and judges item by item.
+
+Good, doubtful or bad, and the exact remedy. Bytes and the time in, bytes out.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from companion import messages
+from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.flight.envelope import HELD_S
+from companion.link.round_trip import MOST_US as MOST_TRIP_US
+from companion.link.round_trip import RoundTrip
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle, identify, is_autopilot
+from companion.mavlink.decode import Decoder
+from companion.mavlink.encode import Encoder
+from companion.messages import MessageId, Sample, SendCommand, Vector3
+from companion.mission.config import CompanionConfig
+
+# The streams need a second to settle at their new rates; what comes then counts.
+SETTLING_US = 1_000_000
+# 2500 IMU samples, ten ESTIMATOR_STATUS, a position that has time to wander.
+LISTENING_US = 10_000_000
+HEARTBEAT_INTERVAL_US = 1_000_000
+# A lost question is asked again; PX4 answers a parameter within 50 ms.
+ASK_AGAIN_US = 500_000
+
+# PX4's parameters in bits and values (their descriptions in PX4's commander module).
+RCL_EXCEPT_OFFBOARD = 4
+RC_DISABLED = 4
+FLIGHTTERM_OFF = 121212
+# COM_OBL_RC_ACT: 0 position, 1 altitude, 2 stabilised, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm.
+LOSS_LAND, LOSS_NEEDS_STICKS, LOSS_DROPS = 4, (0, 1, 2), (6, 7)
+LOSS_NAMES = ("position", "altitude", "stabilised", "return", "land", "hold", "terminate", "disarm")
+# The least that PX4 documents: a lean of 11 degrees; beyond 10 a hit at 3 m/s tips a vehicle onto what it hits.
+LEAST_ACC_HOR_M_S2 = 2.0
+# Below PX4's default of 200 a sample is a mean over so long that short contacts vanish in it.
+LEAST_INTEG_HZ = 200
+# A contact of a stiff frame (the paper's accelerometer shows 0.001 s), for the share of them that samples see.
+STIFF_CONTACT_S = 0.001
+# Eq. 2 of the paper: a foldable arm's push begins with b_s v_c, b_s = 30 /s.
+FOLDING_DAMPING_PER_S = 30.0
+# The position of a vehicle that stands: more than this and a recovery by half a metre is lost in it.
+MOST_WANDER_M, DOUBTFUL_WANDER_M = 0.5, 0.1
+# Innovation test ratios: at 1 the estimator turns its sensors down, and PX4 warns from 0.5 on.
+DOUBTFUL_RATIO, BAD_RATIO = 0.5, 1.0
+# A round trip of so long is five IMU samples; beyond round_trip.MOST_US no flight begins.
+DOUBTFUL_TRIP_US = 20_000
+# PX4's BAT_LOW_THR is 15 %; a flight needs something above it.
+DOUBTFUL_BATTERY, BAD_BATTERY = 50, 20
+# A vehicle that stands still does not clip; a sensor that does shakes in its mount.
+STANDS_M_S2 = 1.0
+
+
+@dataclass(slots=True)
+class Survey:
+    """All that is heard. Times on the companion's clock unless named boot times."""
+
+    config: CompanionConfig
+    started_us: int
+    streams: StreamMonitor
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    refusal: str | None = None
+    heard_since_us: int | None = None
+    listening_since_us: int | None = None
+    parameters: dict[str, int | float] = field(default_factory=dict)
+    imu: list[messages.ImuSample] = field(default_factory=list)
+    positions: list[messages.LocalPosition] = field(default_factory=list)
+    vibration: list[messages.Vibration] = field(default_factory=list)
+    estimator: list[messages.EstimatorStatus] = field(default_factory=list)
+    round_trip: RoundTrip = field(default_factory=RoundTrip)
+    now_us: int = 0
+    heartbeat_due_us: int = 0
+    ask_due_us: int = 0
+
+    @property
+    def finished(self) -> bool:
+        since_us = self.listening_since_us
+        return self.refusal is not None or (since_us is not None and self.now_us >= since_us + LISTENING_US)
+
+
+def start_survey(config: CompanionConfig, now_us: int) -> Survey:
+    return Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)))
+
+
+def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
+    """Take what was heard, return what is to be sent; call it every 50 ms at least."""
+    survey.now_us = now_us
+    outgoing: list[messages.Outgoing] = []
+    for sample in samples:
+        _hear(survey, sample, outgoing)
+    if now_us >= survey.heartbeat_due_us:
+        # From the start: a vehicle may wait for somebody before it speaks, or learn from it what time it is.
+        survey.heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
+        outgoing.append(messages.OnboardHeartbeat(active=False))
+    if survey.heard_since_us is None:
+        wait_s = survey.config.link.heartbeat_wait_s
+        if survey.refusal is None and now_us - survey.started_us > wait_s * 1e6:
+            survey.refusal = f"no PX4 was heard within {wait_s:g} s; check the address, the cable and the baud rate"
+        return outgoing
+    _ask(survey, outgoing)
+    if survey.listening_since_us is None and now_us - survey.heard_since_us >= SETTLING_US:
+        survey.listening_since_us = now_us
+        survey.streams.start(now_us)
+    return outgoing
+
+
+def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
+    now_us, listens = survey.now_us, survey.listening_since_us is not None
+    survey.vehicle.hear(sample, now_us)
+    survey.streams.count(type(sample), now_us)
+    match sample:
+        case messages.Heartbeat() if is_autopilot(sample) and survey.heard_since_us is None and survey.refusal is None:
+            identity = identify(sample)
+            if isinstance(identity, str):
+                survey.refusal = identity
+            else:
+                survey.vehicle.identity, survey.heard_since_us = identity, now_us
+        case messages.Parameter(name, value) if name in PARAMETERS:
+            survey.parameters[name] = value
+        case messages.EstimatorStatus():
+            survey.estimator.append(sample)
+        case messages.TimeSyncRequest(vehicle_time_ns):
+            outgoing.append(messages.TimeSyncReply(vehicle_time_ns, now_us * 1000))
+        case messages.TimeSyncAnswer():
+            survey.round_trip.hear(sample, now_us)
+        case messages.ImuSample() if listens:
+            survey.imu.append(sample)
+        case messages.LocalPosition() if listens:
+            survey.positions.append(sample)
+        case messages.Vibration() if listens:
+            survey.vibration.append(sample)
+
+
+def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
+    asked = survey.round_trip.ask(survey.now_us)
+    outgoing += [] if asked is None else [asked]
+    if survey.now_us < survey.ask_due_us:
+        return
+    survey.ask_due_us = survey.now_us + ASK_AGAIN_US
+    outgoing += [messages.ReadParameter(name) for name in PARAMETERS if name not in survey.parameters]
+    commands: list[messages.VehicleCommand] = []
+    if survey.vehicle.version is None:
+        commands.append(messages.RequestMessage(MessageId.AUTOPILOT_VERSION))
+    if survey.listening_since_us is None:
+        commands += [stream.request() for stream in survey.streams.streams]
+        commands.append(messages.SetMessageInterval(MessageId.ESTIMATOR_STATUS, 1_000_000))
+    outgoing += [SendCommand(command, 0) for command in commands]
+
+
+def spread(vectors: Sequence[Vector3]) -> float:
+    """Root mean squared distance from the mean."""
+    count = len(vectors)
+    if count == 0:
+        return 0.0
+    mean = [sum(vector[axis] for vector in vectors) / count for axis in range(3)]
+    return math.sqrt(sum((vector[axis] - mean[axis]) ** 2 for vector in vectors for axis in range(3)) / count)
+
+
+class Verdict(Enum):
+    GOOD = "ok"
+    DOUBTFUL = "look"
+    BAD = "no"
+
+
+DOUBTFUL, BAD = Verdict.DOUBTFUL, Verdict.BAD
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """`fix` is a parameter and the value that mends it; None where only a person can."""
+
+    item: str
+    verdict: Verdict
+    found: str
+    remedy: str = ""
+    fix: tuple[str, int | float] | None = None
+
+
+def _judged(
+    item: str, found: str, *cases: tuple[bool, Verdict, str], mended: float | None = None, beyond: str = ""
+) -> Finding:
+    """The first case that holds, with its remedy; good where none does. `mended`: the parameter's value that mends it.
+
+    `beyond` is added to what was found where it is not good.
+    """
+    for holds, verdict, remedy in cases:
+        if holds:
+            return Finding(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
+    return Finding(item, Verdict.GOOD, found)
+
+
+def findings(survey: Survey) -> list[Finding]:
+    """All items, in the order in which they would be mended."""
+    found = [_frame(survey), *_streams(survey)]
+    for name, judge in _SETTINGS.items():
+        value = survey.parameters.get(name)
+        unread = Finding(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
+        found.append(unread if value is None else judge(name, value, survey))
+    return [*found, *_estimate(survey), *_vibration(survey), _time(survey), _battery(survey), *_sight(survey)]
+
+
+def _frame(survey: Survey) -> Finding:
+    """HEARTBEAT tells how many arms there are, not where: a quadrotor is taken for an X."""
+    kind = "" if survey.vehicle.identity is None else survey.vehicle.identity.vehicle_type
+    remedy = "companion.estimate.fits_normal: false in the mission: the normal is the push's direction then"
+    is_fitted = kind != "quadrotor" and survey.config.estimate.fits_arms
+    return _judged("frame", kind, (is_fitted, DOUBTFUL, remedy), beyond=": a hit's normal is fitted for a quad-x")
+
+
+def _streams(survey: Survey) -> Iterator[Finding]:
+    rates = survey.streams.rates_hz()
+    serial = "serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again"
+    full = "the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz"
+    for stream in survey.streams.streams:
+        if stream.min_hz:
+            rate_hz = rates.get(stream.message_id.name, 0.0)
+            yield _judged(
+                stream.message_id.name,
+                f"{rate_hz:.0f} Hz of {stream.asked_hz:g} asked for",
+                (rate_hz < stream.min_hz, BAD, f"at least {stream.min_hz:g} Hz are needed; {serial}"),
+                (rate_hz < 0.4 * stream.asked_hz, DOUBTFUL, full),
+            )
+
+
+def _integration(name: str, rate_hz: float, survey: Survey) -> Finding:
+    found = f"{rate_hz:g} Hz: each sample is a mean over {1e3 / rate_hz:.1f} ms"
+    if rate_hz < LEAST_INTEG_HZ:
+        remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
+        return _judged(name, found, (True, DOUBTFUL, remedy), mended=LEAST_INTEG_HZ)
+    is_long = 1.0 / rate_hz > survey.config.estimate.imu_averaging_interval_s
+    remedy = f"companion.estimate.imu_averaging_interval_s: {1.0 / rate_hz:.4f} in the mission"
+    return _judged(name, found, (is_long, DOUBTFUL, remedy))
+
+
+def _offboard_loss_time(name: str, loss_s: float, survey: Survey) -> Finding:
+    found = f"{loss_s:g} s until PX4 acts when the companion has died"
+    further = f"at 2 m/s the vehicle flies {2.0 * (loss_s - HELD_S):g} m further unattended"
+    case = (loss_s > HELD_S, DOUBTFUL, f"{name} = {HELD_S:g}; {further}")
+    return _judged(name, found, case, mended=HELD_S, beyond=f"; setpoints are made safe to hold {HELD_S:g} s")
+
+
+def _offboard_loss(name: str, action: float, survey: Survey) -> Finding:
+    number = int(action)
+    called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
+    remedy, drops, found = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS, f"{number} ({called})"
+    return _judged(
+        name,
+        f"{found} when setpoints stop",
+        (drops, BAD, remedy),
+        (number in LOSS_NEEDS_STICKS, DOUBTFUL, remedy),
+        mended=LOSS_LAND,
+        beyond=": the vehicle would fall" if drops else "; without sticks PX4 sinks and lands, or returns",
+    )
+
+
+def _radio(name: str, bits: float, survey: Survey) -> Finding:
+    if survey.parameters.get("COM_RC_IN_MODE") == RC_DISABLED:
+        return Finding(name, Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
+    if int(bits) & RCL_EXCEPT_OFFBOARD:
+        return Finding(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
+    value = int(bits) | RCL_EXCEPT_OFFBOARD
+    found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
+    return Finding(name, DOUBTFUL, found, f"{name} = {value}, if the flight may go on without a radio", (name, value))
+
+
+def _termination(name: str, breaker: float, survey: Survey) -> Finding:
+    if breaker == FLIGHTTERM_OFF:
+        return Finding(name, Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
+    found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
+    remedy = f"{name} = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
+    return Finding(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
+
+
+def _speeding_up(name: str, most_m_s2: float, survey: Survey) -> Finding:
+    """Of PX4's own modes, as `rebound guard` watches them; the companion's setpoints have their own limit."""
+    lean_deg = math.degrees(math.atan(most_m_s2 / GRAVITY_M_S2))
+    found = f"{most_m_s2:g} m/s^2: PX4's own modes lean by {lean_deg:.0f} degrees as they speed up"
+    remedy = f"{name} = {LEAST_ACC_HOR_M_S2:g} for `rebound guard`: a vehicle that leans in tips where it hits"
+    return _judged(name, found, (most_m_s2 > LEAST_ACC_HOR_M_S2, DOUBTFUL, remedy), mended=LEAST_ACC_HOR_M_S2)
+
+
+# What decides whether a collision is survived.
+_SETTINGS: dict[str, Callable[[str, float, Survey], Finding]] = {
+    "IMU_INTEG_RATE": _integration,
+    "COM_OF_LOSS_T": _offboard_loss_time,
+    "COM_OBL_RC_ACT": _offboard_loss,
+    "COM_RCL_EXCEPT": _radio,
+    "CBRK_FLIGHTTERM": _termination,
+    "MPC_ACC_HOR": _speeding_up,
+}
+PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE")
+
+
+def _estimate(survey: Survey) -> Iterator[Finding]:
+    if not survey.positions:
+        remedy = "wait for GPS, flow or motion capture; QGroundControl's arming checks name what is missing"
+        yield Finding("position", BAD, "no LOCAL_POSITION_NED", remedy)
+        return
+    wander_m = spread([sample.position_ned_m for sample in survey.positions])
+    noise_m_s = spread([sample.velocity_ned_m_s for sample in survey.positions])
+    seconds = LISTENING_US / 1e6
+    remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
+    yield _judged(
+        "position",
+        f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)",
+        (wander_m > MOST_WANDER_M, BAD, remedy),
+        (wander_m > DOUBTFUL_WANDER_M, DOUBTFUL, remedy),
+    )
+    worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
+    if worst is None:
+        yield Finding("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
+    elif not survey.estimator[-1].horizontal_velocity_is_good:
+        remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
+        yield Finding("estimator", BAD, "no horizontal velocity", remedy)
+    else:
+        is_bad = worst >= BAD_RATIO or any(status.accelerometer_is_doubted for status in survey.estimator)
+        yield _judged(
+            "estimator",
+            f"largest innovation test ratio {worst:.2f}",
+            (is_bad, BAD, "the estimator turns its sensors down: calibrate, check mounts"),
+            (worst >= DOUBTFUL_RATIO, DOUBTFUL, "calibrate compass and accelerometer"),
+        )
+
+
+def _vibration(survey: Survey) -> Iterator[Finding]:
+    if survey.vibration:
+        clipped = sum(survey.vibration[-1].clipping_counts) - sum(survey.vibration[0].clipping_counts)
+        remedy = "fasten the flight controller; check the accelerometer"
+        yield _judged("clipping", f"{clipped} clipped samples while standing", (clipped != 0, BAD, remedy))
+    if survey.imu:
+        shakes_m_s2 = spread([sample.specific_force_frd_m_s2 for sample in survey.imu])
+        remedy = "let the vehicle stand still, motors off, and ask again"
+        found = f"{shakes_m_s2:.2f} m/s^2 (RMS) while standing"
+        yield _judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
+
+
+def _time(survey: Survey) -> Finding:
+    median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
+    if median_us is None or worst_us is None:
+        return Finding("time", DOUBTFUL, "TIMESYNC is not answered", "MAVLink 2 on the link (MAV_PROTO_VER 2)")
+    return _judged(
+        "time",
+        f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst",
+        (median_us > MOST_TRIP_US, BAD, "a wire or a direct link instead of this one"),
+        (median_us > DOUBTFUL_TRIP_US, DOUBTFUL, "a wire instead of a radio; serial: baud rate 921600"),
+    )
+
+
+def _battery(survey: Survey) -> Finding:
+    percent = survey.vehicle.battery_percent
+    if percent is None:
+        return Finding("battery", DOUBTFUL, "unknown", "set up the power module (BAT1_SOURCE)")
+    cases = ((percent < BAD_BATTERY, BAD, "charge it"), (percent < DOUBTFUL_BATTERY, DOUBTFUL, "charge it"))
+    return _judged("battery", f"{percent} %", *cases)
+
+
+def _sight(survey: Survey) -> Iterator[Finding]:
+    """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
+    rate_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
+    if not rate_hz:
+        return
+    integ_hz = float(survey.parameters.get("IMU_INTEG_RATE", 1.0 / survey.config.estimate.imu_averaging_interval_s))
+    threshold_m_s2 = survey.config.least_threshold_m_s2 or 0.0
+    seen = min(1.0, rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
+    folding = f"arms that fold: from {threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
+    stiff = f"stiff frames: {100 * seen:.0f} % of 1 ms contacts fall into a sample"
+    remedy = "a faster HIGHRES_IMU (see above); what falls between is found later"
+    yield _judged("smallest hit", f"{folding}; {stiff}", (seen <= 0.9, DOUBTFUL, remedy))
+
+
+class Preflight:
+    """Joins the codec with the pure survey; holds no clock and no socket. Times are microseconds, any epoch."""
+
+    def __init__(self, config: CompanionConfig, now_us: int) -> None:
+        self._decoder, self._encoder = Decoder(), Encoder()
+        self.survey: Survey = start_survey(config, now_us)
+
+    def step(self, received: bytes, now_us: int) -> tuple[bytes, ...]:
+        """Call with what was received since the last call; what is to be sent."""
+        survey = self.survey
+        samples = [sample for _, sample in self._decoder.feed(received) if sample is not None]
+        is_known = survey.vehicle.identity is not None
+        outgoing = advance(survey, samples, now_us)
+        identity = survey.vehicle.identity
+        if identity is not None and not is_known:
+            self._decoder.listen_to(identity.system_id, identity.component_id)
+            self._encoder.speak_to(identity.system_id, identity.component_id)
+        return tuple(packet for message in outgoing for packet in self._encoder.packets(message))
+
+    def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:
+        """What sets it; `parameter` shows the vehicle's answer after further steps."""
+        self.survey.parameters.pop(name, None)
+        return (*self._encoder.packets(messages.SetParameter(name, value)), *self.step(b"", now_us))
+
+    def parameter(self, name: str) -> int | float | None:
+        """As the vehicle last told it."""
+        return self.survey.parameters.get(name)
+
+    @property
+    def finished(self) -> bool:
+        return self.survey.finished
+
+    def findings(self) -> list[Finding]:
+        """All items; complete once `finished` without a refusal."""
+        return findings(self.survey)
