@@ -17,7 +17,7 @@ from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.envelope import Surroundings, bounded
-from companion.flight.hearing import hear, note_height, too_low
+from companion.flight.hearing import hear, landed, note_height, too_low
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.remembering import known_surfaces
