@@ -38,6 +38,7 @@ instance = number(int, 0, 9, "an instance: give a number from 0 to 9")
 speed = number(float, 0, 1000, "a speed: give a number from 0 to 1000, here or in PX4_SIM_SPEED_FACTOR")
 # PX4's own integration is no faster than this.
 rate_hz = number(float, 1, 1000, "a rate: give a number of hertz from 1 to 1000")
+share = number(float, 0, 1, "a share: give a number from 0 to 1")
 mass_kg = number(float, math.ulp(0.0), 1000, "a mass: give kilograms, such as 1.1")
 
 

@@ -12,7 +12,7 @@ from companion.preflight.preflight import Preflight
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from rebound_cli.console import Console, console_for
-from rebound_cli.replay.settings import companion_settings
+from rebound_cli.inputs import companion_settings
 from rebound_cli.signed_connection import open_signed
 
 LONGEST_WAIT_S = 0.05

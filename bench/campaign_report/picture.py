@@ -9,7 +9,7 @@ from matplotlib.patches import Polygon
 from bench.campaign_report.flown import FlownCase, Missions
 from bench.paper.figures import finish, new_figure
 from bench.random_missions.generator import AIRFRAMES, random_mission
-from rebound_cli.figure.outline import footprint
+from rebound_cli.figure.ground import footprint
 from sim_vehicle.scene import Scene
 
 ROWS, COLUMNS = 2, 3

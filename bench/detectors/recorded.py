@@ -24,8 +24,7 @@ from companion.estimate.rotation import body_to_ned
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
 from rebound_cli.logs.log import Heard, Log, Told
 from rebound_cli.logs.reader import read_log
-from rebound_cli.replay.circumstances import Circumstances
-from rebound_cli.replay.watching import watch_log
+from rebound_cli.replay.watching import Circumstances, watch_log
 
 Floats = npt.NDArray[np.float64]
 
@@ -233,8 +232,10 @@ def _moments(path: Path) -> list[int]:
     free: list[tuple[int, bool]] = []
     for item in log.heard:
         known.wait(item.at_us)
-        if known.hear(item):
-            now = known.situation
+        before = known.situation
+        known.hear(item)
+        now = known.situation
+        if now is not before:
             flies = now.landed_state is not LandedState.ON_GROUND and now.armed is not False
             free.append((item.at_us, flies and not now.descent_commanded))
     return [at_us for at_us in _steadily(free) if at_us - log.heard[0].at_us > 1e6 * SLICE_BEFORE_S]

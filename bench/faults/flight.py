@@ -29,8 +29,7 @@ from rebound_cli.inputs import resolved, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import EPOCH_US
 from rebound_cli.realtime import ConfirmAtOnce, FlightFaultError, fly_realtime
-from rebound_cli.replay.recording import read_recording
-from rebound_cli.replay.reproduction import reproduce
+from rebound_cli.replay.recording import read_recording, reproduce
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.truth_match import FlightTruth
 from sim_vehicle.airframe import load_built_in

@@ -3,15 +3,24 @@
 import json
 import sys
 from argparse import Namespace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
+from companion.detection.registry import DETECTORS
 from companion.errors import ConfigurationError, ReboundError
-from rebound_cli.check.schema import mission_schema
-from rebound_cli.check.table import mission_text
-from rebound_cli.check.ways import planned_ways
+from companion.flight.plan import describe_item, describe_modifiers, mission_lines
+from companion.mission.model import Mission
+from companion.recovery.registry import RECOVERY_LAWS
+from rebound_cli.check.ways import Way, planned_ways
 from rebound_cli.extras import needed_text
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from sim_vehicle.errors import SimulationError
+from sim_vehicle.scene import Scene
+
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+# A repeat's laps are shown whole up to so many rows; a longer list hides what matters.
+_MOST_ROWS = 60
 
 
 def run_check(options: Namespace) -> int:
@@ -47,9 +56,70 @@ def _check(path: Path, options: Namespace) -> None:
         print(f"\nnot drawn: {needed_text(error)}")
         return
     picture = options.out / f"{mission.name}.png"
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        draw_mission(picture, mission, world.scene, ways)
-    except OSError as error:
-        raise ConfigurationError(f"{picture} cannot be written: {error.strerror}.") from error
+    options.out.mkdir(parents=True, exist_ok=True)
+    draw_mission(picture, mission, world.scene, ways)
     print(f"\ndrawn in {picture}")
+
+
+def mission_text(mission: Mission, ways: Sequence[Way]) -> str:
+    """A table: what, how far, how long, and what stands in the way."""
+    title = f"{mission.name}: {mission.description}" if mission.description else mission.name
+    shown = ways if len(ways) <= _MOST_ROWS else ways[: _MOST_ROWS - 1]
+    width = max(4, *(len(way.leg.step.label) for way in shown)) + 2
+    text_width = max(len(describe_item(way.leg.step.action)) for way in shown) + 1
+    rows = [f"  {'item':<{width + text_width}}{'length':>9}{'time':>9}{'begins':>9}"]
+    for way in shown:
+        step, leg = way.leg.step, way.leg
+        length, lasts, begins = f"{way.length_m:.1f} m" if way.length_m else "", _time(leg.lasts_s), _time(way.begins_s)
+        text = f"{step.label:<{width}}{describe_item(step.action):<{text_width}}"
+        rows.append(f"  {text}{length:>9}{lasts:>9}{begins:>9}")
+        rows += [f"  {'':<{width + 2}}{note}" for note in _notes(way)]
+    if len(shown) < len(ways):
+        rows.append(f"  ... {len(ways) - len(shown)} more steps")
+    total = f"in all {sum(way.length_m for way in ways):.1f} m"
+    lasts_s = ways[-1].ends_s
+    known = "; how long depends on how long it waits"
+    known = known if lasts_s is None else f" in {lasts_s:.0f} s after arming, if nothing is hit"
+    # the policies, without the items: those are in the table
+    rules = [f"  {line}" for line in mission_lines(mission) if not line.startswith(("Items", " "))]
+    return "\n".join([title, "", *rows, "", f"  {total}{known}", "", *rules])
+
+
+def _time(seconds: float | None) -> str:
+    return "?" if seconds is None else f"{seconds:.1f} s"
+
+
+def _notes(way: Way) -> Iterator[str]:
+    if way.leg.is_cut_off or way.leg.is_detour:
+        yield "no way round what is known" if way.leg.is_cut_off else "round what is known"
+    if way.meets is not None:
+        north, east, down = way.points_ned_m[way.meets.index]
+        yield f"meets '{way.meets.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
+    if modifiers := describe_modifiers(way.leg.step.item):
+        yield modifiers
+
+
+def mission_schema() -> dict[str, Any]:
+    """For editors; what only a look at several values together shows is left to `rebound check MISSION`."""
+    schema = Mission.model_json_schema(by_alias=True)
+    scene = Scene.model_json_schema(ref_template="#/$defs/{model}")
+    definitions = schema["$defs"]
+    for name, definition in scene.pop("$defs", {}).items():
+        assert definitions.setdefault(name, definition) == definition, f"two parts of the schema are called {name}"
+    definitions["Scene"] = scene
+    schema["properties"]["sim"] = {"anyOf": [{"$ref": "#/$defs/Scene"}, {"type": "null"}], "default": None}
+    schema["properties"]["items"]["prefixItems"] = [{"$ref": "#/$defs/MissionItem", "required": ["takeoff"]}]
+    definitions["RecoveryConfig"]["properties"]["law"]["enum"] = sorted(RECOVERY_LAWS)
+    definitions["CompanionConfig"]["properties"]["detector"]["enum"] = sorted(DETECTORS)
+    for part in (schema, *definitions.values()):
+        for written in part.get("properties", {}).values():
+            _describe_by_part(written, part, definitions)
+    return {"$schema": DRAFT, **schema, "title": "Mission file of px4-rebound"}
+
+
+def _describe_by_part(written: dict[str, Any], part: dict[str, Any], definitions: dict[str, Any]) -> None:
+    """A key that is nothing but a part of its own, or names its kind, is described by what is said of that part."""
+    parts = [choice["$ref"] for choice in written.get("anyOf", [written]) if "$ref" in choice]
+    described = part if "const" in written else definitions[parts[0].rpartition("/")[2]] if len(parts) == 1 else {}
+    if "description" in described:
+        written.setdefault("description", described["description"])

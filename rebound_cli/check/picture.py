@@ -12,13 +12,11 @@ from matplotlib.patches import Circle, Polygon
 from companion.mission.fence import Fence
 from companion.mission.model import Mission
 from rebound_cli.check.ways import Way
-from rebound_cli.figure.outline import footprint
-from rebound_cli.figure.overview import draw_patches
+from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
 from sim_vehicle.scene import Scene
 
 _WAY = "tab:orange"
 _FENCE = "tab:green"
-_OBSTACLE = "tab:brown"
 _MEETING = "tab:red"
 # Numbers of items: not on the way itself.
 _BESIDE: Any = {"fontsize": 8, "xytext": (4, 4), "textcoords": "offset points"}
@@ -38,12 +36,11 @@ def draw_mission(path: Path, mission: Mission, scene: Scene, ways: Sequence[Way]
 
 
 def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[Way]) -> None:
-    start = scene.start.position_ned_m
-    for number, (_, obstacle) in enumerate(scene.obstacles()):
-        corners = footprint(obstacle) - np.array(start[:2])
-        label = "obstacles (simulated)" if number == 0 else None
-        axis.add_patch(Polygon(corners[:, ::-1], facecolor=_OBSTACLE, edgecolor=_OBSTACLE, alpha=0.7, label=label))
-        axis.annotate(obstacle.name, corners.mean(axis=0)[::-1], fontsize=7, color=_OBSTACLE)
+    start = np.array(scene.start.position_ned_m)
+    draw_obstacles(axis, scene, start, "obstacles (simulated)", 0.7)
+    for _, obstacle in scene.obstacles():
+        north, east = footprint(obstacle).mean(axis=0) - start[:2]
+        axis.annotate(obstacle.name, (east, north), fontsize=7, color=OBSTACLE)
     draw_patches(axis, mission.obstacles.patches())
     _draw_fence(axis, mission.fence)
     for number, way in enumerate(ways):
@@ -54,9 +51,7 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
     for (north, east), numbers in ends(ways).items():
         axis.annotate(", ".join(numbers), (east, north), **_BESIDE)
     axis.plot([0.0], [0.0], "^", color="black", label="arming position")
-    axis.set_title("From above; numbers are items")
-    axis.set_xlabel("east [m]")
-    axis.set_ylabel("north [m]")
+    axis.set(title="From above; numbers are items", xlabel="east [m]", ylabel="north [m]")
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(alpha=0.3)
     axis.legend(loc="best", fontsize=8)
@@ -101,10 +96,10 @@ def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
             axis.plot([met_s], [height_m], "x", color=_MEETING)
             axis.annotate(f"  {way.meets.name}", (met_s, height_m), fontsize=7, color=_MEETING, rotation=60)
         begins_s += lasts_s
-    axis.axhline(fence.max_height_m, color=_FENCE, linestyle="--", linewidth=1.2, label="fence")
-    axis.axhline(fence.min_height_m, color=_FENCE, linestyle="--", linewidth=1.2)
-    axis.set_title("Height")
-    axis.set_xlabel("time after arming, when nothing is hit [s]")
+    for number, height_m in enumerate((fence.max_height_m, fence.min_height_m)):
+        label = None if number else "fence"
+        axis.axhline(height_m, color=_FENCE, linestyle="--", linewidth=1.2, label=label)
+    axis.set(title="Height", xlabel="time after arming, when nothing is hit [s]")
     axis.set_ylabel("height above the arming position [m]")
     axis.set_ylim(bottom=min(0.0, math.floor(-max(float(way.points_ned_m[:, 2].max()) for way in ways))))
     axis.grid(alpha=0.3)

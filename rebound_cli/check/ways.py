@@ -49,30 +49,23 @@ class Way:
 def planned_ways(mission: Mission, world: SimulatedWorld) -> tuple[Way, ...]:
     """All steps in order, when nothing is hit."""
     begins_s: float | None = 0.0
-    ways = []
+    ways: list[Way] = []
     for leg in itinerary(mission):
-        fractions, points = _points(leg)
+        way, fractions, points = leg.way, np.zeros(1), np.array([leg.start_ned_m])
+        if way is not None and way.duration_s > 0.0:
+            fractions = np.linspace(0.0, 1.0, min(_MOST_POINTS, max(2, math.ceil(way.distance_m / _STEP_M))) + 1)
+            points = np.array([way.at(fraction * way.duration_s)[0] for fraction in fractions])
         ways.append(Way(leg, begins_s, points, fractions, _first_met(points, world.scene, world.airframe)))
         begins_s = ways[-1].ends_s
     return tuple(ways)
 
 
-def _points(leg: Leg) -> tuple[Floats, Floats]:
-    way = leg.way
-    if way is None or way.duration_s == 0.0:
-        return np.array([0.0]), np.array([leg.start_ned_m])
-    count = min(_MOST_POINTS, max(2, math.ceil(way.distance_m / _STEP_M)))
-    fractions = np.linspace(0.0, 1.0, count + 1)
-    return fractions, np.array([way.at(fraction * way.duration_s)[0] for fraction in fractions])
-
-
 def _first_met(points_ned_m: Floats, scene: Scene, airframe: Airframe) -> Meeting | None:
     """The first obstacle, where it stands at first, that a vehicle on these points touches."""
-    start = scene.start.position_ned_m
-    standing_m = airframe.geometry.foot_depth_m
-    for index, (north, east, down) in enumerate(points_ned_m):
-        # the arming position is that of the vehicle's centre as it stands
-        place = (float(north) + start[0], float(east) + start[1], float(down) - standing_m)
+    # The arming position is that of the vehicle's centre as it stands.
+    (north_m, east_m, _), standing_m = scene.start.position_ned_m, airframe.geometry.foot_depth_m
+    for index, (north, east, down) in enumerate(points_ned_m.tolist()):
+        place = (north + north_m, east + east_m, down - standing_m)
         for _, obstacle in scene.obstacles():
             if obstacle.distance_m(place) < airframe.geometry.reach_m:
                 return Meeting(obstacle.name, index)

@@ -1,1 +1,0 @@
-"""`flight.png`, the picture of a flight."""

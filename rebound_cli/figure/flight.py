@@ -1,22 +1,42 @@
 """A flight at a glance, for a reader who knows neither the paper nor the program."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 
 from companion.mission.model import Mission
-from companion.report import FlightReport
-from rebound_cli.figure.hit import draw_fold, draw_position, draw_specific_force, draw_velocity, first_hit, folds
-from rebound_cli.figure.overview import draw_felt, draw_height, draw_map, draw_speed
-from rebound_cli.figure.style import mark_faults
+from companion.report import CollisionReport, FlightReport
+from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches
 from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.run_folder import FIGURE_NAME, TLOG_NAME
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.truth_match import FlightTruth, match_contacts
 from sim_vehicle.scene import Scene
+
+Floats = npt.NDArray[np.float64]
+
+MEASURED = {"color": "tab:blue", "linewidth": 1.8}
+ASKED = {"color": "tab:orange", "linewidth": 1.4, "linestyle": "--"}
+DETECTED, RECOVERED, FAULT = "tab:red", "tab:green", "tab:pink"
+# Arms that fold alike lie on each other: the left ones are dashed so that both show. PX4's motor order of the quad-x.
+_ARMS = {"front right": "b-", "rear left": "m--", "front left": "c--", "rear right": "y-"}
 
 # How much of the approach and of the time after the recovery is shown around a hit.
 _BEFORE_S, _AFTER_S = 2.0, 1.5
+# The hit itself lasts some 0.05 s; a third of a second around it shows it and the quiet on both sides.
+_ZOOM_S = 0.3
+# A hit without a recovery is followed for this long.
+_UNSETTLED_S = 5.0
+# A rigid vehicle's arms bend by less; a picture of that shows nothing.
+_LEAST_FOLD_M = 0.002
+# A normal that is more upright than this (45 degrees) is a ceiling's or a floor's: its push is along the thrust.
+_UPRIGHT = 0.7
+
+_START, _DETECTION = "time since the start [s]", "time from the detection [ms]"
 
 
 def draw_flight(
@@ -24,56 +44,248 @@ def draw_flight(
 ) -> None:
     """Write the picture of the flight in `folder` from its telemetry log and, if there is one, the truth."""
     log = read_flight_log(folder / TLOG_NAME)
-    if report.collisions:
-        figure = Figure(figsize=(18, 8.5), layout="constrained")  # without pyplot: no window, no global state
-        _draw_hit(figure.subplots(2, 3), log, mission, scene, report, truth)
+    picture = _Picture(log, mission, scene, report, truth)
+    count = len(report.collisions)
+    figure = Figure(figsize=(18 if count else 13, 8.5), layout="constrained")  # without pyplot: no global state
+    if count:
+        picture.draw_hit(figure.subplots(2, 3))
     else:
-        figure = Figure(figsize=(13, 8.5), layout="constrained")
-        _draw_free_flight(figure.subplots(2, 2), log, mission, scene, report, truth)
-    figure.suptitle(_title(mission, report), fontsize=13)
+        picture.draw_free_flight(figure.subplots(2, 2))
+    hits = {0: "no hit", 1: "one hit"}.get(count, f"{count} hits, the first of them in detail")
+    detail = f" ({report.reason})" if report.outcome != "completed" else ""
+    figure.suptitle(f"Mission '{mission.name}': {report.outcome}{detail}, {hits}", fontsize=13)
     figure.savefig(folder / FIGURE_NAME, dpi=100)
 
 
-def _title(mission: Mission, report: FlightReport) -> str:
-    count = len(report.collisions)
-    hits = {0: "no hit", 1: "one hit"}.get(count, f"{count} hits, the first of them in detail")
-    detail = f" ({report.reason})" if report.outcome != "completed" else ""
-    return f"Mission '{mission.name}': {report.outcome}{detail}, {hits}"
+@dataclass(frozen=True, slots=True)
+class _Hit:
+    """The first one, in seconds since the flight began and along the line into the obstacle."""
+
+    collision: CollisionReport
+    into_obstacle: Floats
+    detected_s: float
+    recovered_s: float | None
+    contact_s: float | None
+    obstacle: str
+    surface_m: float | None
+    touch_m: float | None  # where the vehicle's centre was at the first touch
+
+    @property
+    def end_s(self) -> float:
+        """When it was over."""
+        return self.recovered_s or self.detected_s + _UNSETTLED_S
+
+    def along(self, vectors: Floats) -> Floats:
+        """Component into the obstacle."""
+        component: Floats = vectors @ self.into_obstacle
+        return component
 
 
-def _draw_hit(
-    axes: Any,
-    log: FlightLog,
-    mission: Mission,
-    scene: Scene | None,
-    report: FlightReport,
-    truth: FlightTruth | None,
-) -> None:
-    hit = first_hit(mission, report, truth)
-    draw_position(axes[0, 0], hit, log, report)
-    draw_velocity(axes[1, 0], hit, log, report, truth)
-    draw_specific_force(axes[0, 1], hit, log, report, mission.companion.least_threshold_m_s2)
-    if truth is not None and folds(truth):
-        draw_fold(axes[1, 1], hit, report, truth)
-    else:
-        draw_speed(axes[1, 1], log, report)
-    draw_map(axes[0, 2], log, report, scene)
-    draw_height(axes[1, 2], log, report)
-    for axis in axes[:, 0]:
-        axis.set_xlim(hit.detected_s - _BEFORE_S, hit.end_s + _AFTER_S)
-    mark_faults((*axes[:, 0], axes[1, 2]), report, truth)
+class _Picture:
+    """Times are seconds since the flight began, places from the take-off point."""
+
+    def __init__(
+        self, log: FlightLog, mission: Mission, scene: Scene | None, report: FlightReport, truth: FlightTruth | None
+    ) -> None:
+        self._log, self._mission, self._scene, self._report, self._truth = log, mission, scene, report, truth
+        self._origin = np.array(report.origin_ned_m or (0.0, 0.0, 0.0))
+        self._imu_s, self._position_s, self._setpoint_s = (
+            self._since_start_s(at_us) for at_us in (log.imu_at_us, log.position_at_us, log.setpoint_at_us)
+        )
+
+    def _since_start_s(self, at_us: Any) -> Any:
+        """Of a time of the log's clock, or of many."""
+        return (at_us - self._report.started_at_us) / 1e6
+
+    def draw_hit(self, axes: Any) -> None:
+        hit = self._first_hit()
+        self._draw_position(axes[0, 0], hit)
+        self._draw_velocity(axes[1, 0], hit)
+        self._draw_specific_force(axes[0, 1], hit)
+        if self._truth is not None and float(self._truth.series["arm_fold_m"].max(initial=0.0)) > _LEAST_FOLD_M:
+            self._draw_fold(axes[1, 1], hit, self._truth)
+        else:
+            self._draw_speed(axes[1, 1])
+        self._draw_map(axes[0, 2])
+        self._draw_height(axes[1, 2])
+        for axis in axes[:, 0]:
+            axis.set_xlim(hit.detected_s - _BEFORE_S, hit.end_s + _AFTER_S)
+        self._mark_faults((*axes[:, 0], axes[1, 2]))
+
+    def draw_free_flight(self, axes: Any) -> None:
+        self._draw_map(axes[0, 0])
+        self._draw_height(axes[0, 1])
+        self._draw_speed(axes[1, 0])
+        self._draw_felt(axes[1, 1])
+        self._mark_faults((axes[0, 1], axes[1, 0], axes[1, 1]))
+
+    def _first_hit(self) -> _Hit:
+        """By the companion; obstacle, surface and touch by the truth, where there is one."""
+        collision = self._report.collisions[0]
+        detected_s, settled_s = (
+            self._since_start_s(collision.detected_at_us),
+            self._mission.companion.settled.duration_s,
+        )
+        normal, contact_s, surface_m, touch_m, obstacle = np.array(collision.normal_ned), None, None, None, "obstacle"
+        contact = None
+        if self._truth is not None:
+            contact = match_contacts(self._report.collisions, self._truth.hits, settled_s).hit_of_collision[0]
+        if self._truth is not None and contact is not None:
+            normal, obstacle = np.array(contact.normal_ned), contact.obstacle
+            contact_s = self._since_start_s(self._truth.at_us(contact.contact_at_boot_us))
+            touch_m = float((np.array(contact.contact_position_ned_m) - self._origin) @ -normal)
+            if contact.contact_point_ned_m is not None:
+                surface_m = float((np.array(contact.contact_point_ned_m) - self._origin) @ -normal)
+        after_s = collision.settled_after_s
+        recovered_s = None if after_s is None else detected_s + after_s + settled_s
+        return _Hit(collision, -normal, detected_s, recovered_s, contact_s, obstacle, surface_m, touch_m)
+
+    def _draw_position(self, axis: Any, hit: _Hit) -> None:
+        def place(positions_ned_m: Any) -> Any:
+            return hit.along(np.array(positions_ned_m) - self._origin)
+
+        place_m = place(self._log.position_ned_m)
+        axis.plot(self._position_s, place_m, label="vehicle's centre", **MEASURED)
+        setpoints_m = place(self._log.setpoint_ned_m)
+        axis.plot(self._setpoint_s, setpoints_m, label="setpoint sent", drawstyle="steps-post", **ASKED)
+        position_m, target_m = place(hit.collision.position_ned_m), place(hit.collision.recovery_setpoint_ned_m)
+        top_m = max(position_m, hit.surface_m or position_m) + 0.5
+        if hit.surface_m is not None:
+            axis.axhline(
+                hit.touch_m, color=OBSTACLE, linewidth=1.0, linestyle=":", label="centre when the guards touch"
+            )
+            far_m = hit.surface_m + 10.0
+            axis.axhspan(hit.surface_m, far_m, facecolor=OBSTACLE, alpha=0.35, hatch="//", label=hit.obstacle)
+        shown_m = place_m[(self._position_s >= hit.detected_s) & (self._position_s <= hit.end_s)]
+        axis.set_ylim(min(target_m, position_m, float(shown_m.min(initial=target_m))) - 0.3, top_m)
+        _mark_moments(axis, hit)
+        _finish(axis, f"Position on the line into the {hit.obstacle}", _START, "distance from take-off point [m]")
+
+    def _draw_velocity(self, axis: Any, hit: _Hit) -> None:
+        if self._truth is not None:
+            true_s = self._since_start_s(self._truth.at_us(self._truth.series["time_boot_us"]))
+            true_m_s = hit.along(self._truth.series["velocity_ned_m_s"])
+            axis.plot(true_s, true_m_s, label="simulator's truth", color="0.55", linewidth=1.0)
+        axis.plot(self._position_s, hit.along(self._log.velocity_ned_m_s), label="measured", **MEASURED)
+        before_m_s = float(hit.along(np.array(hit.collision.impact_velocity_ned_m_s)))
+        label = f"before the hit, by the companion: {before_m_s:.2f} m/s"
+        axis.plot([hit.detected_s], [before_m_s], "o", color=DETECTED, label=label)
+        axis.axhline(0.0, color="0.7", linewidth=0.8)
+        _mark_moments(axis, hit)
+        _finish(axis, f"Velocity into the {hit.obstacle} (negative: away from it)", _START, "velocity [m/s]")
+
+    def _draw_specific_force(self, axis: Any, hit: _Hit) -> None:
+        """Perpendicular to the thrust; along it for a ceiling or a floor, where the pushes are."""
+        near = np.abs(self._imu_s - hit.detected_s) <= _ZOOM_S
+        milliseconds, force = 1e3 * (self._imu_s[near] - hit.detected_s), self._log.specific_force_frd_m_s2[near]
+        style = {"markersize": 5, "label": "each IMU sample", **MEASURED}
+        if abs(hit.into_obstacle[2]) > _UPRIGHT:
+            title = "What the accelerometer felt along the thrust (down positive)"
+            axis.plot(milliseconds, force[:, 2], ".-", **style)
+        else:
+            title = "What the accelerometer felt sideways (perpendicular to thrust)"
+            axis.plot(milliseconds, np.hypot(force[:, 0], force[:, 1]), ".-", **style)
+            self._draw_threshold(axis)
+            axis.set_ylim(bottom=0.0)
+        _mark_zoom(axis, hit)
+        _finish(axis, title, _DETECTION, "specific force [m/s²]", "upper right")
+
+    def _draw_fold(self, axis: Any, hit: _Hit, truth: FlightTruth) -> None:
+        since_s = self._since_start_s(truth.at_us(truth.series["time_boot_us"])) - hit.detected_s
+        near = np.abs(since_s) <= _ZOOM_S
+        fold_mm = 1e3 * truth.series["arm_fold_m"][near]
+        for arm, (name, style) in enumerate(_ARMS.items()):
+            axis.plot(1e3 * since_s[near], fold_mm[:, arm], style, label=f"{name} arm", linewidth=1.8)
+        _mark_zoom(axis, hit)
+        axis.set_ylim(0.0, max(5.0, 1.1 * float(fold_mm.max(initial=0.0))))
+        _finish(axis, "How far each arm folded (simulator's truth)", _DETECTION, "fold [mm]", "upper right")
+
+    def _draw_map(self, axis: Any) -> None:
+        """From above, about the take-off point; an obstacle that moves stands where it stood at first."""
+        asked, flown = self._log.setpoint_ned_m - self._origin, self._log.position_ned_m - self._origin
+        axis.plot(asked[:, 1], asked[:, 0], label="setpoints sent", **ASKED)
+        axis.plot(flown[:, 1], flown[:, 0], label="path measured", **MEASURED)
+        shown = np.concatenate([asked[:, :2], flown[:, :2]])
+        # A setpoint that asks for an acceleration or an attitude alone has no place.
+        shown = shown[np.isfinite(shown).all(axis=1)]
+        if self._scene is not None:
+            draw_obstacles(axis, self._scene, self._origin, "obstacles", 0.6)
+        draw_patches(axis, self._report.obstacles)
+        for number, collision in enumerate(self._report.collisions):
+            north, east, _ = np.array(collision.position_ned_m) - self._origin
+            axis.plot([east], [north], "o", color=DETECTED, label="hit detected" if number == 0 else None)
+        if len(shown):
+            # A wall may be far longer than the flight: the flight is what is looked at.
+            least, most = shown.min(axis=0), shown.max(axis=0)
+            (north, east), half_m = 0.5 * (least + most), 0.5 * float((most - least).max()) + 1.0
+            axis.set(xlim=(east - half_m, east + half_m), ylim=(north - half_m, north + half_m), aspect="equal")
+        _finish(axis, "From above", "east of the take-off point [m]", "north of the take-off point [m]")
+
+    def _draw_height(self, axis: Any) -> None:
+        asked_m, measured_m = (
+            self._origin[2] - places_ned_m[:, 2]
+            for places_ned_m in (self._log.setpoint_ned_m, self._log.position_ned_m)
+        )
+        axis.plot(self._setpoint_s, asked_m, label="setpoint sent", drawstyle="steps-post", **ASKED)
+        axis.plot(self._position_s, measured_m, label="measured", **MEASURED)
+        for collision in self._report.collisions:
+            axis.axvline(self._since_start_s(collision.detected_at_us), color=DETECTED, linewidth=1.0)
+        _finish(axis, "Height above the take-off point", _START, "height [m]")
+
+    def _draw_speed(self, axis: Any) -> None:
+        north_m_s, east_m_s, _ = self._log.velocity_ned_m_s.T
+        axis.plot(self._position_s, np.hypot(north_m_s, east_m_s), label="measured", **MEASURED)
+        _finish(axis, "Horizontal speed", _START, "speed [m/s]")
+
+    def _draw_felt(self, axis: Any) -> None:
+        x, y, _ = self._log.specific_force_frd_m_s2.T
+        axis.plot(self._imu_s, np.hypot(x, y), label="each IMU sample", color="tab:blue", linewidth=0.8)
+        self._draw_threshold(axis)
+        title = "What the accelerometer felt sideways (perpendicular to thrust)"
+        _finish(axis, title, _START, "specific force [m/s²]")
+
+    def _draw_threshold(self, axis: Any) -> None:
+        """Nothing for a detector that does not look at forces."""
+        threshold_m_s2 = self._mission.companion.least_threshold_m_s2
+        if threshold_m_s2 is not None:
+            label = f"least threshold, {threshold_m_s2:g} m/s²"
+            axis.axhline(threshold_m_s2, color=DETECTED, linewidth=1.0, linestyle=":", label=label)
+
+    def _mark_faults(self, axes: Sequence[Any]) -> None:
+        """Shade the times at which a simulated fault acted."""
+        truth = self._truth
+        if truth is None or not truth.faults:
+            return
+        for axis in axes:
+            left, right = axis.get_xlim()
+            for fault in truth.faults:
+                began_s, ended_s = (
+                    right if at_us is None else self._since_start_s(truth.at_us(at_us))
+                    for at_us in (fault.began_at_boot_us, fault.ended_at_boot_us)
+                )
+                axis.axvspan(began_s, max(ended_s, began_s + 0.02), color=FAULT, alpha=0.12)
+                if left <= began_s <= right:
+                    text, place = fault.kind.replace("_", " "), ("data", "axes fraction")
+                    axis.annotate(text, (began_s, 0.02), xycoords=place, fontsize=7, color=FAULT, rotation=90)
+            axis.set_xlim(left, right)
 
 
-def _draw_free_flight(
-    axes: Any,
-    log: FlightLog,
-    mission: Mission,
-    scene: Scene | None,
-    report: FlightReport,
-    truth: FlightTruth | None,
-) -> None:
-    draw_map(axes[0, 0], log, report, scene)
-    draw_height(axes[0, 1], log, report)
-    draw_speed(axes[1, 0], log, report)
-    draw_felt(axes[1, 1], log, report, mission.companion.least_threshold_m_s2)
-    mark_faults((axes[0, 1], axes[1, 0], axes[1, 1]), report, truth)
+def _finish(axis: Any, title: str, across: str, up: str, legend_place: str = "best") -> None:
+    """Title, axes with their units, grid and legend."""
+    axis.set(title=title, xlabel=across, ylabel=up)
+    axis.grid(alpha=0.3)
+    axis.legend(loc=legend_place, fontsize=8, framealpha=0.9)
+
+
+def _mark_moments(axis: Any, hit: _Hit) -> None:
+    axis.axvline(hit.detected_s, color=DETECTED, linewidth=1.2, label="hit detected")
+    if hit.recovered_s is not None:
+        axis.axvline(hit.recovered_s, color=RECOVERED, linewidth=1.2, label="recovered")
+
+
+def _mark_zoom(axis: Any, hit: _Hit) -> None:
+    if hit.contact_s is not None:
+        contact_ms = 1e3 * (hit.contact_s - hit.detected_s)
+        axis.axvline(contact_ms, color=OBSTACLE, linewidth=1.2, label=f"first touch, {-contact_ms:.1f} ms earlier")
+    axis.axvline(0.0, color=DETECTED, linewidth=1.2, label="hit detected")
+    axis.set_xlim(-1e3 * _ZOOM_S, 1e3 * _ZOOM_S)

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from rebound_cli.flight_log import FlightLog, read_flight_log
-from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Push
+from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Push, guards_at
 
 # A touch: above the lateral specific force of the detector's default, so that drag and vibration are none.
 _TOUCH_M_S2 = 4.0
@@ -39,14 +40,16 @@ _STOP_RISE = 1.3
 
 def flight_hit(path: Path) -> Hit:
     """The hardest hit of a log of MAVLink 2 packets. Raises IdentificationError."""
-    try:
-        log = read_flight_log(path)
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read: {error.strerror or 'not a file'}.") from error
+    log = read_flight_log(path)
     if len(log.imu_at_us) == 0 or len(log.position_at_us) == 0:
         raise IdentificationError(f"{path}: no HIGHRES_IMU and LOCAL_POSITION_NED in it; both are needed.")
     name = path.parent.name if path.name == "flight.tlog" else path.stem
-    hits = [hit for touch, release in _contacts(log) if (hit := _hit(name, log, touch, release)) is not None]
+    lateral = np.hypot(log.specific_force_frd_m_s2[:, 0], log.specific_force_frd_m_s2[:, 1])
+    touching = np.flatnonzero(lateral > _TOUCH_M_S2)
+    # First and last sample of every contact.
+    is_new = np.diff(1e-6 * log.imu_time_boot_us[touching]) >= _QUIET_S
+    contacts = [part for part in np.split(touching, np.flatnonzero(is_new) + 1) if len(part)]
+    hits = [hit for part in contacts if (hit := _hit(name, log, int(part[0]), int(part[-1]))) is not None]
     if not hits:
         raise IdentificationError(
             f"{path}: no hit found: no lateral specific force above {_TOUCH_M_S2:g} m/s2 "
@@ -55,38 +58,23 @@ def flight_hit(path: Path) -> Hit:
     return max(hits, key=lambda hit: hit.normal_change_m_s)
 
 
-def _contacts(log: FlightLog) -> list[tuple[int, int]]:
-    """First and last sample of every contact."""
-    lateral = np.hypot(log.specific_force_frd_m_s2[:, 0], log.specific_force_frd_m_s2[:, 1])
-    time_s = 1e-6 * log.imu_time_boot_us
-    contacts: list[tuple[int, int]] = []
-    for index in np.flatnonzero(lateral > _TOUCH_M_S2).tolist():
-        if contacts and time_s[index] - time_s[contacts[-1][1]] < _QUIET_S:
-            contacts[-1] = contacts[-1][0], index
-        else:
-            contacts.append((index, index))
-    return contacts
-
-
 def _hit(name: str, log: FlightLog, touch: int, release: int) -> Hit | None:
-    horizontal = log.velocity_ned_m_s[:, :2]
-    touch_us, release_us = log.imu_at_us[touch], log.imu_at_us[release]
-    before = (log.position_at_us >= touch_us - 1e6 * _BEFORE_S) & (log.position_at_us < touch_us)
+    force = log.specific_force_frd_m_s2[touch : release + 1]
+    before = _between(log, log.imu_at_us[touch], -_BEFORE_S, 0.0)
     if not before.any():
         return None
-    arriving = horizontal[before].mean(axis=0)
-    is_clipped = bool((np.abs(log.specific_force_frd_m_s2[touch : release + 1]) > _MAY_BE_CLIPPED_M_S2).any())
-    leaving = _carried_back(log, release) if is_clipped else _soon_after(log, float(release_us), arriving)
+    arriving = log.velocity_ned_m_s[before, :2].mean(axis=0)
+    is_clipped = bool((np.abs(force) > _MAY_BE_CLIPPED_M_S2).any())
+    leaving = _carried_back(log, release) if is_clipped else _soon_after(log, release, arriving)
     if leaving is None:
         return None
-    change = leaving - arriving
-    away = change / np.hypot(*change)
+    away = (leaving - arriving) / np.linalg.norm(leaving - arriving)
     speed_in, speed_out = float(-arriving @ away), float(leaving @ away)
     if speed_in < _SLOWEST_HIT_M_S or speed_out <= 0:
         return None
     along = np.array([-away[1], away[0]])
-    towards_body, guards = _direction(log.specific_force_frd_m_s2[touch : release + 1, :2])
-    push, stop_m = _push(log, touch, towards_body, speed_in)
+    pushed = force[:, :2].sum(axis=0)
+    push, stop_m = _push(log, touch, pushed / np.linalg.norm(pushed), speed_in)
     return Hit(
         name=name,
         at_s=1e-6 * float(log.imu_time_boot_us[touch]),
@@ -95,26 +83,27 @@ def _hit(name: str, log: FlightLog, touch: int, release: int) -> Hit | None:
         speed_sigma_m_s=_CARRIED_SIGMA_M_S if is_clipped else _SPEED_SIGMA_M_S,
         along_in_m_s=float(arriving @ along),
         along_out_m_s=float(leaving @ along),
-        guards=guards,
+        guards=guards_at(float(np.arctan2(pushed[1], pushed[0]))),
         push=push,
         stop_m=stop_m,
     )
 
 
-def _soon_after(log: FlightLog, release_us: float, arriving_m_s: Floats) -> Floats | None:
+def _between(log: FlightLog, at_us: float, from_s: float, to_s: float) -> npt.NDArray[np.bool_]:
+    """Which of the vehicle's velocities were heard so long after `at_us`."""
+    since_s: Floats = 1e-6 * (log.position_at_us - at_us)
+    return (since_s >= from_s) & (since_s < to_s)
+
+
+def _soon_after(log: FlightLog, release: int, arriving_m_s: Floats) -> Floats | None:
     """The horizontal velocity furthest from that of the arrival, right after the release."""
-    after = (log.position_at_us > release_us) & (log.position_at_us <= release_us + 1e6 * _AFTER_S)
-    if not after.any():
-        return None
-    velocities: Floats = log.velocity_ned_m_s[after, :2]
-    furthest: Floats = velocities[int(np.argmax(((velocities - arriving_m_s) ** 2).sum(axis=1)))]
-    return furthest
+    velocities: Floats = log.velocity_ned_m_s[_between(log, log.imu_at_us[release], 1e-6, _AFTER_S), :2]
+    return max(velocities, key=lambda one: float(np.linalg.norm(one - arriving_m_s)), default=None)
 
 
 def _carried_back(log: FlightLog, release: int) -> Floats | None:
     """The horizontal velocity at the release, from when the vehicle's estimate was right again."""
-    since_s = 1e-6 * (log.position_at_us - log.imu_at_us[release])
-    later = (since_s >= _RIGHT_AGAIN_S[0]) & (since_s <= _RIGHT_AGAIN_S[1])
+    later = _between(log, log.imu_at_us[release], *_RIGHT_AGAIN_S)
     if not later.any():
         return None
     summed = log.accelerated_ned_m_s[:, :2]
@@ -125,47 +114,29 @@ def _carried_back(log: FlightLog, release: int) -> Floats | None:
     return carried
 
 
-def _direction(lateral: Floats) -> tuple[Floats, int]:
-    """Where the push points in the body, and how many guards it comes through: 2 from ahead, 1 diagonally."""
-    mean = lateral.sum(axis=0)
-    unit: Floats = mean / np.hypot(*mean)
-    off_rad = (np.arctan2(unit[1], unit[0]) + np.pi / 4) % (np.pi / 2) - np.pi / 4
-    return unit, 2 if abs(off_rad) < np.pi / 8 else 1
-
-
 def _push(log: FlightLog, touch: int, direction: Floats, speed_m_s: float) -> tuple[Push | None, float | None]:
-    """Depth, speed and push at the middle of every whole sample, integrated from the speed at the touch.
+    """Depth, speed and push at the middle of every whole sample, and where the arms met their stop.
 
-    A sample is the mean over the interval that ends at its time. In the first, the touch lies somewhere:
-    where, its size against the next one's tells.
+    Integrated from the speed at the touch. A sample is the mean over the interval that ends at its time. In the
+    first, the touch lies somewhere: where, its size against the next one's tells.
     """
     push = log.specific_force_frd_m_s2[touch:, :2] @ direction
     interval_s = 1e-6 * float(np.median(np.diff(log.imu_time_boot_us)))
-    if len(push) < 2 or push[1] <= 0:
-        return None, None
     released = np.flatnonzero(push[1:] < _RELEASE_M_S2)
     push = push[: 1 + int(released[0])] if len(released) else push
-    pressed_s = interval_s * min(1.0, float(push[0] / push[1])) if len(push) > 1 else 0.0
-    depth, speed = speed_m_s * pressed_s, speed_m_s - push[0] * interval_s
-    rows: list[tuple[float, ...]] = []
-    middle_s = pressed_s + interval_s / 2
-    for value in push[1:]:
-        middle_speed = speed - value * interval_s / 2
-        rows.append((middle_s, depth + (speed + middle_speed) / 2 * interval_s / 2, middle_speed, value))
-        middle_s += interval_s
-        depth += middle_speed * interval_s
-        speed -= value * interval_s
-    before_stop = _before_stop(push[1:])
-    if before_stop < _FEWEST_SAMPLES:
+    if len(push) <= _FEWEST_SAMPLES:
         return None, None
-    table = np.array(rows)
-    stop_m = float(table[before_stop, 1]) if before_stop < len(rows) else None
-    table = table[:before_stop]
-    return Push(*table.T), stop_m
-
-
-def _before_stop(push: Floats) -> int:
-    """Samples before the push rises again after it has begun to decay: there the arms met their stop."""
-    lowest = np.minimum.accumulate(push)
-    rising = np.flatnonzero((push > _STOP_RISE * lowest + _RELEASE_M_S2) | (push > _CLIPPED_M_S2))
-    return int(rising[0]) - 1 if len(rising) else len(push)
+    pressed_s = interval_s * min(1.0, float(push[0] / push[1]))
+    speed = (speed_m_s - interval_s * np.cumsum(push))[:-1]  # at the beginning of each whole sample
+    push = push[1:]
+    middle = speed - push * interval_s / 2
+    begin_m = speed_m_s * pressed_s + interval_s * (np.cumsum(middle) - middle)
+    depth = begin_m + (speed + middle) * interval_s / 4
+    since_s: Floats = pressed_s + interval_s * (np.arange(len(push), dtype=np.float64) + 0.5)
+    # The push rises again after it has begun to decay, or clips.
+    stopped = np.flatnonzero((push > _STOP_RISE * np.minimum.accumulate(push) + _RELEASE_M_S2) | (push > _CLIPPED_M_S2))
+    whole = int(stopped[0]) - 1 if len(stopped) else len(push)
+    if whole < _FEWEST_SAMPLES:
+        return None, None
+    stop_m = float(depth[whole]) if len(stopped) else None
+    return Push(since_s[:whole], depth[:whole], middle[:whole], push[:whole]), stop_m

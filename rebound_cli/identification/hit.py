@@ -1,5 +1,6 @@
 """What one hit on a wall left behind, whichever instrument saw it."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +17,10 @@ class IdentificationError(ReboundError):
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Positions through a hit along the wall's normal."""
+    """Positions through a hit along the wall's normal, growing towards the wall from any origin."""
 
     time_s: Floats
     towards_wall_m: Floats
-    """Grows towards the wall, from any origin."""
     interval_s: float
 
 
@@ -29,12 +29,9 @@ class Push:
     """The wall's push through a hit, as an inertial sensor shows it."""
 
     since_touch_s: Floats
-    depth_m: Floats
-    """How far the centre of mass has come since the first touch."""
-    speed_m_s: Floats
-    """Towards the wall."""
-    acceleration_m_s2: Floats
-    """Away from the wall, thrust and gravity not in it."""
+    depth_m: Floats  # of the centre of mass beyond its place at the first touch
+    speed_m_s: Floats  # towards the wall
+    acceleration_m_s2: Floats  # away from the wall, without thrust and gravity
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +39,8 @@ class Force:
     """What a force sensor in the wall showed, along the direction of its greatest push."""
 
     peak_n: float
-    pull_n: float
-    """The greatest force the other way. A wall cannot pull: this is the sensor's mounting, ringing."""
-    impulse_n_s: float
-    """Over the whole ringing: mass times the change of speed, if the sensor misses nothing."""
+    pull_n: float  # the greatest force the other way: a wall cannot pull, this is the mounting, ringing
+    impulse_n_s: float  # over the whole ringing: mass times the change of speed, if the sensor misses nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,23 +48,17 @@ class Hit:
     """One hit. Speeds are of the centre of mass; `along` is the horizontal component in the wall's face."""
 
     name: str
-    at_s: float
-    """Of the data's own clock."""
-    speed_in_m_s: float
-    """Greatest speed towards the wall before it."""
-    speed_out_m_s: float
-    """Greatest speed away from the wall after it."""
-    speed_sigma_m_s: float
-    """Standard deviation of either speed, from the noise of the data."""
+    at_s: float  # of the data's own clock
+    speed_in_m_s: float  # the greatest towards the wall before it
+    speed_out_m_s: float  # the greatest away from the wall after it
+    speed_sigma_m_s: float  # standard deviation of either speed
     along_in_m_s: float
     along_out_m_s: float
-    guards: int
-    """Guards that meet the wall: 2 head-on, 1 with the nose turned by 45 degrees."""
+    guards: int  # that meet the wall: 2 head-on, 1 with the nose turned by 45 degrees
     track: Track | None = None
     push: Push | None = None
     force: Force | None = None
-    stop_m: float | None = None
-    """Depth at which the stop of the arms was met, if it was."""
+    stop_m: float | None = None  # depth at which the stop of the arms was met, if it was
 
     @property
     def ratio(self) -> float:
@@ -78,3 +67,9 @@ class Hit:
     @property
     def normal_change_m_s(self) -> float:
         return self.speed_in_m_s + self.speed_out_m_s
+
+
+def guards_at(angle_rad: float) -> int:
+    """2 where the nose, or a side, is within 22.5 degrees of the wall's normal; 1 at the diagonals."""
+    off_rad = (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
+    return 2 if abs(off_rad) < math.pi / 8 else 1

@@ -1,11 +1,26 @@
 """What every reader gives: typed samples in the order heard, and what the log cannot tell."""
 
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
+from companion import messages
 from companion.errors import ReboundError
-from companion.messages import ImuSample, Sample, Vector3
+from companion.messages import ImuSample, MessageId, Sample, Vector3
+
+# Without these a detector loses something.
+WANTED = {
+    MessageId.LOCAL_POSITION_NED: messages.LocalPosition,
+    MessageId.ATTITUDE_QUATERNION: messages.Attitude,
+    MessageId.EXTENDED_SYS_STATE: messages.ExtendedState,
+    MessageId.ATTITUDE_TARGET: messages.AttitudeTarget,
+    MessageId.ODOMETRY: messages.Odometry,
+    MessageId.VIBRATION: messages.Vibration,
+}
+# Of a quad-x every rotor is as far aside as ahead, of a plus one of them is zero; half-way between them are 22.5 deg.
+_LEAST_DIAGONAL = math.tan(math.pi / 8)
 
 
 class LogError(ReboundError):
@@ -24,6 +39,14 @@ class Demand:
     velocity_ned_m_s: Vector3 | None
     velocity_down_m_s: float | None
 
+    @classmethod
+    def of(cls, time_boot_us: int, position_ned_m: Sequence[float], velocity_ned_m_s: Sequence[float]) -> Self:
+        """NaN where nothing was asked."""
+        position = vector(position_ned_m) if all(map(math.isfinite, position_ned_m)) else None
+        velocity = vector(velocity_ned_m_s) if all(map(math.isfinite, velocity_ned_m_s)) else None
+        down = velocity_ned_m_s[2] if math.isfinite(velocity_ned_m_s[2]) else None
+        return cls(time_boot_us, position, velocity, down)
+
 
 Told: TypeAlias = Sample | Demand
 
@@ -40,7 +63,6 @@ class Heard:
 class Log:
     """A recorded flight. `losses` are sentences: what is missing, and what that costs.
 
-    `hover_thrust_fraction` is the vehicle's own estimate or parameter, where the log has it.
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
     `other_arms`: what kind of vehicle it is, where its arms are not those of a quad-x.
@@ -51,7 +73,6 @@ class Log:
     started_at_us: int
     heard: tuple[Heard, ...]
     losses: tuple[str, ...]
-    hover_thrust_fraction: float | None = None
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
     other_arms: str | None = None
@@ -69,8 +90,14 @@ class Log:
         return (at_us - self.started_at_us) * 1e-6
 
 
-def checked(log: Log) -> Log:
-    """The log, if there is anything in it for a detector. Raises LogError."""
-    if len(log.imu()) < 2:
-        raise LogError(f"{log.path}: no IMU samples in it; a collision cannot be looked for without them.")
-    return log
+def other_arms(name: str, rotors: Iterable[tuple[float, float]] = ()) -> str | None:
+    """The vehicle in a word, where its arms are not those of a quad-x; `rotors`: metres ahead and aside of each."""
+    if name != "quadrotor":
+        return name
+    is_plus = any(min(abs(x), abs(y)) < _LEAST_DIAGONAL * max(abs(x), abs(y)) for x, y in rotors)
+    return "quadrotor whose arms are no X" if is_plus else None
+
+
+def vector(row: Sequence[float]) -> Vector3:
+    """The first three."""
+    return row[0], row[1], row[2]

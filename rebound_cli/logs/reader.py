@@ -1,26 +1,92 @@
-"""Any log by its path."""
+"""Any log by its path. Telemetry logs (.tlog) of any program are read here, with any number of systems on them."""
 
+import math
+import struct
+from collections import Counter
 from pathlib import Path
 
-from rebound_cli.logs.log import Log, LogError
+from companion.link.identity import Identity, identify, is_autopilot
+from companion.mavlink.decode import Decoder
+from companion.mavlink.packet import message_id_of, payload_of, source_of
+from companion.messages import Heartbeat, MessageId
+from companion.shell.tlog import read_tlog
+from rebound_cli.logs.log import WANTED, Demand, Heard, Log, LogError, other_arms
 
 _ULOG_MAGIC = b"ULog"
+Packets = list[tuple[int, bytes]]
+
+# POSITION_TARGET_LOCAL_NED: time_boot_ms; position, velocity, acceleration; yaw and its rate; type mask, frame. Zeros
+# at the end are left out. The mask's first six bits tell what of position and velocity is to be ignored.
+_TARGET = struct.Struct("<I11fHB")
 
 
 def read_log(path: Path) -> Log:
-    """A .ulg by its first bytes, whatever its name; everything else as a telemetry log. Raises LogError."""
-    from rebound_cli.logs.telemetry import read_telemetry
+    """A .ulg by its first bytes, whatever its name; everything else as a telemetry log. Raises LogError, OSError."""
     from rebound_cli.logs.ulog import read_ulog
 
-    try:
-        with path.open("rb") as file:
-            magic = file.read(len(_ULOG_MAGIC))
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file.") from None
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror or error}.") from error
+    with path.open("rb") as file:
+        magic = file.read(len(_ULOG_MAGIC))
     if not magic:
         raise LogError(f"{path}: the file is empty.")
-    if magic == _ULOG_MAGIC or path.suffix == ".ulg":
-        return read_ulog(path)
-    return read_telemetry(path)
+    log = read_ulog(path) if magic == _ULOG_MAGIC or path.suffix == ".ulg" else read_telemetry(path)
+    if len(log.imu()) < 2:
+        raise LogError(f"{path}: no IMU samples in it; a collision cannot be looked for without them.")
+    return log
+
+
+def read_telemetry(path: Path) -> Log:
+    """Raises LogError."""
+    packets = list(read_tlog(path))
+    if not packets:
+        raise LogError(f"{path}: not a telemetry log: no MAVLink packet with a time stamp in it.")
+    vehicle, others = _vehicle(path, packets)
+    source, decoder = (vehicle.system_id, vehicle.component_id), Decoder()
+    decoder.listen_to(*source)
+    heard: list[Heard] = []
+    kinds: set[int] = set()
+    for at_us, packet in packets:
+        if source_of(packet) != source:
+            continue
+        kinds.add(message_id_of(packet))
+        if message_id_of(packet) == MessageId.POSITION_TARGET_LOCAL_NED:
+            heard.append(Heard(at_us, _demand(packet)))
+        else:
+            heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
+    if MessageId.HIGHRES_IMU not in kinds:
+        raise LogError(
+            f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "
+            "asked (MAV_x_MODE, or SET_MESSAGE_INTERVAL 105)."
+        )
+    losses = [f"{wanted.name} is not in it" for wanted in WANTED if wanted not in kinds]
+    if others:
+        losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
+    name, arms = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}", other_arms(vehicle.vehicle_type)
+    return Log(path, name, packets[0][0], tuple(heard), tuple(losses), other_arms=arms)
+
+
+def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:
+    """The PX4 multicopter with the most IMU samples, and the other ones by number."""
+    decoder = Decoder()
+    beats: dict[int, Heartbeat] = {}
+    imu: Counter[int] = Counter()
+    for _, packet in packets:
+        number = message_id_of(packet)
+        if number == MessageId.HIGHRES_IMU:
+            imu[source_of(packet)[0]] += 1
+        elif number == 0:
+            for _, sample in decoder.feed(packet):
+                if isinstance(sample, Heartbeat) and is_autopilot(sample):
+                    beats[sample.system_id] = sample
+    found = [identify(beat) for beat in beats.values()]
+    vehicles = [identity for identity in found if isinstance(identity, Identity)]
+    if not vehicles:
+        why = next((refusal for refusal in found if isinstance(refusal, str)), "no autopilot's heartbeat is in it")
+        raise LogError(f"{path}: no PX4 multicopter speaks in it: {why}.")
+    chosen = max(vehicles, key=lambda identity: imu[identity.system_id])
+    return chosen, ", ".join(str(v.system_id) for v in vehicles if v is not chosen)
+
+
+def _demand(packet: bytes) -> Demand:
+    time_ms, *values, mask, _ = _TARGET.unpack_from(payload_of(packet).ljust(_TARGET.size, b"\0"))
+    asked = [math.nan if mask & 1 << bit else values[bit] for bit in range(6)]
+    return Demand.of(time_ms * 1000, asked[:3], asked[3:])

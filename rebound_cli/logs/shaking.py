@@ -1,5 +1,6 @@
 """What a healthy vehicle shakes, on each axis and in each phase of its flight: the floor under every threshold."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -24,6 +25,9 @@ class Stage(Enum):
     LANDING = "landing"
 
 
+# Away from the ground, a take-off and a landing.
+FLYING = (Stage.HOVER, Stage.UNDER_WAY)
+
 # The running mean's. Long enough for 25 samples at 50 Hz (a spread good to 15 %), short enough to have forgotten the
 # ground by the top of a take-off and to follow drag as the speed changes.
 MEMORY_US = 500_000
@@ -42,7 +46,6 @@ class Shaking:
     """Departures of the specific force from its own running mean, (n, 3) body FRD, and what the vehicle was doing."""
 
     at_us: npt.NDArray[np.int64]
-    force_frd_m_s2: Floats
     departure_frd_m_s2: Floats
     stages: npt.NDArray[np.object_]
     interval_us: float
@@ -52,9 +55,10 @@ class Shaking:
         """Samples a second; gaps count for nothing."""
         return 1e6 / self.interval_us
 
-    def during(self, *stages: Stage) -> Floats:
-        """Departures in these stages."""
-        return self.departure_frd_m_s2[[stage in stages for stage in self.stages]]
+    def during(self, stage: Stage) -> Floats:
+        """Departures in this stage."""
+        departures: Floats = self.departure_frd_m_s2[self.stages == stage]
+        return departures
 
     def noise_m_s2(self) -> Mapping[Stage, Floats]:
         """RMS on each axis for every stage with more than a second of samples."""
@@ -62,6 +66,10 @@ class Shaking:
         return {
             stage: np.sqrt((row**2).mean(axis=0)) for stage, row in rows.items() if len(row) * self.interval_us > 1e6
         }
+
+    def noise_data(self) -> dict[str, list[float]]:
+        """The same for a program."""
+        return {stage.value: [round(v, 3) for v in row.tolist()] for stage, row in self.noise_m_s2().items()}
 
 
 def shaking(log: Log) -> Shaking:
@@ -71,7 +79,7 @@ def shaking(log: Log) -> Shaking:
     force = np.array([sample.specific_force_frd_m_s2 for _, sample in imu])
     intervals_us = np.diff(np.array([sample.time_boot_us for _, sample in imu]))
     interval_us = float(np.median(intervals_us[intervals_us > 0])) if (intervals_us > 0).any() else 1e6
-    return Shaking(at_us, force, _departures(force, interval_us), _stages(log, at_us), interval_us)
+    return Shaking(at_us, _departures(force, interval_us), _stages(log, at_us), interval_us)
 
 
 def _departures(force: Floats, interval_us: float) -> Floats:
@@ -87,51 +95,39 @@ def _departures(force: Floats, interval_us: float) -> Floats:
 
 def _stages(log: Log, at_us: npt.NDArray[np.int64]) -> npt.NDArray[np.object_]:
     """By the land detector and the speed; without a land detector whatever is armed flies."""
+    # When it was on the ground or not even armed, and when it was slow: one row a change.
+    down, slow = [(int(at_us[0]), False)], [(int(at_us[0]), False)]
+    landed = disarmed = False
+    for heard in log.heard:
+        match heard.sample:
+            case ExtendedState():
+                landed = heard.sample.landed_state is LandedState.ON_GROUND
+            case Heartbeat():
+                disarmed = not heard.sample.armed
+            case LocalPosition():
+                slow.append((heard.at_us, math.hypot(*heard.sample.velocity_ned_m_s) < HOVER_M_S))
+        if down[-1][1] != (landed or disarmed):
+            down.append((heard.at_us, landed or disarmed))
     stages = np.full(len(at_us), Stage.UNDER_WAY, dtype=object)
-    down, slow = _is_down(log), _is_slow(log)
-    for (start_us, is_slow), (end_us, _) in pairwise([*slow, (int(at_us[-1]) + 1, False)]):
-        if is_slow:
-            stages[_slice(at_us, start_us, end_us)] = Stage.HOVER
-    for (start_us, is_down), (end_us, _) in pairwise([*down, (int(at_us[-1]) + 1, False)]):
-        if not is_down:
-            continue
-        stages[_slice(at_us, end_us, end_us + TAKEOFF_US)] = Stage.TAKEOFF
-        stages[_slice(at_us, start_us - LANDING_US, start_us)] = Stage.LANDING
-    for (start_us, is_down), (end_us, _) in pairwise([*down, (int(at_us[-1]) + 1, False)]):
-        if is_down:
-            stages[_slice(at_us, start_us, end_us)] = Stage.GROUND
+
+    def mark(start_us: int, end_us: int, stage: Stage) -> None:
+        stages[slice(*np.searchsorted(at_us, (start_us, end_us)))] = stage
+
+    end_us = int(at_us[-1]) + 1
+    for start_us, next_us in _spans(slow, end_us):
+        mark(start_us, next_us, Stage.HOVER)
+    on_ground = _spans(down, end_us)
+    for start_us, next_us in on_ground:
+        mark(next_us, next_us + TAKEOFF_US, Stage.TAKEOFF)
+        mark(start_us - LANDING_US, start_us, Stage.LANDING)
+    for start_us, next_us in on_ground:
+        mark(start_us, next_us, Stage.GROUND)
     return stages
 
 
-def _slice(at_us: npt.NDArray[np.int64], start_us: int, end_us: int) -> slice:
-    return slice(*np.searchsorted(at_us, (start_us, end_us)))
-
-
-def _is_down(log: Log) -> list[tuple[int, bool]]:
-    """Changes of: on the ground, or not even armed."""
-    changes: list[tuple[int, bool]] = []
-    landed = disarmed = False
-    for heard in log.heard:
-        if isinstance(heard.sample, ExtendedState):
-            landed = heard.sample.landed_state is LandedState.ON_GROUND
-        elif isinstance(heard.sample, Heartbeat):
-            disarmed = not heard.sample.armed
-        else:
-            continue
-        if not changes or changes[-1][1] != (landed or disarmed):
-            changes.append((heard.at_us, landed or disarmed))
-    return changes
-
-
-def _is_slow(log: Log) -> list[tuple[int, bool]]:
-    changes: list[tuple[int, bool]] = []
-    for heard in log.heard:
-        if isinstance(heard.sample, LocalPosition):
-            n, e, d = heard.sample.velocity_ned_m_s
-            is_slow = n * n + e * e + d * d < HOVER_M_S**2
-            if not changes or changes[-1][1] != is_slow:
-                changes.append((heard.at_us, is_slow))
-    return changes
+def _spans(changes: list[tuple[int, bool]], end_us: int) -> list[tuple[int, int]]:
+    """Beginning and end of each time in which it was so."""
+    return [(start, end) for (start, was_so), (end, _) in pairwise([*changes, (end_us, False)]) if was_so]
 
 
 def clipped(log: Log) -> tuple[int, str]:

@@ -1,34 +1,33 @@
-"""PX4's own logs (.ulg) as the samples that its MAVLink link would have carried.
+"""PX4's own logs (.ulg) as the samples that its MAVLink link would have carried; pyulog reads the file.
 
 The conversions are those of PX4's mavlink/streams (HIGHRES_IMU, LOCAL_POSITION_NED, ODOMETRY, ATTITUDE_QUATERNION,
 ATTITUDE_TARGET, VIBRATION, EXTENDED_SYS_STATE, HEARTBEAT). A log holds most topics at lower rates than the wire
 would, and which it holds differs from version to version (v1.11 to v1.16 and later): what is not there is said.
 """
 
-from collections.abc import Iterable
+import contextlib
+import io
+import math
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+from pyulog import ULog
 
-from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS
-from companion.messages import Attitude, AttitudeTarget, Heartbeat, LocalPosition, Odometry, Vector3, Vibration
-from rebound_cli.logs.inertial import averaging_us, clipped_at_us, imu_samples, inertial_topic
-from rebound_cli.logs.kind import QUADROTOR, other_arms, rotors, vehicle_type
-from rebound_cli.logs.landed import landed_states
-from rebound_cli.logs.log import Demand, Heard, Log, LogError, checked
-from rebound_cli.logs.modes import custom_mode
-from rebound_cli.logs.topics import ARMED, Topic, Topics
+from companion import messages
+from companion.link.identity import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
+from rebound_cli.logs.log import Demand, Heard, Log, LogError, other_arms, vector
 
-_NAMES = (
+Floats = npt.NDArray[np.float64]
+
+_NAMES = [
     *("sensor_combined", "vehicle_imu", "vehicle_imu_status", "estimator_sensor_bias", "estimator_selector_status"),
     *("vehicle_local_position", "vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_status"),
     *("vehicle_land_detected", "vehicle_control_mode", "position_setpoint_triplet", "trajectory_setpoint"),
-    *("vehicle_local_position_setpoint", "hover_thrust_estimate"),
-)
-
-# MAV_STATE, as PX4 fills HEARTBEAT.system_status.
-_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5
-
+    "vehicle_local_position_setpoint",
+]
 # What a missing topic costs, in the words of docs/replay.md.
 _COSTS = {
     "vehicle_local_position": "height and velocity are not known: no v_c, and landings are told by the land detector",
@@ -44,54 +43,172 @@ _LATE_US = 1_000_000
 _LONGEST_US = 24 * 3600 * 1_000_000
 # Slower than a third of the wire's 30 Hz, a velocity is old by the time of a hit.
 _SLOW_HZ = 15.0
+# Every ULog message begins with its size and its type.
+_HEADER_SIZE = 3
+
+# MAV_STATE, as PX4 fills HEARTBEAT.system_status.
+_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5
+# vehicle_status.arming_state, the same number since 2015; position_setpoint.type.
+_ARMED, _TAKEOFF, _LAND = 2, 3, 4
+# MAV_TYPE where a log names none, that of a VTOL that does not say which, and of what vehicle_status.vehicle_type
+# counts beside rotary wings: fixed wings and rovers.
+_QUADROTOR, _VTOL, _OTHER_TYPES = 2, 19, {2: 1, 3: 10}
+# vehicle_status.nav_state to the parts of HEARTBEAT.custom_mode (px4_custom_mode.h, get_px4_custom_mode): main modes
+# MANUAL 1, ALTCTL 2, POSCTL 3, ACRO 5, OFFBOARD 6, STABILIZED 7; under AUTO 4 TAKEOFF 2, LOITER 3, MISSION 4, RTL 5,
+# LAND 6, FOLLOW 8, PRECLAND 9. DESCEND (12) shows as LAND, TERMINATION (13) as MANUAL, ORBIT (21) under POSCTL.
+_MAIN = {0: 1, 1: 2, 2: 3, 10: 5, 13: 1, 14: 6, 15: 7}
+_AUTO = {3: 4, 4: 3, 5: 5, 12: 6, 17: 2, 18: 6, 19: 8, 20: 9}
+_MODES = {state: main << 16 for state, main in _MAIN.items()} | {21: 3 << 16 | 1 << 24}
+_MODES |= {state: 4 << 16 | sub << 24 for state, sub in _AUTO.items()}
+
+
+class _Topic:
+    """One instance of a uORB topic, in the order of time. Fields that this version has not are None."""
+
+    def __init__(self, data: Mapping[str, npt.NDArray[Any]]) -> None:
+        stamps = data["timestamp"].astype(np.int64)
+        order = np.argsort(stamps, kind="stable")
+        self.time_us: npt.NDArray[np.int64] = stamps[order]
+        self._fields = {name: values[order] for name, values in data.items()}
+
+    def column(self, *names: str) -> Floats | None:
+        """The first of these fields that there is."""
+        values = next((self._fields[name] for name in names if name in self._fields), None)
+        with np.errstate(invalid="ignore"):  # damage can make a signalling NaN
+            return None if values is None else values.astype(np.float64)
+
+    def vector(self, *names: str) -> Floats | None:
+        """Fields side by side, one row a sample; None when one of them is missing."""
+        columns = [column for name in names if (column := self.column(name)) is not None]
+        return np.column_stack(columns) if len(columns) == len(names) else None
+
+    def array(self, name: str, length: int = 3) -> Floats | None:
+        return self.vector(*(f"{name}[{index}]" for index in range(length)))
+
+    def rows(self, values: Floats | None) -> Iterator[tuple[int, int, list[float]]]:
+        """Number, time and values of each sample whose values are finite."""
+        if values is not None:
+            for index in np.flatnonzero(np.isfinite(values).all(axis=1)).tolist():
+                yield index, int(self.time_us[index]), values[index].tolist()
+
+    def rate_hz(self) -> float:
+        lasted_us = int(self.time_us[-1] - self.time_us[0])
+        return (len(self.time_us) - 1) * 1e6 / lasted_us if lasted_us > 0 else 0.0
+
+    def held(self, values: Floats, at_us: npt.NDArray[np.int64]) -> tuple[Floats, npt.NDArray[np.bool_]]:
+        """The last value at each time, the first before that; and where there was one yet."""
+        index = np.searchsorted(self.time_us, at_us, side="right") - 1
+        return values[np.maximum(index, 0)], index >= 0
+
+
+_Topics = Mapping[tuple[str, int], _Topic]
+
+
+class _Content(io.BytesIO):
+    """A file in memory. Where its end cuts a message of the head, pyulog would go back and read it again for ever."""
+
+    _message_at = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size == _HEADER_SIZE:
+            self._message_at = self.tell()
+        return super().read(size)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        if whence == io.SEEK_CUR and self.tell() + offset < self._message_at:
+            raise EOFError("it is cut short")
+        return super().seek(offset, whence)
 
 
 def read_ulog(path: Path) -> Log:
     """Raises LogError."""
-    topics = Topics(path, _NAMES)
-    imu = inertial_topic(topics)
-    if imu is None:
-        raise LogError(
-            f"{path}: neither sensor_combined nor vehicle_imu in it; PX4 logs them by default (SDLOG_PROFILE)."
-        )
-    kind = vehicle_type(path, topics)
-    heard: list[Heard] = list(imu_samples(topics, imu))
+    content = _Content(path.read_bytes())
+    try:
+        # It prints its warnings; what they say is asked for below.
+        with contextlib.redirect_stdout(io.StringIO()):
+            log = ULog(content, _NAMES)
+    except Exception as error:  # damaged files make it raise whatever the bytes led to
+        raise LogError(f"{path}: not a readable PX4 log: {error or type(error).__name__}.") from error
+    topics = {
+        (data.name, data.multi_id): _Topic(data.data) for data in log.data_list if len(data.data.get("timestamp", ()))
+    }
+    # The faster of the two: by default sensor_combined is logged whole and vehicle_imu twice a second.
+    inertial = [topic for name in ("vehicle_imu", "sensor_combined") if (topic := topics.get((name, 0))) is not None]
+    if not inertial:
+        text = "neither sensor_combined nor vehicle_imu in it; PX4 logs them by default (SDLOG_PROFILE)"
+        raise LogError(f"{path}: {text}.")
+    imu = max(inertial, key=_Topic.rate_hz)
+    parameters = {k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)}
+    kind = _vehicle_type(path, topics.get(("vehicle_status", 0)), parameters)
+    heard = list(_imu_samples(topics, imu))
     for names, convert in _CONVERSIONS.items():
-        topic = topics.first(*names)
-        if topic is not None:
-            heard.extend(convert(topic))
-    heard.extend(landed_states(topics))
+        topic = next((topics[name, 0] for name in names if (name, 0) in topics), None)
+        heard += () if topic is None else convert(topic)
+    heard += _landed_states(topics)
     middle_us = int(np.median(imu.time_us))
-    heard = sorted((item for item in heard if abs(item.at_us - middle_us) < _LONGEST_US), key=lambda item: item.at_us)
-    version = "" if topics.version is None else " " + ".".join(map(str, topics.version))
-    hardware = f" on {topics.hardware}" if topics.hardware else ""
-    return checked(
-        Log(
-            path=path,
-            vehicle=f"PX4{version}{hardware}",
-            started_at_us=topics.started_us,
-            heard=tuple(heard),
-            losses=tuple(_losses(topics, imu)),
-            hover_thrust_fraction=_hover_thrust(topics),
-            clipped_at_us=clipped_at_us(imu),
-            averaging_us=averaging_us(imu),
-            other_arms=other_arms(MULTICOPTERS[kind], rotors(topics)),
-        )
+    clipped, intervals = imu.column(*_CLIPPING), imu.column("accelerometer_integral_dt", "delta_velocity_dt")
+    return Log(
+        path=path,
+        vehicle=_name(log),
+        # Instants that topics share; a log's own start may lie hours of waiting before its data.
+        started_at_us=int(log.start_timestamp),
+        heard=tuple(sorted((h for h in heard if abs(h.at_us - middle_us) < _LONGEST_US), key=lambda h: h.at_us)),
+        losses=tuple(_losses(log, topics, imu)),
+        clipped_at_us=None if clipped is None else tuple(imu.time_us[clipped > 0].tolist()),
+        # A driver that reads its sensor in blocks makes some of them longer.
+        averaging_us=None if intervals is None else float(np.percentile(intervals, 99)),
+        other_arms=other_arms(MULTICOPTERS[kind], _rotors(parameters)),
     )
 
 
-def _losses(topics: Topics, imu: Topic) -> Iterable[str]:
-    if topics.is_damaged:
+def _name(log: ULog) -> str:
+    hardware, release = log.msg_info_dict.get("ver_hw"), log.msg_info_dict.get("ver_sw_release")
+    version = f" {release >> 24 & 255}.{release >> 16 & 255}.{release >> 8 & 255}" if isinstance(release, int) else ""
+    return f"PX4{version}{f' on {hardware}' if hardware else ''}"
+
+
+def _vehicle_type(path: Path, status: _Topic | None, parameters: Mapping[str, float]) -> int:
+    """MAV_TYPE. Raises LogError where the vehicle is no multicopter."""
+
+    def last(field: str) -> float | None:
+        values = None if status is None else status.column(field)
+        return None if values is None else float(values[-1])
+
+    # A parameter counts where the vehicle's own status holds no type; 0 says nothing.
+    said, vtol = last("system_type"), None if status is None else status.column("is_vtol")
+    kinds = [
+        int(parameters.get("MAV_TYPE", 0) if said is None else said),
+        _OTHER_TYPES.get(int(last("vehicle_type") or 0), 0),
+        _VTOL if vtol is not None and vtol.all() else 0,
+    ]
+    kind = next((kind for kind in kinds if kind and kind not in MULTICOPTERS), max(kinds) or _QUADROTOR)
+    identity = identify(messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, False, 0, 0))
+    if isinstance(identity, str):
+        raise LogError(f"{path}: {identity}; collisions are looked for in multicopters' logs alone.")
+    return kind
+
+
+def _rotors(parameters: Mapping[str, float]) -> list[tuple[float, float]]:
+    """Metres ahead and aside of each, as PX4's control allocation has them (v1.13 and later); empty without it."""
+    places = [
+        (parameters.get(f"CA_ROTOR{number}_PX"), parameters.get(f"CA_ROTOR{number}_PY"))
+        for number in range(int(parameters.get("CA_ROTOR_COUNT", 0)))
+    ]
+    return [(x, y) for x, y in places if x is not None and y is not None]
+
+
+def _losses(log: ULog, topics: _Topics, imu: _Topic) -> Iterator[str]:
+    if log.file_corruption:
         yield "the file is damaged in places: samples are missing there"
-    if topics.lost_s > 0:
-        yield f"the logger dropped {topics.lost_s:.2f} s of data: nothing is seen there"
+    if (lost_s := sum(dropout.duration for dropout in log.dropouts) * 1e-3) > 0:
+        yield f"the logger dropped {lost_s:.2f} s of data: nothing is seen there"
     for name, cost in _COSTS.items():
-        topic = topics.get(name)
+        topic = topics.get((name, 0))
         if topic is None:
             yield f"no {name}: {cost}"
         elif topic.time_us[0] - imu.time_us[0] > _LATE_US:
-            yield f"no {name} before {(topic.time_us[0] - topics.started_us) * 1e-6:.1f} s: until then {cost}"
-    position = topics.get("vehicle_local_position")
+            yield f"no {name} before {(topic.time_us[0] - log.start_timestamp) * 1e-6:.1f} s: until then {cost}"
+    position = topics.get(("vehicle_local_position", 0))
     if position is not None:
         if position.rate_hz() < _SLOW_HZ:
             yield (
@@ -103,110 +220,144 @@ def _losses(topics: Topics, imu: Topic) -> Iterable[str]:
             if valid is not None and not valid.all():
                 share = 100 * (1 - float(valid.mean()))
                 yield f"the {what} is invalid by the estimator's own word for {share:.0f} % of the log: so is v_c"
-    if imu.column("accelerometer_clipping") is None and imu.column("delta_velocity_clipping") is None:
+    if imu.column(*_CLIPPING) is None:
         yield "no clipping flags in this version: clipped peaks are told by their size alone"
 
 
-def _local_position(topic: Topic) -> Iterable[Heard]:
+# When a raw reading inside a sample was at the end of the sensor's range.
+_CLIPPING = ("accelerometer_clipping", "delta_velocity_clipping")
+
+
+def _imu_samples(topics: _Topics, imu: _Topic) -> Iterator[Heard]:
+    """Mean specific force and angular rate over each integration interval, less the estimator's biases."""
+    force, turning, taken_us = imu.array("accelerometer_m_s2"), imu.array("gyro_rad"), None
+    if force is None:
+        # vehicle_imu holds increments and how long they took, in microseconds.
+        velocity, velocity_us = imu.array("delta_velocity"), imu.vector("delta_velocity_dt")
+        angle, angle_us = imu.array("delta_angle"), imu.vector("delta_angle_dt")
+        if velocity is None or velocity_us is None or angle is None or angle_us is None:
+            return
+        with np.errstate(divide="ignore", invalid="ignore"):
+            force, turning = velocity / (velocity_us * 1e-6), angle / (angle_us * 1e-6)
+        taken_us = imu.column("timestamp_sample")
+    if turning is None:
+        return
+    biases = [_bias(topics, sensor, imu.time_us) for sensor in ("accel", "gyro")]
+    for index, time_us, row in imu.rows(np.column_stack([force, turning]) - np.column_stack(biases)):
+        sample_us = time_us if taken_us is None else int(taken_us[index])
+        yield Heard(time_us, messages.ImuSample(sample_us, vector(row), vector(row[3:])))
+
+
+def _bias(topics: _Topics, sensor: str, at_us: npt.NDArray[np.int64]) -> Floats:
+    """What the primary estimator held the bias for at each time; zero where it is not logged."""
+    biases, primary = np.zeros((len(at_us), 3)), np.zeros(len(at_us))
+    selector = topics.get(("estimator_selector_status", 0))
+    chosen = None if selector is None else selector.column("primary_instance")
+    if selector is not None and chosen is not None:
+        primary, _ = selector.held(chosen, at_us)
+    instances = [topic for (name, _), topic in sorted(topics.items()) if name == "estimator_sensor_bias"]
+    for instance, topic in enumerate(instances):
+        values, device = topic.array(f"{sensor}_bias"), topic.vector(f"{sensor}_device_id")
+        if values is not None:
+            held, is_known = topic.held(values if device is None else np.where(device > 0, values, 0.0), at_us)
+            biases = np.where((primary == instance)[:, None], np.where(is_known[:, None], held, 0.0), biases)
+    return biases
+
+
+def _ms(time_us: int) -> int:
+    """A message's stamp in milliseconds cuts what is less."""
+    return time_us // 1000 * 1000
+
+
+def _local_position(topic: _Topic) -> Iterator[Heard]:
     """LOCAL_POSITION_NED and, where the version counts its jumps, ODOMETRY: the wire sends both, valid or not."""
-    rows = topic.vector("x", "y", "z", "vx", "vy", "vz")
-    if rows is None:
-        return
-    counters = [topic.fields.get(f"{name}_reset_counter") for name in ("xy", "z", "vxy", "vz")]
-    counts = sum(c.astype(np.int64) for c in counters if c is not None)
-    resets = np.broadcast_to(counts, len(rows)).tolist() if any(c is not None for c in counters) else None
-    for index, (time_us, row) in enumerate(zip(topic.time_us.tolist(), rows.tolist(), strict=True)):
-        if not np.isfinite(row).all():
-            continue
-        position, velocity = _vector(row[:3]), _vector(row[3:])
-        # The message's stamp is cut to milliseconds.
-        yield Heard(time_us, LocalPosition(time_us // 1000 * 1000, position, velocity))
+    columns = [topic.column(f"{name}_reset_counter") for name in ("xy", "z", "vxy", "vz")]
+    counters = [column for column in columns if column is not None]
+    resets = np.sum(counters, axis=0) if counters else None
+    for index, time_us, row in topic.rows(topic.vector("x", "y", "z", "vx", "vy", "vz")):
+        position, velocity = vector(row), vector(row[3:])
+        yield Heard(time_us, messages.LocalPosition(_ms(time_us), position, velocity))
         if resets is not None:
-            yield Heard(time_us, Odometry(time_us, position, velocity, resets[index] % 256))
+            yield Heard(time_us, messages.Odometry(time_us, position, velocity, int(resets[index]) % 256))
 
 
-def _attitude(topic: Topic) -> Iterable[Heard]:
-    quaternions = topic.array("q", 4)
-    if quaternions is None:
-        return
+def _attitude(topic: _Topic) -> Iterator[Heard]:
     rates = topic.vector("rollspeed", "pitchspeed", "yawspeed")  # until v1.11
-    for index, (time_us, row) in enumerate(zip(topic.time_us.tolist(), quaternions.tolist(), strict=True)):
-        if np.isfinite(row).all():
-            turning = None if rates is None else _vector(rates[index].tolist())
-            yield Heard(time_us, Attitude(time_us // 1000 * 1000, (row[0], row[1], row[2], row[3]), turning))
+    for index, time_us, (w, x, y, z) in topic.rows(topic.array("q", 4)):
+        turning = None if rates is None else vector(rates[index].tolist())
+        yield Heard(time_us, messages.Attitude(_ms(time_us), (w, x, y, z), turning))
 
 
-def _attitude_target(topic: Topic) -> Iterable[Heard]:
-    thrust = topic.array("thrust_body")
-    if thrust is None:
-        return
+def _attitude_target(topic: _Topic) -> Iterator[Heard]:
     attitudes = topic.array("q_d", 4)
-    fractions = np.linalg.norm(thrust, axis=1).tolist()
-    for index, (time_us, fraction) in enumerate(zip(topic.time_us.tolist(), fractions, strict=True)):
-        if not np.isfinite(fraction):
-            continue
-        attitude = None
-        if attitudes is not None and np.isfinite(attitudes[index]).all():
-            w, x, y, z = attitudes[index].tolist()
-            attitude = (w, x, y, z)
-        yield Heard(time_us, AttitudeTarget(time_us // 1000 * 1000, fraction, attitude))
+    for index, time_us, thrust in topic.rows(topic.array("thrust_body")):
+        w, x, y, z = [math.nan] * 4 if attitudes is None else attitudes[index].tolist()
+        attitude = (w, x, y, z) if math.isfinite(w + x + y + z) else None
+        yield Heard(time_us, messages.AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
 
 
-def _vibration(topic: Topic) -> Iterable[Heard]:
-    clipping = topic.array("accel_clipping")
-    levels = topic.vector("gyro_vibration_metric", "accel_vibration_metric")
+def _vibration(topic: _Topic) -> Iterator[Heard]:
+    clipping, levels = topic.array("accel_clipping"), topic.vector("gyro_vibration_metric", "accel_vibration_metric")
     if clipping is None or levels is None:
         return
-    counts = clipping.sum(axis=1).astype(np.int64).tolist()
-    for time_us, count, (gyroscope, accelerometer) in zip(topic.time_us.tolist(), counts, levels.tolist(), strict=True):
-        yield Heard(time_us, Vibration(time_us, gyroscope, accelerometer, (count, 0, 0)))
+    for time_us, count, (gyro, accel) in zip(
+        topic.time_us.tolist(), clipping.sum(axis=1), levels.tolist(), strict=True
+    ):
+        yield Heard(time_us, messages.Vibration(time_us, gyro, accel, (int(count), 0, 0)))
 
 
-def _heartbeat(topic: Topic) -> Iterable[Heard]:
-    arming, navigation = topic.column("arming_state"), topic.column("nav_state")
+def _heartbeat(topic: _Topic) -> Iterator[Heard]:
+    count = len(topic.time_us)
+    arming, none = topic.column("arming_state"), np.full(count, -1.0)
     if arming is None:
         return
-    count = len(arming)
-    failsafe, kinds = topic.column("failsafe"), topic.column("system_type")
-    modes = [0] * count if navigation is None else [custom_mode(int(state)) for state in navigation]
-    for index, time_us in enumerate(topic.time_us.tolist()):
-        armed = arming[index] == ARMED
-        acting = failsafe is not None and bool(failsafe[index])
-        kind = int(kinds[index]) if kinds is not None and int(kinds[index]) in MULTICOPTERS else QUADROTOR
-        status = _CRITICAL if acting else _ACTIVE if armed else _STANDBY
-        beat = Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(armed), modes[index], status)
+    columns = [none if (c := topic.column(n)) is None else c for n in ("nav_state", "failsafe", "system_type")]
+    for time_us, arm, state, acts, kind in zip(topic.time_us.tolist(), arming, *columns, strict=True):
+        status = _CRITICAL if acts > 0 else _ACTIVE if arm == _ARMED else _STANDBY
+        kind = int(kind) if int(kind) in MULTICOPTERS else _QUADROTOR
+        mode = _MODES.get(int(state), 0)
+        beat = messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(arm == _ARMED), mode, status)
         yield Heard(time_us, beat)
 
 
-def _demand(topic: Topic) -> Iterable[Heard]:
+def _demand(topic: _Topic) -> Iterator[Heard]:
     """Fields are x, y, z, vx, ... until v1.13 and position[], velocity[] since; NaN where nothing is asked."""
-    positions = topic.array("position")
-    velocities = topic.array("velocity")
+    positions, velocities = topic.array("position"), topic.array("velocity")
     if positions is None or velocities is None:
         positions, velocities = topic.vector("x", "y", "z"), topic.vector("vx", "vy", "vz")
     if positions is None or velocities is None:
         return
     for time_us, place, speed in zip(topic.time_us.tolist(), positions.tolist(), velocities.tolist(), strict=True):
-        position = _vector(place) if np.isfinite(place).all() else None
-        velocity = _vector(speed) if np.isfinite(speed).all() else None
-        down = speed[2] if np.isfinite(speed[2]) else None
-        yield Heard(time_us, Demand(time_us, position, velocity, down))
+        yield Heard(time_us, Demand.of(time_us, place, speed))
 
 
-def _hover_thrust(topics: Topics) -> float | None:
-    estimate = topics.get("hover_thrust_estimate")
-    if estimate is not None:
-        values, valid = estimate.column("hover_thrust"), estimate.column("valid")
-        if values is not None:
-            chosen = values if valid is None else values[valid > 0]
-            if len(chosen):
-                return float(np.median(chosen))
-    parameter = topics.parameters.get("MPC_THR_HOVER")
-    return None if parameter is None else float(parameter)
+def _landed_states(topics: _Topics) -> Iterator[Heard]:
+    """EXTENDED_SYS_STATE by PX4's rule (EXTENDED_SYS_STATE.hpp): one at every change of what it is made of."""
+    news: list[tuple[int, str, int]] = []
+    for name, field in (
+        ("vehicle_land_detected", "landed"),
+        ("vehicle_control_mode", "flag_control_auto_enabled"),
+        ("position_setpoint_triplet", "current.valid"),
+        ("position_setpoint_triplet", "current.type"),
+    ):
+        topic = topics.get((name, 0))
+        values = None if topic is None else topic.column(field)
+        if topic is not None and values is not None:
+            news += [(t, field, int(value)) for t, value in zip(topic.time_us.tolist(), values, strict=True)]
+    known: dict[str, int] = {}
+    for time_us, field, value in sorted(news, key=lambda item: item[0]):
+        known[field] = value
+        if "landed" in known:
+            yield Heard(time_us, messages.ExtendedState(_landed_state(known)))
 
 
-def _vector(row: list[float]) -> Vector3:
-    return (row[0], row[1], row[2])
+def _landed_state(known: Mapping[str, int]) -> messages.LandedState:
+    if known["landed"]:
+        return messages.LandedState.ON_GROUND
+    if known.get("flag_control_auto_enabled") and known.get("current.valid"):
+        flown = {_TAKEOFF: messages.LandedState.TAKEOFF, _LAND: messages.LandedState.LANDING}
+        return flown.get(known.get("current.type", 0), messages.LandedState.IN_AIR)
+    return messages.LandedState.IN_AIR
 
 
 _CONVERSIONS = {

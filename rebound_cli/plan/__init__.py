@@ -1,1 +1,0 @@
-"""`rebound plan`: missions from and for QGroundControl's .plan files."""

@@ -19,14 +19,19 @@ from sim_vehicle.hil.messages import Place
 
 
 def run_import(options: Namespace) -> int:
-    plan, name = _read_json(options.plan), options.name or _name_of(options.plan)
+    path: Path = options.plan
+    try:
+        plan = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ConfigurationError(f"{path}: not JSON, so no plan of QGroundControl: {error}.") from error
+    name = options.name or re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-") or "mission"
     try:
         data, notes = mission_of_plan(plan, name)
     except ConfigurationError as error:
-        raise ConfigurationError(f"{options.plan}: {error}") from error
-    text = mission_yaml(data, f"From {options.plan.name}, a plan of QGroundControl.")
+        raise ConfigurationError(f"{path}: {error}") from error
+    text = mission_yaml(data, f"From {path.name}, a plan of QGroundControl.")
     # What is written can be flown: a plan that leaves its own fence is refused here and not at the field.
-    mission_from(parse_document(text, f"the mission from {options.plan}"))
+    mission_from(parse_document(text, f"the mission from {path}"))
     _write(options.out, text, notes)
     return 0
 
@@ -54,29 +59,11 @@ def _flow(value: Any) -> str:
     return text.removesuffix("\n").removesuffix("\n...")
 
 
-def _name_of(path: Path) -> str:
-    return re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-") or "mission"
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ConfigurationError(f"{path}: no such file.") from None
-    except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}.") from error
-    except ValueError as error:
-        raise ConfigurationError(f"{path}: not JSON, so no plan of QGroundControl: {error}.") from error
-
-
 def _write(out: Path | None, text: str, notes: Sequence[str]) -> None:
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
     if out is None:
         print(text, end="")
         return
-    try:
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{out}: cannot be written: {error.strerror}.") from error
+    out.write_text(text, encoding="utf-8")
     print(f"written to {out}", file=sys.stderr)

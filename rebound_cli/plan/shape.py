@@ -1,11 +1,22 @@
-"""What a .plan of QGroundControl must look like before it is read: the parts that are read, and nothing of the rest.
+"""What a .plan of QGroundControl looks like: the parts that are read, and MAVLink's numbers in them.
 
 Source: QGroundControl's developer guide, "Plan File Format".
 """
 
-from typing import Annotated, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, Strict
+
+# MAV_CMD
+WAYPOINT, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, LAND, TAKEOFF = 16, 18, 19, 20, 21, 22
+DELAY, CONDITION_DELAY, CONDITION_YAW, JUMP, CHANGE_SPEED = 93, 112, 115, 177, 178
+# Cameras, gimbals and regions of interest: they do not change where the vehicle flies.
+BESIDE_THE_WAY = (*range(195, 198), 200, 201, *range(203, 207), 214, *range(530, 533), 1000, 2000, 2001, 2500, 2501)
+# MAV_TYPE: what QGroundControl writes for any multicopter is a quadrotor.
+QUADROTOR = 2
+MULTICOPTERS = (QUADROTOR, 3, 4, 13, 14, 15, 29, 35, 43)
+# MAV_FRAME
+FRAME_ABOVE_SEA, FRAME_ABOVE_HOME, FRAME_WITHOUT_PLACE = (0, 5), (3, 6), 2
 
 # Far beyond any angle, height or time that means something, and small enough to be computed with.
 _MOST = 1e7
@@ -14,7 +25,7 @@ Number: TypeAlias = Annotated[float, Field(ge=-_MOST, le=_MOST)]
 Latitude: TypeAlias = Annotated[float, Field(ge=-90, le=90)]
 Longitude: TypeAlias = Annotated[float, Field(ge=-180, le=180)]
 # Not strict: JSON has lists where this has tuples.
-Place: TypeAlias = Annotated[tuple[Latitude, Longitude], Strict(False)]
+LatLon: TypeAlias = Annotated[tuple[Latitude, Longitude], Strict(False)]
 Whole: TypeAlias = Annotated[int, Field(ge=0, le=65_535)]
 
 
@@ -24,32 +35,41 @@ class _Part(BaseModel):
 
 
 class SimpleItem(_Part):
-    params: list[Number | None] | None = None
-    command: Whole | None = None
-    frame: Whole | None = None
+    """One command."""
+
+    type: Literal["SimpleItem"]
+    params: Annotated[list[Number | None], Field(min_length=7, max_length=7)]
+    command: Whole
+    frame: Whole
     doJumpId: Whole = 0  # noqa: N815 - QGroundControl's names
+
+    def value(self, number: int) -> float:
+        """MAVLink's param1 to param7; 0 where the plan says nothing."""
+        return self.params[number - 1] or 0.0
 
 
 class Transect(_Part):
     Items: list[SimpleItem] | None = None
 
 
-class Item(SimpleItem):
-    type: str | None = None
-    complexItemType: str | None = None  # noqa: N815
+class ComplexItem(_Part):
+    """A survey or another pattern."""
+
+    type: Literal["ComplexItem"]
+    complexItemType: str = "ComplexItem"  # noqa: N815
     TransectStyleComplexItem: Transect = Transect()
 
 
 class MissionPart(_Part):
-    plannedHomePosition: Annotated[list[Number], Field(max_length=3)] | None = None  # noqa: N815
+    plannedHomePosition: Annotated[list[Number], Field(min_length=2, max_length=3)]  # noqa: N815
     hoverSpeed: Number | None = None  # noqa: N815
     vehicleType: Whole | None = None  # noqa: N815
-    items: list[Item] = []
+    items: Annotated[list[Annotated[SimpleItem | ComplexItem, Field(discriminator="type")]], Field(min_length=1)]
 
 
 class Circle(_Part):
     radius: Annotated[float, Field(gt=0, le=_MOST)]
-    center: Place
+    center: LatLon
 
 
 class _Fence(_Part):
@@ -61,7 +81,7 @@ class CircleFence(_Fence):
 
 
 class PolygonFence(_Fence):
-    polygon: list[Place]
+    polygon: list[LatLon]
 
 
 class GeoFence(_Part):
@@ -74,16 +94,7 @@ class RallyPoints(_Part):
 
 
 class PlanShape(_Part):
+    fileType: Literal["Plan"]  # noqa: N815
     mission: MissionPart
     geoFence: GeoFence | None = None  # noqa: N815
     rallyPoints: RallyPoints | None = None  # noqa: N815
-
-
-def whole_plan(plan: object) -> PlanShape:
-    """Raises ValueError: where the first part lies that is not as it must be, and how it is."""
-    try:
-        return PlanShape.model_validate(plan)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise ValueError(f"{place}: {first['msg'][:1].lower()}{first['msg'][1:]}") from error

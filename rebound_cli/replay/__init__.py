@@ -1,1 +1,0 @@
-"""`rebound replay`: the same detector over a recorded flight, and our own flights decided again to the bit."""

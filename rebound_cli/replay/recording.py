@@ -1,4 +1,8 @@
-"""A run folder as the companion lived it: for each step what came, when, and what the companion did."""
+"""A run folder as the companion lived it, and the flight decided again.
+
+For each step it is known what came, when, and what the companion did: the same bytes at the same times go through the
+whole companion once more.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -8,41 +12,32 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from companion.companion import Companion
+from companion.core import situation
+from companion.detection.interface import Situation
 from companion.guard.config import GuardConfig
+from companion.guard.core import situation as guard_situation
+from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.shell.tlog import read_tlog
+from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
-from rebound_cli.run_folder import (
-    EVENTS_NAME,
-    GUARD_NAME,
-    INPUTS_NAME,
-    RESOLVED_NAME,
-    SUMMARY_NAME,
-    TLOG_NAME,
-    VERSIONS_NAME,
-    read_records,
-    read_text,
-    whole_lines,
-)
+from rebound_cli.replay.watching import Findings
 
 
 @dataclass(slots=True)
 class Step:
-    """One call of the companion's step; what it was told came after it."""
+    """One call of the companion's step; `told`: what it was told after it, as `inputs.jsonl` has it."""
 
     time_us: int
     received: Sequence[bytes] = ()
     sent: Sequence[bytes] = ()
-    confirms: bool = False
-    stop_reason: str | None = None
-    file_appears: bool = False
-    computer: ComputerStatus | None = None
-    notes: list[tuple[str, str]] = field(default_factory=list)  # kinds of events and their texts
+    told: list[dict[str, Any]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,80 +56,51 @@ class Recording:
 
 
 def is_run_folder(path: Path) -> bool:
-    return path.is_dir() and (path / TLOG_NAME).exists()
+    return path.is_dir() and (path / run_folder.TLOG_NAME).exists()
 
 
 def read_recording(folder: Path) -> Recording:
     """Raises LogError, DocumentError, RunFolderError."""
-    inputs_file = folder / INPUTS_NAME
+    inputs_file, tlog = folder / run_folder.INPUTS_NAME, folder / run_folder.TLOG_NAME
     if not inputs_file.exists():
-        raise LogError(
-            f"{folder}: no {INPUTS_NAME} in it, so the flight was recorded by a version that cannot be replayed to the "
-            f"bit; replay {folder / TLOG_NAME} instead."
-        )
-    settings = _settings(folder)
-    steps = _steps(folder / TLOG_NAME)
+        text = f"no {inputs_file.name} in it, so the flight was recorded by a version that no replay repeats to the bit"
+        raise LogError(f"{folder}: {text}; replay {tlog} instead.")
+    file = settings_file(folder)
+    document, is_guard = load_flown(file), file.name == run_folder.GUARD_NAME
+    settings = validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
+    steps = _steps(tlog)
     if not steps:
-        raise LogError(f"{folder / TLOG_NAME}: no packet in it: nothing was ever heard in this flight.")
-    last_packet_us = max(steps)
-    is_cut = not (folder / SUMMARY_NAME).exists()
+        raise LogError(f"{tlog}: no packet in it: nothing was ever heard in this flight.")
+    end_us, is_cut = max(steps), not (folder / run_folder.SUMMARY_NAME).exists()
     # Of a flight that was cut off a last line may be unfinished; in any other that is damage.
-    inputs, events = (
-        whole_lines(text) if is_cut else text for text in (read_text(inputs_file), read_text(folder / EVENTS_NAME))
-    )
-    for record in read_records(inputs_file, inputs):
-        step = steps.setdefault(record["time_us"], Step(record["time_us"]))
-        step.confirms |= record["kind"] == "confirm"
-        step.file_appears |= record["kind"] == "file"
-        step.stop_reason = record.get("reason", step.stop_reason)
-        if record["kind"] == "computer":
-            step.computer = _computer(inputs_file, record.get("status"))
-        if record["kind"] == "note":
-            step.notes.append((str(record.get("event")), str(record.get("text"))))
+    inputs, events = (run_folder.read_text(folder / name) for name in (inputs_file.name, run_folder.EVENTS_NAME))
+    if is_cut:
+        inputs, events = run_folder.whole_lines(inputs), run_folder.whole_lines(events)
+    for record in run_folder.read_records(inputs_file, inputs):
+        steps.setdefault(record["time_us"], Step(record["time_us"])).told.append(record)
     lines = events.splitlines(keepends=True)
     if is_cut:
-        end_us = _whole_until_us(steps, last_packet_us)
+        # Of the step with the last packet perhaps not all was written. Nor does the flight end after a step with
+        # notes, which are told with the step after it under the time of their own.
+        for time_us in sorted((time_us for time_us in steps if time_us < end_us), reverse=True):
+            if all(record["kind"] != "note" for record in steps[time_us].told):
+                break
+            end_us = time_us
         steps = {time_us: step for time_us, step in steps.items() if time_us < end_us}
         if not steps:
             raise LogError(f"{folder}: cut off before a whole step of the flight was written.")
-        told = zip(lines, read_records(folder / EVENTS_NAME, events), strict=True)
+        told = zip(lines, run_folder.read_records(folder / run_folder.EVENTS_NAME, events), strict=True)
         lines = [line for line, event in told if event["time_us"] < end_us]
     try:
-        versions = dict(json.loads(read_text(folder / VERSIONS_NAME)))
+        versions = dict(json.loads(run_folder.read_text(folder / run_folder.VERSIONS_NAME)))
     except (ValueError, TypeError) as error:
-        raise LogError(f"{folder / VERSIONS_NAME}: damaged: {error}.") from error
+        raise LogError(f"{folder / run_folder.VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
-
-
-def _computer(file: Path, status: Any) -> ComputerStatus:
-    try:
-        return ComputerStatus(**{**status, "cpu_percent": tuple(status["cpu_percent"])})
-    except (TypeError, KeyError) as error:
-        raise LogError(f"{file}: a status of the computer is damaged.") from error
-
-
-def _whole_until_us(steps: Mapping[int, Step], last_packet_us: int) -> int:
-    """Where a flight that was cut off ends: of the step with the last packet perhaps not all was written.
-
-    Nor does it end after a step with notes, which are told with the step after it under the time of their own.
-    """
-    end_us = last_packet_us
-    for time_us in sorted((time_us for time_us in steps if time_us < last_packet_us), reverse=True):
-        if not steps[time_us].notes:
-            break
-        end_us = time_us
-    return end_us
 
 
 def settings_file(folder: Path) -> Path:
     """The mission as it was flown, or the guard's settings."""
-    return folder / (GUARD_NAME if (folder / GUARD_NAME).exists() else RESOLVED_NAME)
-
-
-def _settings(folder: Path) -> Mission | GuardConfig:
-    file = settings_file(folder)
-    document = load_flown(file)
-    return mission_from(document) if file.name == RESOLVED_NAME else validated(GuardConfig, document, document.data)
+    return folder / (run_folder.GUARD_NAME if (folder / run_folder.GUARD_NAME).exists() else run_folder.RESOLVED_NAME)
 
 
 def _steps(tlog: Path) -> dict[int, Step]:
@@ -143,11 +109,83 @@ def _steps(tlog: Path) -> dict[int, Step]:
     for time_us, group in groupby(read_tlog(tlog), key=itemgetter(0)):
         packets = [packet for _, packet in group]
         count = len(packets)
-        while count and _is_ours(packets[count - 1]):
+        while count and source_of(packets[count - 1])[1] == COMPONENT_ID:
             count -= 1
         steps[time_us] = Step(time_us, packets[:count], packets[count:])
     return steps
 
 
-def _is_ours(packet: bytes) -> bool:
-    return source_of(packet)[1] == int(COMPONENT_ID)
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What became of it; `first_difference` is None when every packet sent and every event is the same to the bit."""
+
+    findings: Findings
+    steps: int
+    packets_received: int
+    packets_sent: int
+    events: int
+    is_cut: bool
+    first_difference: str | None
+
+
+def reproduce(recording: Recording) -> Reproduction:
+    """Fly the recording to its end, whatever differs."""
+    settings = recording.settings
+    stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
+    findings, expected, differences = Findings(), list(recording.event_lines), []
+    told: list[str] = []
+    for step in recording.steps:
+        # What the flight knew when the packets came; they may move it on.
+        known = _known(stepped)
+        result = stepped.step(b"".join(step.received), step.time_us)
+        for event in result.events:
+            then = expected[len(told)] if len(told) < len(expected) else None
+            told.append(run_folder.event_line(event))
+            if then is None:
+                differences.append(f"this event is new: {told[-1].strip()}")
+            elif told[-1] != then:
+                differences.append(f"event {len(told)} was {then.strip()} and is {told[-1].strip()}")
+            findings.tell(event.time_us, event.text)
+        if list(step.sent) != list(result.sent_frames):
+            were, are = len(step.sent), len(result.sent_frames)
+            what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
+            differences.append(f"at {step.time_us} us {what}")
+        assert stepped.core is not None, "the first step begins it"
+        findings.note(stepped.core.watch, known, step.time_us)
+        for record in step.told:
+            _tell(stepped, record)
+    differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
+    findings.close(recording.steps[-1].time_us)
+    return Reproduction(
+        findings=findings,
+        steps=len(recording.steps),
+        packets_received=sum(len(step.received) for step in recording.steps),
+        packets_sent=sum(len(step.sent) for step in recording.steps),
+        events=len(expected),
+        is_cut=recording.is_cut,
+        first_difference=differences[0] if differences else None,
+    )
+
+
+def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
+    match record, stepped:
+        case {"kind": "confirm"}, Companion():
+            stepped.confirm_plan()
+        case {"kind": "file"}, Companion():
+            stepped.file_is_there()
+        case {"kind": "stop", "reason": str(reason)}, _:
+            stepped.stop(reason)
+        case {"kind": "note", "event": event, "text": text}, _:
+            stepped.note(str(event), str(text))
+        case {"kind": "computer"}, _:
+            try:
+                status = ComputerStatus(**record["status"] | {"cpu_percent": tuple(record["status"]["cpu_percent"])})
+            except (TypeError, KeyError) as error:
+                raise LogError(f"{run_folder.INPUTS_NAME}: a status of the computer is damaged.") from error
+            stepped.tell_computer(status)
+
+
+def _known(stepped: Companion | Guard) -> Situation:
+    if stepped.core is None:
+        return Situation(off_reason="connect")
+    return guard_situation(stepped.core) if isinstance(stepped, Guard) else situation(stepped.core)

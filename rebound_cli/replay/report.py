@@ -1,16 +1,18 @@
-"""A replay in words for a person, and as data for a program."""
+"""One replay, whichever kind of log it is: from the log to findings, in words for a person and as data."""
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.detection.interface import Evidence, ImpactKind
 from companion.messages import LandedState
-from rebound_cli.logs.shaking import Stage, clipped
-from rebound_cli.replay.findings import Finding, Span
-from rebound_cli.replay.reproduction import Reproduction
-from rebound_cli.replay.result import Replay, peak_m_s2
+from companion.mission.config import CompanionConfig
+from rebound_cli.logs.log import WANTED, Log, LogError
+from rebound_cli.logs.shaking import Shaking, clipped, shaking
+from rebound_cli.replay.recording import Recording, Reproduction, reproduce
+from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
 
 SCHEMA = 1
 
@@ -22,30 +24,80 @@ _HOW = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What was looked at, with what, and what was found. `log` is as the detector heard it."""
+
+    log: Log
+    detector: str
+    recorded_rate_hz: float
+    shaking: Shaking
+    findings: Findings
+    losses: tuple[str, ...]
+    reproduction: Reproduction | None
+
+    @property
+    def peak_m_s2(self) -> float:
+        """The largest specific force in one sample."""
+        return max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in self.log.imu())
+
+
+def replay_log(log: Log, config: CompanionConfig, rate_hz: float | None) -> Replay:
+    """The detector over the log. Raises LogError when the rate leaves nothing."""
+    recorded_hz = shaking(log).rate_hz
+    if rate_hz is not None:
+        log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
+        if len(log.imu()) < 2:
+            raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
+    findings = watch_log(log, config)
+    return Replay(log, config.detector, recorded_hz, shaking(log), findings, _losses(log, config), None)
+
+
+def replay_flight(log: Log, recording: Recording) -> Replay:
+    """Our own flight decided again, from the first byte to the last."""
+    config = recording.settings.companion
+    reproduction = reproduce(recording)
+    # The flight's own zero, so that times are those of its timeline.
+    log = replace(log, started_at_us=recording.steps[0].time_us)
+    shown = shaking(log)
+    losses = _losses(log, config)
+    return Replay(log, config.detector, shown.rate_hz, shown, reproduction.findings, losses, reproduction)
+
+
+def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
+    """What the log lacks, and what the detector loses by it."""
+    detector = config.detectors[config.detector](getattr(config, config.detector), 0)
+    kinds = {type(heard.sample) for heard in log.heard}
+    missing = [
+        f"without {message.name} '{config.detector}' loses: {loss}"
+        for message, loss in detector.losses.items()
+        if message in WANTED and WANTED[message] not in kinds
+    ]
+    if log.other_arms is not None and config.estimate.fits_arms:
+        missing.append(f"a {log.other_arms}: a hit's normal is fitted for the four arms of a quad-x")
+    return (*log.losses, *missing)
+
+
 def report_text(replay: Replay, pictures: Sequence[str]) -> str:
-    """The whole report; times in seconds since the log's start."""
-    log = replay.log
-    parts = [_headline(replay)]
-    lines = [(happening.at_us, happening.text) for happening in replay.findings.happenings]
-    pictured = dict(zip(map(id, replay.findings.impacts), pictures, strict=False))
-    for finding in replay.findings.impacts:
-        lines.append((finding.at_us, _finding_text(replay, finding, pictured.get(id(finding)))))
-    parts.append("\n".join(_timeline_text(log.seconds(at_us), text) for at_us, text in sorted(lines, key=_time)))
+    """The whole report, with a picture of each impact; times in seconds since the log's start."""
+    log, rate_hz = replay.log, replay.shaking.rate_hz
+    recorded = f" (recorded at {replay.recorded_rate_hz:.0f})" if abs(rate_hz - replay.recorded_rate_hz) > 1 else ""
+    headline = f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, IMU at {rate_hz:.0f} Hz{recorded}"
+    told: list[tuple[int, list[str]]] = [(h.at_us, [h.text]) for h in replay.findings.happenings]
+    for finding, picture in zip(replay.findings.impacts, pictures, strict=True):
+        told.append((finding.at_us, [*_finding_rows(replay, finding), f"picture: {picture}"]))
+    timeline = [_entry(log.seconds(at_us), texts) for at_us, texts in sorted(told, key=lambda row: row[0])]
+    parts = [f"{headline}, detector '{replay.detector}'", *(["\n".join(timeline)] if timeline else [])]
     parts.append("\n".join(_wrapped(fact, "", "  ") for fact in _facts(replay)))
     if replay.reproduction is not None:
-        parts.append(_wrapped(reproduction_text(replay.reproduction), "", "  "))
-    parts.append(verdict_text(replay))
-    return "\n\n".join(part for part in parts if part) + "\n"
+        parts.append(_wrapped(_reproduction_text(replay.reproduction), "", "  "))
+    return "\n\n".join([*parts, _verdict(replay)]) + "\n"
 
 
-def _time(line: tuple[int, str]) -> int:
-    return line[0]
-
-
-def _timeline_text(at_s: float, text: str) -> str:
+def _entry(at_s: float, texts: Sequence[str]) -> str:
     lead = f"{at_s:9.3f} s  "
-    first, *others = text.split("\n")
     hanging = " " * len(lead)
+    first, *others = texts
     return "\n".join([_wrapped(first, lead, hanging), *(_wrapped(row, hanging, hanging + "  ") for row in others)])
 
 
@@ -53,105 +105,65 @@ def _wrapped(text: str, lead: str, hanging: str) -> str:
     return textwrap.fill(text, _WIDTH, initial_indent=lead, subsequent_indent=hanging)
 
 
-def verdict_text(replay: Replay) -> str:
+def _verdict(replay: Replay) -> str:
     """One line: how many collisions, how many touches that are none, and in how much of the flight one would show."""
     collisions, contacts = len(replay.findings.collisions), len(replay.findings.contacts)
     text = f"{collisions or 'no'} collision{'' if collisions == 1 else 's'}"
-    text += f", {contacts} contact{'' if contacts == 1 else 's'} that {_are(contacts)} none" if contacts else ""
+    text += f", {contacts} contact{' that is' if contacts == 1 else 's that are'} none" if contacts else ""
     share = replay.findings.watched_share
     return text + ("; no flight was heard" if share is None else f"; {100.0 * share:.0f} % of the flight was watched")
 
 
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
-
-
-def _headline(replay: Replay) -> str:
-    log, rate_hz = replay.log, replay.shaking.rate_hz
-    rate = f"IMU at {rate_hz:.0f} Hz"
-    if abs(rate_hz - replay.recorded_rate_hz) > 1:
-        rate += f" (recorded at {replay.recorded_rate_hz:.0f})"
-    return f"{log.path}: {log.vehicle}, {log.duration_s:.1f} s, {rate}, detector '{replay.detector}'"
-
-
-def _finding_text(replay: Replay, finding: Finding, picture: str | None) -> str:
-    first, final, impact = finding.first, finding.final, finding.first.impact
-    force = math.hypot(*impact.specific_force_frd_m_s2)
-    lead = "HIT" if finding.is_collision else "contact, no collision"
+def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
+    first, final, situation = finding.first, finding.final, finding.situation
     kind = "" if final.kind is ImpactKind.UNKNOWN else f": {final.kind.value}"
     at_least = "at least " if final.is_lower_bound else ""
-    rows = [
-        f"{lead}{kind}, confidence {final.confidence:.2f}",
-        f"seen by {_HOW[impact.evidence]}: {force:.1f} m/s^2, a hit from {finding.threshold_m_s2:.1f} on",
-        f"v_c {math.hypot(*first.velocity_ned_m_s):.2f} m/s {_vector(first.velocity_ned_m_s)} NED, "
-        f"normal {_vector(final.normal_ned)}",
-        f"contact since {replay.log.seconds(_on_log(finding)):.3f} s +-{first.time_error_us / 1e3:.1f} ms",
-        f"peak {at_least}{final.peak_specific_force_m_s2:.1f} m/s^2, impulse {at_least}{final.impulse_m_s:.2f} m/s",
-        f"{_circumstances(finding)}",
-    ]
-    if picture is not None:
-        rows.append(f"picture: {picture}")
-    return "\n".join(rows)
+    yield f"{'HIT' if finding.is_collision else 'contact, no collision'}{kind}, confidence {final.confidence:.2f}"
+    force = math.hypot(*first.impact.specific_force_frd_m_s2)
+    how = _HOW[first.impact.evidence]
+    yield f"seen by {how}: {force:.1f} m/s^2, a hit from {finding.threshold_m_s2:.1f} on"
+    v_c = f"{math.hypot(*first.velocity_ned_m_s):.2f} m/s {_vector(first.velocity_ned_m_s)}"
+    yield f"v_c {v_c} NED, normal {_vector(final.normal_ned)}"
+    yield f"contact since {replay.log.seconds(_on_log(finding)):.3f} s +-{first.time_error_us / 1e3:.1f} ms"
+    yield f"peak {at_least}{final.peak_specific_force_m_s2:.1f} m/s^2, impulse {at_least}{final.impulse_m_s:.2f} m/s"
+    height = "height unknown" if situation.height_m is None else f"{situation.height_m:.2f} m up"
+    landed = f"vehicle says {situation.landed_state.name.lower().replace('_', ' ')}"
+    landed = "landed or not unknown" if situation.landed_state is LandedState.UNDEFINED else landed
+    descent = "descending to land" if situation.descent_commanded else "no descent asked for"
+    yield f"at the time: {height}, {landed}, {descent}"
 
 
 def _on_log(finding: Finding) -> float:
     """t_c on the log's clock: as long before the detection as on the vehicle's."""
-    impact = finding.first.impact
-    return finding.at_us - (impact.sample_time_boot_us - finding.first.time_boot_us)
+    return finding.at_us - (finding.first.impact.sample_time_boot_us - finding.first.time_boot_us)
 
 
-def _circumstances(finding: Finding) -> str:
-    situation = finding.situation
-    height = "height unknown" if situation.height_m is None else f"{situation.height_m:.2f} m up"
-    landed = "landed or not unknown"
-    if situation.landed_state is not LandedState.UNDEFINED:
-        landed = f"vehicle says {situation.landed_state.name.lower().replace('_', ' ')}"
-    descent = "descending to land" if situation.descent_commanded else "no descent asked for"
-    return f"at the time: {height}, {landed}, {descent}"
-
-
-def _facts(replay: Replay) -> list[str]:
-    noise = replay.shaking.noise_m_s2()
-    rows = [
-        f"noise floor, {stage.value}: {_numbers(noise[stage].tolist())} m/s^2 RMS (x, y, z)"
-        for stage in Stage
-        if stage in noise
-    ]
+def _facts(replay: Replay) -> Iterator[str]:
+    for stage, noise in replay.shaking.noise_m_s2().items():
+        yield f"noise floor, {stage.value}: {', '.join(f'{value:.2f}' for value in noise)} m/s^2 RMS (x, y, z)"
     count, how = clipped(replay.log)
-    peak = peak_m_s2(replay.log)
-    rows.append(f"clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how}); largest sample {peak:.1f} m/s^2")
-    rows.append(_spans_text("blind", replay, replay.findings.blind))
-    rows.append(_spans_text("off", replay, replay.findings.off))
-    rows.extend(f"note: {loss}" for loss in replay.losses)
-    return rows
+    samples = f"{count or 'no'} sample{'' if count == 1 else 's'} ({how})"
+    yield f"clipping: {samples}; largest sample {replay.peak_m_s2:.1f} m/s^2"
+    for word, spans in (("blind", replay.findings.blind), ("off", replay.findings.off)):
+        total_s = sum(span.duration_s for span in spans)
+        shown = [f"{replay.log.seconds(s.start_us):.2f} s for {s.duration_s:.2f} s ({s.reason})" for s in spans[:4]]
+        more = f" and {len(spans) - 4} times more" if len(spans) > 4 else ""
+        yield f"{word}: {total_s:.2f} s in all: {', '.join(shown)}{more}" if spans else f"{word}: never"
+    for loss in replay.losses:
+        yield f"note: {loss}"
 
 
-def _spans_text(word: str, replay: Replay, spans: Sequence[Span]) -> str:
-    if not spans:
-        return f"{word}: never"
-    total_s = sum(span.duration_s for span in spans)
-    shown = [
-        f"{replay.log.seconds(span.start_us):.2f} s for {span.duration_s:.2f} s ({span.reason})" for span in spans[:4]
-    ]
-    more = f" and {len(spans) - 4} times more" if len(spans) > 4 else ""
-    return f"{word}: {total_s:.2f} s in all: {', '.join(shown)}{more}"
-
-
-def reproduction_text(reproduction: Reproduction) -> str:
+def _reproduction_text(again: Reproduction) -> str:
     """Whether the flight was decided again to the bit."""
     extent = (
-        f"{reproduction.steps} steps, {reproduction.packets_received} packets in, "
-        f"{reproduction.packets_sent} packets out, {reproduction.events} events"
+        f"{again.steps} steps, {again.packets_received} packets in, {again.packets_sent} packets out, "
+        f"{again.events} events"
     )
-    if reproduction.is_cut:
+    if again.is_cut:
         extent += "; the program was ended at once, and what came after its last packet is not known"
-    if reproduction.first_difference is None:
+    if again.first_difference is None:
         return f"identical: every decision of the flight came again to the bit ({extent})"
-    return f"NOT identical ({extent}): {reproduction.first_difference}"
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ", ".join(f"{value:.2f}" for value in values)
+    return f"NOT identical ({extent}): {again.first_difference}"
 
 
 def _vector(vector: Sequence[float]) -> str:
@@ -161,9 +173,10 @@ def _vector(vector: Sequence[float]) -> str:
 
 def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
     """The same for a program; vectors NED unless named FRD, SI units, times in seconds since the log's start."""
-    log, findings, reproduction = replay.log, replay.findings, replay.reproduction
+    log, findings, again = replay.log, replay.findings, replay.reproduction
     count, how = clipped(log)
-    names = [*pictures, *[None] * (len(findings.impacts) - len(pictures))]
+    names = ("first_difference", "steps", "packets_received", "packets_sent", "events")
+    extent = {name: getattr(again, name) for name in names if again is not None}
     return {
         "schema": SCHEMA,
         "log": str(log.path),
@@ -175,31 +188,17 @@ def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
         "collisions": len(findings.collisions),
         "impacts": [
             {**_finding_data(replay, finding), "picture": name}
-            for finding, name in zip(findings.impacts, names, strict=True)
+            for finding, name in zip(findings.impacts, pictures, strict=True)
         ],
         "happenings": [{"at_s": _seconds(replay, h.at_us), "text": h.text} for h in findings.happenings],
         "watched_share": findings.watched_share,
-        "blind": [_span_data(replay, span) for span in findings.blind],
-        "off": [_span_data(replay, span) for span in findings.off],
-        "noise_rms_frd_m_s2": {
-            stage.value: [round(float(value), 3) for value in values]
-            for stage, values in replay.shaking.noise_m_s2().items()
-        },
+        **{name: [_span_data(replay, span) for span in getattr(findings, name)] for name in ("blind", "off")},
+        "noise_rms_frd_m_s2": replay.shaking.noise_data(),
         "clipped_samples": count,
         "clipping_known_by": how,
-        "peak_specific_force_m_s2": round(peak_m_s2(log), 3),
+        "peak_specific_force_m_s2": round(replay.peak_m_s2, 3),
         "notes": list(replay.losses),
-        "reproduction": None
-        if reproduction is None
-        else {
-            "identical": reproduction.first_difference is None,
-            "first_difference": reproduction.first_difference,
-            "steps": reproduction.steps,
-            "packets_received": reproduction.packets_received,
-            "packets_sent": reproduction.packets_sent,
-            "events": reproduction.events,
-            "cut": reproduction.is_cut,
-        },
+        "reproduction": again and {"identical": again.first_difference is None, **extent, "cut": again.is_cut},
     }
 
 

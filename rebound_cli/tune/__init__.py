@@ -1,1 +1,0 @@
-"""`rebound tune`: from healthy flights to what a detector can see on this vehicle, and the settings to fly with."""

@@ -1,29 +1,40 @@
-"""`rebound tune`: from healthy flights to settings."""
+"""`rebound tune`: from healthy flights to what a detector can see on this vehicle, and the settings to fly with."""
 
 import json
+import math
+import textwrap
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from companion.errors import ConfigurationError
+from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
 from rebound_cli.console import console_for, with_progress
 from rebound_cli.documents import parse_document, validated
-from rebound_cli.inputs import load_world
+from rebound_cli.inputs import companion_settings, load_world
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
-from rebound_cli.logs.shaking import Stage, shaking
+from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import is_run_folder
-from rebound_cli.replay.settings import companion_settings
-from rebound_cli.replay.watching import watch_log
-from rebound_cli.run_folder import TLOG_NAME
-from rebound_cli.tune.crash import crash, told_hits
-from rebound_cli.tune.hits import Sight, hit_moments, sight
-from rebound_cli.tune.margins import margins
-from rebound_cli.tune.report import Healthy, Tuning, tuning_data, tuning_text
-from rebound_cli.tune.settings import advise, settings_text
-from sim_vehicle.airframe import Airframe
+from rebound_cli.replay.watching import Findings, watch_log
+from rebound_cli.run_folder import SUMMARY_NAME, TLOG_NAME
+from rebound_cli.tune.hits import SPEEDS_M_S, Sight, hit_moments, sight
+from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
+SCHEMA = 1
+
+_WIDTH = 110
+# PX4's failure detector takes a larger tilt for a lost attitude: FD_FAIL_R and FD_FAIL_P, 60 deg by default.
+_TILT_DEG = 60.0
+# PX4's land detector takes less force, for so long, for a fall: LNDMC_FFALL_THR and LNDMC_FFALL_TTRI.
+_FALL_M_S2 = 2.0
+_FALL_US = 300_000
 BUILT_IN = ("foldable", "rigid")
 # Beside the recorded rate: what a radio or a slow serial port leaves of it, and PX4's default.
 RATES_HZ = (100.0, 50.0)
@@ -35,11 +46,15 @@ def run_tune(options: Namespace) -> int:
     if out is not None and out.exists():
         raise ConfigurationError(f"{out} exists already: give --out another name.")
     config = companion_settings(options.companion, (), options.detector)
-    airframes = [load_world(None, (), name, None).airframe for name in _airframes(options)]
-    logs = [_log(path) for path in options.logs]
-    flights = [Healthy(log, shaking(log), watch_log(log, config)) for log in logs]
-    found = list(margins(logs, config))
-    seen = list(with_progress(_sights(logs, config, airframes), len(airframes) * len(_rates(logs))))
+    names = BUILT_IN if options.airframe is None else (options.airframe,)
+    airframes = [load_world(None, (), name, None).airframe for name in names]
+    flights = [read_healthy(path, config) for path in options.logs]
+    logs, recorded_hz = [flight.log for flight in flights], min(flight.shaking.rate_hz for flight in flights)
+    # A rate as good as the recorded one shows nothing new.
+    rates = [None, *(rate_hz for rate_hz in RATES_HZ if rate_hz < 0.9 * recorded_hz)]
+    found = margins(logs, config)
+    sights = (sight(logs, config, airframe, rate_hz) for airframe in airframes for rate_hz in rates)
+    seen = list(with_progress(sights, len(airframes) * len(rates)))
     tuning = Tuning(config.detector, flights, found, seen, advise(logs, config, found, seen))
     text = settings_text(tuning.advice, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
@@ -51,42 +66,162 @@ def run_tune(options: Namespace) -> int:
         console.print(tuning_text(tuning))
         console.print(text.rstrip())
     if out is not None:
-        _write(out, text)
+        out.write_text(text, encoding="utf-8")
         console.print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
     return 0
 
 
-def _airframes(options: Namespace) -> Sequence[str]:
-    return BUILT_IN if options.airframe is None else (options.airframe,)
+@dataclass(frozen=True, slots=True)
+class Healthy:
+    """A flight without a collision, and what the detector made of it."""
+
+    log: Log
+    shaking: Shaking
+    findings: Findings
+
+    @property
+    def in_air_s(self) -> float:
+        return float(np.sum(self.shaking.stages != Stage.GROUND)) * self.shaking.interval_us * 1e-6
 
 
-def _log(path: Path) -> Log:
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """All that was worked out."""
+
+    detector: str
+    flights: Sequence[Healthy]
+    margins: Sequence[Margin]
+    sights: Sequence[Sight]
+    advice: Advice
+
+
+def read_healthy(path: Path, config: CompanionConfig) -> Healthy:
+    """Raises LogError for a log that cannot be read, and for a flight that teaches nothing or the wrong thing."""
     log = read_log(path / TLOG_NAME if is_run_folder(path) else path)
-    hits = told_hits(path)
+    hits = _told_hits(path)
     wrong = f"its summary tells {hits} collision{'' if hits == 1 else 's'}" if hits else crash(log)
     if wrong is not None:
         raise LogError(f"{path}: not a healthy flight, {wrong}; tune learns from flights without a hit or a crash.")
-    if not any(stage in (Stage.HOVER, Stage.UNDER_WAY) for stage in shaking(log).stages):
+    shakes = shaking(log)
+    if not any(stage in FLYING for stage in shakes.stages):
         raise LogError(f"{path}: no flight in it, only the ground, a take-off and a landing.")
-    if not list(hit_moments(log)):
+    if not any(hit_moments(log)):
         raise LogError(f"{path}: too short a flight to learn from; a minute in the air is a good one.")
-    return log
+    return Healthy(log, shakes, watch_log(log, config))
 
 
-def _rates(logs: Sequence[Log]) -> Sequence[float | None]:
-    recorded_hz = min(shaking(log).rate_hz for log in logs)
-    # A rate as good as the recorded one shows nothing new.
-    return [None, *(rate_hz for rate_hz in RATES_HZ if rate_hz < 0.9 * recorded_hz)]
+def _told_hits(folder: Path) -> int:
+    """Collisions that the summary of our own flight tells; 0 where there is none to read."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        return len(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8"))["collisions"])
+    return 0
 
 
-def _sights(logs: Sequence[Log], config: CompanionConfig, airframes: Sequence[Airframe]) -> Iterator[Sight]:
-    for airframe in airframes:
-        for rate_hz in _rates(logs):
-            yield sight(logs, config, airframe, rate_hz)
+def crash(log: Log) -> str | None:
+    """What speaks against a healthy flight: armed, it tipped over or fell. None where nothing does."""
+    armed, falls_from_us = False, None
+    for heard in log.heard:
+        match heard.sample:
+            case Heartbeat(armed=armed):
+                pass
+            case Attitude(attitude_wxyz=(_, x, y, _)) if armed:
+                tilt_deg = math.degrees(math.acos(max(-1.0, 1.0 - 2.0 * (x * x + y * y))))
+                if tilt_deg > _TILT_DEG:
+                    return f"it tipped to {tilt_deg:.0f} degrees at {log.seconds(heard.at_us):.1f} s"
+            case ImuSample(specific_force_frd_m_s2=force):
+                if not armed or math.hypot(*force) > _FALL_M_S2:
+                    falls_from_us = None
+                    continue
+                falls_from_us = heard.at_us if falls_from_us is None else falls_from_us
+                if heard.at_us - falls_from_us >= _FALL_US:
+                    return f"it fell at {log.seconds(falls_from_us):.1f} s"
+    return None
 
 
-def _write(out: Path, text: str) -> None:
-    try:
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"{out} cannot be written: {error.strerror}.") from error
+def tuning_text(tuning: Tuning) -> str:
+    parts = [*map(_flight_rows, tuning.flights), _margin_rows(tuning), _sight_rows(tuning)]
+    return "\n\n".join("\n".join(part) for part in parts) + "\n"
+
+
+def _flight_rows(flight: Healthy) -> Iterator[str]:
+    log, found, shaking = flight.log, flight.findings, flight.shaking
+    rows = [
+        f"{log.path}: {log.vehicle}, {flight.in_air_s:.0f} s in the air, IMU at {shaking.rate_hz:.0f} Hz",
+        f"  {'':<16}{'noise x, y, z, RMS':<26}{'largest departure sideways, along z':<36}[m/s^2]",
+    ]
+    for stage, noise in shaking.noise_m_s2().items():
+        x, y, z = shaking.during(stage).T
+        values = ", ".join(f"{value:.2f}" for value in noise)
+        rows.append(f"  {stage.value:<16}{values:<26}{np.hypot(x, y).max():.1f}, {np.abs(z).max():.1f}")
+    count, how = clipped(log)
+    alarms, blind_s = len(found.collisions), sum(span.duration_s for span in found.blind)
+    blind = f"blind for {blind_s:.2f} s, first: {found.blind[0].reason}" if found.blind else "never blind"
+    rows += [
+        f"  clipping: {count or 'no'} sample{'' if count == 1 else 's'} ({how})",
+        f"  as set now: {alarms or 'no'} false alarm{'s' if alarms > 1 else ''}, {blind}",
+        *(f"  note: {loss}" for loss in log.losses),
+    ]
+    for row in rows:
+        yield textwrap.fill(row, _WIDTH, subsequent_indent="    ") if len(row) > _WIDTH else row
+
+
+def _margin_rows(tuning: Tuning) -> Iterator[str]:
+    yield f"detector '{tuning.detector}': the largest sign of a hit in these flights, as a share of each threshold"
+    for margin in tuning.margins:
+        share = f"below {SHARES[0]:g}" if margin.share is None else f"{margin.share:.2f}"
+        alarm = "   a false alarm" if (margin.share or 0.0) >= 1.0 else ""
+        yield f"  {margin.setting:<28}{margin.value:<10g}{share}{alarm}"
+    if left := tuning.advice.false_alarms_left:
+        yield f"  with the settings below still {left} false alarms: this vehicle is not made quiet by thresholds"
+
+
+def _sight_rows(tuning: Tuning) -> Iterator[str]:
+    hits = tuning.sights[0].hits
+    yield f"hits put into these flights, seen of {hits}, by speed in m/s (eq. 2, head-on, by force alone)"
+    yield f"  {'':<24}{''.join(f'{speed:>6g}' for speed in SPEEDS_M_S)}   all seen from"
+    for one in tuning.sights:
+        counts, certain = "".join(f"{count:>6}" for count in one.seen), one.certain_from_m_s
+        text = "no speed tried" if certain is None else f"{certain:g} m/s on"
+        yield f"  {one.airframe + f', {one.rate_hz:.0f} Hz':<24}{counts}   {text}"
+
+
+def tuning_data(tuning: Tuning) -> dict[str, Any]:
+    """The same for a program; SI units, body FRD."""
+    return {
+        "schema": SCHEMA,
+        "detector": tuning.detector,
+        "flights": [_flight_data(flight) for flight in tuning.flights],
+        "margins": [asdict(margin) for margin in tuning.margins],
+        "hits": [
+            {
+                "airframe": one.airframe,
+                "rate_hz": round(one.rate_hz, 2),
+                "hits": one.hits,
+                "speeds_m_s": list(SPEEDS_M_S),
+                "seen": list(one.seen),
+                "all_seen_from_m_s": one.certain_from_m_s,
+            }
+            for one in tuning.sights
+        ],
+        "settings": [
+            {"place": ".".join(("companion", *place)), "value": value, "reason": reason}
+            for place, (value, reason) in tuning.advice.settings.items()
+        ],
+        "false_alarms_left": tuning.advice.false_alarms_left,
+    }
+
+
+def _flight_data(flight: Healthy) -> dict[str, Any]:
+    count, how = clipped(flight.log)
+    return {
+        "log": str(flight.log.path),
+        "vehicle": flight.log.vehicle,
+        "in_air_s": round(flight.in_air_s, 2),
+        "imu_rate_hz": round(flight.shaking.rate_hz, 2),
+        "noise_rms_frd_m_s2": flight.shaking.noise_data(),
+        "clipped_samples": count,
+        "clipping_known_by": how,
+        "false_alarms": len(flight.findings.collisions),
+        "blind_s": round(sum(span.duration_s for span in flight.findings.blind), 3),
+        "notes": list(flight.log.losses),
+    }

@@ -9,14 +9,15 @@ what a real hit changes afterwards would only help. So this is a detector's sigh
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 import numpy.typing as npt
 
 from companion.messages import ImuSample
 from companion.mission.config import CompanionConfig
-from rebound_cli.logs.log import Heard, Log
-from rebound_cli.logs.shaking import Stage, shaking
+from rebound_cli.logs.log import Log
+from rebound_cli.logs.shaking import FLYING, shaking
 from rebound_cli.replay.watching import watch_log
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.layout import spring_and_damper
@@ -31,14 +32,13 @@ SPACING_US = 2_500_000
 ROOM_US = 500_000
 # Eq. 2's contacts last up to 0.12 s.
 FOUND_WITHIN_US = 150_000
+LONGEST_CONTACT_S = 0.25
 # Fine against the rigid frame's contact of 1 ms.
 STEP_S = 1e-5
-LONGEST_CONTACT_S = 0.25
 # Multiples of the golden ratio fall evenly and never repeat: hits anywhere between the samples of a stream at
 # PX4's default of 50 Hz, and from anywhere around the body.
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 SLOWEST_INTERVAL_US = 20_000
-TURN_RAD = 2.0 * math.pi * GOLDEN
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,28 +53,22 @@ class Sight:
     @property
     def certain_from_m_s(self) -> float | None:
         """From this speed on every hit was seen; None when not even the fastest all were."""
-        certain = None
-        for speed_m_s, count in zip(reversed(SPEEDS_M_S), reversed(self.seen), strict=True):
-            if count < self.hits:
-                break
-            certain = speed_m_s
-        return certain
+        certain = len(list(takewhile(lambda count: count == self.hits, reversed(self.seen))))
+        return SPEEDS_M_S[-certain] if certain else None
 
 
 def sight(logs: Sequence[Log], config: CompanionConfig, airframe: Airframe, asked_hz: float | None) -> Sight:
     """Over all flights together; `asked_hz` None for the recorded rate."""
     moments = [list(hit_moments(log)) for log in logs]
-    counts = []
-    for speed_m_s in SPEEDS_M_S:
+    counts = [0] * len(SPEEDS_M_S)
+    for index, speed_m_s in enumerate(SPEEDS_M_S):
         impulse = impulse_since_touch(airframe, speed_m_s)
-        counts.append(
-            sum(
-                _seen(with_hits(log, times, impulse), times, config, asked_hz)
-                for log, times in zip(logs, moments, strict=True)
-            )
-        )
-    recorded_hz = min(shaking(log).rate_hz for log in logs)
-    return Sight(airframe.name, asked_hz or recorded_hz, sum(map(len, moments)), tuple(counts))
+        for log, times_us in zip(logs, moments, strict=True):
+            findings = watch_log(with_hits(log, times_us, impulse), config, asked_hz)
+            found_us = [finding.at_us for finding in findings.collisions]
+            counts[index] += sum(any(t < at_us <= t + FOUND_WITHIN_US for at_us in found_us) for t in times_us)
+    rate_hz = asked_hz or min(shaking(log).rate_hz for log in logs)
+    return Sight(airframe.name, rate_hz, sum(map(len, moments)), tuple(counts))
 
 
 def impulse_since_touch(airframe: Airframe, speed_m_s: float) -> Floats:
@@ -85,68 +79,49 @@ def impulse_since_touch(airframe: Airframe, speed_m_s: float) -> Floats:
     arms = airframe.arms
     # Two guards share a head-on hit, each with its arm: together they are eq. 2 for the whole vehicle.
     stop_per_s2, stop_per_s = spring_and_damper(arms.stop, mass_kg=1.0)
-    most = airframe.imu.accelerometer_range_m_s2
-    depth_m, speed, shown = 0.0, speed_m_s, [0.0]
+    depth_m, speed, pushes = 0.0, speed_m_s, [0.0]
     for _ in range(round(LONGEST_CONTACT_S / STEP_S)):
         push = arms.stiffness_per_s2 * depth_m + arms.damping_per_s * speed
-        beyond_m = depth_m - arms.fold_max_m
-        if beyond_m >= 0.0:
+        if (beyond_m := depth_m - arms.fold_max_m) >= 0.0:
             push += max(0.0, stop_per_s2 * beyond_m + stop_per_s * speed)
         if push <= 0.0:
             break
         speed -= push * STEP_S
         depth_m += speed * STEP_S
-        shown.append(shown[-1] + min(push, most) * STEP_S)
-    return np.array(shown)
+        pushes.append(push)
+    return np.cumsum(np.minimum(pushes, airframe.imu.accelerometer_range_m_s2)) * STEP_S
 
 
 def hit_moments(log: Log) -> Iterator[int]:
     """Times in the air, away from take-off and landing, one each SPACING_US and anywhere among the samples."""
     found = shaking(log)
-    in_air = [stage in (Stage.HOVER, Stage.UNDER_WAY) for stage in found.stages]
-    due_us = int(found.at_us[0]) + SPACING_US
-    count = 0
-    for at_us, flies in zip(found.at_us.tolist(), in_air, strict=True):
-        if not flies:
+    due_us, last_us, count = int(found.at_us[0]) + SPACING_US, int(found.at_us[-1]) - ROOM_US, 0
+    for at_us, stage in zip(found.at_us.tolist(), found.stages, strict=True):
+        if stage not in FLYING:
             due_us = max(due_us, at_us + SPACING_US)
-        elif due_us <= at_us <= int(found.at_us[-1]) - ROOM_US:
+        elif due_us <= at_us <= last_us:
             yield at_us + round(SLOWEST_INTERVAL_US * (count * GOLDEN % 1.0))
-            count += 1
-            due_us = at_us + SPACING_US
+            due_us, count = at_us + SPACING_US, count + 1
 
 
 def with_hits(log: Log, moments_us: Sequence[int], impulse: Floats) -> Log:
     """The log as its sensor would have shown it with a hit at each of the moments."""
-    return replace(log, heard=tuple(_struck(log, moments_us, impulse)))
-
-
-def _struck(log: Log, moments_us: Sequence[int], impulse: Floats) -> Iterator[Heard]:
     window_us = log.averaging_us or shaking(log).interval_us
-    lasts_us = len(impulse) * STEP_S * 1e6 + window_us
-    number = -1
-    for item in log.heard:
-        sample = item.sample
-        if not isinstance(sample, ImuSample):
-            yield item
-            continue
-        while number + 1 < len(moments_us) and item.at_us > moments_us[number + 1]:
-            number += 1
-        since_us = item.at_us - moments_us[number] if number >= 0 else lasts_us
-        if since_us >= lasts_us:
-            yield item
-            continue
-        push = (_taken(impulse, since_us) - _taken(impulse, since_us - window_us)) / (window_us * 1e-6)
-        side_rad = number * TURN_RAD
-        x, y, z = sample.specific_force_frd_m_s2
-        force = (x - push * math.cos(side_rad), y - push * math.sin(side_rad), z)
-        yield Heard(item.at_us, replace(sample, specific_force_frd_m_s2=force))
+    at_us = np.array([time_us for time_us, _ in log.imu()])
+    known_us = np.arange(len(impulse)) * STEP_S * 1e6
+    pushed = np.zeros((len(at_us), 2))
+    for number, moment_us in enumerate(moments_us):
+        since_us, side_rad = at_us - moment_us, 2.0 * math.pi * GOLDEN * number
+        taken = np.interp(since_us, known_us, impulse) - np.interp(since_us - window_us, known_us, impulse)
+        pushed -= np.outer(taken / (window_us * 1e-6), (math.cos(side_rad), math.sin(side_rad)))
+    pushes = iter(pushed.tolist())
+    heard = [
+        replace(item, sample=_struck(item.sample, *next(pushes))) if isinstance(item.sample, ImuSample) else item
+        for item in log.heard
+    ]
+    return replace(log, heard=tuple(heard))
 
 
-def _taken(impulse: Floats, since_us: float) -> float:
-    """So long after the first touch; nothing before it, all after the end."""
-    return float(impulse[min(max(int(since_us * 1e-6 / STEP_S), 0), len(impulse) - 1)])
-
-
-def _seen(log: Log, moments_us: Sequence[int], config: CompanionConfig, asked_hz: float | None) -> int:
-    found = [finding.at_us for finding in watch_log(log, config, asked_hz).collisions]
-    return sum(any(hit < at_us <= hit + FOUND_WITHIN_US for at_us in found) for hit in moments_us)
+def _struck(sample: ImuSample, ahead_m_s2: float, aside_m_s2: float) -> ImuSample:
+    x, y, z = sample.specific_force_frd_m_s2
+    return replace(sample, specific_force_frd_m_s2=(x + ahead_m_s2, y + aside_m_s2, z))

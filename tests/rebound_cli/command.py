@@ -6,8 +6,7 @@ import sys
 import time
 from pathlib import Path
 
-from rebound_cli.replay.recording import read_recording
-from rebound_cli.replay.reproduction import reproduce
+from rebound_cli.replay.recording import read_recording, reproduce
 
 ROOT = Path(__file__).parents[2]
 WALL = ROOT / "missions" / "wall.yaml"

@@ -10,11 +10,15 @@ import pytest
 
 from bench.head_on import head_on
 from rebound_cli.documents import load_document, validated
-from rebound_cli.identification.fit import fit_friction, fit_restitution, fit_restitution_with_loss, fit_spring
+from rebound_cli.identification.capture import find_hit, read_table
+from rebound_cli.identification.fit import (
+    fit_friction,
+    fit_restitution,
+    fit_restitution_with_loss,
+    fit_spring,
+    leave_one_out,
+)
 from rebound_cli.identification.hit import IdentificationError
-from rebound_cli.identification.motion import find_hit
-from rebound_cli.identification.report import leave_one_out
-from rebound_cli.identification.table import read_table
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.scene import Scene
@@ -157,7 +161,7 @@ def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
 
 def test_bad_data_end_in_one_clear_sentence(tmp_path):
     missing = tmp_path / "missing.csv"
-    assert_one_clear_sentence(run("identify", missing), f"{missing}: no such file")
+    assert_one_clear_sentence(run("identify", missing), f"{missing}: No such file")
     no_column = tmp_path / "no_column.csv"
     no_column.write_text("time_s,position_x_m\n0,1\n")
     assert_one_clear_sentence(run("identify", no_column), no_column, "position_y_m")

@@ -9,11 +9,11 @@ import pytest
 import yaml
 
 from companion.mission.program import ACTIONS
+from rebound_cli.check.command import mission_schema
 from rebound_cli.check.picture import ends
-from rebound_cli.check.schema import mission_schema
 from rebound_cli.check.ways import planned_ways
 from rebound_cli.documents import parse_document
-from rebound_cli.figure.outline import footprint
+from rebound_cli.figure.ground import footprint
 from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.scene import Scene
 from tests.rebound_cli.command import ROOT, WALL, run

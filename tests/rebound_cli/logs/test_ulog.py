@@ -213,17 +213,12 @@ def test_what_was_asked_for_in_the_words_of_two_versions(tmp_path, fields, row):
     assert of(log, Demand) == [Demand(START + 5, (1.0, 2.0, 3.0), None, 0.5)]
 
 
-def test_the_vehicle_is_named_and_its_hover_thrust_found(tmp_path):
+def test_the_vehicle_is_named(tmp_path):
     info = [
         ("uint32_t", "ver_sw_release", struct.pack("<I", 0x010C03FF)),
         ("char[12]", "ver_hw", b"PX4_FMU_V5XX"),
     ]
-    log = read(tmp_path, IMU, info=info, parameters=[("MPC_THR_HOVER", 0.42)])
-    assert log.vehicle == "PX4 1.12.3 on PX4_FMU_V5XX"
-    assert log.hover_thrust_fraction == pytest.approx(0.42)
-    estimate = ([("float", "hover_thrust"), ("bool", "valid")], [(START, 0.1, False), (START, 0.5, True)])
-    log = read(tmp_path, {**IMU, "hover_thrust_estimate": estimate}, parameters=[("MPC_THR_HOVER", 0.42)])
-    assert log.hover_thrust_fraction == 0.5
+    assert read(tmp_path, IMU, info=info).vehicle == "PX4 1.12.3 on PX4_FMU_V5XX"
 
 
 def test_what_is_missing_is_said_with_its_cost(tmp_path):

@@ -144,7 +144,7 @@ def test_what_else_is_left_out_of_a_plan_is_told():
         (item(177, 2, -1, *[0] * 5), "for ever"),
         (item(177, 1, 1, *[0] * 5), "repeats a take-off"),
         (item(115, 45, 0, 0, 1, 0, 0, 0), "give it a heading"),
-        ({"type": "SimpleItem", "command": 16, "frame": 3, "params": [1]}, "not complete"),
+        ({"type": "SimpleItem", "command": 16, "frame": 3, "params": [1]}, "params: list should have at least 7 items"),
         ({"type": "ComplexItem", "complexItemType": "StructureScan"}, "'StructureScan', whose way"),
     ],
 )
@@ -212,7 +212,7 @@ def test_both_ways_on_the_command_line(tmp_path):
     assert Mission.model_validate(yaml.safe_load(back.read_text())).name == "made"
 
 
-@pytest.mark.parametrize(("text", "words"), [("[]", "no fileType 'Plan'"), ("{", "not JSON"), (None, "no such file")])
+@pytest.mark.parametrize(("text", "words"), [("[]", "no whole plan"), ("{", "not JSON"), (None, "No such file")])
 def test_a_file_that_is_no_plan(tmp_path, text, words):
     path = tmp_path / "x.plan"
     if text is not None:

@@ -7,8 +7,7 @@ import pytest
 import yaml
 
 from rebound_cli.main import main
-from rebound_cli.replay.recording import read_recording
-from rebound_cli.replay.reproduction import reproduce
+from rebound_cli.replay.recording import read_recording, reproduce
 from tests.rebound_cli.command import WALL
 
 
@@ -133,7 +132,7 @@ def test_a_damaged_folder_is_one_sentence(flight, spoil, words, capsys):
 def test_arguments_that_make_no_sense_are_refused(wall_flight, tmp_path, capsys):
     for arguments, words in (
         ((tmp_path,), "no flight.tlog in this folder"),
-        ((tmp_path / "none.ulg",), "no such file"),
+        ((tmp_path / "none.ulg",), "No such file"),
         ((wall_flight, "--detector", "magic"), "there is no detector 'magic'"),
         ((wall_flight, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
         ((wall_flight, "--detector", "lateral"), "a baseline of `python -m bench detectors`"),

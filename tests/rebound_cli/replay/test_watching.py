@@ -11,9 +11,8 @@ from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND
 from rebound_cli.logs.log import Demand, Heard
 from rebound_cli.logs.shaking import Stage, shaking
-from rebound_cli.replay.circumstances import DESCENT_M_S, Circumstances
-from rebound_cli.replay.result import replay_log
-from rebound_cli.replay.watching import thinned, watch_log
+from rebound_cli.replay.report import replay_log
+from rebound_cli.replay.watching import DESCENT_M_S, Circumstances, thinned, watch_log
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
 
 

@@ -14,10 +14,9 @@ from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.logs.log import Heard
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
-from rebound_cli.tune.crash import crash
+from rebound_cli.tune.command import crash
 from rebound_cli.tune.hits import SPEEDS_M_S, STEP_S, Sight, hit_moments, impulse_since_touch, sight, with_hits
-from rebound_cli.tune.margins import margins
-from rebound_cli.tune.settings import RESERVE, advise, settings_text
+from rebound_cli.tune.settings import RESERVE, advise, margins, settings_text
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import WALL
 from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
@@ -46,20 +45,20 @@ def test_a_flight_without_jolts_is_far_from_the_threshold():
 def test_a_threshold_that_a_healthy_flight_crosses_is_raised_with_a_reserve():
     log = flight(push_m_s2=6.0)
     assert watch_log(log, LATERAL).collisions
-    found = list(margins([log], LATERAL))
+    found = margins([log], LATERAL)
     advice = advise([log], LATERAL, found, [UNSEEN])
-    value = advice.values[("lateral", "threshold_m_s2")]
+    value, _ = advice.settings["lateral", "threshold_m_s2"]
     assert value == pytest.approx(RESERVE * 6.0, rel=0.15)
-    assert advice.values[("lateral", "noise_factor")] == LATERAL.lateral.noise_factor
+    assert advice.settings["lateral", "noise_factor"][0] == LATERAL.lateral.noise_factor
     assert advice.false_alarms_left == 0
     assert watch_log(log, advice.config).collisions == []
 
 
 def test_what_needs_no_change_stays_as_it_was():
     log = flight(push_m_s2=2.0)
-    advice = advise([log], LATERAL, list(margins([log], LATERAL)), [UNSEEN])
-    assert advice.values[("lateral", "threshold_m_s2")] == 4.0
-    assert "as it was" in advice.reasons[("lateral", "threshold_m_s2")]
+    advice = advise([log], LATERAL, margins([log], LATERAL), [UNSEEN])
+    value, reason = advice.settings["lateral", "threshold_m_s2"]
+    assert value == 4.0 and "as it was" in reason
 
 
 def test_a_hit_of_the_arm_model_begins_with_its_damper_and_gives_back_a_fifth():
@@ -215,5 +214,5 @@ def test_a_crash_and_our_own_flight_with_a_hit_are_refused(tmp_path, capsys):
 def test_every_detectors_settings_can_be_written():
     config = CompanionConfig()
     log = flight(hit_us=None)
-    text = settings_text(advise([log], config, list(margins([log], config)), [UNSEEN]), "x.ulg")
+    text = settings_text(advise([log], config, margins([log], config), [UNSEEN]), "x.ulg")
     assert CompanionConfig.model_validate(yaml.safe_load(text)["companion"]).detector == config.detector
