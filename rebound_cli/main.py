@@ -10,7 +10,6 @@ from pathlib import Path
 
 from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, arguments, exit_codes
-from rebound_cli import tool_arguments as tools
 from rebound_cli.extras import needed_text
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
@@ -69,12 +68,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="rebound", description=text)
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    for add in (
-        *(arguments.add_fly, arguments.add_guard, arguments.add_init, tools.add_check, tools.add_plan),
-        *(arguments.add_sim, arguments.add_preflight, arguments.add_status, arguments.add_logs, arguments.add_doctor),
-        *(tools.add_replay, tools.add_tune, arguments.add_airframe, tools.add_identify),
-        *(arguments.add_key, arguments.add_completion, arguments.add_service),
-    ):
+    for add in arguments.COMMANDS:
         add(commands)
     return parser
 
