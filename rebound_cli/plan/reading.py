@@ -78,7 +78,7 @@ class _Reader:
         if not {"land", "return"} & self.items[-1].keys():
             self.items.append({"return": {}})
             self.notes.append("the plan does not land: a return was put at its end")
-        if plan.rallyPoints is not None and plan.rallyPoints.points:
+        if plan.rallyPoints and plan.rallyPoints.get("points"):
             self.notes.append("left out: rally points; a mission returns to where the vehicle was armed")
         if (plan.mission.vehicleType or shape.QUADROTOR) not in shape.MULTICOPTERS:
             self.notes.append("the plan was made for another kind of vehicle: only multicopters are flown")

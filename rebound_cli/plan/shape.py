@@ -89,12 +89,8 @@ class GeoFence(_Part):
     polygons: list[PolygonFence] = []
 
 
-class RallyPoints(_Part):
-    points: list[list[Number]] = []
-
-
 class PlanShape(_Part):
     fileType: Literal["Plan"]  # noqa: N815
     mission: MissionPart
     geoFence: GeoFence | None = None  # noqa: N815
-    rallyPoints: RallyPoints | None = None  # noqa: N815
+    rallyPoints: dict[str, object] | None = None  # noqa: N815
