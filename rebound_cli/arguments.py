@@ -59,6 +59,22 @@ def host_and_port(text: str) -> tuple[str, int]:
     return host, int(port(number))
 
 
+def _expected(text: str) -> int:
+    if text != "none" and not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of collisions: give none or a whole number")
+    return 0 if text == "none" else int(text)
+
+
+def _home(text: str) -> tuple[float, float, float]:
+    try:
+        latitude_deg, longitude_deg, altitude_m = map(float, (text if text.count(",") > 1 else f"{text},0").split(","))
+    except ValueError:
+        latitude_deg = longitude_deg = altitude_m = math.nan
+    if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0 and math.isfinite(altitude_m)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not LAT,LON or LAT,LON,ALT, such as 47.3977,8.5456,488")
+    return latitude_deg, longitude_deg, altitude_m
+
+
 def runs(function: str) -> Run:
     """A command's function by "module:name", imported when it runs: `--help` and errors in arguments come at once."""
     module, _, name = function.partition(":")
@@ -78,10 +94,10 @@ def _command(commands: Commands, name: str, function: str, summary: str, descrip
 def _add_world_options(parser: Parser) -> None:
     parser.add_argument("--airframe", metavar="NAME|FILE", help="foldable, rigid or an airframe file")
     parser.add_argument("--seed", type=int, help="seed of every random number of the simulated vehicle")
-    add_set(parser, "change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5")
+    _add_set(parser, "change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5")
 
 
-def add_set(parser: Parser, text: str) -> None:
+def _add_set(parser: Parser, text: str) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help=text)
 
 
@@ -97,12 +113,16 @@ def _add_peer_and_key(parser: Parser) -> None:
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help=text)
 
 
-def add_companion(parser: Parser) -> None:
+def _add_out(parser: Parser, metavar: str, text: str, default: Path | None = None) -> None:
+    parser.add_argument("--out", type=Path, default=default, metavar=metavar, help=text)
+
+
+def _add_companion(parser: Parser) -> None:
     text = "settings from this file's companion: part, as tune writes it"
     parser.add_argument("--companion", type=Path, metavar="FILE", help=text)
 
 
-def add_json(parser: Parser, what: str) -> None:
+def _add_json(parser: Parser, what: str) -> None:
     parser.add_argument("--json", action="store_true", help=f"print the {what} on stdout and nothing else there")
 
 
@@ -120,15 +140,15 @@ def add_fly(commands: Commands) -> None:
     how.add_argument("--lockstep", action="store_true", help="simulate in this process, as fast as the machine allows")
     _add_connect(how, required=False)
     _add_world_options(fly)
-    fly.add_argument("--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<time>-<mission>)")
+    _add_out(fly, "DIR", "folder of this run (default: runs/<time>-<mission>)")
     text = "with --sim px4: PX4's instance (its option -i)"
     fly.add_argument("--instance", type=instance, default=0, metavar="N", help=text)
-    add_companion(fly)
+    _add_companion(fly)
     text = "go on with the mission where the flight in this folder was interrupted"
     fly.add_argument("--resume", type=Path, metavar="RUN", help=text)
     text = "what is known beforehand, e.g. another run's obstacles.json"
     fly.add_argument("--obstacles", type=Path, metavar="FILE", help=text)
-    add_json(fly, "summary")
+    _add_json(fly, "summary")
     _add_peer_and_key(fly)
     fly.add_argument("--yes", action="store_true", help="with --connect: fly the plan without asking")
 
@@ -139,10 +159,10 @@ def add_guard(commands: Commands) -> None:
     _add_connect(guard, required=True)
     _add_peer_and_key(guard)
     guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/guard.md")
-    add_set(guard, "change a setting, e.g. max_hits=5")
+    _add_set(guard, "change a setting, e.g. max_hits=5")
     guard.add_argument("--modes", metavar="A,B", help="the modes that may be taken over, e.g. POSCTL,AUTO.MISSION")
     guard.add_argument("--then", choices=("previous", "hold"), help="what the vehicle is given back to (default: hold)")
-    guard.add_argument("--out", type=Path, metavar="DIR", help="where the log goes (default runs/<time>-guard)")
+    _add_out(guard, "DIR", "where the log goes (default runs/<time>-guard)")
 
 
 def add_init(commands: Commands) -> None:
@@ -191,10 +211,10 @@ def add_preflight(commands: Commands) -> None:
     preflight = _command(commands, "preflight", "preflight:run_preflight", summary, text)
     _add_connect(preflight, required=True)
     _add_peer_and_key(preflight)
-    add_companion(preflight)
+    _add_companion(preflight)
     preflight.add_argument("--fix", action="store_true", help="offer to set the parameters that would mend it")
     preflight.add_argument("--yes", action="store_true", help="with --fix: set them without asking")
-    add_json(preflight, "findings")
+    _add_json(preflight, "findings")
 
 
 def add_status(commands: Commands) -> None:
@@ -202,7 +222,7 @@ def add_status(commands: Commands) -> None:
     status = _command(commands, "status", "status:run_status", "what a running guard or flight is doing", text)
     text = "where to ask (default: this session, then the service)"
     status.add_argument("--socket", type=Path, metavar="PATH", help=text)
-    add_json(status, "status")
+    _add_json(status, "status")
 
 
 def add_logs(commands: Commands) -> None:
@@ -223,9 +243,9 @@ def add_logs(commands: Commands) -> None:
         parser.add_argument("flight", nargs="?", default="last", metavar="FLIGHT", help=text)
     for parser in (listed, shown, exported):
         _add_runs(parser)
-    add_json(listed, "flights")
-    add_json(shown, "flight")
-    exported.add_argument("--out", type=Path, metavar="FILE", help="the archive (default: FLIGHT.tar.gz)")
+    _add_json(listed, "flights")
+    _add_json(shown, "flight")
+    _add_out(exported, "FILE", "the archive (default: FLIGHT.tar.gz)")
     _add_no_position(exported)
 
 
@@ -251,6 +271,82 @@ def _add_runs(parser: Parser) -> None:
 def _add_no_position(parser: Parser) -> None:
     text = "without coordinates: no packets, no places in events and summary"
     parser.add_argument("--no-position", action="store_true", help=text)
+
+
+def add_check(commands: Commands) -> None:
+    text = "Validates mission files, prints what would be flown and when, and draws it."
+    check = _command(
+        commands, "check", "check.command:run_check", "check a mission file and show what would be flown", text
+    )
+    missions = "mission files, or names of ones that ship"
+    check.add_argument("missions", type=mission_file, nargs="*", metavar="MISSION", help=missions)
+    schema = "print the JSON schema of mission files, for editors, and nothing else"
+    check.add_argument("--schema", action="store_true", help=schema)
+    _add_set(check, "change a value of the mission file, e.g. items.1.go_to.speed_m_s=2.5")
+    _add_out(check, "DIR", "folder of the pictures (default: runs/check)", default=Path("runs/check"))
+    check.add_argument("--no-picture", action="store_true", help="draw nothing")
+
+
+def add_plan(commands: Commands) -> None:
+    text = "Reads and writes QGroundControl's .plan files; see docs/missions.md."
+    plan = commands.add_parser("plan", help="missions from and for QGroundControl", description=text)
+    ways = plan.add_subparsers(required=True, metavar="import|export")
+    text = "Makes a mission of a .plan."
+    reading = _command(ways, "import", "plan.command:run_import", "a mission file from a .plan", text)
+    reading.add_argument("plan", type=Path, metavar="PLAN", help="QGroundControl's file")
+    reading.add_argument("--name", help="name of the mission (default: the file's)")
+    _add_out(reading, "FILE", "default: standard output")
+    text = "Makes a .plan of a mission."
+    writing = _command(ways, "export", "plan.command:run_export", "a .plan from a mission file", text)
+    writing.add_argument("mission", type=mission_file, metavar="MISSION")
+    home = "where the vehicle will be armed: degrees, and metres above sea level (default 0)"
+    writing.add_argument("--home", type=_home, required=True, metavar="LAT,LON[,ALT]", help=home)
+    _add_out(writing, "FILE", "default: standard output")
+
+
+def add_replay(commands: Commands) -> None:
+    text = "The detector over a .ulg, a .tlog or a run's folder; see docs/replay.md."
+    replay = _command(commands, "replay", "replay.command:run_replay", "look for collisions in a recorded flight", text)
+    replay.add_argument("log", type=Path, metavar="LOG", help="a .ulg, a .tlog or a run's folder")
+    replay.add_argument("--detector", metavar="NAME", help="another detector than the mission's, or than the default")
+    rate = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"
+    replay.add_argument("--rate", type=rate_hz, metavar="HZ", help=rate)
+    _add_companion(replay)
+    _add_set(replay, "change a setting, e.g. companion.fused.side_threshold_m_s2=6")
+    expected = "exit 1 unless there are exactly so many collisions"
+    replay.add_argument("--expect", type=_expected, metavar="none|N", help=expected)
+    least = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
+    replay.add_argument("--least-watched", type=share, default=0.5, metavar="SHARE", help=least)
+    _add_out(replay, "DIR", "folder of the pictures (default: runs/replay-<name of the log>)")
+    _add_json(replay, "findings")
+
+
+def add_tune(commands: Commands) -> None:
+    text = "Noise floor, margins and the smallest hit that would be seen, and settings; see docs/replay.md."
+    tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
+    logs = "flights without a collision: .ulg, .tlog or runs' folders"
+    tune.add_argument("logs", type=Path, nargs="+", metavar="LOG", help=logs)
+    tune.add_argument("--detector", metavar="NAME", help="default: the companion's")
+    arms = "whose arms hit the wall (default: both foldable and rigid)"
+    tune.add_argument("--airframe", metavar="NAME|FILE", help=arms)
+    tune.add_argument("--companion", type=Path, metavar="FILE", help="settings to begin with (default: the defaults)")
+    _add_out(tune, "FILE", "write the settings, for rebound fly --companion FILE")
+    _add_json(tune, "figures")
+
+
+def add_identify(commands: Commands) -> None:
+    text = "Fits stiffness, damping and restitution to hits on a wall; see docs/airframes.md."
+    identify = _command(
+        commands, "identify", "identification.command:run_identify", "find an airframe's springs in recorded hits", text
+    )
+    data = "a CSV file, a .tlog or a run's folder: one hit each"
+    identify.add_argument("data", type=Path, nargs="+", metavar="DATA", help=data)
+    identify.add_argument("--mass", type=mass_kg, metavar="KG", help="of the vehicle; known for simulated runs")
+    identify.add_argument("--axis", choices=("x", "y"), help="CSV: it is square to the wall (default: by the turn)")
+    _add_out(identify, "FILE", "write an airframe file")
+    identify.add_argument("--name", help="name of the airframe (default: the file's)")
+    base = "airframe for all else (default: foldable, rigid where no spring is seen)"
+    identify.add_argument("--based-on", metavar="NAME", help=base)
 
 
 def add_airframe(commands: Commands) -> None:
@@ -298,3 +394,10 @@ def add_service(commands: Commands) -> None:
     how.add_argument("--mission", type=mission_file, metavar="FILE", help=text)
     _add_connect(service, required=False)
     service.add_argument("--dry-run", action="store_true", help="show what would be written or removed, and stop")
+
+
+# In the order of `rebound --help`.
+COMMANDS = (
+    *(add_fly, add_guard, add_init, add_check, add_plan, add_sim, add_preflight, add_status, add_logs, add_doctor),
+    *(add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
+)

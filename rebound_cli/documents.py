@@ -66,10 +66,6 @@ class Document:
         return f"{self.name}:{next(around, 1)}"
 
 
-def empty_document(name: str) -> Document:
-    return Document(name)
-
-
 def load_document(path: Path) -> Document:
     """Read one YAML file whose top level is a mapping. Raises DocumentError."""
     try:

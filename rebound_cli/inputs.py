@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.errors import ConfigurationError
-from rebound_cli import documents
+from rebound_cli import documents, run_folder
 from rebound_cli.documents import Document, DocumentError, DocumentPath, Override, load_document, validated
-from rebound_cli.run_folder import EVENTS_NAME, OBSTACLES_NAME, RESOLVED_NAME, read_records, read_text, whole_lines
+from rebound_cli.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.mavlink.restamp import check_messages
@@ -64,12 +64,11 @@ def companion_settings(path: Path | None, sets: Sequence[str], detector: str | N
     Of the file only the `companion:` part counts.
     """
     from companion.mission.config import CompanionConfig
-    from rebound_cli.run_folder import GUARD_NAME, RESOLVED_NAME
 
     if path is None:
-        document = documents.empty_document("no mission file")
+        document = Document("no mission file")
     else:
-        document = load_flown(path) if path.name in (GUARD_NAME, RESOLVED_NAME) else load_document(path)
+        document = load_flown(path) if path.name in (run_folder.GUARD_NAME, RESOLVED_NAME) else load_document(path)
     documents.apply_overrides(document, sets)
     if detector is not None:
         documents.apply_override(document, Override(f"--detector {detector}", ("companion", "detector"), detector))
@@ -191,7 +190,7 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
     flown = mission_from(load_flown(run / RESOLVED_NAME))
     if flown.items != mission.items:
         raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
-    events = list(read_records(run / EVENTS_NAME, whole_lines(read_text(run / EVENTS_NAME))))
+    events = list(read_records(run / run_folder.EVENTS_NAME, whole_lines(read_text(run / run_folder.EVENTS_NAME))))
     armed = _last(events, "armed")
     item, end = _last(events, "item"), _last(events, "aborted")
     if _last(events, "done") is not None:
@@ -208,12 +207,13 @@ def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
             "hits": sum(event["kind"] == "detection" for event in events) + (flown.resume.hits if flown.resume else 0),
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ResumeError(f"{run / EVENTS_NAME}: not the events of a flight; the file is damaged.") from error
+        text = "not the events of a flight; the file is damaged"
+        raise ResumeError(f"{run / run_folder.EVENTS_NAME}: {text}.") from error
 
 
 def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) -> None:
     """Go on where that flight was interrupted, and if it `knows_more` with its obstacles. Raises ResumeError."""
-    stored = run / OBSTACLES_NAME
+    stored = run / run_folder.OBSTACLES_NAME
     given: dict[DocumentPath, Any] = {("resume",): resume_of(run, mission)}
     if knows_more and stored.exists():
         given |= {("obstacles", "known"): [], ("obstacles", "file"): str(stored)}

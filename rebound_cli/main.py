@@ -11,7 +11,6 @@ from pathlib import Path
 from companion.errors import ConfigurationError, ReboundError
 from rebound_cli import __version__, arguments, exit_codes
 from rebound_cli.extras import needed_text
-from rebound_cli.tool_arguments import add_check, add_identify, add_plan, add_replay, add_tune
 
 # What writing to an open file fails with: a full disk, a limit of size or space, a broken disk or a terminal gone.
 _DISK_ERRORS = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
@@ -69,12 +68,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="rebound", description=text)
     parser.add_argument("--version", action="version", version=f"rebound {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="command")
-    for add in (
-        *(arguments.add_fly, arguments.add_guard, arguments.add_init, add_check, add_plan, arguments.add_sim),
-        *(arguments.add_preflight, arguments.add_status, arguments.add_logs, arguments.add_doctor),
-        *(add_replay, add_tune, arguments.add_airframe, add_identify),
-        *(arguments.add_key, arguments.add_completion, arguments.add_service),
-    ):
+    for add in arguments.COMMANDS:
         add(commands)
     return parser
 
