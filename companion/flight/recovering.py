@@ -62,7 +62,8 @@ class Recover:
         goal, state, record = self._record.setpoint_ned_m, self._state(), self._record
         is_level = self._contact.normal_ned[2] == 0.0
         most_m_s2 = self._config.vertical_acceleration_m_s2
-        climb_m_s2 = height_held(state, goal[2], 1.0, most_m_s2)
+        spread_m_s = record.reckoning.spread_m_s[2]
+        climb_m_s2 = height_held(state, spread_m_s, goal[2], 1.0, most_m_s2)
         if not self._law.follows:
             return Target(goal, self._yaw_rad)
         if self._is_known and not self._is_spinning and not self._presses():
@@ -91,7 +92,7 @@ class Recover:
         if not is_level:
             return Target(goal, self._yaw_rad, REST, asked, leans_only=True, expected=expected)
         velocity = (0.0, 0.0, record.estimated_down_m_s)  # which leaves PX4's own loop nothing to ask for
-        asked = (asked[0], asked[1], height_held(state, goal[2], 2.0, most_m_s2))
+        asked = (asked[0], asked[1], height_held(state, spread_m_s, goal[2], 2.0, most_m_s2))
         return Target(goal, self._yaw_rad, velocity, asked, True, True, expected)
 
     def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:

@@ -72,7 +72,8 @@ class Recovering:
         return self._recover.target(now_us)
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
-        if now_us - self._began_us > ECHO_STALE_US:
+        # In a mode that somebody else has commanded PX4 flies to its own places.
+        if now_us - self._began_us > ECHO_STALE_US and guard.vehicle.is_mode_known:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES:
             guard.program_elsewhere = True

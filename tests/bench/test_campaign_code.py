@@ -16,7 +16,7 @@ from bench.recoveries.hits import recoveries_campaign
 from tests.rebound_cli.command import ROOT
 
 # The engine, and how a document is written: no result follows from them.
-ENGINE = ["bench.campaign", "bench.marked"]
+ENGINE = ["bench.campaign", "bench.marked", "bench.processes"]
 
 
 @pytest.fixture(scope="module")

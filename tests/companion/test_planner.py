@@ -238,7 +238,7 @@ def test_a_climb_ends_sooner_than_by_the_vehicles_own_loop(speed_m_s):
     for most_m_s2 in (3.0, 0.0):
         w, way, done, furthest = speed_m_s, 0.0, 0.0, 0.0
         for _ in range(500):
-            asked = height_held(Moving((0.0, 0.0, way), (0.0, 0.0, w)), 0.0, 1.0, most_m_s2)
+            asked = height_held(Moving((0.0, 0.0, way), (0.0, 0.0, w)), 0.0, 0.0, 1.0, most_m_s2)
             assert abs(asked) <= most_m_s2
             done += 0.002 / 0.03 * (asked - 4.0 * (w + way) - done)
             w += 0.002 * done
@@ -247,6 +247,12 @@ def test_a_climb_ends_sooner_than_by_the_vehicles_own_loop(speed_m_s):
         assert abs(w) < 0.1, "neither on nor back"
         ways.append(furthest)
     assert ways[0] < 0.7 * ways[1], "less than without; 0: none"
+
+
+def test_a_climb_that_may_be_none_is_not_braked():
+    climbing = Moving((0.0, 0.0, 0.0), (0.0, 0.0, -0.3))
+    assert height_held(climbing, 0.4, 0.0, 1.0, 3.0) == 0.0
+    assert height_held(climbing, 0.1, 0.0, 1.0, 3.0) == pytest.approx(0.8)
 
 
 # --- laws
