@@ -162,7 +162,7 @@ def test_a_judge_names_each_kind_of_loss() -> None:
 
 
 def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
-    # Given an accelerometer that is off in the second of a hit at 1.9 m/s
+    # Given an accelerometer that is off in the second of a hit
     hidden = FLOWN["accelerometer zero"]
     results: list[Json] = []
     faults = [hidden, replace(hidden, expected=replace(hidden.expected, blinds=False))]
