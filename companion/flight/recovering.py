@@ -191,14 +191,13 @@ class Recover:
         self._touch(sample)
         state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
+        is_on = self._plan is not None and self._plan.holds(elapsed_s, state)
+        if known != self._planned_for or not (self._is_known or is_on):
+            self._planned_for, is_on = known, False
+            self._aim(flight, state, now_us)
         if self._is_spinning or not law.plans:
             self._plan = None
-        elif self._plan is not None and self._plan.holds(elapsed_s, state) and known == self._planned_for:
-            return
-        if self._plan is not None or known != self._planned_for:
-            self._planned_for = known
-            self._aim(flight, state, now_us)
-        if law.plans and not self._is_spinning:
+        elif not is_on:
             self._plan, self._plan_began_us = plan(state, record.setpoint_ned_m, self._surfaces, self._limits), now_us
 
     def _touch(self, sample: LocalPosition) -> None:
