@@ -136,6 +136,7 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
     """A simulated vehicle of our own; or its body, for the PX4 that the person starts, at the connection `px4`."""
     from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
 
+    waits = ""
     if px4 is None:
         own, words = udp_in("127.0.0.1", 0), READY_WORDS
         # The companion keeps to the clock, whatever PX4_SIM_SPEED_FACTOR says.
@@ -146,8 +147,10 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
 
         port, words = PX4_SIMULATOR_PORT + instance, FIRST_ANSWER_WORDS
         options = ["--autopilot", "px4", "--port", str(port)]
-        flight.console.print(f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ...")
+        waits = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ..."
     with VehicleProcess(flight.folder, options, words) as vehicle:
+        if waits:
+            flight.console.print(waits)
         vehicle.wait_until_ready(flight.interrupts, flight.console)
         # What PX4 said while it booted is old.
         while px4 is not None and px4.receive(0):
