@@ -59,41 +59,50 @@ class Recover:
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
-        goal, state, record = self._record.setpoint_ned_m, self._state(), self._record
-        is_level = self._contact.normal_ned[2] == 0.0
-        most_m_s2 = self._config.vertical_acceleration_m_s2
-        spread_m_s = record.reckoning.spread_m_s[2]
-        climb_m_s2 = height_held(state, spread_m_s, goal[2], 1.0, most_m_s2)
         if not self._law.follows:
-            return Target(goal, self._yaw_rad)
-        if self._is_known and not self._is_spinning and not self._presses():
-            motion = Moving(goal, REST)
-            if self._plan is not None:
-                motion = self._plan.at(1e-6 * (now_us - self._plan_began_us))
-            (n, e, d), (u, v, w) = motion.position_ned_m, motion.velocity_ned_m_s
-            a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
-            if is_level:
-                d, w, c = goal[2], 0.0, climb_m_s2
-            return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
+            return Target(self._record.setpoint_ned_m, self._yaw_rad)
+        elapsed_s = 1e-6 * (now_us - self._plan_began_us)
+        is_steady = self._is_known and not self._is_spinning and not self._presses()
+        return self._planned(elapsed_s) if is_steady else self._leaning(elapsed_s)
+
+    def _planned(self, elapsed_s: float) -> Target:
+        """Place, velocity and acceleration, by which PX4's own loops follow the plan."""
+        goal = self._record.setpoint_ned_m
+        motion = Moving(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
+        (n, e, d), (u, v, w) = motion.position_ned_m, motion.velocity_ned_m_s
+        a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
+        if self._is_level:
+            d, w, c = goal[2], 0.0, self._height_m_s2(1.0)
+        return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
+
+    def _leaning(self, elapsed_s: float) -> Target:
+        """Accelerations alone: PX4's loops know nothing right of the motion, or would do harm to this one."""
+        goal, record, state = self._record.setpoint_ned_m, self._record, self._state()
         if self._plan is not None and not self._presses():
-            a, b, c = self._plan.led_back(1e-6 * (now_us - self._plan_began_us), state)
+            asked = self._plan.led_back(elapsed_s, state)
         else:
             limits = self._limits.spinning(self._spin_rad_s)
-            a, b, c = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
+            asked = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
         north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
-        a, b, c = safe_to_hold((a, b, c), self._leant.velocity_ned_m_s)
-        asked = self._kept_off((a + north, b + east, climb_m_s2 if is_level else c))
+        a, b, c = safe_to_hold(asked, self._leant.velocity_ned_m_s)
+        a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
+        falls = self._is_level and self._may_fall and self._presses(HANGS_M_S2)
+        is_free = falls or (self._is_level and not self._is_known)
+        if is_free:
+            c = FALLS_M_S2 if falls else self._height_m_s2(2.0)
+        # As it takes itself to move, which leaves PX4's own loop nothing to add to what is asked for up and down.
+        velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
         expected = Moving(state.position_ned_m, state.velocity_ned_m_s, record.level_leans_m_s2)
-        if is_level and self._may_fall and self._presses(HANGS_M_S2):
-            velocity, asked = (0.0, 0.0, record.estimated_down_m_s), (asked[0], asked[1], FALLS_M_S2)
-            return Target(goal, self._yaw_rad, velocity, asked, True, True, None if self._is_known else expected)
-        if self._is_known:
-            return Target(goal, self._yaw_rad, REST, asked, leans_only=True)
-        if not is_level:
-            return Target(goal, self._yaw_rad, REST, asked, leans_only=True, expected=expected)
-        velocity = (0.0, 0.0, record.estimated_down_m_s)  # which leaves PX4's own loop nothing to ask for
-        asked = (asked[0], asked[1], height_held(state, spread_m_s, goal[2], 2.0, most_m_s2))
-        return Target(goal, self._yaw_rad, velocity, asked, True, True, expected)
+        return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
+
+    @property
+    def _is_level(self) -> bool:
+        """Whether what was touched is upright, and the height is held by itself."""
+        return self._contact.normal_ned[2] == 0.0
+
+    def _height_m_s2(self, loops: float) -> float:
+        spread_m_s, down_m = self._record.reckoning.spread_m_s[2], self._record.setpoint_ned_m[2]
+        return height_held(self._state(), spread_m_s, down_m, loops, self._config.vertical_acceleration_m_s2)
 
     def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
         spread = self._record.reckoning.spread_m_s
