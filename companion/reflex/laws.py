@@ -72,7 +72,7 @@ def _adaptive(config: RecoveryConfig, contact: Contact, motion: Moving, limits: 
     normal, x = contact.normal_ned, motion.position_ned_m
     off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
     off_m = split(plus(x, -1.0, contact.position_ned_m), normal)[0]
-    harder_m = config.clearance_s * abs(split(contact.velocity_ned_m_s, normal)[0])
+    harder_m = config.clearance_s * max(0.0, -split(contact.velocity_ned_m_s, normal)[0])
     along_m_s = math.hypot(*tangential)
     if normal[2] == 0.0:
         tangential = (tangential[0], tangential[1], 0.0)

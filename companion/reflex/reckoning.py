@@ -79,8 +79,7 @@ class Bank:
 
     def struck(self, faster_m_s: Vector3, spread_m_s: Vector3, hides_m_s: Vector3) -> "Bank":
         """Another hit, while what the first one hid is being put right."""
-        bank = copy.copy(self)
-        bank.state, bank.covariance = self.state.copy(), self.covariance.copy()
+        bank = copy.deepcopy(self)
         bank.state[:, :, 1] += np.array(faster_m_s)
         bank.covariance[:, :, 1, 1] += np.array(spread_m_s) ** 2
         bank.covariance[:, :, 2, 2] += np.array(hides_m_s) ** 2
@@ -119,17 +118,16 @@ class Bank:
         self.covariance = self.covariance - with_it[..., :, None] * with_it[..., None, :] / size[..., None, None]
         self.likely = self.likely - (missed**2 / size + np.log(size)).sum(axis=1)
 
-    def found(self, since_s: float) -> tuple[Moving, Vector3, Vector3, float]:
-        """The motion and its velocity's spread, by what the told velocity is off now, and by how much it may be off in
-        all from now on."""
+    def found(self, since_s: float) -> tuple[Moving, Vector3, float]:
+        """The motion, its velocity's spread, and by how much what is told may be off in all from now on."""
         share = np.exp(0.5 * (self.likely - self.likely.max()))
         share /= share.sum()
-        g, _, left = missing(since_s)
+        left = missing(since_s)[2]
         (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
         spread2 = self.covariance[..., 1, 1] + (self.state[..., 1] - [u, v, w]) ** 2
-        (p, q, r), (a, b, c) = np.sqrt(share @ spread2).tolist(), ((share * g) @ self.state[..., 2]).tolist()
+        p, q, r = np.sqrt(share @ spread2).tolist()
         left2 = left**2 * (self.covariance[..., 2, 2] + self.state[..., 2] ** 2).sum(axis=1)
-        return Moving((x, y, z), (u, v, w)), (p, q, r), (a, b, c), math.sqrt(share @ left2)
+        return Moving((x, y, z), (u, v, w)), (p, q, r), math.sqrt(share @ left2)
 
 
 def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
@@ -165,7 +163,6 @@ class Reckoning:
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # what the lean does in vain, north and east
     push_m_s2: Vector3 = REST  # what moves the vehicle besides its lean, level: wind, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
-    off_m_s: Vector3 = REST  # by what the vehicle's estimate is wrong about its velocity
     _bank: Bank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
@@ -174,7 +171,6 @@ class Reckoning:
     _time_boot_us: int = 0
     _told_boot_us: int = 0
     _pushed_boot_us: int = 0
-    _is_put_right: bool = False
     _is_shown: bool = False
     _clock_boot_us: int = 0  # from which on what was hidden is put right
 
@@ -201,14 +197,15 @@ class Reckoning:
             self._bank = self.earlier._bank.struck(
                 plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
             )
-        self._told_boot_us, self.is_right, self._is_put_right = 0, False, False
+        self._told_boot_us, self.is_right = 0, False
 
     def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
         """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
         self._is_shown, self.is_whole = is_whole, is_whole and self.earlier is None
         if pushed_boot_us != self._pushed_boot_us:
             self._pushed_boot_us = pushed_boot_us
-            self._begin()
+            if not self.is_whole:
+                self._begin()
 
     def imu(self, strapdown: Strapdown) -> None:
         """Take the newest sample. More than gravity is a contact's push, of which the start says what it leaves."""
@@ -235,37 +232,39 @@ class Reckoning:
 
     def hear(self, sample: LocalPosition) -> None:
         """Take what the vehicle says of its place and velocity."""
-        since_us = sample.time_boot_us - round(1e6 * DELAY_S) - self._clock_boot_us
-        if (
-            sample.time_boot_us - round(1e6 * DELAY_S) <= self.hit_boot_us
-            or sample.time_boot_us <= self._pushed_boot_us
-        ):
+        at_us = sample.time_boot_us - round(1e6 * DELAY_S)
+        if at_us <= self.hit_boot_us:
             return
-        if not self.is_right:
-            if not self.is_whole:
-                self._reckon(sample, 1e-6 * since_us)
-            self.is_right = self.is_whole or self._is_put_right or since_us >= OVER_US
+        is_in_push = sample.time_boot_us <= self._pushed_boot_us
+        self.is_right |= self.is_whole or at_us - self._clock_boot_us >= OVER_US
+        if not (self.is_right or is_in_push):
+            self.is_right = self._reckon(sample, at_us)
         if self.is_right:
             self._correct(sample)
 
-    def _reckon(self, sample: LocalPosition, since_s: float) -> None:
-        config, bank, before_us = self.config, self._bank, self._told_boot_us
+    def _reckon(self, sample: LocalPosition, at_us: int) -> bool:
+        """Take what is told into the filters; whether it will be wrong by next to nothing from now on."""
+        config, bank, before_us, since_s = (
+            self.config,
+            self._bank,
+            self._told_boot_us,
+            1e-6 * (at_us - self._clock_boot_us),
+        )
         self._told_boot_us = sample.time_boot_us
         every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
         # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
-        at_us = self._clock_boot_us + round(1e6 * since_s)
         behind_s = 1e-6 * (self._time_boot_us - at_us)
         summed = plus(self._summed_m_s, -behind_s, self._acceleration)
         bank.move(1e-6 * (at_us - self._at_boot_us), plus(summed, -1.0, self._moved_m_s))
         self._at_boot_us, self._moved_m_s = at_us, summed
         v, x = sample.velocity_ned_m_s, sample.position_ned_m
         bank.hear(since_s, v, x, config.velocity_noise_m_s, config.position_noise_m, colour)
-        found, self.spread_m_s, self.off_m_s, left_m_s = bank.found(since_s)
+        found, self.spread_m_s, left_m_s = bank.found(since_s)
         velocity = plus(found.velocity_ned_m_s, behind_s, self._acceleration)
         place = plus(found.position_ned_m, behind_s, velocity)
         self.motion = Moving(place, velocity, self.motion.acceleration_ned_m_s2)
-        self._is_put_right = left_m_s <= RIGHT_M_S
+        return left_m_s <= RIGHT_M_S
 
     def _correct(self, sample: LocalPosition) -> None:
         """By an estimate that is right: at once by the first, then by so much as is not its noise."""
@@ -275,7 +274,7 @@ class Reckoning:
         place = plus(was.position_ned_m, share, plus(sample.position_ned_m, -1.0, was.position_ned_m))
         velocity = plus(was.velocity_ned_m_s, share, plus(sample.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = Moving(place, velocity, was.acceleration_ned_m_s2)
-        self.off_m_s = self.spread_m_s = REST
+        self.spread_m_s = REST
 
 
 def lean_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
