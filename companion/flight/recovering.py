@@ -16,6 +16,7 @@ from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
 from companion.reflex.config import (
     AGREEING,
+    BEHIND_M,
     DAMPED,
     FALLS_M_S2,
     HANGS_M_S2,
@@ -51,7 +52,7 @@ class Recover:
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         self._spin_rad_s = 0.0
         self._is_known = not self._law.follows  # the motion after the hit
-        self._has_left, self._may_fall, self._comes_m_s, self._told_m_s = False, False, 0.0, REST
+        self._has_left, self._may_fall, self._comes_m_s = False, False, 0.0
         self._agreed: Vector3 | None = None  # the normal by the velocities before and after
         self._planned_for: object = None  # what was known of the contact
         self._plan: Plan | None = None  # while the vehicle follows one; else it is asked for accelerations alone
@@ -83,13 +84,9 @@ class Recover:
         else:
             limits = self._limits.spinning(self._spin_rad_s)
             asked = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
-        a, b, c = self._kept_off(asked)
-        if not self._presses():
-            north, east = record.reckoning.wind_m_s2
-            a, b, _ = safe_to_hold((a, b, c), (self._leant.velocity_ned_m_s, self._told_m_s))
-            a, b = a + north, b + east
-        if self._is_level:
-            c = self._height_m_s2(1.0)
+        north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
+        a, b, c = safe_to_hold(asked, self._leant.velocity_ned_m_s)
+        a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
         falls = self._is_level and self._may_fall and self._presses(HANGS_M_S2)
         is_free = falls or (self._is_level and not self._is_known)
         if is_free:
@@ -124,7 +121,7 @@ class Recover:
         What PX4's loops add to that against a wind, or have added up against the surface itself, is not to be had.
         """
         return any(
-            surface.off_m(self._leant.position_ned_m) < TOUCHES_M
+            -BEHIND_M <= surface.off_m(self._leant.position_ned_m) < TOUCHES_M
             and split(self._leant.acceleration_ned_m_s2, surface.normal_ned)[0] < -least_m_s2
             for surface in self._surfaces
         )
@@ -134,8 +131,6 @@ class Recover:
         if attitude is not None and attitude.angular_velocity_frd_rad_s is not None:
             self._spin_rad_s = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)[2]
         self._may_fall = _has_room_below(flight)
-        latest = flight.vehicle.history.latest()
-        self._told_m_s = REST if latest is None else latest.velocity_ned_m_s
         for sample in inputs.positions:
             noise_m = flight.mission.companion.estimate.position_noise_m
             if record.is_contradicted(sample.time_boot_us, flight.vehicle.history, noise_m):
@@ -224,15 +219,17 @@ class Recover:
         record, contact = self._record, self._contact
         motion = record.reckoning.motion
         off_m_s = split(motion.velocity_ned_m_s, contact.normal_ned)[0]
-        pushes = sample.time_boot_us - record.contact_ended_boot_us < LEFT_US
+        is_touched = sample.time_boot_us - record.contact_ended_boot_us < LEFT_US
+        is_pushed = self._is_known and split(record.reckoning.push_m_s2, contact.normal_ned)[0] > LEANS_M_S2
+        asked_m_s = 0.0
         if self._is_known and self._plan is not None:
-            pushes |= split(record.reckoning.push_m_s2, contact.normal_ned)[0] > LEANS_M_S2
             asked_m_s = split(self._plan.at(elapsed_s).velocity_ned_m_s, contact.normal_ned)[0]
-            pushes &= off_m_s - asked_m_s > LEAVING_M_S
-        self._comes_m_s = max(0.0, off_m_s) if pushes else 0.0
-        self._has_left = not pushes and (self._has_left or off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S)
+        is_carried = (is_touched or is_pushed) and off_m_s - asked_m_s > LEAVING_M_S
+        self._comes_m_s = off_m_s if is_carried else 0.0
+        has_left = self._has_left or off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S
+        self._has_left = has_left and not (is_touched or is_carried)
         place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
-        if pushes and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
+        if is_carried and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
             place = motion.position_ned_m
         self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
 

@@ -15,6 +15,7 @@ from companion.messages import Vector3
 from companion.reflex.config import (
     AHEAD,
     ATTITUDE_RAD_S,
+    BEHIND_M,
     CLIMB_GAIN_PER_S,
     HARDER,
     HARDEST_S,
@@ -153,7 +154,7 @@ def kept_off(
     one that leaves is not taken away, and one that leans into the surface, or flies there, is asked to lean away.
     """
     for surface in surfaces:
-        if surface.off_m(state.position_ned_m) >= surface.distance_m:
+        if not -BEHIND_M <= surface.off_m(state.position_ned_m) < surface.distance_m:
             continue
         normal, most_m_s2 = surface.normal_ned, HARDER * limits.acceleration_m_s2
         leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * LEAD_S, state.acceleration_ned_m_s2), normal)[0]
@@ -167,16 +168,14 @@ def kept_off(
     return acceleration_ned_m_s2
 
 
-def safe_to_hold(acceleration_ned_m_s2: Vector3, velocities_ned_m_s: Sequence[Vector3]) -> Vector3:
-    """So much of a level acceleration as, asked for last and held until PX4 notices, makes no slow vehicle fast: by each
-    of the velocities that it may have."""
-    a, b, c = acceleration_ned_m_s2
-    asked2, share = max(a * a + b * b, 1e-9), 1.0
-    for u, v, _ in velocities_ned_m_s:
-        most_m_s, along = max(math.hypot(u, v), HELD_TO_M_S), (a * u + b * v) / asked2
-        # |v + share a t| = most, of which the larger root.
-        most_s = math.sqrt(max(0.0, along * along + (most_m_s**2 - u * u - v * v) / asked2)) - along
-        share = min(share, max(0.0, most_s) / HELD_S)
+def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+    """So much of a level acceleration as, asked for last and held until PX4 notices, makes no slow vehicle fast."""
+    (a, b, c), (u, v, _) = acceleration_ned_m_s2, velocity_ned_m_s
+    most_m_s, asked2 = max(math.hypot(u, v), HELD_TO_M_S), a * a + b * b
+    # |v + share a t| = most, of which the larger root.
+    along = (a * u + b * v) / max(asked2, 1e-9)
+    most_s = math.sqrt(max(0.0, along * along + (most_m_s**2 - u * u - v * v) / max(asked2, 1e-9))) - along
+    share = min(1.0, max(0.0, most_s) / HELD_S)
     return (share * a, share * b, c)
 
 
