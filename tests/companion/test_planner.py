@@ -144,6 +144,15 @@ def test_nothing_leads_into_a_surface_nearer_than_its_clearance(off_the_wall_m):
     assert kept_off((3.0, 1.0, 0.5), Moving(plus(AT, 0.36, SOUTH), REST), REST, [wall], limits)[0] == 3.0
 
 
+def test_a_surface_far_behind_which_the_vehicle_is_keeps_it_off_nothing():
+    # Given a vehicle that flies where a wall was thought to be, by more than arms give way and an estimate drifts
+    wall = Surface(AT, SOUTH, 0.35)
+    for deep_m, is_there in ((0.0, True), (0.15, True), (0.25, False), (3.0, False)):
+        state = Moving(plus(AT, -deep_m, SOUTH), (0.5, 0.0, 0.0))
+        asked = kept_off((1.0, 0.0, 0.0), state, REST, [wall], LIMITS)
+        assert (asked == (1.0, 0.0, 0.0)) is not is_there
+
+
 def test_a_vehicle_that_may_not_leave_at_all_does_not_brake():
     # Given one that is thought to leave with 0.4 m/s, give or take 0.6 m/s
     state, wall = Moving(plus(AT, 0.1, SOUTH), (-0.4, 0.0, 0.0)), Surface(AT, SOUTH, 0.35)
@@ -322,6 +331,14 @@ def test_a_hovering_vehicle_that_is_struck_gives_way():
     struck = Contact(0, AT, REST, (0.0, 1.0, 0.0))
     goal, _ = adaptive(struck, Moving((4.0, -1.95, -1.5), (0.0, 0.45, 0.0)))
     assert goal[:2] == pytest.approx((4.0, -1.65)), "0.35 m from where it was struck, more than it takes to stop"
+
+
+def test_what_overtook_the_vehicle_needs_no_more_clearance():
+    # Given one that is struck from behind while it flies away from what strikes it
+    fled = Contact(0, AT, (-3.0, 0.0, 0.0), SOUTH)
+    assert fled.rebound(0.45).velocity_ned_m_s == (-3.0, 0.0, 0.0), "it goes on leaving"
+    goal, _ = adaptive(fled, Moving(AT, REST), clearance_s=0.5)
+    assert off_m(fled, goal) == pytest.approx(0.35), "the speed away asks for none"
 
 
 def test_where_a_leant_vehicle_comes_to_rest_is_asked_for():
