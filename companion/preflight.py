@@ -10,7 +10,6 @@ from enum import Enum
 
 from companion import messages
 from companion.estimate.strapdown import GRAVITY_M_S2
-from companion.flight.envelope import HELD_S
 from companion.link.round_trip import MOST_US as MOST_TRIP_US
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -19,6 +18,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
+from companion.reflex.config import HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.
 SETTLING_US = 1_000_000

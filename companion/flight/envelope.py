@@ -18,17 +18,22 @@ from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
-from companion.reflex.config import BEHIND_M, CLIMB_GAIN_PER_S, HEIGHT_PER_S
+from companion.reflex.config import (
+    BEHIND_M,
+    CLIMB_GAIN_PER_S,
+    HEIGHT_PER_S,
+    HELD_S,
+    NOTICED_S,
+    PLACE_PER_S,
+    VELOCITY_PER_S,
+)
 from companion.reflex.halfspace import Surface, plus, split
 from companion.reflex.planner import REST, Moving
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
-# PX4's defaults: COM_OF_LOSS_T, then the gains of north, east and down.
-HELD_S = 1.0
-PLACE_PER_S = (0.95, 0.95, HEIGHT_PER_S)
-VELOCITY_PER_S = (1.8, 1.8, CLIMB_GAIN_PER_S)
-# PX4 notices the silence late: with 1 s set, a real one went into hold after 1.04 to 1.13 s (docs/px4.md).
-NOTICED_S = 0.13
+# PX4's gains of north, east and down.
+PLACE_GAINS_PER_S = (PLACE_PER_S, PLACE_PER_S, HEIGHT_PER_S)
+VELOCITY_GAINS_PER_S = (VELOCITY_PER_S, VELOCITY_PER_S, CLIMB_GAIN_PER_S)
 # PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
 BRAKES_M_S2 = 3.0
 # After a lean PX4 brings to rest what its estimate says, which is wrong. After a hit at 2 m/s it was right again within
@@ -116,9 +121,9 @@ def _asked(target: Target, motion: Moving, axis: int) -> tuple[float | None, flo
 
 def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_s: float) -> Iterator[float]:
     """Of one axis: at each time, and stopped."""
-    k_x, off_m = (0.0, 0.0) if x_s is None else (PLACE_PER_S[axis], x_s - x)
+    k_x, off_m = (0.0, 0.0) if x_s is None else (PLACE_GAINS_PER_S[axis], x_s - x)
     leans = x_s is None and v_s is None
-    k_v = 0.0 if leans else VELOCITY_PER_S[axis]
+    k_v = 0.0 if leans else VELOCITY_GAINS_PER_S[axis]
     asked_m_s2, way, after_m_s = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, x, v
     for by_asked, by_speed, left in _answers(k_x, k_v):
         way, after_m_s = x + by_asked * asked_m_s2 + by_speed * v, by_speed * asked_m_s2 + left * v

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 from companion import messages
 from companion.flight.context import FlightContext
-from companion.flight.envelope import HELD_S, LOSS_PARAMETER, longer_loss_text
+from companion.flight.envelope import LOSS_PARAMETER, longer_loss_text
 from companion.link.refusals import LASTING_US
 from companion.link.vehicle import identify, is_autopilot
 from companion.messages import Sample
 from companion.px4_mode import mode_name
+from companion.reflex.config import HELD_S
 
 
 def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:

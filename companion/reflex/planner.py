@@ -23,6 +23,7 @@ from companion.reflex.config import (
     HELD_S,
     HELD_TO_M_S,
     LEAD_S,
+    NOTICED_S,
     OFF_PLAN_M,
     OFF_PLAN_M_S,
     PLACE_PER_S,
@@ -175,7 +176,7 @@ def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> V
     # |v + share a t| = most, of which the larger root.
     along = (a * u + b * v) / max(asked2, 1e-9)
     most_s = math.sqrt(max(0.0, along * along + (most_m_s**2 - u * u - v * v) / max(asked2, 1e-9))) - along
-    share = min(1.0, max(0.0, most_s) / HELD_S)
+    share = min(1.0, max(0.0, most_s) / (HELD_S + NOTICED_S))
     return (share * a, share * b, c)
 
 

@@ -10,8 +10,6 @@ import pytest
 from companion.core import Limiter
 from companion.flight.context import Target
 from companion.flight.envelope import (
-    HELD_S,
-    NOTICED_S,
     Known,
     Surroundings,
     bounded,
@@ -25,6 +23,7 @@ from companion.memory.patch import Patch
 from companion.mission.fence import Fence
 from companion.mission.model import Mission
 from companion.mission.policy import Limits
+from companion.reflex.config import HELD_S, NOTICED_S
 from companion.reflex.planner import Moving
 from tests.companion.hostile import flight_in
 
