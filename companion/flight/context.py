@@ -83,7 +83,7 @@ class Inputs(NamedTuple):
 
 @dataclass(slots=True)
 class StepTally:
-    """What has happened to the present step; begun anew with the next one."""
+    """What has happened to the present step; reset by the next one."""
 
     index: int = 0
     began_us: int | None = None

@@ -160,7 +160,7 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
     return Holder.FAILSAFE if report.failsafe or still_intended else Holder.PILOT
 
 
-# As long as it takes to ask for two modes in vain: nobody is to be kept in OFFBOARD by a hand-over that does not end.
+# As long as two modes that are asked for and refused: nobody is to be kept in OFFBOARD by a hand-over that does not end.
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 

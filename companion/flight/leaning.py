@@ -25,11 +25,11 @@ NEARER_M = 0.05
 STEADY_M_S = 0.12
 # Lean and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
-# Begun anew the means say at first, of a vehicle that speeds up, what no wind has said; after so long by a twentieth.
+# Started again, the means say at first, of a vehicle that speeds up, what no wind has said; after so long by a twentieth.
 SETTLED_US = 600_000
 # An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet.
 LEAST_US = 300_000
-# What the lean has to do in vain, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes 1.1 m/s^2 of
+# What an external force takes of the lean, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes 1.1 m/s^2 of
 # the paper's vehicle, and moves it (docs/recovery.md: the gusts with which this was tried). Arms that press on a wall
 # carry a vehicle that leans by 15 degrees; from 22 on it is tipped over.
 HELD_M_S2 = 1.5
@@ -38,7 +38,7 @@ LET_GO_M_S2 = 0.5
 # Who comes nearer as fast as this is not kept from it.
 NEARING_M_S = 0.1
 # Who leans on what was softly felt slides along it, a pole or an edge, with changing velocity, and may come nearer. So
-# for so long after a touch what the lean did in vain before it is the measure, wherever the vehicle is to be.
+# for so long after a touch the external force before it is the measure, wherever the vehicle is to be.
 TOUCHED_US = 5_000_000
 
 
@@ -74,7 +74,7 @@ class _Stretch:
 
 @dataclass(slots=True)
 class Leaning:
-    """Looked at with each position while setpoints are flown; begun anew with `forget`."""
+    """Looked at with each position while setpoints are flown; started again by `forget`."""
 
     stretch: _Stretch | None = None
     began_us: int = 0
@@ -95,7 +95,7 @@ class Leaning:
         self.stretch, self.time_us, self.touched_us = None, 0, None
 
     def _calm(self) -> Flat:
-        """What the lean does in vain, and did before the means were begun anew."""
+        """The external force, by the means of now or, where those are too young, of before."""
         return self.wind_m_s2 if self.time_us and self.is_settled else self.calm_m_s2
 
     @property
@@ -110,7 +110,7 @@ class Leaning:
 
     @property
     def wind_m_s2(self) -> Flat:
-        """What the vehicle leans by in vain where it is where it is to be; NED, against the wind."""
+        """The lean against drag and wind, learnt where the vehicle is where it is to be; NED."""
         return self.missing_m_s2 if self.stretch is None else self.stretch.missing_m_s2
 
     def feel(self, specific_force_frd_m_s2: Vector3) -> None:

@@ -21,7 +21,7 @@ SMOOTHING_S = 0.5
 
 @dataclass(slots=True)
 class Pressing:
-    """Looked at with each position while setpoints are flown; begun anew with `forget`. Boot clock."""
+    """Looked at with each position while setpoints are flown; started again by `forget`. Boot clock."""
 
     fraction: float = 0.0
     told_us: int = -KEPT_US

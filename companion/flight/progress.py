@@ -277,7 +277,7 @@ class Heading:
 
 
 class FlyHome(_OnAWay):
-    """Up where that is asked for, then straight; begun anew after each recovery on the way."""
+    """Up where that is asked for, then straight; planned again after each recovery on the way."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
