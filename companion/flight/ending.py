@@ -160,7 +160,7 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
     return Holder.FAILSAFE if report.failsafe or still_intended else Holder.PILOT
 
 
-# As long as two modes that are asked for and refused: nobody is to be kept in OFFBOARD by a hand-over that does not end.
+# As long as two modes take that are refused: a hand-over that does not end keeps nobody in OFFBOARD.
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 

@@ -25,13 +25,13 @@ NEARER_M = 0.05
 STEADY_M_S = 0.12
 # Lean and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
-# Started again, the means say at first, of a vehicle that speeds up, what no wind has said; after so long by a twentieth.
+# Of a vehicle that speeds up, means that have just started are wrong; after so long by a twentieth.
 SETTLED_US = 600_000
 # An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet.
 LEAST_US = 300_000
-# What an external force takes of the lean, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes 1.1 m/s^2 of
-# the paper's vehicle, and moves it (docs/recovery.md: the gusts with which this was tried). Arms that press on a wall
-# carry a vehicle that leans by 15 degrees; from 22 on it is tipped over.
+# What an external force takes of the lean, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes
+# 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle
+# that leans by 15 degrees; from 22 on it is tipped over.
 HELD_M_S2 = 1.5
 # Less than this, three times the noise, is no push: of a vehicle that turns to another place the lean comes back first.
 LET_GO_M_S2 = 0.5

@@ -160,7 +160,7 @@ class Reckoning:
     is_whole: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
     is_right: bool = False  # the estimate has been found so
     lean_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
-    wind_m_s2: tuple[float, float] = (0.0, 0.0)  # of the lean, what wind and drag take: a slow external force, north and east
+    wind_m_s2: tuple[float, float] = (0.0, 0.0)  # the slow external force, wind and drag: what it takes of the lean
     push_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
     _bank: Bank = field(init=False)
