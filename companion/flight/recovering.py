@@ -229,7 +229,9 @@ class Recover:
         has_left = self._has_left or off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S
         self._has_left = has_left and not (is_touched or is_carried)
         place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
-        if is_carried and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
+        # Before its motion is known, what a vehicle still touches is where it is: frames and arms give way.
+        goes_along = is_carried or (is_touched and not self._is_known)
+        if goes_along and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
             place = motion.position_ned_m
         self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
 

@@ -232,6 +232,17 @@ def test_what_pushes_a_vehicle_along_takes_its_surface_and_its_goal_with_it():
     assert goals[-1] < 3.0 - 0.8 * 1.48 - 0.3
 
 
+def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
+    # Given arms that are pressed in by 0.1 m, and push the vehicle out again
+    flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
+    record.reckoning.tell(True, HIT_US)
+    record.contact_ended_boot_us = HIT_US + 60_000
+    sample = LocalPosition(HIT_US + 60_000, (2.9, 0.0, -2.0), (-0.3, 0.0, 0.0))
+    recover.step(flight, Inputs(positions=[sample]), 60_000)
+    # Then its clearance is kept from there
+    assert record.setpoint_ned_m[0] <= 2.9 - 0.35 + 1e-6
+
+
 def test_what_shakes_a_vehicle_that_leaves_as_it_is_asked_to_moves_no_surface():
     # Given a vehicle that follows its plan off a wall, and shakes so that the contact seems never to end
     flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
