@@ -237,7 +237,7 @@ def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
     flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
     record.reckoning.tell(True, HIT_US)
     record.contact_ended_boot_us = HIT_US + 60_000
-    sample = LocalPosition(HIT_US + 60_000, (2.9, 0.0, -2.0), (-0.3, 0.0, 0.0))
+    sample = LocalPosition(HIT_US + 60_000, (2.9, 0.0, -2.0), (-0.1, 0.0, 0.0))
     recover.step(flight, Inputs(positions=[sample]), 60_000)
     # Then its clearance is kept from there
     assert record.setpoint_ned_m[0] <= 2.9 - 0.35 + 1e-6
