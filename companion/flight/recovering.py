@@ -70,7 +70,8 @@ class Recover:
         """Place, velocity and acceleration, by which PX4's own loops follow the plan."""
         goal = self._record.setpoint_ned_m
         motion = Moving(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
-        (n, e, d), (u, v, w) = motion.position_ned_m, motion.velocity_ned_m_s
+        # PX4 takes its velocity for what it tells: as much is asked for beside the plan's.
+        (n, e, d), (u, v, w) = motion.position_ned_m, plus(motion.velocity_ned_m_s, 1.0, self._record.reckoning.off_m_s)
         a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
         if self._is_level:
             d, w, c = goal[2], 0.0, self._height_m_s2(1.0)
@@ -143,7 +144,8 @@ class Recover:
             if not is_known:
                 continue
             record.follow_recovery(sample)
-            since_us = self._monitor.settled_since(sample)
+            told_m_s = plus(sample.velocity_ned_m_s, -1.0, record.reckoning.off_m_s)
+            since_us = self._monitor.settled_since(replace(sample, velocity_ned_m_s=told_m_s))
             if since_us is not None and not self._is_spinning:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}

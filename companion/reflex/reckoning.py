@@ -25,6 +25,7 @@ from companion.estimate.strapdown import GRAVITY_M_S2, Strapdown
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
 from companion.reflex.config import (
+    COMPARED_S,
     CORRECTED_S,
     DRIFT_M2_S3,
     FRICTION_SPREAD,
@@ -33,6 +34,7 @@ from companion.reflex.config import (
     LEAST_SPREAD_M_S,
     MISFIT,
     MOST_LEANT,
+    MOST_OFF_M_S,
     OVER_US,
     PLACE_SPREAD_M,
     PUSHES_S,
@@ -163,6 +165,7 @@ class Reckoning:
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # the slow external force, wind and drag: what it takes of the lean
     push_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
+    off_m_s: Vector3 = REST  # by what the told velocity is not that of the told places, once the estimate is right
     _bank: Bank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
@@ -170,6 +173,7 @@ class Reckoning:
     _moved_m_s: Vector3 = REST  # the sum up to there
     _time_boot_us: int = 0
     _told_boot_us: int = 0
+    _told: LocalPosition | None = None  # the newest of the estimate that is right
     _pushed_boot_us: int = 0
     _is_shown: bool = False
     _clock_boot_us: int = 0  # from which on what was hidden is put right
@@ -197,7 +201,7 @@ class Reckoning:
             self._bank = self.earlier._bank.struck(
                 plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
             )
-        self._told_boot_us, self.is_right = 0, False
+        self._told_boot_us, self._told, self.is_right, self.off_m_s = 0, None, False, REST
 
     def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
         """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
@@ -271,10 +275,27 @@ class Reckoning:
         elapsed_s = 1e-6 * (sample.time_boot_us - self._told_boot_us)
         share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
         was, self._told_boot_us = self.motion, sample.time_boot_us
+        self._compare(sample)
+        told_m_s = plus(sample.velocity_ned_m_s, -1.0, self.off_m_s)
         place = plus(was.position_ned_m, share, plus(sample.position_ned_m, -1.0, was.position_ned_m))
-        velocity = plus(was.velocity_ned_m_s, share, plus(sample.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
+        velocity = plus(was.velocity_ned_m_s, share, plus(told_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = Moving(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = REST
+
+    def _compare(self, sample: LocalPosition) -> None:
+        """The told velocity with the told places: after a clipped hit it is off for seconds, while they are not."""
+        before, self._told = self._told, sample
+        if before is None:
+            return
+        elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
+        if not 0.0 < elapsed_s < COMPARED_S:
+            return
+        half, share = 0.5 * elapsed_s, elapsed_s / (COMPARED_S + elapsed_s)
+        led = plus(plus(before.position_ned_m, half, before.velocity_ned_m_s), half, sample.velocity_ned_m_s)
+        further = plus(led, -1.0, sample.position_ned_m)
+        off = plus(self.off_m_s, share, plus(plus(REST, 1.0 / elapsed_s, further), -1.0, self.off_m_s))
+        size = math.hypot(*off)
+        self.off_m_s = off if size <= MOST_OFF_M_S else plus(REST, MOST_OFF_M_S / size, off)
 
 
 def lean_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:

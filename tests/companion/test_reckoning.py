@@ -270,7 +270,7 @@ def test_a_whole_hit_is_followed_by_what_is_told_even_while_it_pushes():
     found = reckoned((0.5, 0.0, 0.0))
     for since_us in range(40_000, 500_000, 20_000):
         found.tell(True, HIT_US + since_us)
-        found.hear(said(0.3, since_us, (3.0, 0.0, -2.0)))
+        found.hear(said(0.3, since_us, (3.0 + 0.3e-6 * since_us, 0.0, -2.0)))
     # Then the motion is what the estimate says, not what was expected of the hit
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.3, abs=0.02)
 
