@@ -1,10 +1,10 @@
-"""`bench campaign`: flies everything that must be shown and writes docs/campaign.md, and docs/recovery.md's table."""
+"""`bench campaign`: flies everything that must be shown and writes the notes campaign.md and recovery.md."""
 
 import time
 from argparse import Namespace
 from pathlib import Path
 
-from bench.arguments import DRAWN_NAME, DRAWN_TITLE
+from bench.arguments import DRAWN_NAME, DRAWN_TITLE, NOTES
 from bench.campaign.plan import Campaign
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.campaign_report import tables
@@ -39,7 +39,7 @@ def run_campaign_command(options: Namespace) -> int:
     if options.airframe is not None:
         raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
     started_s = time.monotonic()
-    workers, out = Workers(options.jobs, options.scheduler), options.out or Path("docs")
+    workers, out = Workers(options.jobs, options.scheduler), options.out or NOTES
     if options.vehicles == "drawn":
         return _run_drawn(options, workers, out)
     _check(out)
