@@ -11,7 +11,7 @@ def add_campaign(commands: Commands) -> None:
     campaign = commands.add_parser(
         "campaign",
         help="fly random missions in random rooms and write what became of them",
-        description="Random missions with both airframes, and hits with both recovery laws; see bench/notes/campaign.md.",
+        description="Random missions with both airframes, hits with both laws; see bench/notes/campaign.md.",
     )
     campaign.add_argument("--missions", type=count, default=1000, metavar="N", help="random missions (default 1000)")
     campaign.add_argument(
