@@ -113,7 +113,7 @@ class Imu(_Part):
 
 
 class Clipping(_Part):
-    """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (docs/px4.md).
+    """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (bench/notes/px4.md).
 
     The hidden part is missing in the velocity at once. `late_s` later the error of the place that grows from it begins
     to correct both, as a second-order system.

@@ -158,8 +158,8 @@ Both airframes fly the same missions with the paper's law and gain. The contrast
   the IMUs due to low impact times".)
 - The rigid vehicle runs past its setpoint, the further the faster it hits, and the foldable one does not, as in the
   paper. It is the vehicle's estimator: of a rigid hit clipping hides nearly all, so that the vehicle believes for half
-  a second that it still flies into the wall, and leans back hard (docs/px4.md; a real PX4 with the same law ran past
-  by 0.39, 0.58, 0.79 and 1.01 m).
+  a second that it still flies into the wall, and leans back hard (bench/notes/px4.md; a real PX4 with the same law
+  ran past by 0.39, 0.58, 0.79 and 1.01 m).
 """
 
 _COLUMNS = (

@@ -130,6 +130,8 @@ def _type(prop: Mapping[str, Any], elsewhere: Mapping[Model, str]) -> str:
             return " or ".join(dict.fromkeys(parts))
     if "$ref" in prop:
         name = prop["$ref"].rpartition("/")[2]
+        if name in {model.__name__ for model in _faults()}:
+            return "[faults](#faults)"
         page = next((page for model, page in elsewhere.items() if model.__name__ == name), "")
         return f"[{name}]({page}#{name.lower()})"
     if "enum" in prop:

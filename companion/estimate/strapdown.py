@@ -32,7 +32,7 @@ class Strapdown:
     """The attitude by the rates alone, from the last one told that was right; None while those told are right.
 
     A filter that puts a velocity right takes part of its error for a tilt. Gyroscopes do not. Of 2.4 m/s that a real
-    PX4 had missed it made 4 degrees, for more than a second (docs/px4.md).
+    PX4 had missed it made 4 degrees, for more than a second (bench/notes/px4.md).
     """
     level_leans_m_s2: Vector3 = ZERO
     """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; zero while that is right."""

@@ -27,12 +27,12 @@ LOSS_PARAMETER = "COM_OF_LOSS_T"
 HELD_S = 1.0
 PLACE_PER_S = (0.95, 0.95, HEIGHT_PER_S)
 VELOCITY_PER_S = (1.8, 1.8, CLIMB_GAIN_PER_S)
-# PX4 notices the silence late: with 1 s set, a real one went into hold after 1.04 to 1.13 s (docs/px4.md).
+# PX4 notices the silence late: with 1 s set, a real one went into hold after 1.04 to 1.13 s (bench/notes/px4.md).
 NOTICED_S = 0.13
 # PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
 BRAKES_M_S2 = 3.0
 # After a lean PX4 brings to rest what its estimate says, which is wrong. After a hit at 2 m/s it was right again within
-# 0.4 s with the parameters of `rebound airframe px4`, within 1.5 s with PX4's own (docs/px4.md).
+# 0.4 s with the parameters of `rebound airframe px4`, within 1.5 s with PX4's own (bench/notes/px4.md).
 REPAIRED_S = 1.5
 # At a rebound of 1 m/s a look every 0.2 m.
 _TIMES_S = tuple((HELD_S + NOTICED_S) * look / 6 for look in range(1, 7))

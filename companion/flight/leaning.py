@@ -30,8 +30,8 @@ SETTLED_US = 600_000
 # An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet.
 LEAST_US = 300_000
 # What the lean has to do in vain, besides what drag and wind took before: 9 degrees. A gust of 5 m/s takes 1.1 m/s^2 of
-# the paper's vehicle, and moves it (docs/recovery.md: the gusts with which this was tried). Arms that press on a wall
-# carry a vehicle that leans by 15 degrees; from 22 on it is tipped over.
+# the paper's vehicle, and moves it (bench/notes/recovery.md: the gusts with which this was tried). Arms that press on a
+# wall carry a vehicle that leans by 15 degrees; from 22 on it is tipped over.
 HELD_M_S2 = 1.5
 # Less than this, three times the noise, is no push: of a vehicle that turns to another place the lean comes back first.
 LET_GO_M_S2 = 0.5

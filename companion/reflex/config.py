@@ -46,13 +46,14 @@ STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 # rad/s. From here on a lean that lags by LEAD_S points half a right angle and more beside what PX4's own loops ask for.
 SPINNING_RAD_S = 6.0
 
-# A setpoint that is the last is held for COM_OF_LOSS_T, 1 s by default, and what PX4 takes to notice (docs/px4.md).
+# A setpoint that is the last is held for COM_OF_LOSS_T, 1 s by default, and what PX4 takes to notice
+# (bench/notes/px4.md).
 HELD_S = 1.13
 # A vehicle that does 1 m/s by then is at rest within 0.2 m with MPC_ACC_HOR.
 HELD_TO_M_S = 1.0
 
 # --- half-spaces
-# Sine of 10 degrees: as well as a normal is known after most hits (docs/detection.md).
+# Sine of 10 degrees: as well as a normal is known after most hits (bench/notes/detection.md).
 NORMAL_SINE = 0.17
 # Sine of the normal's angle from the horizontal. Below it height is held, as the vehicle's own lean and a single
 # clipped sample tilt the normal of a wall; above it the obstacle is a ceiling, a floor or a steep roof.
@@ -82,7 +83,7 @@ LEFT_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
 KNOWN_US = 80_000
 # How an estimate is put right after a clipped hit. Three hits of a real PX4 by motion capture took 0.12 s, 4.45 rad/s
-# and a damping of 0.59 (docs/px4.md); others are up to twice as late, and half to twice as fast.
+# and a damping of 0.59 (bench/notes/px4.md); others are up to twice as late, and half to twice as fast.
 PUT_RIGHT_AFTER_S = (0.05, 0.1, 0.15, 0.2, 0.25)
 PUT_RIGHT_RAD_S = (2.2, 3.1, 4.4, 6.2, 8.8)
 PUT_RIGHT_DAMPING = (0.45, 0.6, 0.85)
@@ -94,7 +95,7 @@ DRIFT_M2_S3 = 0.03
 PLACE_SPREAD_M = 0.1
 # Right is what is known to be wrong by no more than four times a good velocity's noise.
 RIGHT_M_S = 0.15
-# By then the slowest has passed through zero: with PX4's own parameters it was right within 1.5 s (docs/px4.md).
+# By then the slowest has passed through zero: with PX4's own parameters it was right within 1.5 s (bench/notes/px4.md).
 OVER_US = 1_500_000
 # Spreads of the velocity after a hit about the one expected: of the speed into the obstacle (frames give back 0.2 to
 # 0.9 of it, and the normal is good to 20 degrees), of the speed by friction, and upwards (0.6 m/s at 5 m/s).

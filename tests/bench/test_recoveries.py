@@ -31,7 +31,7 @@ def test_a_vehicle_that_the_hit_spins_keeps_its_height():
 def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_the_wall_nor_past_the_goal(
     airframe, speed_m_s
 ):
-    """What a real PX4 does with such a hit (docs/px4.md): it says "into the wall", and is right a second later."""
+    """A real PX4 after such a hit (bench/notes/px4.md) says "into the wall", and is right a second later."""
     flight = work_out(RecoveryCase("adaptive", airframe, 0, speed_m_s, 1))
     assert (flight["outcome"], flight["recontacts"], flight["returned"]) == ("completed", 0, 0)
     assert flight["past_m"] < 0.05
