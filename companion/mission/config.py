@@ -103,11 +103,11 @@ class SettledConfig(Written):
     """When a recovery has ended."""
 
     distance_m: Positive = 0.10
-    """So near to the recovery setpoint,"""
+    """Largest distance to the recovery setpoint."""
     speed_m_s: Positive = 0.10
-    """so slow,"""
+    """Largest speed."""
     duration_s: Positive = 0.5
-    """for so long."""
+    """How long both must hold."""
     timeout_s: Positive = 10.0
     """A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it."""
     smoothing_s: NotNegative = 0.1
