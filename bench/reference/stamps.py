@@ -25,6 +25,7 @@ _STAMP = re.compile(
     r"Measured\s+by\s+`(?P<command>[^`]+)`\s+on\s+version\s+(?P<version>[\w.+-]+)\s+of\s+"
     r"(?P<paths>`[^`]+`(?:,\s+`[^`]+`)*)"
 )
+FLOWN = ("companion", "sim_vehicle")
 # Files that a result depends on beside the code.
 _DATA = (".yaml", ".csv")
 _DIGITS = 16
@@ -44,8 +45,8 @@ class Stamp:
         return digest(self.paths) != self.version.partition("+")[2]
 
 
-def stamp_text(command: str, paths: Sequence[str]) -> str:
-    """The sentence of a stamp made now, without its full stop."""
+def stamp_text(command: str, paths: Sequence[str] = FLOWN) -> str:
+    """The sentence of a stamp made now, without its full stop. Most studies fly all of both programs."""
     named = ", ".join(f"`{path}`" for path in paths)
     return f"Measured by `{command}` on version {__version__}+{digest(paths)} of {named}"
 
