@@ -73,7 +73,7 @@ class CollisionGuard:
         self._thread = threading.Thread(target=self._run, name="rebound-guard", daemon=True)
 
     def start(self) -> None:
-        """Attach; return when the vehicle's streams are fast enough, some 3 s later. Raises GuardError if they are not."""
+        """Attach; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
         self._switch_interval_s = sys.getswitchinterval()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_interval_s))
         # Looking for garbage among all that a program has loaded takes 0.1 s, on whichever thread it falls.
