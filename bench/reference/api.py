@@ -12,6 +12,7 @@ from pydantic import BaseModel
 import companion.mavsdk
 import sim_vehicle.testing
 from bench.reference.markdown import code, table
+from bench.reference.models import world_links
 from companion.guard.config import GuardConfig
 from companion.report import CollisionReport, Event
 
@@ -41,7 +42,7 @@ def _entry(name: str, value: object, prefix: str = "") -> str:
     if not isinstance(value, type):
         return head + f"```text\n{name}{_signature(value)}\n```\n\n{doc}\n\n"
     if issubclass(value, BaseModel):
-        page = "guard.md" if value is GuardConfig else f"world.md#{value.__name__.lower()}"
+        page = "guard.md" if value is GuardConfig else world_links()[value.__name__]
         return head + f"{doc}\n\nIts fields are [these keys]({page}).\n\n"
     if doc.startswith(f"{value.__name__}("):
         doc = ""  # a dataclass's own

@@ -26,12 +26,14 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "parameters.md": tables.parameters_page,
     "python-api.md": api.api_page,
 }
-MADE_BY = "<!-- Written by `python -m bench docs`; do not edit. -->\n\n"
+MADE_BY = "\n<!-- Written by `python -m bench docs`; do not edit. -->\n"
 
 
 def page_text(name: str) -> str:
     """The page as it is to be."""
-    return MADE_BY + PAGES[name]().rstrip() + "\n"
+    # Below the title, which the site takes from the first line.
+    title, rest = PAGES[name]().rstrip().split("\n", 1)
+    return f"{title}\n{MADE_BY}{rest}\n"
 
 
 def run_docs(options: Namespace) -> int:

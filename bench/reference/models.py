@@ -31,22 +31,22 @@ Model = type[BaseModel]
 def mission_page() -> str:
     head = "# Mission keys\n\nEvery key of a mission file. [Write a mission](../how-to/missions.md) shows how they are "
     head += "used.\nPositions are metres north, east and down of the arming position.\n\n"
-    elsewhere: dict[Model, str] = {CompanionConfig: "companion.md"}
-    return head + _pages(Mission, elsewhere)
+    return head + _sections(Mission, {CompanionConfig: "[companion](companion.md)"})
 
 
 def companion_page() -> str:
     head = "# Companion keys\n\nThe `companion:` part of a mission, of a guard's file and of `--companion FILE`. Every "
     head += "key is optional.\n\n"
-    return head + _pages(CompanionConfig)
+    return head + _sections(CompanionConfig)
 
 
 def guard_page() -> str:
     head = "# Guard keys\n\nThe file of `rebound guard --config`. Every key is optional. `fence`, `limits`, `recovery` "
     head += "and\n`companion` mean what they do in a [mission](mission.md).\n\n"
-    models: list[Model] = [Fence, Limits, RecoveryConfig]
-    shared: dict[Model, str] = dict.fromkeys(models, "mission.md")
-    return head + _section(GuardConfig, shared | {CompanionConfig: "companion.md"})
+    shared: dict[Model, str] = {CompanionConfig: "[companion](companion.md)"}
+    shared |= {Fence: "[fence](mission.md#fence)", Limits: "[limits](mission.md#limits)"}
+    shared |= {RecoveryConfig: "[recovery](mission.md#recovery)"}
+    return head + _sections(GuardConfig, shared)
 
 
 def world_page() -> str:
@@ -54,11 +54,10 @@ def world_page() -> str:
     head += (
         "`--connect` ignores it.\nPositions are metres in the world, whose origin is the vehicle's default start.\n\n"
     )
-    models: list[Model] = [Scene, *_below(Scene, stop=_faults())]
-    text = head + "".join(_section(model) for model in models)
+    text = head + _sections(Scene, dict.fromkeys(_faults(), "[faults](#faults)"))
     text += "## Faults\n\nEach entry of `faults` has a `kind` and a time: `at_s` or `between_s`, in seconds of the "
     text += "vehicle's boot clock.\n\n"
-    return text + "".join(_section(model, level="###", name=_kind(model)) for model in _faults())
+    return text + "".join(_section(model, "### " + _kind(model), {}) for model in _faults())
 
 
 def airframe_page() -> str:
@@ -84,14 +83,26 @@ def airframe_page() -> str:
     return text
 
 
-def _pages(top: Model, elsewhere: Mapping[Model, str] | None = None) -> str:
-    known = elsewhere or {}
-    return "".join(_section(model, known) for model in (top, *_below(top, stop=tuple(known))))
+def world_links() -> Mapping[str, str]:
+    """Of each model of a world by its name the address of its section."""
+    return {model.__name__: f"world.md#{_anchor(path)}" for model, path in _paths(Scene, _faults()).items()}
 
 
-def _section(
-    model: Model, elsewhere: Mapping[Model, str] | None = None, level: str = "##", name: str | None = None
-) -> str:
+def _sections(top: Model, elsewhere: Mapping[Model, str] | None = None) -> str:
+    """The keys of a file, then those of each key that is a map, under its path. `elsewhere`: links to other pages."""
+    paths = _paths(top, tuple(elsewhere or {}))
+    links = {model.__name__: link for model, link in (elsewhere or {}).items()}
+    links |= {model.__name__: f"[{path}](#{_anchor(path)})" for model, path in paths.items()}
+    text = _section(top, "## All keys", links)
+    return text + "".join(_section(model, f"## {path}", links) for model, path in paths.items())
+
+
+def _anchor(path: str) -> str:
+    """As GitHub and MkDocs make it of a heading."""
+    return path.replace(".", "")
+
+
+def _section(model: Model, heading: str, links: Mapping[str, str]) -> str:
     """A heading, the model's docstring and a row a key."""
     schema = model.model_json_schema(by_alias=True)
     if "$ref" in schema:  # a model that leads to itself
@@ -102,15 +113,13 @@ def _section(
         key = field.alias or field_name
         if key == "kind":
             continue
-        kind = _type(schema["properties"][key], elsewhere or {})
+        kind = _type(schema["properties"][key], links)
         default = "" if field.is_required() else _default(field.get_default(call_default_factory=True))
         inner = next(_models(field.annotation), None)
         meaning = notes.get(field_name) or (_doc(inner).partition("\n")[0] if inner else "")
         rows.append((code(key), kind, default, meaning))
     return (
-        f"{level} {name or model.__name__}\n\n{_doc(model)}\n\n"
-        + table(("key", "value", "default", "meaning"), rows)
-        + ("\n" if rows else "")
+        f"{heading}\n\n{_doc(model)}\n\n" + table(("key", "value", "default", "meaning"), rows) + ("\n" if rows else "")
     )
 
 
@@ -122,18 +131,14 @@ def _default(value: object) -> str:
     return code(json.dumps(value)) if value != () else "none"
 
 
-def _type(prop: Mapping[str, Any], elsewhere: Mapping[Model, str]) -> str:
+def _type(prop: Mapping[str, Any], links: Mapping[str, str]) -> str:
     """In words, from JSON schema; a model's name leads to its section."""
     for word in ("anyOf", "oneOf", "allOf"):
         if word in prop:
-            parts = [_type(part, elsewhere) for part in prop[word] if part.get("type") != "null"]
+            parts = [_type(part, links) for part in prop[word] if part.get("type") != "null"]
             return " or ".join(dict.fromkeys(parts))
     if "$ref" in prop:
-        name = prop["$ref"].rpartition("/")[2]
-        if name in {model.__name__ for model in _faults()}:
-            return "[faults](#faults)"
-        page = next((page for model, page in elsewhere.items() if model.__name__ == name), "")
-        return f"[{name}]({page}#{name.lower()})"
+        return links[prop["$ref"].rpartition("/")[2]]
     if "enum" in prop:
         return " or ".join(code(value) for value in prop["enum"])
     if "const" in prop:
@@ -141,7 +146,7 @@ def _type(prop: Mapping[str, Any], elsewhere: Mapping[Model, str]) -> str:
     if prop.get("type") == "array":
         inner = prop.get("items") or (prop.get("prefixItems") or [{}])[0]
         count = prop.get("maxItems") if prop.get("maxItems") == prop.get("minItems") else None
-        return f"list of {count or ''} {_type(inner, elsewhere)}".replace("  ", " ")
+        return f"list of {count or ''} {_type(inner, links)}".replace("  ", " ")
     words = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
     text = words.get(str(prop.get("type")), "map")
     least = ("minimum", "from") if "minimum" in prop else ("exclusiveMinimum", "above")
@@ -154,15 +159,18 @@ def _doc(model: Model) -> str:
     return "" if text == inspect.getdoc(BaseModel) else text
 
 
-def _below(model: Model, stop: Sequence[Model] = ()) -> list[Model]:
-    """Every model that the keys of this one lead to, each once, in the order of the keys."""
-    found: dict[Model, None] = {}
-    for field in model.model_fields.values():
+def _paths(top: Model, stop: Sequence[Model] = (), at: str = "") -> dict[Model, str]:
+    """Every model that the keys of this one lead to, with the shortest path of keys."""
+    own: dict[Model, str] = {}
+    for name, field in top.model_fields.items():
         for inner in _models(field.annotation):
-            if inner not in stop and inner not in found and inner is not model:
-                found[inner] = None
-                found |= dict.fromkeys(one for one in _below(inner, (*stop, *found, model)) if one not in found)
-    return list(found)
+            if inner not in stop and inner is not top:
+                own.setdefault(inner, f"{at}{field.alias or name}")
+    found: dict[Model, str] = {}
+    for inner, path in own.items():
+        found[inner] = path
+        found |= _paths(inner, (*stop, *own, *found, top), f"{path}.")
+    return found
 
 
 def _models(annotation: Any) -> Iterator[Model]:
