@@ -12,7 +12,7 @@ from companion.mavlink import encode, readers
 from sim_vehicle.parameters.definitions import TABLE
 
 ROOT = Path(__file__).parents[2]
-_OBSTACLES = ("walls", "poles", "boxes")
+_OBSTACLES = {"walls": "wall", "poles": "pole", "boxes": "box"}
 
 
 def missions_page() -> str:
@@ -23,7 +23,8 @@ def missions_page() -> str:
     rows = []
     for path in sorted((ROOT / "missions").glob("*.yaml")):
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        placed = [f"{len(data['sim'][kind])} {kind}" for kind in _OBSTACLES if data.get("sim", {}).get(kind)]
+        counts = {kind: len(data.get("sim", {}).get(kind, ())) for kind in _OBSTACLES}
+        placed = [f"{count} {_OBSTACLES[kind] if count == 1 else kind}" for kind, count in counts.items() if count]
         rows.append((code(path.name), data["description"], ", ".join(placed) or "none"))
     return text + table(("file", "what it flies", "obstacles"), rows)
 
