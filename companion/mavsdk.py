@@ -1,4 +1,6 @@
-"""A guard for programs on MAVSDK (version 4): `from companion.mavsdk import CollisionGuard`; see docs/guard.md."""
+"""A guard for programs on MAVSDK (version 4): `from companion.mavsdk import CollisionGuard`. See
+docs/tutorials/mavsdk.md.
+"""
 
 from companion.guard.config import GuardConfig
 from companion.guard.states import State

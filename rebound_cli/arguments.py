@@ -133,7 +133,7 @@ def add_fly(commands: Commands) -> None:
     how = fly.add_mutually_exclusive_group()
     text = (
         "start the simulated vehicle and fly it in real time over UDP, as without any of these; "
-        "px4: with your PX4 as its autopilot, see docs/px4.md"
+        "px4: with your PX4 as its autopilot, see docs/how-to/px4.md"
     )
     own, *_ = SIMULATED_AUTOPILOTS
     how.add_argument("--sim", nargs="?", choices=SIMULATED_AUTOPILOTS, const=own, default=own, metavar="px4", help=text)
@@ -154,11 +154,11 @@ def add_fly(commands: Commands) -> None:
 
 
 def add_guard(commands: Commands) -> None:
-    text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/guard.md."
+    text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/how-to/guard.md."
     guard = _command(commands, "guard", "guard:run_guard", "protect a flight that something else commands", text)
     _add_connect(guard, required=True)
     _add_peer_and_key(guard)
-    guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/guard.md")
+    guard.add_argument("--config", type=Path, metavar="FILE", help="settings, as in docs/how-to/guard.md")
     _add_set(guard, "change a setting, e.g. max_hits=5")
     guard.add_argument("--modes", metavar="A,B", help="the modes that may be taken over, e.g. POSCTL,AUTO.MISSION")
     guard.add_argument("--then", choices=("previous", "hold"), help="what the vehicle is given back to (default: hold)")
@@ -166,7 +166,7 @@ def add_guard(commands: Commands) -> None:
 
 
 def add_init(commands: Commands) -> None:
-    text = "A copy, to be changed, of one of the missions that ship with the program; see docs/missions.md."
+    text = "A copy, to be changed, of one of the missions that ship with the program; see docs/how-to/missions.md."
     init = _command(commands, "init", "init:run_init", "write a mission to begin with", text)
     init.add_argument("file", type=Path, metavar="FILE", help="the file to write, such as my-mission.yaml")
     init.add_argument("--from", dest="model", default="wall", metavar="MISSION", help="which one (default: wall)")
@@ -177,7 +177,7 @@ def add_sim(commands: Commands) -> None:
     sim = _command(commands, "sim", "sim:run_sim", "run the simulated vehicle alone", text)
     sim.add_argument("--mission", type=Path, metavar="FILE", help="mission file whose sim: part describes the world")
     _add_world_options(sim)
-    text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/px4.md"
+    text = "px4: your PX4 SITL flies the vehicle's body in lockstep, see docs/how-to/px4.md"
     sim.add_argument("--autopilot", choices=SIMULATED_AUTOPILOTS, default="builtin", help=text)
     text = (
         "UDP port to listen on for the companion (default 14580 + instance; 0: any free one); "
@@ -193,20 +193,20 @@ def add_sim(commands: Commands) -> None:
     sim.add_argument("--sensor-rate", type=int, choices=(250, 500, 1000), default=1000, help=text)
     text = "where the companion's link sends unasked (default 127.0.0.1:14540 + instance)"
     sim.add_argument("--remote", type=host_and_port, metavar="HOST:PORT", help=text)
-    text = "one more link, e.g. tcpin://0.0.0.0:5760 or serial:///dev/ttyUSB0:57600; see docs/vehicle.md"
+    text = "one more link, e.g. tcpin://0.0.0.0:5760 or serial:///dev/ttyUSB0:57600"
     sim.add_argument("--link", action="append", default=[], metavar="URL", help=text)
     text = "adds N to the UDP ports and to the system's number"
     sim.add_argument("--instance", type=instance, default=0, metavar="N", help=text)
     text = "write what really happened to this .npz file at the end"
     sim.add_argument("--truth", type=Path, metavar="FILE", help=text)
-    text = "how it is given a key of message signing: by SETUP_SIGNING on any link, or as PX4 1.17 (docs/vehicle.md)"
+    text = "how it is given a key of message signing: by SETUP_SIGNING on any link, or as PX4 1.17"
     sim.add_argument("--signing", choices=("any-link", "px4-1.17"), default="any-link", help=text)
     sim.add_argument("--signing-key", type=Path, metavar="FILE", help="it has this key, and MAV_SIGN_CFG is 1")
     sim.add_argument("--stop-with-stdin", action="store_true", help="end when standard input ends")
 
 
 def add_preflight(commands: Commands) -> None:
-    text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/preflight.md."
+    text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/how-to/preflight.md."
     summary = "look at a connected vehicle before its first flight"
     preflight = _command(commands, "preflight", "preflight:run_preflight", summary, text)
     _add_connect(preflight, required=True)
@@ -218,7 +218,7 @@ def add_preflight(commands: Commands) -> None:
 
 
 def add_status(commands: Commands) -> None:
-    text = "Asks a running `guard` or `fly --connect` on this machine; see docs/logs.md."
+    text = "Asks a running `guard` or `fly --connect` on this machine; see docs/how-to/flights.md."
     status = _command(commands, "status", "status:run_status", "what a running guard or flight is doing", text)
     text = "where to ask (default: this session, then the service)"
     status.add_argument("--socket", type=Path, metavar="PATH", help=text)
@@ -226,7 +226,7 @@ def add_status(commands: Commands) -> None:
 
 
 def add_logs(commands: Commands) -> None:
-    text = "Flights that `fly --connect` and `guard` have recorded; see docs/logs.md."
+    text = "Flights that `fly --connect` and `guard` have recorded; see docs/how-to/flights.md."
     logs = commands.add_parser("logs", help="recorded flights of real vehicles: list, show, export", description=text)
     whats = logs.add_subparsers(required=True, metavar="WHAT", dest="what")
     ways = {
@@ -250,7 +250,7 @@ def add_logs(commands: Commands) -> None:
 
 
 def add_doctor(commands: Commands) -> None:
-    text = "Configuration without keys, versions, machine, journal, last flights; see docs/logs.md."
+    text = "Configuration without keys, versions, machine, journal, last flights; see docs/how-to/flights.md."
     summary = "one archive for whoever is asked for help"
     doctor = _command(commands, "doctor", "flights.doctor:run_doctor", summary, text)
     out = Path("rebound-doctor.tar.gz")
@@ -288,7 +288,7 @@ def add_check(commands: Commands) -> None:
 
 
 def add_plan(commands: Commands) -> None:
-    text = "Reads and writes QGroundControl's .plan files; see docs/missions.md."
+    text = "Reads and writes QGroundControl's .plan files; see docs/how-to/qgroundcontrol.md."
     plan = commands.add_parser("plan", help="missions from and for QGroundControl", description=text)
     ways = plan.add_subparsers(required=True, metavar="import|export")
     text = "Makes a mission of a .plan."
@@ -305,7 +305,7 @@ def add_plan(commands: Commands) -> None:
 
 
 def add_replay(commands: Commands) -> None:
-    text = "The detector over a .ulg, a .tlog or a run's folder; see docs/replay.md."
+    text = "The detector over a .ulg, a .tlog or a run's folder; see docs/how-to/recorded-flights.md."
     replay = _command(commands, "replay", "replay.command:run_replay", "look for collisions in a recorded flight", text)
     replay.add_argument("log", type=Path, metavar="LOG", help="a .ulg, a .tlog or a run's folder")
     replay.add_argument("--detector", metavar="NAME", help="another detector than the mission's, or than the default")
@@ -322,7 +322,7 @@ def add_replay(commands: Commands) -> None:
 
 
 def add_tune(commands: Commands) -> None:
-    text = "Noise floor, margins and the smallest hit that would be seen, and settings; see docs/replay.md."
+    text = "Noise floor, margins, the smallest hit that would be seen, settings; see docs/how-to/recorded-flights.md."
     tune = _command(commands, "tune", "tune.command:run_tune", "settings for a vehicle from its healthy flights", text)
     logs = "flights without a collision: .ulg, .tlog or runs' folders"
     tune.add_argument("logs", type=Path, nargs="+", metavar="LOG", help=logs)
@@ -335,7 +335,7 @@ def add_tune(commands: Commands) -> None:
 
 
 def add_identify(commands: Commands) -> None:
-    text = "Fits stiffness, damping and restitution to hits on a wall; see docs/airframes.md."
+    text = "Fits stiffness, damping and restitution to hits on a wall; see docs/how-to/airframes.md."
     identify = _command(
         commands, "identify", "identification.command:run_identify", "find an airframe's springs in recorded hits", text
     )
@@ -361,7 +361,7 @@ def add_airframe(commands: Commands) -> None:
 
 
 def add_key(commands: Commands) -> None:
-    text = "The key that a vehicle and those who may command it share; see docs/security.md."
+    text = "The key that a vehicle and those who may command it share; see docs/how-to/security.md."
     key = _command(commands, "key", "key:run_key", "make a key for MAVLink's message signing", text)
     text = "new: make a key; px4: write it as the file that PX4 has on its SD card"
     key.add_argument("what", choices=("new", "px4"), help=text)
@@ -379,7 +379,7 @@ def add_completion(commands: Commands) -> None:
 
 
 def add_service(commands: Commands) -> None:
-    text = "Started at boot, watched, started again; see docs/companion-computer.md."
+    text = "Started at boot, watched, started again; see docs/how-to/service.md."
     summary = "install the guard, or a mission, as a service of systemd"
     service = _command(commands, "service", "service.command:run_service", summary, text)
     text = (

@@ -1,4 +1,4 @@
-"""The exit codes of every command but 0; docs/companion-computer.md has the table."""
+"""The exit codes of every command but 0; docs/reference/commands.md has the table."""
 
 ERROR = 1
 # argparse's own, for a command line that cannot be read.

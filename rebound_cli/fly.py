@@ -147,7 +147,7 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
 
         port, words = PX4_SIMULATOR_PORT + instance, FIRST_ANSWER_WORDS
         options = ["--autopilot", "px4", "--port", str(port)]
-        waits = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/px4.md) ..."
+        waits = f"Waiting for PX4 to connect to the simulator at TCP port {port} (docs/how-to/px4.md) ..."
     with VehicleProcess(flight.folder, options, words) as vehicle:
         if waits:
             flight.console.print(waits)

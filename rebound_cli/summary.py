@@ -1,4 +1,4 @@
-"""`summary.json`: what the companion says of a flight beside what the simulator knows; docs/summary.md."""
+"""`summary.json`: what the companion says of a flight beside what the simulator knows; docs/reference/summary.md."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The companion's collisions beside the simulator's contacts. Definitions in docs/summary.md."""
+"""The companion's collisions beside the simulator's contacts. Definitions in docs/reference/summary.md."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

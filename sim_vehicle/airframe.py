@@ -34,6 +34,7 @@ class Geometry(_Part):
     guard_height_m: NotNegative
     """Height of the guard's hoop, half above and half below the arms' plane."""
     hub_solid_radius_m: Positive
+    """Of the solid sphere in the middle."""
     foot_radius_m: Positive
     """Distance of each of the four feet from the centre, under the arms."""
     foot_depth_m: Positive
@@ -82,6 +83,7 @@ class Motors(_Part):
     idle_fraction: NotNegative
     """Thrust of an armed, idling motor as a fraction of the maximum."""
     time_constant_s: Positive
+    """Of the first-order lag from command to thrust."""
     moment_per_thrust_m: Positive
     """Reaction torque about the rotor's axis per newton of thrust."""
 
@@ -90,20 +92,26 @@ class Surface(_Part):
     guard_friction: NotNegative
     """Coulomb coefficient between a guard and a wall."""
     ground_friction: NotNegative
+    """Coulomb coefficient between a foot and the ground."""
     foot: Bounce
     """One foot on the ground, for a quarter of the vehicle's mass."""
 
 
 class Imu(_Part):
     raw_interval_us: Annotated[int, Field(gt=0)]
+    """Between two raw samples."""
     integration_interval_us: Annotated[int, Field(gt=0)]
     """Averaging interval of one HIGHRES_IMU sample (PX4: 1e6 / IMU_INTEG_RATE)."""
     accelerometer_range_m_s2: Positive
+    """Raw samples are clipped here, per axis."""
     accelerometer_noise_m_s2: NotNegative
     """Standard deviation of the *mean* over one integration interval: sensor noise and vibration."""
     accelerometer_bias_m_s2: NotNegative
+    """Standard deviation of the constant error that is drawn for each flight, per axis."""
     gyroscope_noise_rad_s: NotNegative
+    """As `accelerometer_noise_m_s2`, of the angular rate."""
     gyroscope_bias_rad_s: NotNegative
+    """As `accelerometer_bias_m_s2`, of the angular rate."""
 
     @model_validator(mode="after")
     def _whole_samples(self) -> "Imu":
@@ -113,15 +121,18 @@ class Imu(_Part):
 
 
 class Clipping(_Part):
-    """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (docs/px4.md).
+    """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (bench/notes/px4.md).
 
     The hidden part is missing in the velocity at once. `late_s` later the error of the place that grows from it begins
     to correct both, as a second-order system.
     """
 
     late_s: NotNegative
+    """Until the correction begins."""
     frequency_rad_s: Positive
+    """Natural frequency of the correction."""
     damping: Positive
+    """Its damping ratio."""
 
 
 class Estimate(_Part):
@@ -132,13 +143,21 @@ class Estimate(_Part):
     """
 
     kind: Literal["markov", "ekf"]
+    """`markov` or `ekf`."""
     delay_s: NotNegative
+    """Age of position and velocity when they are used."""
     position_noise_m: NotNegative
+    """Standard deviation per axis."""
     position_correlation_s: Positive
+    """Time constant of that error."""
     velocity_noise_m_s: NotNegative
+    """Standard deviation per axis."""
     velocity_correlation_s: Positive
+    """Time constant of that error."""
     attitude_noise_rad: NotNegative
+    """Standard deviation per axis."""
     attitude_correlation_s: Positive
+    """Time constant of that error."""
     clipping: Clipping | None
     """None: the estimate knows all of a hit, whatever the accelerometer saw of it."""
 
@@ -147,29 +166,44 @@ class Control(_Part):
     """Gains of eqs. 4-6. Attitude gains are stated as the closed loop's frequency and damping."""
 
     position_p_per_s: Positive
+    """Eq. 6, k_p; PX4's MPC_XY_P."""
     velocity_p_per_s: Positive
+    """Eq. 6, k_v."""
     velocity_i_per_s2: NotNegative
+    """Eq. 6, k_vI."""
     velocity_d: NotNegative
+    """Eq. 6, k_vD."""
     climb_p_per_s: Positive | None = None
     """Of the velocity along z; None: as sideways. A vehicle that leans slowly climbs as fast as any."""
     climb_i_per_s2: NotNegative | None = None
     """The same of the integral."""
     attitude_frequency_rad_s: Positive
+    """Natural frequency of roll and pitch: k_R is J times its square."""
     attitude_damping: Positive
+    """Damping ratio of all three axes: k_Omega is 2 J times both."""
     yaw_frequency_rad_s: Positive
+    """Natural frequency of yaw."""
     tilt_max_rad: Positive
+    """Of the commanded attitude."""
     speed_max_m_s: Positive
+    """Horizontal; PX4's MPC_XY_VEL_MAX."""
     climb_max_m_s: Positive
+    """PX4's MPC_Z_VEL_MAX_UP."""
     descent_max_m_s: Positive
+    """PX4's MPC_Z_VEL_MAX_DN."""
 
 
 class Airframe(_Part):
     """One vehicle. Frames: body forward-right-down; arms in PX4's quad-x motor order."""
 
     name: str
+    """Names the airframe in summaries."""
     description: str
+    """A line for people."""
     mass_kg: Positive
+    """Of the whole vehicle."""
     inertia_kg_m2: tuple[Positive, Positive, Positive]
+    """About body x, y, z, arms out."""
     drag_n_s_m: NotNegative
     """Linear drag of the whole vehicle, the same in every direction."""
     geometry: Geometry

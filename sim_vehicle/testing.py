@@ -1,6 +1,7 @@
 """For test authors: a simulated PX4 in a test, with walls to place, faults to inject and the truth to read.
 
-`start_vehicle` serves one on real sockets, `LockstepVehicle` is one in memory on virtual time. See docs/testing.md.
+`start_vehicle` serves one on real sockets, `LockstepVehicle` is one in memory on virtual time. See
+docs/how-to/testing.md.
 """
 
 from sim_vehicle.bench import faults

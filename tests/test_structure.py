@@ -11,7 +11,6 @@ import pytest
 
 import bench.main
 import rebound_cli.main
-from bench.diagrams import with_diagrams
 from bench.import_graph import PACKAGES, imported_names, module_imports
 
 ROOT = Path(__file__).parent.parent
@@ -85,11 +84,6 @@ def test_no_module_needs_itself_by_way_of_others() -> None:
         graphlib.TopologicalSorter(module_imports(ROOT)).prepare()
     except graphlib.CycleError as cycle:
         pytest.fail(" is imported by ".join(cycle.args[1]))
-
-
-def test_the_documented_diagrams_are_those_of_the_tables() -> None:
-    text = (ROOT / "docs/architecture.md").read_text()
-    assert text == with_diagrams(text), "run `make diagrams`"
 
 
 def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:

@@ -1,10 +1,10 @@
-"""`bench campaign`: flies everything that must be shown and writes docs/campaign.md, and docs/recovery.md's table."""
+"""`bench campaign`: flies everything that must be shown and writes the notes campaign.md and recovery.md."""
 
 import time
 from argparse import Namespace
 from pathlib import Path
 
-from bench.arguments import DRAWN_NAME, DRAWN_TITLE
+from bench.arguments import DRAWN_NAME, DRAWN_TITLE, NOTES
 from bench.campaign.plan import Campaign
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.campaign_report import tables
@@ -22,8 +22,8 @@ from bench.random_missions.generator import MissionCase
 from bench.recoveries.command import PART as RECOVERY_PART
 from bench.recoveries.command import write_table
 from bench.recoveries.hits import recoveries_campaign
+from bench.reference.stamps import stamp_text
 from companion.errors import ConfigurationError
-from rebound_cli import __version__
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
 PART, TITLE = "campaign", "Campaign"
@@ -39,7 +39,7 @@ def run_campaign_command(options: Namespace) -> int:
     if options.airframe is not None:
         raise ConfigurationError("--airframe belongs to --only: a campaign flies every mission with both.")
     started_s = time.monotonic()
-    workers, out = Workers(options.jobs, options.scheduler), options.out or Path("docs")
+    workers, out = Workers(options.jobs, options.scheduler), options.out or NOTES
     if options.vehicles == "drawn":
         return _run_drawn(options, workers, out)
     _check(out)
@@ -117,7 +117,7 @@ def _lead(options: Namespace, worked_out: list[tuple[Campaign, Results]]) -> str
     failed = sum(len(results.failures) for _, results in worked_out)
     laws = "".join(f", and {len(hits.results)} hits with a recovery law each" for hits in others)
     return (
-        f"\nWritten by `{command}` (version {__version__}): {len(missions.results)} flights of seeds "
+        f"\n{stamp_text(command)}: {len(missions.results)} flights of seeds "
         f"{options.first_seed} to {last_seed}, {seconds / 3600:.1f} h in the vehicle's time{laws}."
         f"{f' {failed} cases failed.' if failed else ''}\n"
     )

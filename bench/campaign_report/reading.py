@@ -19,7 +19,7 @@ landings within 1 m of where they were told and of home; no way to a goal or hom
 earlier hit had shown, but a second try of the same item; no goal was called out of reach to which the straight way
 is 1.5 m clear of everything; the outcome that follows. *Crash*: leant by more than 90°, reached the ground with
 more than 1.2 m/s or when nothing said to land, more than 1 m outside the fence. All by what really happened, and
-by the rules of [missions.md](missions.md), not by the companion's own state. A vehicle that leant beyond 90° or
+by the rules of `docs/how-to/missions.md`, not by the companion's own state. A vehicle that leant beyond 90° or
 touched the ground, rose again and finished its mission has crashed all the same.
 
 *Hits* count by their first contact; its speed is that against the obstacle. *Noticed*: of hits that went into the

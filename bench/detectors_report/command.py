@@ -1,4 +1,4 @@
-"""`bench detectors`: works the bench's campaigns out, writes the tables of docs/detection.md and the pictures."""
+"""`bench detectors`: works the campaigns out, writes the tables of bench/notes/detection.md and the pictures."""
 
 import time
 from argparse import Namespace
@@ -25,7 +25,7 @@ from bench.detectors_report.numbers import Hits
 from bench.detectors_report.reading import HOW_TO_READ
 from bench.marked import checked_text, write_part
 from bench.places import make_folder
-from rebound_cli import __version__
+from bench.reference.stamps import stamp_text
 
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
 PART, TITLE = "detectors", "Detection"
@@ -142,7 +142,7 @@ def _lead(options: Namespace, worked_out: Worked, failures: list[str]) -> str:
     command = f"python -m bench detectors --hits {options.hits} --hours {options.hours:g}{first}{which}{data}"
     counts = ", ".join(f"{len(results.results)} {name.replace('-', ' ')}" for name, (_, results) in worked_out.items())
     failed = f" {sum(len(r.failures) for _, r in worked_out.values())} cases failed." if failures else ""
-    return f"\nWritten by `{command}` (version {__version__}): {counts}.{failed}\n"
+    return f"\n{stamp_text(command)}: {counts}.{failed}\n"
 
 
 def _figures(worked_out: Worked) -> dict[str, Figure]:

@@ -11,13 +11,12 @@ def add_faults(commands: Commands) -> None:
         "faults",
         help="inject faults and attacks into flights and write what became of them",
         description="Flights into a wall with a fault each, files that mean harm, and hits under load; "
-        "see docs/faults.md. A broken-off run goes on where it was.",
+        "see docs/reference/faults.md. A broken-off run goes on where it was.",
     )
     faults.add_argument("--seeds", type=count, default=50, metavar="N", help="flights of each fault (default 50)")
     faults.add_argument("--only", metavar="NAME", help="print the flights of this fault and write nothing")
     add_jobs(faults)
     faults.add_argument("--hits", type=count, default=1000, metavar="N", help="hits under load (default 1000)")
-    faults.add_argument(
-        "--out", type=Path, default=Path("docs/faults.md"), metavar="FILE", help="default: docs/faults.md"
-    )
+    page = Path("docs/reference/faults.md")
+    faults.add_argument("--out", type=Path, default=page, metavar="FILE", help="default: %(default)s")
     faults.set_defaults(run=runs("bench.faults.command:run_faults"))

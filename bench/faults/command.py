@@ -15,9 +15,17 @@ from bench.faults.flight import fly, fly_from_one_take_off
 from bench.faults.table import PART, TITLE, Row, text_of
 from bench.marked import checked_text, write_part
 from bench.processes import ctrl_c_waiting
+from bench.reference.stamps import stamp_text
 from companion.errors import ConfigurationError
 from rebound_cli.console import with_progress
 
+FLOWN_CODE = (
+    "companion",
+    "sim_vehicle",
+    "rebound_cli/realtime.py",
+    "bench/faults/flight.py",
+    "bench/faults/catalogue.py",
+)
 # A flight's number in the record is its row's plus so many for each seed.
 NAMES = (*FLOWN, *FILES)
 
@@ -37,7 +45,8 @@ def run_faults(options: Namespace) -> int:
     finally:
         record.close()
     rows = [row for name in NAMES if (row := _row(record, name, options.seeds)).results]
-    write_part(options.out, PART, text_of(rows, under_load, options.seeds, campaign.version), TITLE)
+    stamp = stamp_text(f"python -m bench faults --seeds {options.seeds}", FLOWN_CODE)
+    write_part(options.out, PART, text_of(rows, under_load, stamp), TITLE)
     failing = [row.name for row in rows if row.failures]
     print(f"{len(rows)} rows, {len(failing)} not as expected{': ' if failing else ''}{', '.join(failing)}.")
     print(f"Written to {options.out}.")

@@ -27,14 +27,14 @@ class Row:
         return [result for result in self.results if result["complaints"]]
 
 
-def text_of(rows: Sequence[Row], under_load: Json | None, seeds: int, version: str) -> str:
-    """What stands between the document's marks."""
+def text_of(rows: Sequence[Row], under_load: Json | None, stamp: str) -> str:
+    """What stands between the document's marks; `stamp` says what made it (see `bench.reference.stamps`)."""
     flights = sum(len(row.results) for row in rows)
     failing = [row for row in rows if row.failures]
     lines = [
         "",
-        f"Written by `python -m bench faults --seeds {seeds}` (version {version}): {len(rows)} faults, {flights} "
-        f"flights and files; {len(rows) - len(failing)} rows as expected in every one, {len(failing)} not.",
+        f"{stamp}: {len(rows)} faults, {flights} flights and files; {len(rows) - len(failing)} rows as expected in "
+        f"every one, {len(failing)} not.",
         "",
         "| fault | injected | expected | n | happened | worst | verdict |",
         "|---|---|---|---|---|---|---|",

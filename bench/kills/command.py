@@ -8,6 +8,7 @@ from bench.campaign.plan import Campaign, Json
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.kills.killed import KILLED_S, kills_campaign
 from bench.marked import checked_text, write_part
+from bench.reference.stamps import stamp_text
 
 PART, TITLE = "kills", "A companion that is killed around a hit"
 BIN_S = 0.1
@@ -34,7 +35,8 @@ def table(campaign: Campaign, results: Results) -> str:
 
 def _lines(flights: Sequence[Json], first_seed: int) -> Iterator[str]:
     kills = [kill for flight in flights for kill in flight["kills"]]
-    yield f"`python -m bench kills --kills {len(kills)} --first-seed {first_seed}`: {len(flights)} flights, both"
+    stamp = stamp_text(f"python -m bench kills --kills {len(kills)} --first-seed {first_seed}")
+    yield f"{stamp}: {len(flights)} flights, both"
     yield "airframes, IMU at 250 and 50 Hz; 0.7 to 5 m/s, up to 45° slanted. After the kill nothing is sent;"
     yield "PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s, and lands. Second contact: the centre closes"
     yield f"with the wall at more than {SECOND_M_S:g} m/s after the kill, the hit itself apart. All by the truth."

@@ -12,7 +12,7 @@ def add_paper(commands: Commands) -> None:
     paper = commands.add_parser(
         "paper",
         help="fly the paper's studies and write figures and table",
-        description="The paper's figures and numbers beside ours, flown in lockstep; see docs/paper.md.",
+        description="The paper's figures and numbers beside ours, flown in lockstep; see bench/notes/paper.md.",
     )
     add_documents_folder(paper, "paper.md and images/paper")
     paper.add_argument(

@@ -1,4 +1,4 @@
-"""`python -m bench paper`: flies every study and writes pictures, table and the result section of docs/paper.md."""
+"""`python -m bench paper`: flies every study and writes pictures, table and results of bench/notes/paper.md."""
 
 from argparse import Namespace
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from bench.paper.study import Study, StudyFindings, concluded
 from bench.paper.table import ClaimRow, rows_text
 from bench.places import make_folder
 from bench.processes import in_processes
-from rebound_cli import __version__
+from bench.reference.stamps import stamp_text
 
 STUDIES: tuple[Study, ...] = (
     arm,
@@ -80,7 +80,7 @@ def results_text(findings: Sequence[StudyFindings], seeds: int) -> str:
     differing = [row for row in rows if row.is_judged and not row.agrees]
     option = "" if seeds == DEFAULT_SEEDS else f" --seeds {seeds}"
     parts = [
-        f"Written by `python -m bench paper{option}` (version {__version__}). Detector `lateral`, law `paper`, "
+        f"{stamp_text(f'python -m bench paper{option}')}. Detector `lateral`, law `paper`, "
         "γ = 0.5; the vehicle knows itself by flow, range and its own Kalman filter ([estimator.md](estimator.md)).\n",
         f"{sum(row.is_judged for row in rows)} rows have a verdict; {len(differing)} differ, each with its reason in "
         "the remark or in its study below.\n",

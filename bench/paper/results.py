@@ -13,8 +13,8 @@ from bench.baselines.config import BaselineMission
 from bench.paper.flights import DETECTOR, GAMMA_S, LAW
 from bench.places import make_place
 from bench.processes import in_processes
+from bench.reference.stamps import stamp_text
 from bench.sensitivity import stop_sensitivity_text
-from rebound_cli import __version__
 from rebound_cli.documents import Document, validated
 from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import load_mission_document, with_guards, world_from
@@ -141,7 +141,7 @@ def fly_case(case: ResultsCase) -> CaseFigures:
 _INTRODUCTION = """\
 # Results: wall hits at four speeds
 
-Written by `python -m bench paper results`{seeds_option} (version {version}, Python {python}, {machine}).
+{stamp} (Python {python}, {machine}).
 
 Each row is {seeds} flights of `{mission}`, seeds 1 to {seeds}: whole flights from take-off to landing in
 lockstep, with all MAVLink bytes and the log on. One of them again, with its log, summary and picture:
@@ -158,8 +158,8 @@ Both airframes fly the same missions with the paper's law and gain. The contrast
   the IMUs due to low impact times".)
 - The rigid vehicle runs past its setpoint, the further the faster it hits, and the foldable one does not, as in the
   paper. It is the vehicle's estimator: of a rigid hit clipping hides nearly all, so that the vehicle believes for half
-  a second that it still flies into the wall, and leans back hard (docs/px4.md; a real PX4 with the same law ran past
-  by 0.39, 0.58, 0.79 and 1.01 m).
+  a second that it still flies into the wall, and leans back hard (bench/notes/px4.md; a real PX4 with the same law
+  ran past by 0.39, 0.58, 0.79 and 1.01 m).
 """
 
 _COLUMNS = (
@@ -206,8 +206,7 @@ def results_text(figures: Sequence[CaseFigures], seeds: int) -> str:
     """The Markdown file."""
     parts = [
         _INTRODUCTION.format(
-            seeds_option="" if seeds == 20 else f" --seeds {seeds}",
-            version=__version__,
+            stamp=stamp_text("python -m bench paper results" + ("" if seeds == 20 else f" --seeds {seeds}")),
             python=platform.python_version(),
             machine=platform.machine(),
             seeds=seeds,

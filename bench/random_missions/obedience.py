@@ -1,4 +1,4 @@
-"""Whether what the companion did, event by event, is what docs/missions.md says follows from the mission."""
+"""Whether what the companion did, event by event, is what docs/how-to/missions.md says follows from the mission."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""`bench campaign recoveries`: the same hits with laws `paper` and `adaptive`, as a table in docs/recovery.md."""
+"""`bench campaign recoveries`: hits with laws `paper` and `adaptive`, as a table in bench/notes/recovery.md."""
 
 import statistics
 from argparse import Namespace
@@ -9,6 +9,7 @@ from bench.campaign.plan import Campaign, Json
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.marked import checked_text, write_part
 from bench.recoveries.hits import AIRFRAMES, LAWS, SLANTS_DEG, SPEEDS_M_S, RecoveryCase, of, recoveries_campaign
+from bench.reference.stamps import stamp_text
 
 PART = "recoveries"
 
@@ -30,7 +31,8 @@ def write_table(path: Path, campaign: Campaign, results: Results, seeds: int) ->
 
 
 def _lines(cases: Sequence[RecoveryCase], results: dict[int, Json], seeds: int) -> Iterator[str]:
-    yield f"`python -m bench campaign recoveries --seeds {seeds}`: {len(cases)} flights through the whole wire;"
+    stamp = stamp_text(f"python -m bench campaign recoveries --seeds {seeds}")
+    yield f"{stamp}: {len(cases)} flights through the whole wire;"
     yield "each cell `paper` → `adaptive`. Settled: median; the others: the worst. Clear: the guards' distance at rest."
     yield "Touched again: flights, and in brackets those of them in which the centre had come back to the wall."
     yield ""

@@ -8,40 +8,49 @@ class FusedConfig(Written):
 
     retired = frozenset({"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push"})
 
-    # A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its spread reads half too much, to be safe); a gust
-    # of 5 m/s adds 1.1 m/s^2 of drag at most. Eq. 2 begins with b_s v_c = 15 m/s^2 at 0.5 m/s.
     side_threshold_m_s2: Positive = 1.75
-    # Beyond nothing and beyond the propellers' most: those bounds are themselves uncertain by a tenth of hover.
+    """Least lateral external force that is a hit. A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its
+    spread reads half too much, to be safe); a gust of 5 m/s adds 1.1 m/s^2 of drag at most. Eq. 2 begins with b_s v_c =
+    15 m/s^2 at 0.5 m/s."""
     vertical_threshold_m_s2: Positive = 4.0
-    # Of the spread as `floor` has it, at least 1.5 times the true one: 6.3 standard deviations, which sideways two of
-    # 10^9 normal samples exceed, one in half a thousand hours at 250 Hz.
+    """Least vertical external force that is a hit. Beyond nothing and beyond the propellers' most: those bounds are
+    themselves uncertain by a tenth of hover."""
     noise_factor: Positive = 4.2
-    # Drag per mass is 0.2 to 0.4 /s times the speed and turns with the vehicle.
+    """Threshold over the spread of the specific force learnt in flight, which reads at least 1.5 times the true
+    one: 6.3 standard deviations, which sideways two of 10^9 normal samples exceed, one in half a
+    thousand hours at 250 Hz."""
     drag_per_s: NotNegative = 0.3
-    # A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six times that. A foldable vehicle's hit
-    # at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long, clipping leaves the estimate 0.16.
+    """Room for drag: per mass it is 0.2 to 0.4 /s times the speed, and turns with the vehicle."""
     velocity_step_m_s: Positive = 0.12
-    # Of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz.
+    """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
+    times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
+    clipping leaves the estimate 0.16."""
     velocity_step_slow_m_s: Positive = 0.7
-    # With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by 2 rad/s changes its velocity
-    # by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s.
+    """The same of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz."""
     velocity_step_turned_m_s: Positive = 0.07
+    """The same beside a rate jump. With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by
+    2 rad/s changes its velocity by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s."""
     rate_step_rad_s: Positive = 2.0
-    # Thrust that turns at 1 rad/s changes the acceleration by 0.6 m/s^2 in 60 ms; the estimate's 20 ms of delay make
-    # 0.012 m/s of that. Turning about the thrust itself changes nothing.
+    """Least rate jump that counts beside a velocity jump."""
     velocity_per_rate_m: NotNegative = 0.01
-    # Spun: rates that step from one sample to the next without any force in them, kept by the next one. Motors at full
-    # moment make 200 rad/s^2; twice that, so that a nimbler vehicle's flips are none. A rigid vehicle that meets a
-    # leaning wall at 2 m/s steps by 15 rad/s and more.
+    """Room in a velocity jump for a vehicle that turns. Thrust that turns at 1 rad/s changes the acceleration by 0.6
+    m/s^2 in 60 ms; the estimate's 20 ms of delay make 0.012 m/s of that. Turning about the thrust itself changes
+    nothing."""
     spin_rad_s: Positive = 2.0
+    """Least rate jump that is a hit by itself: from one sample to the next, and kept by the one after. Motors at full
+    moment make 200 rad/s^2; twice that, so that a nimbler vehicle's flips are none. A rigid vehicle that meets a
+    leaning wall at 2 m/s steps by 15 rad/s and more."""
     spin_rad_s2: Positive = 400.0
-    # A contact lasts 20 to 120 ms with the force present all through; this long without it, it is over.
+    """Added to it for each second between the samples."""
     rearm_quiet_s: Positive = 0.04
-    # Longer loud than this is no contact but a new way to shake, and is learnt.
+    """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5
-    # After a contact the estimate swings (its delay, a filter's switching): velocities count again after this.
+    """Longest contact. Longer loud than this is no contact but a new way to shake, and is learnt."""
     velocity_rest_s: Positive = 0.15
-    # A hand is slower than an obstacle: below `soft_m_s2` on a hovering vehicle wait for the force to show itself, for
-    # so long at most; a force that jumps is no hand's (see `soft`).
+    """After a contact velocities count again after this: its delay and a filter's switching make the estimate swing."""
     soft_m_s2: Positive = 8.0
+    """Below this, on a hovering vehicle, a force may be a hand. A hand is slower than an obstacle: below `soft_m_s2` on
+    a hovering vehicle wait for the force to show itself, for so long at most; a force that jumps is no hand's (see
+    `soft`)."""
     soft_wait_s: Positive = 0.02
+    """How long such a force is looked at."""

@@ -23,13 +23,15 @@ BLIND_M_S2 = 30.0
 class SightConfig(Written):
     """When a detector counts as blind."""
 
-    # Ten samples of PX4's default 50 Hz, with reserve: whoever waits longer for one sees no hit in time.
     silence_s: Positive = 0.25
-    # 20 Hz is one sample in 50 ms: the longest contacts, about 100 ms, would show in two, most in none.
+    """Without IMU or position for so long there is no data. Ten samples of PX4's default 50 Hz, with reserve: whoever
+    waits longer for one sees no hit in time."""
     min_rate_hz: Positive = 20.0
-    # By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a vehicle that shakes so much that less cannot be
-    # told from its shaking does not see the slower half of its hits.
+    """Least rate of HIGHRES_IMU. 20 Hz is one sample in 50 ms: the longest contacts, about 100 ms, would show in two,
+    most in none."""
     max_threshold_m_s2: Positive = BLIND_M_S2
+    """Largest threshold: vibration above it hides hits. By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a
+    vehicle that shakes so much that less cannot be told from its shaking does not see the slower half of its hits."""
 
 
 class Sight(NamedTuple):

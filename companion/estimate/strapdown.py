@@ -14,7 +14,7 @@ ATTITUDE_KEPT_S = 0.1
 LONGEST_GAP_US = 100_000
 # A velocity that is held against the sum lags by no more than this (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
-# Cosine of 15 degrees: the tilt that a filter makes of 9 m/s missed, by what a real PX4 made of 2.4 m/s (docs/px4.md).
+# Cosine of 15 degrees: the tilt that a filter makes of 9 m/s missed, by what a real PX4 made of 2.4 m/s (bench/notes/px4.md).
 # Gyroscopes that show more are wrong themselves.
 MOST_WRONG = 0.966
 
@@ -33,7 +33,7 @@ class Strapdown:
     """The attitude by the rates alone, from the last one told that was right; None while those told are right.
 
     A filter that puts a velocity right takes part of its error for a tilt. Gyroscopes do not. Of 2.4 m/s that a real
-    PX4 had missed it made 4 degrees, for more than a second (docs/px4.md).
+    PX4 had missed it made 4 degrees, for more than a second (bench/notes/px4.md).
     """
     level_leans_m_s2: Vector3 = ZERO
     """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; zero while that is right."""

@@ -37,7 +37,7 @@ VELOCITY_GAINS_PER_S = (VELOCITY_PER_S, VELOCITY_PER_S, CLIMB_GAIN_PER_S)
 # PX4's own modes brake with it by default: MPC_ACC_HOR, MPC_ACC_DOWN_MAX.
 BRAKES_M_S2 = 3.0
 # After a lean PX4 brings to rest what its estimate says, which is wrong. After a hit at 2 m/s it was right again within
-# 0.4 s with the parameters of `rebound airframe px4`, within 1.5 s with PX4's own (docs/px4.md).
+# 0.4 s with the parameters of `rebound airframe px4`, within 1.5 s with PX4's own (bench/notes/px4.md).
 REPAIRED_S = 1.5
 # At a rebound of 1 m/s a look every 0.2 m.
 _TIMES_S = tuple((HELD_S + NOTICED_S) * look / 6 for look in range(1, 7))

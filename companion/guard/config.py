@@ -25,22 +25,31 @@ class GuardConfig(Written):
     """The file of `rebound guard --config`; a mission's parts of the same name mean the same."""
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = DEFAULT_MODES
-    # hold: what flew into the wall does not do it again unless somebody says so.
+    """PX4's modes that the guard may take over."""
     then: Literal["previous", "hold"] = "hold"
-    # With `then: previous` a mission flies into the same wall again. Three hits in one flight are no accident.
+    """What the vehicle is given back to. hold: what flew into the wall does not do it again unless somebody says so."""
     max_hits: Annotated[int, Field(strict=True, ge=1)] = 3
-    # A hit while a program on a link of its own sends setpoints. `reposition` leads the vehicle clear by a command; a
-    # real PX4 that gets it while the contact lasts flies off backwards (see guard.holding): not done unasked.
+    """Of one flight; after this one the vehicle is given back to hold, whatever `then` says. With `then: previous` a
+    mission flies into the same wall again. Three hits in one flight are no accident."""
     beside_program: Literal["tell", "reposition"] = "tell"
-    # The answer takes 10 ms, CURRENT_MODE at 10 Hz 100 ms; a command lost on the way is repeated after 500 ms.
+    """What follows a hit in another program's OFFBOARD: a report, or one DO_REPOSITION. A hit while a program on a link
+    of its own sends setpoints. `reposition` leads the vehicle clear by a command; a real PX4 that gets it while the
+    contact lasts flies off backwards (see guard.holding): not done unasked."""
     confirm_within_s: Annotated[Positive, Field(ge=0.2)] = 1.0
-    # PX4 wants 2 Hz to be seen before it takes OFFBOARD; five times that survives a link that loses packets.
+    """How long OFFBOARD may take; then the vehicle is asked to hold. The answer takes 10 ms, CURRENT_MODE at 10 Hz 100
+    ms; a command lost on the way is repeated after 500 ms."""
     lead_hz: Annotated[Positive, Field(ge=2.0, le=50.0)] = 10.0
-    # From where the vehicle was armed. Nobody knows a stranger's field: as good as none until it is given.
+    """Rate of setpoints before there is a hit. PX4 wants 2 Hz to be seen before it takes OFFBOARD; five times that
+    survives a link that loses packets."""
     fence: Fence = Fence(radius_m=100_000.0, max_height_m=10_000.0)
+    """Where recoveries may lead. From where the vehicle was armed. Nobody knows a stranger's field: as good as none
+    until it is given."""
     limits: Limits = Limits()
+    """What no setpoint exceeds."""
     recovery: KnownRecovery = RecoveryConfig()
+    """How a recovery is planned."""
     companion: CompanionConfig = CompanionConfig()
+    """Detection, estimate, streams and link."""
 
     @field_validator("modes")
     @classmethod

@@ -108,7 +108,7 @@ def _grown(touched: tuple[float, float], reaches_m: float) -> tuple[float, float
     return low - beyond_m, high + beyond_m
 
 
-# Of the normals that one whole contact gives, 61 % are within 10 degrees and 94 % within 20 (docs/detection.md).
+# Of the normals that one whole contact gives, 61 % are within 10 degrees and 94 % within 20 (bench/notes/detection.md).
 ERROR_RAD = math.radians(15.0)
 # A clipped sample tilts the push by what it lacks; a stiff hit is one such sample, and has been 50 degrees off.
 CLIPPED_ERROR_RAD = math.radians(30.0)

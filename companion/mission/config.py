@@ -103,11 +103,11 @@ class SettledConfig(Written):
     """When a recovery has ended."""
 
     distance_m: Positive = 0.10
-    """So near to the recovery setpoint,"""
+    """Largest distance to the recovery setpoint."""
     speed_m_s: Positive = 0.10
-    """so slow,"""
+    """Largest speed."""
     duration_s: Positive = 0.5
-    """for so long."""
+    """How long both must hold."""
     timeout_s: Positive = 10.0
     """A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it."""
     smoothing_s: NotNegative = 0.1
@@ -145,8 +145,8 @@ class FlightConfig(Written):
     speeding_up_m_s2: Annotated[Positive, Field(le=9.81)] = 1.0
     """The most, of any item's acceleration, with which the horizontal speed grows. A vehicle that leans into its way is
     hit below its centre and tips: beyond 10 degrees at 3 m/s, or 16 at 1 m/s, its thrust then pins it to the obstacle
-    (docs/recovery.md). This leans it by 6, and what a head wind leans it by is taken off it; drag comes on top.
-    Braking leans it the other way."""
+    (docs/explanation/recovery.md). This leans it by 6, and what a head wind leans it by is taken off it; drag comes on
+    top. Braking leans it the other way."""
     acceptance_radius_m: Positive = 0.5
     """A waypoint is passed, not settled on. A PX4 that flies by GPS wanders by this much around a setpoint (its own
     simulator's noise moves a hover by 0.5 m); a quarter of it could be missed for a long time."""

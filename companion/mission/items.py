@@ -236,11 +236,11 @@ class SteadyCondition(Written):
     """The vehicle rests at its setpoint."""
 
     within_m: Positive = 0.2
-    """So near to the setpoint ..."""
+    """Largest distance to the setpoint."""
     speed_m_s: Positive = 0.15
-    """... and so slow ..."""
+    """Largest speed."""
     for_s: Positive = 1.0
-    """... for so long."""
+    """How long both must hold."""
 
 
 class WaitForItem(Written):

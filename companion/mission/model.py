@@ -55,6 +55,7 @@ class Mission(Written):
     companion: CompanionConfig = CompanionConfig()
     resume: Resume | None = None
     sim: dict[str, object] | None = None
+    """The simulated world (see `sim_vehicle.scene.Scene`)."""
 
     @model_validator(mode="after")
     def _takeoff_first_land_last(self) -> Self:

@@ -47,13 +47,13 @@ STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 SPINNING_RAD_S = 6.0
 
 # A setpoint that is the last is held for COM_OF_LOSS_T, 1 s by default. PX4 notices the silence late: with 1 s set, a
-# real one went into hold after 1.04 to 1.13 s (docs/px4.md).
+# real one went into hold after 1.04 to 1.13 s (bench/notes/px4.md).
 HELD_S, NOTICED_S = 1.0, 0.13
 # A vehicle that does 1 m/s by then is at rest within 0.2 m with MPC_ACC_HOR.
 HELD_TO_M_S = 1.0
 
 # --- half-spaces
-# Sine of 10 degrees: as well as a normal is known after most hits (docs/detection.md).
+# Sine of 10 degrees: as well as a normal is known after most hits (bench/notes/detection.md).
 NORMAL_SINE = 0.17
 # Sine of the normal's angle from the horizontal. Below it height is held, as the vehicle's own lean and a single
 # clipped sample tilt the normal of a wall; above it the obstacle is a ceiling, a floor or a steep roof.
@@ -83,11 +83,11 @@ LEFT_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
 KNOWN_US = 80_000
 # How an estimate is put right after a clipped hit. Three hits of a real PX4 by motion capture took 0.12 s, 4.45 rad/s
-# and a damping of 0.59 (docs/px4.md); others are up to twice as late, and half to twice as fast.
+# and a damping of 0.59 (bench/notes/px4.md); others are up to twice as late, and half to twice as fast.
 PUT_RIGHT_AFTER_S = (0.05, 0.1, 0.15, 0.2, 0.25)
 PUT_RIGHT_RAD_S = (2.2, 3.1, 4.4, 6.2, 8.8)
 PUT_RIGHT_DAMPING = (0.45, 0.6, 0.85)
-# Of what was hidden, the share by which those three hits differ from that: 6 % RMS over 1.5 s (docs/px4.md).
+# Of what was hidden, the share by which those three hits differ from that: 6 % RMS over 1.5 s (bench/notes/px4.md).
 MISFIT = 0.06
 # What the accelerometer's sum drifts by: a tilt that is off by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
@@ -95,7 +95,7 @@ DRIFT_M2_S3 = 0.03
 PLACE_SPREAD_M = 0.1
 # Right is what is known to be wrong by no more than four times a good velocity's noise.
 RIGHT_M_S = 0.15
-# By then the slowest has passed through zero: with PX4's own parameters it was right within 1.5 s (docs/px4.md).
+# By then the slowest has passed through zero: with PX4's own parameters it was right within 1.5 s (bench/notes/px4.md).
 OVER_US = 1_500_000
 # A velocity that is told is held against the places that are told over this time: their noise of 0.02 m makes 0.04 m/s
 # of it. What is more than twice RIGHT_M_S is no rest of what was put right, but a place that jumped.

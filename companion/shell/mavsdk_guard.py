@@ -39,12 +39,12 @@ EVENTS_KEPT = 1000
 
 
 class CollisionGuard:
-    """Watches the program's vehicle through the program's own connection, and takes it over at a hit.
+    """Guards the program's vehicle over the program's own connection, and takes it over at a hit.
 
-    While it is attached Python's threads take turns every SWITCH_INTERVAL_S (sys.setswitchinterval), and no garbage is
-    looked for among what was there before (gc.freeze).
-    `on_event` is called on the guard's own thread. As a context manager, or as an asynchronous one, it starts and
-    stops by itself. Raises GuardError where MAVSDK 4 is not there, or nothing can be guarded.
+    `mavsdk` and `system` are MAVSDK 4's objects. `on_event` is called on the guard's own thread. A `with` block, or an
+    `async with` block, starts and stops it. While it is attached, threads take turns every SWITCH_INTERVAL_S
+    (sys.setswitchinterval), and older objects are not collected as garbage (gc.freeze).
+    Raises GuardError without MAVSDK 4.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class CollisionGuard:
         self._thread = threading.Thread(target=self._run, name="rebound-guard", daemon=True)
 
     def start(self) -> None:
-        """Attach; returns when the vehicle's streams have been found fast enough, some 3 s later."""
+        """Attach; return when the streams are fast enough, some 3 s later. Raises GuardError if they are not."""
         self._switch_interval_s = sys.getswitchinterval()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_interval_s))
         # Looking for garbage among all that a program has loaded takes 0.1 s, on whichever thread it falls.
@@ -88,7 +88,7 @@ class CollisionGuard:
             raise GuardError(f"No guard: {outcome or 'the vehicle does not answer'}.")
 
     def stop(self) -> None:
-        """Give the vehicle back if it is held, and let go of MAVSDK."""
+        """Give the vehicle back if the guard holds it, and release MAVSDK. Takes 10 s at most."""
         with self._changed:
             self._guard.core.stop_reason = "stopped by the program"
             self._changed.notify_all()
@@ -109,25 +109,27 @@ class CollisionGuard:
 
     @property
     def state(self) -> State:
+        """What the guard is doing now."""
         return self._guard.core.machine.state
 
     @property
     def holds(self) -> bool:
-        """Whether the vehicle flies by the guard's setpoints; the program's are kept out meanwhile."""
+        """Whether the vehicle flies by the guard's setpoints. The program's setpoints are dropped meanwhile."""
         return self._guard.core.machine.holds
 
     @property
     def kept_out(self) -> int:
-        """How many of the program's setpoints have been kept out so far."""
+        """How many of the program's setpoints were dropped so far."""
         return self._guard.kept_out
 
     @property
     def collisions(self) -> tuple[CollisionReport, ...]:
+        """Every hit so far, local NED, SI."""
         with self._changed:
             return self._guard.core.collisions()
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Block until the condition holds; looked at whenever something has happened."""
+        """Block until the condition holds, and return True; False after `timeout_s`. It is tested after each event."""
         with self._changed:
             return self._changed.wait_for(condition, timeout_s)
 

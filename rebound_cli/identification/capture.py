@@ -10,7 +10,7 @@ import numpy as np
 
 from rebound_cli.identification.hit import Floats, Force, Hit, IdentificationError, Track, guards_at
 
-# A column is known by the end of its name: the plain names of docs/airframes.md, then what a ROS bag
+# A column is known by the end of its name: the plain names of docs/how-to/airframes.md, then what a ROS bag
 # becomes in CSV. Columns of other topics are ignored.
 _TIME = ("time_s", "__time")
 _POSITION = ("position_{}_m", "position/{}")
@@ -75,7 +75,7 @@ def read_table(path: Path) -> Table:
                 return np.array([_number(line, found[0]) for line in lines])
         if is_needed:
             wanted = " or ends in ".join(names).format(axis, axis)
-            raise IdentificationError(f"{path}: no column is called {wanted}; see docs/airframes.md.")
+            raise IdentificationError(f"{path}: no column is called {wanted}; see docs/how-to/airframes.md.")
         return None
 
     columns = [column(_TIME), *(column(_POSITION, axis) for axis in "xy")]

@@ -21,7 +21,7 @@ _BEFORE_S = 0.1
 # After it the greatest speed away is taken within this: the estimate is late by 20 ms or more, and on a real
 # vehicle smoothed over some tens; later the autopilot is already braking.
 _AFTER_S = 0.15
-# Clipping hides a part of a hit from the vehicle's estimate: a real PX4's was right again after 1.2 s (docs/px4.md).
+# Clipping hides a part of a hit from the vehicle's estimate: a real PX4's was right after 1.2 s (bench/notes/px4.md).
 # From this long after the release the velocity is carried back to it by what the accelerometer has summed up since.
 _RIGHT_AGAIN_S = (1.3, 1.8)
 # Standard deviation of a speed of a good optical-flow or motion-capture estimate.

@@ -28,7 +28,7 @@ _NAMES = [
     *("vehicle_land_detected", "vehicle_control_mode", "position_setpoint_triplet", "trajectory_setpoint"),
     "vehicle_local_position_setpoint",
 ]
-# What a missing topic costs, in the words of docs/replay.md.
+# What a missing topic costs, in the words of docs/how-to/recorded-flights.md.
 _COSTS = {
     "vehicle_local_position": "height and velocity are not known: no v_c, and landings are told by the land detector",
     "vehicle_attitude": "the direction of a hit in the world is not known",

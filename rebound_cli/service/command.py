@@ -17,7 +17,7 @@ from rebound_cli.service.system import ServiceError, System, hidden_program, ser
 
 _SETTINGS_NAME, _GUARD_NAME = "service.yaml", "guard.yaml"
 # A guard by all its defaults, of which the first to be changed is shown.
-_GUARD_TEXT = "# Settings: docs/guard.md.\nthen: hold\n"
+_GUARD_TEXT = "# Settings: docs/how-to/guard.md.\nthen: hold\n"
 # What was asked for, beside what is kept.
 _NEW = ".new"
 _BOOT = "It runs from the next boot on."
@@ -51,7 +51,7 @@ def _install(system: System, options: Namespace) -> int:
     system.refuse_if_unfit()
     hidden = hidden_program()
     if hidden is not None:
-        text = f"{hidden} is hidden from the service: install Rebound in /opt/rebound (docs/companion-computer.md)."
+        text = f"{hidden} is hidden from the service: install Rebound in /opt/rebound (docs/how-to/service.md)."
         raise ServiceError(text)
     for file in planned:
         if not file.is_kept:

@@ -132,5 +132,5 @@ def ekf_reset(
 
 
 def other(kind: str, **settings: Any) -> FaultRequest:
-    """Any kind of docs/missions.md's table with its settings, without `at_s` and `between_s`."""
+    """Any kind of docs/reference/world.md's table with its settings, without `at_s` and `between_s`."""
     return FaultRequest(kind, settings)

@@ -61,7 +61,9 @@ class Gust(During):
 
     kind: Literal["gust"]
     velocity_ned_m_s: Point
+    """Of the extra wind: the direction it blows to."""
     rise_s: Positive = 0.5
+    """How long it rises, and how long it falls."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -86,6 +88,7 @@ class MotorFailure(Timed):
     motor: Motor
     """PX4's order: 0 front right, 1 rear left, 2 front left, 3 rear right."""
     thrust_share: Share = 0.0
+    """Share of the commanded thrust that is left."""
 
 
 class FreeFall(Timed):
@@ -99,6 +102,7 @@ class BatterySag(During):
 
     kind: Literal["battery_sag"]
     voltage_share: Annotated[float, Field(gt=0, le=1)]
+    """Share of the voltage that is left at the end."""
 
 
 class PayloadDrop(Moment):
@@ -106,6 +110,7 @@ class PayloadDrop(Moment):
 
     kind: Literal["payload_drop"]
     mass_kg: Positive
+    """Of the load."""
 
 
 class Vibration(Timed):
@@ -115,6 +120,7 @@ class Vibration(Timed):
     accelerometer_rms_m_s2: NotNegative
     """On each axis at hover thrust; goes with thrust."""
     gyroscope_rms_rad_s: NotNegative = 0.0
+    """The same of the gyroscope."""
     motor: Motor | None = None
     """The rotor that is bent; without it all four share it."""
     motor_hz: Annotated[float, Field(gt=0, le=1000)] = 180.0
@@ -126,7 +132,9 @@ class Push(During):
 
     kind: Literal["push"]
     force_ned_n: Point
+    """The full force."""
     point_frd_m: Point = (0.0, 0.0, 0.0)
+    """Where it acts; the centre of mass by default."""
     rise_s: NotNegative = 0.05
     """To full force and back, as half a cosine."""
 
@@ -140,6 +148,7 @@ class HandCatch(During):
     damping_n_s_m: NotNegative = 30.0
     """Near critical for a vehicle of 1 kg, as arms are."""
     turn_damping_n_m_s: NotNegative = 0.1
+    """Torque against turning, per rad/s."""
 
 
 class ImuBias(Timed):
@@ -147,7 +156,9 @@ class ImuBias(Timed):
 
     kind: Literal["imu_bias"]
     accelerometer_frd_m_s2: Point = (0.0, 0.0, 0.0)
+    """Added to the specific force."""
     gyroscope_frd_rad_s: Point = (0.0, 0.0, 0.0)
+    """Added to the angular rate."""
 
 
 class ImuStuck(Timed):
@@ -155,6 +166,7 @@ class ImuStuck(Timed):
 
     kind: Literal["imu_stuck"]
     axis: Literal["accelerometer_x", "accelerometer_y", "accelerometer_z", "gyroscope_x", "gyroscope_y", "gyroscope_z"]
+    """Which one."""
     value: Finite | None = None
     """m/s2 or rad/s."""
 
@@ -166,6 +178,7 @@ class EstimatorReset(Moment):
     position_jump_ned_m: Point = (0.0, 0.0, 0.0)
     """Stays: the vehicle flies on in a frame that has moved."""
     velocity_jump_ned_m_s: Point = (0.0, 0.0, 0.0)
+    """Fades within `settles_s`."""
     settles_s: Positive = 1.0
     """Time constant with which the velocity finds back to the truth."""
 
@@ -178,10 +191,13 @@ class EstimatorAfterClipping(Timed):
 
     kind: Literal["estimator_after_clipping"]
     resets: Annotated[int, Field(ge=0, le=20)] = 4
+    """How many."""
     over_s: Positive = 0.036
+    """Within how long."""
     kick_m_s: NotNegative = 0.3
     """Standard deviation, per axis, of what each reset leaves instead of the error before."""
     settles_s: Positive = 0.5
+    """Time constant with which the last error fades."""
     least_hidden_m_s: NotNegative = 0.02
     """Less than this hidden in an interval disturbs nobody: a propeller that clips now and then."""
 
@@ -191,6 +207,7 @@ class AidingLoss(Timed):
 
     kind: Literal["aiding_loss"]
     sensor: Literal["optical_flow", "range_finder", "compass", "motion_capture", "gps"]
+    """Which one."""
     drift_m_s2: NotNegative = 0.1
     """Velocity gone astray per root second, for an estimate of kind markov; half a degree of tilt is 0.09 m/s2."""
 
@@ -200,6 +217,7 @@ class WireFault(Timed):
 
     kind: Literal["wire"]
     direction: Literal["to_companion", "to_vehicle", "both"] = "both"
+    """Of the packets."""
     messages: tuple[int | str, ...] = ()
     """Names or numbers of the messages that are hit; none named means all."""
     loss: Share = 0.0
@@ -207,12 +225,15 @@ class WireFault(Timed):
     burst_packets: Annotated[float, Field(ge=1)] = 1.0
     """Mean length of a run of lost packets (Gilbert's two-state channel)."""
     delay_s: NotNegative = 0.0
+    """Every packet is so late."""
     jitter_s: NotNegative = 0.0
     """Up to so much more, evenly; the order stays."""
     reorder: Share = 0.0
     """Share of packets that are overtaken."""
     reorder_by_s: Positive = 0.02
+    """How long such a packet is held back."""
     duplicate: Share = 0.0
+    """Share of packets that come twice."""
     corrupt: Share = 0.0
     """Share of packets of which one byte is changed."""
 

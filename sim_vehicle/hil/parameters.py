@@ -107,7 +107,7 @@ def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
     interval_us = airframe.imu.integration_interval_us
     yield Parameter("IMU_INTEG_RATE", round(1e6 / interval_us), "one HIGHRES_IMU a sample of the simulator")
     # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s at 2 m/s and by 4 m/s at 4: it
-    # should then doubt its accelerometer, not its attitude, and correct itself soon (docs/px4.md).
+    # should then doubt its accelerometer, not its attitude, and correct itself soon (bench/notes/px4.md).
     yield Parameter("EKF2_ACC_NOISE", 1.0, "m/s2; leaves room for what a hit hides from the accelerometer")
     gyroscope_noise_rad_s = airframe.imu.gyroscope_noise_rad_s * math.sqrt(1e-6 * interval_us / EKF_PERIOD_S)
     yield Parameter("EKF2_GYR_NOISE", gyroscope_noise_rad_s, "rad/s; the gyroscope's own, over a step of EKF2")

@@ -192,7 +192,7 @@ def test_files_that_mean_harm_are_refused_in_words(name: str) -> None:
 def test_the_table_counts_what_was_not_as_expected() -> None:
     good = {"complaints": [], "outcome": "read", "seconds": 0.1}
     bad = good | {"complaints": ["taken as good"], "seconds": 2.5}
-    text = text_of([Row(FILES["YAML bomb"], [good, bad])], None, 2, "1.0")
+    text = text_of([Row(FILES["YAML bomb"], [good, bad])], None, "Made")
     assert "1 faults, 2 flights and files; 0 rows as expected in every one, 1 not." in text
     assert "| 2 | read 2 | 2.5 s of processor time | **1 of 2 not** |" in text
     assert "- **YAML bomb**, 1 of 2:\n  - 1 × taken as good" in text
@@ -201,7 +201,7 @@ def test_the_table_counts_what_was_not_as_expected() -> None:
 def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None:
     spread = _spread([0.004, 0.006, None])
     assert (spread["found"], spread["p50"], spread["most"]) == (2, 6.0, math.inf)
-    text = text_of([], {"hits": 3, "load": 1.0, "busy": spread, "quiet": spread}, 1, "1.0")
+    text = text_of([], {"hits": 3, "load": 1.0, "busy": spread, "quiet": spread}, "Made")
     assert "| p50 6.0 ms, p99 more than 500 ms, p99.9 more than 500 ms, most more than 500 ms | 2 of 3 |" in text
 
 

@@ -29,7 +29,7 @@ from tests.rebound_cli.command import ROOT
 
 pytestmark = pytest.mark.slow
 
-DOCUMENT = (ROOT / "docs" / "paper.md").read_text()
+DOCUMENT = (ROOT / "bench" / "notes" / "paper.md").read_text()
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_adaptive_settles_a_fifth_sooner_without_running_past_and_clear_of_the_wall():
-    """This cell; docs/campaign.md has the median of all."""
+    """This cell; bench/notes/campaign.md has the median of all."""
     paper, adaptive = (work_out(RecoveryCase(law, "foldable", 0, 2.0, 1)) for law in ("paper", "adaptive"))
     assert (paper["outcome"], adaptive["outcome"]) == ("completed", "completed")
     assert adaptive["settled_s"] < 0.8 * paper["settled_s"]
@@ -31,7 +31,7 @@ def test_a_vehicle_that_the_hit_spins_keeps_its_height():
 def test_a_clipped_hit_that_the_vehicle_has_not_seen_whole_leads_neither_into_the_wall_nor_past_the_goal(
     airframe, speed_m_s
 ):
-    """What a real PX4 does with such a hit (docs/px4.md): it says "into the wall", and is right a second later."""
+    """A real PX4 after such a hit (bench/notes/px4.md) says "into the wall", and is right a second later."""
     flight = work_out(RecoveryCase("adaptive", airframe, 0, speed_m_s, 1))
     assert (flight["outcome"], flight["recontacts"], flight["returned"]) == ("completed", 0, 0)
     assert flight["past_m"] < 0.05

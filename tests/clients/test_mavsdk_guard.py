@@ -149,7 +149,7 @@ def test_from_a_mode_of_px4s_own_offboard_is_confirmed_and_given_back_and_asynci
 
 
 def test_the_three_lines_of_the_document_are_enough():
-    text = (ROOT / "docs" / "guard.md").read_text()
+    text = (ROOT / "docs" / "tutorials" / "mavsdk.md").read_text()
     lines = re.search(r"<!-- three lines -->\n```python\n(.*?)```", text, re.DOTALL)[1]
     assert len([line for line in lines.splitlines() if line]) == 3
     with simulator(*WALL) as simulated, connected(simulated) as (mavsdk, system):

@@ -133,7 +133,8 @@ def test_the_simulated_vehicle_is_flown_into_a_wall(tmp_path, home):
 
 
 def test_the_fixture_of_the_documents_is_there(tmp_path, home):
-    examples = re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/testing.md").read_text(), re.DOTALL | re.MULTILINE)
+    text = (ROOT / "docs/how-to/testing.md").read_text()
+    examples = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     chosen = [text for text in examples if "rebound_vehicle" in text and "mavsdk" not in text]
     for number, text in enumerate(chosen):
         (tmp_path / f"test_{number}.py").write_text(text)

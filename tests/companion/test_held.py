@@ -27,7 +27,7 @@ from companion.reflex.config import HELD_S, NOTICED_S
 from companion.reflex.planner import Moving
 from tests.companion.hostile import flight_in
 
-DOCS = Path(__file__).parents[2] / "docs" / "px4.md"
+DOCS = Path(__file__).parents[2] / "bench" / "notes" / "px4.md"
 ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
 FENCE, LIMITS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), Limits()

@@ -9,7 +9,7 @@ import pytest
 from rebound_cli.documents import load_document
 from rebound_cli.inputs import mission_from, world_from
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "missions.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "reference" / "missions.md"
 FOLDER = Path(__file__).parents[2] / "missions"
 NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 # Nothing in them that a real vehicle could not find: they fly on one as they are.

@@ -1,4 +1,4 @@
-"""Detections beside contacts, by the definitions of docs/summary.md."""
+"""Detections beside contacts, by the definitions of docs/reference/summary.md."""
 
 import dataclasses
 

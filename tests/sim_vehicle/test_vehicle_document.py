@@ -1,4 +1,4 @@
-"""docs/vehicle.md names tests that exist, and the table of parameters holds none that nobody needs."""
+"""The simulated vehicle's page names tests that exist, and its parameters are such as somebody needs."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from sim_vehicle.parameters.definitions import TABLE, definitions
 
 ROOT = Path(__file__).parents[2]
-DOCUMENT = (ROOT / "docs" / "vehicle.md").read_text()
+DOCUMENT = (ROOT / "docs" / "reference" / "simulated-vehicle.md").read_text()
 # Where the document's file names begin.
 FOLDERS = (ROOT / "tests/sim_vehicle", ROOT / "tests/sim_vehicle/autopilot", ROOT / "tests")
 _HEADINGS = ("test", "as PX4")

@@ -205,13 +205,6 @@ def test_exit_codes_that_no_restart_mends_end_the_service(monkeypatch):
     assert main(["guard", "--connect", "serial:///dev/ttyNONE:57600"]) == exit_codes.ERROR
 
 
-def test_the_documented_exit_codes_are_those_of_the_program():
-    text = (ROOT / "docs" / "companion-computer.md").read_text()
-    codes = [line.split("|")[1].strip() for line in text.partition("## Exit codes")[2].splitlines() if line[:3] > "| /"]
-    known = (exit_codes.ERROR, exit_codes.USAGE, exit_codes.CONFIGURATION, exit_codes.INTERRUPTED)
-    assert [code for code in codes if code.isdecimal()] == ["0", *map(str, known)]
-
-
 def test_the_back_off_is_there_where_systemd_knows_it():
     assert values(unit(systemd=254), "RestartSteps") == ["5"] and values(unit(systemd=254), "RestartMaxDelaySec")
     for older in (252, None):

@@ -1,4 +1,4 @@
-"""The examples of docs/testing.md, run as a reader would run them."""
+"""The examples for test authors, run as a reader would run them."""
 
 import re
 from pathlib import Path
@@ -12,10 +12,12 @@ pytestmark = pytest.mark.slow
 pytest_plugins = "pytester"
 
 ROOT = Path(__file__).parents[3]
+PAGES = ("how-to/testing.md", "tutorials/test-your-program.md")
 
 
 def examples() -> list[str]:
-    return re.findall(r"^```python\n(.*?)^```$", (ROOT / "docs/testing.md").read_text(), re.DOTALL | re.MULTILINE)
+    texts = [(ROOT / "docs" / page).read_text() for page in PAGES]
+    return [one for text in texts for one in re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)]
 
 
 def test_every_example_passes(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -26,7 +28,7 @@ def test_every_example_passes(pytester: pytest.Pytester, monkeypatch: pytest.Mon
     for number, example in enumerate(examples()):
         (tests if "def test_" in example else scripts).append(example)
         pytester.makepyfile(**{f"test_example_{number}" if "def test_" in example else f"script_{number}": example})
-    assert (len(tests), len(scripts)) == (4, 1)
+    assert (len(tests), len(scripts)) == (6, 1)
     for path in sorted(pytester.path.glob("script_*.py")):
         assert pytester.runpython(path).ret == 0
     result = pytester.runpytest_subprocess(
@@ -41,7 +43,7 @@ def test_the_tables_name_every_fault_and_setting() -> None:
     from sim_vehicle.bench import faults
     from sim_vehicle.bench.bench import Setup
 
-    text = (ROOT / "docs/testing.md").read_text()
+    text = (ROOT / "docs/how-to/testing.md").read_text()
     functions = [name for name, value in vars(faults).items() if getattr(value, "__module__", "") == faults.__name__]
     offered = {name for name in functions if name.islower() and name != "opposite"}
     assert all(f"`{name}(" in text or f"`{name}`" in text for name in offered)

@@ -77,8 +77,8 @@ def imu_hz(baud: int, asked_hz: float | None) -> tuple[float, float]:
     return len(end.all("HIGHRES_IMU")) / 10, sum(map(len, end.packets)) / 10
 
 
-# The rates that PX4's own rule gives (docs/vehicle.md), by default and when asked for 200 Hz. The fastest line shows
-# the sample rate of 250 Hz, of which asking for 200 gives every second.
+# The rates that PX4's own rule gives, by default and when asked for 200 Hz. The fastest line shows the sample
+# rate of 250 Hz, of which asking for 200 gives every second.
 @pytest.mark.parametrize(
     ("baud", "by_default_hz", "asked_hz"),
     [(57_600, 5, 15), (115_200, 11, 30), (460_800, 42, 120), (921_600, 50, 124)],

@@ -1,0 +1,1 @@
+"""`bench docs`: the pages below docs/reference/, made from models, arguments, state tables and docstrings."""

@@ -1,0 +1,23 @@
+"""Markdown that several generated pages have in common."""
+
+import re
+from collections.abc import Iterable, Sequence
+
+
+def cell(text: object) -> str:
+    """One line without a bar, as a table's cell must be; what looks like a tag is none."""
+    parts = re.split(r"(`[^`]*`)", " ".join(str(text).split()))
+    plain = (part if part.startswith("`") else part.replace("<", "&lt;") for part in parts)
+    return re.sub(r"(?<!\\)\|", r"\\|", "".join(plain))
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; empty where there is no row."""
+    lines = ["| " + " | ".join(cell(part) for part in row) + " |" for row in rows]
+    if not lines:
+        return ""
+    return "\n".join(["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *lines]) + "\n"
+
+
+def code(text: object) -> str:
+    return f"`{text}`" if str(text) else ""

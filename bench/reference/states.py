@@ -1,0 +1,54 @@
+"""The page of state machines and of what imports what, from the tables and the imports themselves."""
+
+from pathlib import Path
+
+from bench.import_graph import package_diagram
+from companion.flight.states import TABLE as FLIGHT
+from companion.guard.states import TABLE as GUARD
+from sim_vehicle.autopilot.commander.failsafe_table import markdown_table as failsafe_table
+from sim_vehicle.autopilot.commander.modes import mode_diagram
+
+ROOT = Path(__file__).parents[2]
+
+
+def states_page() -> str:
+    """Diagrams are Mermaid's, which GitHub and the site draw."""
+    return "\n".join(
+        [
+            "# State machines",
+            "",
+            "A trigger that a state does not list leaves the state as it is.",
+            "",
+            "## The flight",
+            "",
+            "`companion/flight/states.py` is the source.",
+            "",
+            f"```mermaid\n{FLIGHT.mermaid_diagram()}```",
+            "",
+            FLIGHT.markdown_table(),
+            "## The guard",
+            "",
+            "`companion/guard/states.py` is the source.",
+            "",
+            f"```mermaid\n{GUARD.mermaid_diagram()}```",
+            "",
+            GUARD.markdown_table(),
+            "## The simulated vehicle's modes",
+            "",
+            "`sim_vehicle/autopilot/commander/modes.py` is the source.",
+            "",
+            f"```mermaid\n{mode_diagram().rstrip()}\n```",
+            "",
+            "## The simulated vehicle's failsafes",
+            "",
+            "`sim_vehicle/autopilot/commander/failsafe_table.py` is the source. Of several actions the vehicle takes "
+            "the one that stands last in `Action`.",
+            "",
+            failsafe_table(),
+            "## Which package imports which",
+            "",
+            "An arrow leads from a package to one that it imports.",
+            "",
+            f"```mermaid\n{package_diagram(ROOT)}```",
+        ]
+    )

@@ -1,0 +1,76 @@
+"""Every link and every path that the manual, the notes and the code name leads somewhere."""
+
+import re
+
+import pytest
+
+from tests.docs.pages import ROOT, blocks, manual, name_of
+
+NOTES = sorted((ROOT / "bench" / "notes").glob("*.md"))
+_LINK = re.compile(r"\[[^]]*\]\((?!https?:)([^)#\s]*)(?:#([^)\s]+))?\)")
+# Paths in code font: of the checkout's own folders and files, without a star and without what a reader fills in.
+_PATH = re.compile(
+    r"`((?:companion|sim_vehicle|rebound_cli|bench|tests|docs|missions|examples|requirements|\.ci)/[\w./-]*)`"
+)
+_DOCUMENT = re.compile(r"(?<![\w/])((?:docs|bench/notes)/[\w/-]+\.md)(?:#([\w-]+))?")
+_PROGRAMS = ("companion", "sim_vehicle", "rebound_cli", "bench", "tests", "examples", "missions")
+
+
+def anchors(text):
+    """As GitHub and MkDocs make them of headings."""
+    heads = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S), re.MULTILINE)
+    plain = (re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", head).replace("`", "").lower() for head in heads)
+    return {re.sub(r"[^\w\- ]", "", head).strip().replace(" ", "-") for head in plain}
+
+
+def broken(path):
+    text = path.read_text(encoding="utf-8")
+    prose = re.sub(r"^ *```.*?^ *```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    for target, anchor in _LINK.findall(prose):
+        there = (path.parent / target).resolve() if target else path
+        if not there.exists():
+            yield f"{target} does not exist"
+        elif anchor and there.suffix == ".md" and anchor not in anchors(there.read_text(encoding="utf-8")):
+            yield f"{target} has no heading #{anchor}"
+
+
+@pytest.mark.parametrize("path", [*manual(), ROOT / "CHANGELOG.md", *NOTES], ids=name_of)
+def test_every_link_leads_somewhere(path):
+    assert list(broken(path)) == []
+
+
+@pytest.mark.parametrize("path", manual(), ids=name_of)
+def test_every_path_in_the_manual_exists(path):
+    text = path.read_text(encoding="utf-8")
+    assert [named for named in _PATH.findall(text) if not (ROOT / named).exists()] == []
+
+
+def test_every_page_that_the_code_names_exists():
+    found = {
+        f"{name_of(path)}: {named}"
+        for folder in _PROGRAMS
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".yaml", ".json")
+        for named, anchor in _DOCUMENT.findall(path.read_text(encoding="utf-8"))
+        if not (ROOT / named).exists() or (anchor and anchor not in anchors((ROOT / named).read_text(encoding="utf-8")))
+    }
+    assert found == set()
+
+
+def test_pages_of_the_site_link_to_no_file_outside_it():
+    # What MkDocs cannot serve is named as a path: README and CONTRIBUTING alone are read on GitHub only.
+    outside = [
+        f"{name_of(path)}: {target}"
+        for path in manual()
+        if "docs" in path.relative_to(ROOT).parts
+        for target, _ in _LINK.findall(path.read_text(encoding="utf-8"))
+        if target and (ROOT / "docs") not in (path.parent / target).resolve().parents
+    ]
+    assert outside == []
+
+
+def test_a_broken_link_and_a_missing_heading_are_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# One\n\n## Two words\n\n[a](#two-words) [b](#three) [c](no.md)\n\n```text\n[d](none.md)\n```\n")
+    assert list(broken(page)) == [" has no heading #three", "no.md does not exist"]
+    assert blocks(page) == [("text", "[d](none.md)\n")]

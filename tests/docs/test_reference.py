@@ -1,0 +1,43 @@
+"""The generated pages are those of the code, and say something of everything."""
+
+import ast
+
+import pytest
+
+from bench.reference import events, summary
+from bench.reference.command import FOLDER, PAGES, page_text
+from rebound_cli import exit_codes
+from rebound_cli.summary import Flown, build_summary
+from rebound_cli.truth_match import FlightTruth
+from tests.rebound_cli.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_as_the_code_has_it(name):
+    assert (FOLDER / name).read_text(encoding="utf-8") == page_text(name), "run `make docs`"
+
+
+def test_every_kind_of_event_has_its_meaning():
+    assert set(events.data_keys()) | events.ELSEWHERE == set(events.MEANINGS)
+
+
+def test_an_event_that_is_told_under_a_name_is_found():
+    call = next(events._calls(ast.parse('flight.tell(now_us, "hold", text, hold_s=3)')))
+    assert call.args[1].value == "hold"
+
+
+def test_every_key_of_the_summary_has_its_meaning():
+    # Given a flight with one collision, of which the simulator knows the contact
+    truth = FlightTruth([hit(10_000)], path_of([(10.0, 3.8, -1.5)]), EPOCH_US)
+    found = build_summary(Flown(report_of(collision(10_004)), 0.5, truth), FACTS)
+    # Then the page explains just the keys that there are
+    (entry,) = found["collisions"]
+    assert set(found) == set(summary.FLIGHT)
+    assert set(entry) == set(summary.COLLISION)
+    assert set(entry["truth"]) == set(summary.TRUTH)
+
+
+def test_the_exit_codes_are_those_of_the_program():
+    text = page_text("commands.md").partition("## Exit codes")[2]
+    codes = [int(line.split("|")[1]) for line in text.splitlines() if line[2:3].isdecimal()]
+    assert codes == [0, exit_codes.ERROR, exit_codes.USAGE, exit_codes.CONFIGURATION, exit_codes.INTERRUPTED]
