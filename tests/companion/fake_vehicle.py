@@ -4,15 +4,22 @@ It shares no code with the product. What it does on request can be spoiled in th
 spoil it: silence, refusals, lost answers, a pilot, a failsafe.
 """
 
+import copy
+import copyreg
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 
 from pymavlink.dialects.v20 import development as mav
 
 from companion.companion import Companion
 from companion.mission.model import Mission
 from companion.report import Event
+
+# A layout of bytes knows no copying, and is made anew.
+copyreg.pickle(struct.Struct, lambda layout: (struct.Struct, (layout.format,)))
 
 OFFBOARD, LOITER, LAND, POSCTL = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24, 3 << 16
 INTERVAL_US = 4_000
@@ -253,6 +260,10 @@ class Flight:
         self.events += result.events
         return list(result.events)
 
+    def copy(self) -> "Flight":
+        """Goes on as this one would; what both have done so far is flown once."""
+        return copy.deepcopy(self)
+
     def run_until(self, condition: Callable[[], bool], limit_s: float = 60.0) -> None:
         """Step until the condition holds; the test fails when it does not within virtual `limit_s`."""
         for _ in range(math.ceil(limit_s * 1e6 / INTERVAL_US)):
@@ -287,6 +298,32 @@ class Flight:
     def setpoints_since(self, time_us: int) -> list:
         """Setpoint packets sent after `now_us` = time_us."""
         return [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == 84]
+
+
+INTO_WALL = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
+    {"land": {}},
+]
+
+
+def flying_in(state: str, no_current_mode: bool = False, **changes: str) -> Flight:
+    """A flight in the middle of the given state, airborne; of a mission that meets a wall 3 m north."""
+    return _flying_in(state, no_current_mode, **changes).copy()
+
+
+@cache
+def _flying_in(state: str, no_current_mode: bool, **changes: str) -> Flight:
+    f = flight(FakeVehicle(wall_north_m=3.0, no_current_mode=no_current_mode), items=INTO_WALL, **changes)
+    if state == "takeoff":
+        f.run_until(lambda: f.vehicle.landed == 2)
+    elif state == "landing":
+        f.run_until(lambda: "landing" in f.kinds())
+    else:
+        f.run_to(state)
+    f.run_for(0.1)
+    assert f.state == state
+    return f
 
 
 def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes: object) -> Flight:

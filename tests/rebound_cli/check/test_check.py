@@ -16,7 +16,7 @@ from rebound_cli.documents import parse_document
 from rebound_cli.figure.ground import footprint
 from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.scene import Scene
-from tests.rebound_cli.command import ROOT, WALL, run
+from tests.rebound_cli.command import ROOT, WALL, run_here
 
 SCHEMA = ROOT / "missions" / "schema.json"
 MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))
@@ -87,7 +87,7 @@ def test_obstacles_seen_from_above():
 
 
 def test_a_person_reads_what_would_be_flown(tmp_path):
-    result = run("check", WALL, "--out", tmp_path)
+    result = run_here("check", WALL, "--out", tmp_path)
     assert result.returncode == 0, result.stderr
     for words in ("go to [7.00, 0.00, -1.50]", "7.0 m", "meets 'north wall'", "in all 15.5 m in 21 s", "Fence"):
         assert words in result.stdout
@@ -98,11 +98,11 @@ def test_a_person_reads_what_would_be_flown(tmp_path):
 def test_one_wrong_file_does_not_hide_another(tmp_path):
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text("name: wrong\nitems:\n  - takeoff: {height: 1}\n  - land:\n")
-    result = run("check", wrong, WALL, "--no-picture", "--set", "on_interrupt=land")
+    result = run_here("check", wrong, WALL, "--no-picture", "--set", "on_interrupt=land")
     assert result.returncode == 1
     assert f"{wrong}:3: items.0.takeoff.height: unknown key" in result.stderr and "Traceback" not in result.stderr
     assert "hand the vehicle to land" in result.stdout
-    assert run("check").returncode == 1
+    assert run_here("check").returncode == 1
 
 
 # --- the schema
