@@ -58,6 +58,7 @@ def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
 
+@pytest.mark.slow
 def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     # Given a sensor that says nothing true any more, and nothing at all
     blind = Fault(
@@ -143,6 +144,7 @@ class Forgetting(Injector):
         return _Forgetful("log")
 
 
+@pytest.mark.slow
 def test_a_judge_names_each_kind_of_loss() -> None:
     no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
     bad = {
@@ -162,6 +164,7 @@ def test_a_judge_names_each_kind_of_loss() -> None:
         assert any(text.startswith(words) for text in result["complaints"]), (words, result)
 
 
+@pytest.mark.slow
 def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
     # Given an accelerometer that is off in the second of a hit
     hidden = FLOWN["accelerometer zero"]

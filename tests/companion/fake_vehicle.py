@@ -34,8 +34,10 @@ SQUARE_ITEMS = [
 ]
 
 
-def mission(**changes: object) -> Mission:
-    return Mission.model_validate({"name": "test", "items": SQUARE_ITEMS, **changes})
+def mission(companion: dict | None = None, **changes: object) -> Mission:
+    """Measures the streams for half a second instead of two, unless told otherwise."""
+    settings = {"streams": {"window_s": 0.5}, **(companion or {})}
+    return Mission.model_validate({"name": "test", "items": SQUARE_ITEMS, "companion": settings, **changes})
 
 
 @dataclass
