@@ -41,7 +41,9 @@ def test_a_wall_through_the_start_position(tmp_path, how):
 
 
 def test_an_unknown_airframe():
-    assert_one_clear_sentence(run_here("fly", WALL, "--lockstep", "--airframe", "foldible"), "foldible", "foldable, rigid")
+    assert_one_clear_sentence(
+        run_here("fly", WALL, "--lockstep", "--airframe", "foldible"), "foldible", "foldable, rigid"
+    )
 
 
 def test_a_port_in_use(tmp_path):
@@ -61,7 +63,9 @@ def test_a_missing_serial_port():
 
 
 def test_a_wrong_address():
-    assert_one_clear_sentence(run_here("fly", SQUARE, "--connect", "0.0.0.0:14540"), "did you mean udpin://0.0.0.0:14540?")
+    assert_one_clear_sentence(
+        run_here("fly", SQUARE, "--connect", "0.0.0.0:14540"), "did you mean udpin://0.0.0.0:14540?"
+    )
     assert_one_clear_sentence(run_here("fly", SQUARE, "--connect", "the drone"), "udpin://HOST:PORT")
 
 

@@ -135,12 +135,11 @@ def test_the_wall_may_stand_on_either_side_of_either_axis(tmp_path):
     assert ratios == pytest.approx([ratios[0]] * 4, abs=0.02)
 
 
-def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
+def test_a_flight_becomes_an_airframe_that_flies(wall_flight, tmp_path):
     # Given a flight of the foldable vehicle into the wall, above the speed that reaches the stop
-    flown = run_here("fly", WALL, "--lockstep", "--out", tmp_path / "run")
-    assert flown.returncode == 0, flown.stderr
+    folder, _ = wall_flight
     # When it is identified from its telemetry
-    identified = run_here("identify", tmp_path / "run", "--out", tmp_path / "found.yaml")
+    identified = run_here("identify", folder, "--out", tmp_path / "found.yaml")
     assert identified.returncode == 0, identified.stderr
     # Then the file has the vehicle's springs and stop
     document = load_document(tmp_path / "found.yaml")
@@ -150,7 +149,7 @@ def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
     assert airframe.arms.stiffness_per_s2 == pytest.approx(500, rel=0.3)
     assert airframe.arms.fold_max_m == pytest.approx(0.03, abs=0.005)
     # whatever the file is called
-    named = run_here("identify", tmp_path / "run", "--out", tmp_path / "a: #b.yaml", "--name", 'an "own": vehicle')
+    named = run_here("identify", folder, "--out", tmp_path / "a: #b.yaml", "--name", 'an "own": vehicle')
     assert named.returncode == 0, named.stderr
     assert load_document(tmp_path / "a: #b.yaml").data["name"] == 'an "own": vehicle'
     # And flies the same mission
