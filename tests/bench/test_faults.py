@@ -209,6 +209,7 @@ def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None
     assert "| p50 6.0 ms, p99 more than 500 ms, p99.9 more than 500 ms, most more than 500 ms | 2 of 3 |" in text
 
 
+@pytest.mark.slow
 def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
     # Given one row, of which one seed has been tried before
     monkeypatch.chdir(tmp_path)

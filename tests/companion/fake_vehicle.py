@@ -263,8 +263,10 @@ class Flight:
         return list(result.events)
 
     def copy(self) -> "Flight":
-        """Goes on as this one would; what both have done so far is flown once."""
-        return copy.deepcopy(self)
+        """Goes on as this one would; what both have done so far is flown once. What was said stays as it is."""
+        v = self.vehicle
+        said = [*self.events, *self.sent, *v.setpoints, *v.commands, *v.heartbeats, *v.timesyncs]
+        return copy.deepcopy(self, {id(one): one for one in said})
 
     def run_until(self, condition: Callable[[], bool], limit_s: float = 60.0) -> None:
         """Step until the condition holds; the test fails when it does not within virtual `limit_s`."""

@@ -98,7 +98,7 @@ def test_into_a_silence_the_mode_is_asked_for_once():
 def test_a_takeover_at_any_instant_stops_the_setpoints_with_the_report_that_shows_it(state):
     """All of a recovery, half a second of the others: ahead of, with and behind every stream and setpoint."""
     flown, tried = flying_in(state), 0
-    while flown.state == state and (state == "recovering" or tried < 18):
+    while flown.state == state and (state == "recovering" or tried < 14):
         tried += 1
         f = flown.copy()
         f.vehicle.pilot_takes(POSCTL)
@@ -110,8 +110,8 @@ def test_a_takeover_at_any_instant_stops_the_setpoints_with_the_report_that_show
         f.run_for(0.5)
         assert f.setpoints_since(before_report_us) == [], tried
         assert f.state == "aborted" and f.vehicle.mode == POSCTL and modes_asked(f) == asked
-        # The streams' periods are 5, 25, 50 and 250 intervals: 7 has no part in common with any.
-        flown.run_for(7 * INTERVAL_US * 1e-6)
+        # The streams' periods are 5, 25, 50 and 250 intervals: 9 has no part in common with any.
+        flown.run_for(9 * INTERVAL_US * 1e-6)
     assert tried >= 10
 
 

@@ -88,7 +88,7 @@ def test_hits_put_into_a_flight_leave_their_whole_impulse_in_its_samples():
 
 
 def test_a_contact_shorter_than_the_streams_interval_is_missed_now_and_then():
-    log = replace(flight(duration_s=20.0, hit_us=None), averaging_us=4000.0)
+    log = replace(flight(duration_s=14.0, hit_us=None), averaging_us=4000.0)
     folding = [sight([log], LATERAL, FOLDABLE, rate_hz) for rate_hz in (None, 50.0)]
     stiff = [sight([log], LATERAL, RIGID, rate_hz) for rate_hz in (None, 50.0)]
     assert stiff[0].certain_from_m_s == SPEEDS_M_S[0]
