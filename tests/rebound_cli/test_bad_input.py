@@ -69,6 +69,14 @@ def test_a_wrong_address():
     assert_one_clear_sentence(run_here("fly", SQUARE, "--connect", "the drone"), "udpin://HOST:PORT")
 
 
+@pytest.mark.parametrize("url", ["udpout://0.0.0.0:14580", "udpout://127.0.0.1:70000", "udpout://no.invalid:14580"])
+@pytest.mark.parametrize("command", [("fly", SQUARE), ("guard",), ("preflight",)], ids=lambda words: words[0])
+def test_an_address_that_nobody_can_answer_from(tmp_path, command, url):
+    out = ("--out", tmp_path / "run") if command[0] != "preflight" else ()
+    assert_one_clear_sentence(run_here(*command, "--connect", url, *out), url.split("//")[1].split(":")[0])
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
