@@ -38,6 +38,7 @@ class Air:
     sets: tuple[str, ...] = ()
     events: list[Event] = field(default_factory=list)
     pending: bytes = b""
+    heard: bytes = b""
     setpoints: list = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -52,9 +53,10 @@ class Air:
     def state(self) -> str:
         return self.companion.status().state
 
-    def step(self, forged: bytes = b"") -> None:
-        heard = b"".join(self.vehicle.step(self.pending))
-        result = self.companion.step(forged + heard, EPOCH_US + self.vehicle.time_boot_us)
+    def step(self, forged: bytes = b"", pilots: bytes = b"") -> None:
+        """`forged` reaches the companion before the vehicle's packets, `pilots` the vehicle after the companion's."""
+        self.heard = b"".join(self.vehicle.step(self.pending + pilots))
+        result = self.companion.step(forged + self.heard, EPOCH_US + self.vehicle.time_boot_us)
         self.pending = b"".join(result.sent_frames)
         self.events += result.events
         for frame in result.sent_frames:
