@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 from pymavlink.dialects.v20 import development as mav
 
@@ -34,7 +35,7 @@ SQUARE_ITEMS = [
 ]
 
 
-def mission(companion: dict | None = None, **changes: object) -> Mission:
+def mission(companion: dict | None = None, **changes: Any) -> Mission:
     """Measures the streams for half a second instead of two, unless told otherwise."""
     settings = {"streams": {"window_s": 0.5}, **(companion or {})}
     return Mission.model_validate({"name": "test", "items": SQUARE_ITEMS, "companion": settings, **changes})
@@ -311,13 +312,13 @@ INTO_WALL = [
 ]
 
 
-def flying_in(state: str, no_current_mode: bool = False, **changes: str) -> Flight:
+def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flight:
     """A flight in the middle of the given state, airborne; of a mission that meets a wall 3 m north."""
     return _flying_in(state, no_current_mode, **changes).copy()
 
 
 @cache
-def _flying_in(state: str, no_current_mode: bool, **changes: str) -> Flight:
+def _flying_in(state: str, no_current_mode: bool, **changes: Any) -> Flight:
     f = flight(FakeVehicle(wall_north_m=3.0, no_current_mode=no_current_mode), items=INTO_WALL, **changes)
     if state == "takeoff":
         f.run_until(lambda: f.vehicle.landed == 2)
@@ -330,7 +331,7 @@ def _flying_in(state: str, no_current_mode: bool, **changes: str) -> Flight:
     return f
 
 
-def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes: object) -> Flight:
+def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes: Any) -> Flight:
     companion = Companion(mission(**changes))
     if confirmed:
         companion.confirm_plan()

@@ -41,6 +41,16 @@ def in_a_child(work: Callable[[], Any]) -> Any:
     return json.loads(text)
 
 
+def messages_in(packets: bytes) -> list[Any]:
+    return mav.MAVLink(None).parse_buffer(bytearray(packets)) or []
+
+
+def flies(message: Any) -> bool:
+    """A setpoint, or a command that asks for a mode or for motors."""
+    is_command = message.get_type() == "COMMAND_LONG" and message.command in (SET_MODE, ARM)
+    return is_command or message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"
+
+
 def taken_over(air: Air, mode: int) -> dict[str, Any]:
     """After how many intervals the vehicle reported the pilot's mode, and what the companion sent from then on."""
     fields = (1, 1, SET_MODE, 0, 1.0, float(mode >> 16 & 0xFF), float(mode >> 24), 0, 0, 0, 0)
@@ -49,20 +59,17 @@ def taken_over(air: Air, mode: int) -> dict[str, Any]:
     reported, sent = None, []
     for interval in range(WATCHED):
         air.step(pilots=sticks + (asks if interval == 0 else b""))
-        reader = mav.MAVLink(None)
-        if reported is None:
-            modes = [getattr(message, "custom_mode", None) for message in reader.parse_buffer(bytearray(air.heard)) or []]
-            reported = interval if mode in modes else None
+        if reported is None and mode in [getattr(message, "custom_mode", None) for message in messages_in(air.heard)]:
+            reported = interval
         if reported is not None:
-            messages = reader.parse_buffer(bytearray(air.pending)) or []
-            sent += [m.get_type() for m in messages if m.get_type() == "SET_POSITION_TARGET_LOCAL_NED"]
-            sent += [str(m.command) for m in messages if m.get_type() == "COMMAND_LONG" and m.command in (SET_MODE, ARM)]
+            sent += [message.get_type() for message in messages_in(air.pending) if flies(message)]
     return {"reported": reported, "sent": sent, "state": air.state, "mode": air.companion.status().vehicle_mode}
 
 
 # In intervals, with no part in common with the periods of the streams.
 @pytest.mark.parametrize(
-    ("mode", "name", "every"), [(POSCTL, "POSCTL", 37), (AUTO_LOITER, "AUTO.LOITER", 101), (AUTO_LAND, "AUTO.LAND", 101)]
+    ("mode", "name", "every"),
+    [(POSCTL, "POSCTL", 37), (AUTO_LOITER, "AUTO.LOITER", 101), (AUTO_LAND, "AUTO.LAND", 101)],
 )
 def test_a_pilots_mode_at_any_instant_of_a_recovery_is_followed_by_no_setpoint(mode, name, every):
     # Given a vehicle that recovers from a hit on a wall
