@@ -2,6 +2,7 @@
 
 import pytest
 
+from rebound_cli import fly
 from tests.rebound_cli.command import WALL, run_here
 
 
@@ -10,3 +11,9 @@ def wall_flight(tmp_path_factory):
     """The wall mission, flown once: its folder, to be left as it is, and what the command printed."""
     folder = tmp_path_factory.mktemp("flights") / "wall"
     return folder, run_here("fly", WALL, "--lockstep", "--json", "--out", folder)
+
+
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """For flights whose flight.png nobody looks at: drawing takes as long as flying."""
+    monkeypatch.setattr(fly, "_draw", lambda *_: None)
