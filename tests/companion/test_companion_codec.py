@@ -273,6 +273,14 @@ def test_the_square_of_a_rotations_length_is_one_to_a_thousandth():
         assert isinstance(sample, Refused) is not is_believed, square
 
 
+@pytest.mark.parametrize(("force_m_s2", "is_off"), [(0.0, True), (0.75, True), (-0.75, True), (0.82, False)])
+def test_an_accelerometer_that_shows_no_more_than_its_zero_g_offset_is_off(force_m_s2, is_off):
+    # The widest among PX4's drivers: 80 mg, 0.785 m/s^2
+    message = copy.copy(measured("HIGHRES_IMU"))
+    message.xacc, message.yacc, message.zacc = force_m_s2, 0.0, 0.0
+    assert isinstance(listening_decoder().feed(packed(message))[0][1], Refused) is is_off
+
+
 def test_a_stamp_that_is_not_exact_in_double_precision_is_refused():
     for name in ("HIGHRES_IMU", "ODOMETRY", "VIBRATION"):
         message = copy.copy(measured(name))
