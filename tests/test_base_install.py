@@ -1,10 +1,9 @@
 """What a drone installs is enough for what a drone does: tried in a process that has no more."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).parent.parent
 # Everything that only an extra brings.
@@ -14,29 +13,40 @@ LEFT_OUT = (
     *("mavsdk", "pyulog", "pygeomag", "ambiance", "pytest", "rich"),
 )
 WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"
-QUICK = "'--set', 'companion.link.heartbeat_wait_s=0.2'"
+QUICK = ("--set", "companion.link.heartbeat_wait_s=0.2")
 
 
 def alone(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", WITHOUT + code], cwd=ROOT, capture_output=True, text=True, timeout=120)
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
-        ("'guard', '--connect', 'udpin://127.0.0.1:0', '--out', folder, " + QUICK, "No HEARTBEAT"),
-        ("'fly', 'missions/square.yaml', '--connect', 'udpin://127.0.0.1:0', '--out', folder, " + QUICK, "HEARTBEAT"),
-        ("'fly', 'missions/square.yaml', '--lockstep', '--out', folder", "pip install 'px4-rebound[sim]'"),
-        ("'preflight', '--connect', 'nonsense'", "not a connection address"),
-        ("'sim'", "pip install 'px4-rebound[sim]'"),
-        ("'replay', 'some.ulg'", "pip install 'px4-rebound[logs]'"),
-    ],
-)
-def test_each_command_works_or_names_the_extra_that_it_needs(tmp_path, command, words):
-    code = f"from rebound_cli.main import main\nfolder = {str(tmp_path / 'run')!r}\nsys.exit(main([{command}]))"
+COMMANDS = [
+    (["guard", "--connect", "udpin://127.0.0.1:0", "--out", "guarded", *QUICK], "No HEARTBEAT"),
+    (["fly", "missions/square.yaml", "--connect", "udpin://127.0.0.1:0", "--out", "flown", *QUICK], "HEARTBEAT"),
+    (["fly", "missions/square.yaml", "--lockstep", "--out", "run"], "pip install 'px4-rebound[sim]'"),
+    (["preflight", "--connect", "nonsense"], "not a connection address"),
+    (["sim"], "pip install 'px4-rebound[sim]'"),
+    (["replay", "some.ulg"], "pip install 'px4-rebound[logs]'"),
+]
+
+
+def test_each_command_works_or_names_the_extra_that_it_needs(tmp_path):
+    folders = ("guarded", "flown", "run")
+    commands = [[str(tmp_path / word) if word in folders else word for word in words] for words, _ in COMMANDS]
+    code = f"""
+import contextlib, io, json
+from rebound_cli.main import main
+for words in {commands!r}:
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        code = main(words)
+    print(json.dumps([code, said.getvalue()]))
+"""
     done = alone(code, tmp_path)
-    assert done.returncode == 1 and "Traceback" not in done.stderr, done.stderr
-    assert words in done.stderr + done.stdout
+    assert done.returncode == 0, done.stderr
+    for (command, words), line in zip(COMMANDS, done.stdout.splitlines(), strict=True):
+        code, said = json.loads(line)
+        assert code == 1 and words in said, (command, said)
 
 
 def test_missions_are_checked_and_what_cannot_be_drawn_is_said(tmp_path):

@@ -1,6 +1,7 @@
 """The rooms' rules: who may import whom, and where the world outside may be touched."""
 
 import argparse
+import functools
 import graphlib
 import importlib
 from collections.abc import Iterator
@@ -36,12 +37,15 @@ def name(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
+imported = functools.cache(lambda path: tuple(imported_names(path)))
+
+
 def breaches(packages: tuple[str, ...], forbidden: set[str]) -> list[str]:
     return [
         f"{name(path)} imports {module}"
         for package in packages
         for path in sources(package)
-        for module in imported_names(path)
+        for module in imported(path)
         if module.split(".")[0] in forbidden
     ]
 

@@ -8,6 +8,7 @@ serial:///dev/ttyAMA0:921600     serial port and baud rate
 udp://:14540                     the older form of udpin (or of udpout when a remote host is given)
 """
 
+import ipaddress
 import re
 import socket
 from collections.abc import Callable
@@ -18,6 +19,8 @@ from companion.shell.peer import Peer
 from companion.shell.streams import TcpInConnection, serial_port, tcp_out
 
 _HOST_PORT = re.compile(r"^(?P<host>\[[0-9a-fA-F:]+\]|[^:/\[\]]*):(?P<port>\d{1,5})$")
+_MOST_PORT = 65_535  # 16 bits
+_BROADCAST = ipaddress.IPv4Address("255.255.255.255")
 _SCHEMES = ("udpin", "udpout", "tcpout", "tcpin", "serial", "udp")
 _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOST:PORT or serial:///dev/PORT:BAUD"
 
@@ -39,6 +42,8 @@ def open_connection(
     host, port = _host_and_port(url, rest)
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
+    if scheme in ("udpout", "tcpout"):
+        _check_one_host(url, scheme, host, port)
     if scheme == "udpin":
         return udp_in(host, port, Peer(None if peer is None else _peer(peer, host), is_genuine))
     if scheme == "udpout":
@@ -75,6 +80,9 @@ def _meant(text: str) -> str | None:
         # PX4's TELEM2 for a companion, SER_TEL2_BAUD.
         device, _, baud = text.replace(",", ":").partition(":")
         return f"serial://{device}:{baud or 921600}"
+    host_port = _HOST_PORT.match(rest) or _HOST_PORT.match(text)
+    if host_port is not None and int(host_port["port"]) > _MOST_PORT:
+        return None
     known = {"udp": "udpin", "udpin": "udpin", "udpout": "udpout", "tcp": "tcpout", "tcpin": "tcpin"}.get(scheme)
     if known is not None and _HOST_PORT.match(rest):
         return f"{known}://{rest}"
@@ -83,6 +91,17 @@ def _meant(text: str) -> str | None:
     if not _HOST_PORT.match(text):
         return None
     return f"udpin://{text}" if scheme in ("", "0.0.0.0") else f"udpout://{text}"
+
+
+def _check_one_host(url: str, scheme: str, host: str, port: int) -> None:
+    """Only who answers from the address that was sent to is ever heard."""
+    _, address = resolve(socket.SOCK_DGRAM, host, port)
+    number = ipaddress.ip_address(address[0])
+    if number.is_unspecified:
+        listening = f"{scheme.removesuffix('out')}in://{host}:{port}"
+        raise AddressError(f"{url!r} names any host: to listen, use {listening}; to send, name one.")
+    if number.is_multicast or number == _BROADCAST:
+        raise AddressError(f"{url!r} names many hosts: give the vehicle's own address.")
 
 
 def _peer(text: str, listening: str) -> tuple[str, int | None]:
@@ -108,6 +127,8 @@ def _device_and_baud(url: str, rest: str) -> tuple[str, int]:
 
 def _host_and_port(url: str, rest: str) -> tuple[str, int]:
     match = _HOST_PORT.match(rest)
-    if match is None or int(match["port"]) > 65_535:
+    if match is None:
         raise AddressError(f"{url!r} names no host and port: use {_FORMS}.")
+    if int(match["port"]) > _MOST_PORT:
+        raise AddressError(f"{url!r}: there is no port {match['port']}, the last is {_MOST_PORT}.")
     return match["host"], int(match["port"])

@@ -78,6 +78,7 @@ def test_the_table_counts_what_is_lost_without_a_rule():
     assert [cell.strip() for cell in hand.split("|")][3:] == ["0", "+0", "+0", *["–"] * 5, ""]
 
 
+@pytest.mark.slow
 def test_a_drawn_hit_is_heard_with_and_without_each_rule():
     # Given a hit, and the rule by which alone the detector hears velocities
     heard = detections_campaign(1, 71_003, ("velocity jump", "hand"), None).cases

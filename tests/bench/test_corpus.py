@@ -37,6 +37,7 @@ def verdicts(flight, tmp_path_factory):
     return json.loads((folder / "verdicts.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_flight_is_judged_from_its_bytes_against_its_truth(flight, verdicts):
     # Given a recorded flight with hits
     hits, _, _ = load_truth(flight / TRUTH_NAME)
@@ -81,12 +82,14 @@ def test_drawn_vehicles_of_both_kinds_fly_a_mission_of_each_seed(monkeypatch, tm
     ]
 
 
+@pytest.mark.slow
 def test_a_flight_that_is_there_is_not_flown_again(flight):
     before = (flight / TLOG_NAME).stat().st_mtime_ns
     record((flight, CASE))
     assert (flight / TLOG_NAME).stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_a_hit_that_is_lost_and_a_false_one_are_told(verdicts, tmp_path, capsys):
     # Given a version that misses the first hit at 50 Hz and tells one that is none
     worse = copy.deepcopy(verdicts)

@@ -58,6 +58,7 @@ def test_what_lies_outside_the_envelope_is_named(fields: dict[str, float], wrong
     assert outside(core, made("SET_POSITION_TARGET_LOCAL_NED", SETPOINT | fields)) == wrong
 
 
+@pytest.mark.slow
 def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     # Given a sensor that says nothing true any more, and nothing at all
     blind = Fault(
@@ -66,7 +67,8 @@ def test_flights_part_at_the_first_item_and_each_has_its_own_fault() -> None:
     calm = Fault("calm", "link", "", lambda _: Injector(), Expected((COMPLETED,)))
     # When both fly on from one take-off
     results: dict[str, Json] = {}
-    fly_from_one_take_off(7, [blind, calm], results.__setitem__)
+    # (a wall that the blind one falls beside at once, and does not scratch along for half a minute)
+    fly_from_one_take_off(3, [blind, calm], results.__setitem__)
     # Then the hit is found by the one that could, and the other is told as what it is
     assert results["calm"]["found"] and results["calm"]["complaints"] == []
     assert not results["blind"]["found"] and "hit not found" in results["blind"]["complaints"]
@@ -142,6 +144,7 @@ class Forgetting(Injector):
         return _Forgetful("log")
 
 
+@pytest.mark.slow
 def test_a_judge_names_each_kind_of_loss() -> None:
     no_wall = Expected((COMPLETED, HANDED_OVER), finds=False, has_wall=False)
     bad = {
@@ -161,6 +164,7 @@ def test_a_judge_names_each_kind_of_loss() -> None:
         assert any(text.startswith(words) for text in result["complaints"]), (words, result)
 
 
+@pytest.mark.slow
 def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_says_that_something_can() -> None:
     # Given an accelerometer that is off in the second of a hit
     hidden = FLOWN["accelerometer zero"]
@@ -205,6 +209,7 @@ def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None
     assert "| p50 6.0 ms, p99 more than 500 ms, p99.9 more than 500 ms, most more than 500 ms | 2 of 3 |" in text
 
 
+@pytest.mark.slow
 def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
     # Given one row, of which one seed has been tried before
     monkeypatch.chdir(tmp_path)

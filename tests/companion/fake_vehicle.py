@@ -4,15 +4,23 @@ It shares no code with the product. What it does on request can be spoiled in th
 spoil it: silence, refusals, lost answers, a pilot, a failsafe.
 """
 
+import copy
+import copyreg
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 from pymavlink.dialects.v20 import development as mav
 
 from companion.companion import Companion
 from companion.mission.model import Mission
 from companion.report import Event
+
+# A layout of bytes knows no copying, and is made anew.
+copyreg.pickle(struct.Struct, lambda layout: (struct.Struct, (layout.format,)))
 
 OFFBOARD, LOITER, LAND, POSCTL = 6 << 16, 4 << 16 | 3 << 24, 4 << 16 | 6 << 24, 3 << 16
 INTERVAL_US = 4_000
@@ -27,8 +35,10 @@ SQUARE_ITEMS = [
 ]
 
 
-def mission(**changes: object) -> Mission:
-    return Mission.model_validate({"name": "test", "items": SQUARE_ITEMS, **changes})
+def mission(companion: dict | None = None, **changes: Any) -> Mission:
+    """Measures the streams for half a second instead of two, unless told otherwise."""
+    settings = {"streams": {"window_s": 0.5}, **(companion or {})}
+    return Mission.model_validate({"name": "test", "items": SQUARE_ITEMS, "companion": settings, **changes})
 
 
 @dataclass
@@ -194,10 +204,10 @@ class FakeVehicle:
                 command = [0.0, 0.0, 0.0]  # feet do not slide
         elif self.armed and self.mode == LAND:
             command = [0.0, 0.0, 0.7]
-        steps = 40
-        force = 0.0
+        # The spring of a contact needs 0.1 ms; free flight is a lag of 1/6 s.
+        steps = 40 if self.wall_north_m is not None and self.position[0] > self.wall_north_m - 0.1 else 1
+        force, h = 0.0, dt / steps
         for _ in range(steps):
-            h = dt / steps
             for i in range(3):
                 self.velocity[i] += max(-8.0, min(8.0, 6.0 * (command[i] - self.velocity[i]))) * h
             force += self.wall_force(h) / steps
@@ -253,6 +263,12 @@ class Flight:
         self.events += result.events
         return list(result.events)
 
+    def copy(self) -> "Flight":
+        """Goes on as this one would; what both have done so far is flown once. What was said stays as it is."""
+        v = self.vehicle
+        said = [*self.events, *self.sent, *v.setpoints, *v.commands, *v.heartbeats, *v.timesyncs]
+        return copy.deepcopy(self, {id(one): one for one in said})
+
     def run_until(self, condition: Callable[[], bool], limit_s: float = 60.0) -> None:
         """Step until the condition holds; the test fails when it does not within virtual `limit_s`."""
         for _ in range(math.ceil(limit_s * 1e6 / INTERVAL_US)):
@@ -289,7 +305,33 @@ class Flight:
         return [(t, f) for t, f in self.sent if t > time_us and f[7] | f[8] << 8 | f[9] << 16 == 84]
 
 
-def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes: object) -> Flight:
+INTO_WALL = [
+    {"takeoff": {"height_m": 1.5}},
+    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
+    {"land": {}},
+]
+
+
+def flying_in(state: str, no_current_mode: bool = False, **changes: Any) -> Flight:
+    """A flight in the middle of the given state, airborne; of a mission that meets a wall 3 m north."""
+    return _flying_in(state, no_current_mode, **changes).copy()
+
+
+@cache
+def _flying_in(state: str, no_current_mode: bool, **changes: Any) -> Flight:
+    f = flight(FakeVehicle(wall_north_m=3.0, no_current_mode=no_current_mode), items=INTO_WALL, **changes)
+    if state == "takeoff":
+        f.run_until(lambda: f.vehicle.landed == 2)
+    elif state == "landing":
+        f.run_until(lambda: "landing" in f.kinds())
+    else:
+        f.run_to(state)
+    f.run_for(0.1)
+    assert f.state == state
+    return f
+
+
+def flight(vehicle: FakeVehicle | None = None, confirmed: bool = True, **changes: Any) -> Flight:
     companion = Companion(mission(**changes))
     if confirmed:
         companion.confirm_plan()

@@ -3,6 +3,7 @@
 import math
 import random
 from collections.abc import Iterable
+from functools import cache
 
 from pymavlink.dialects.v20 import development as mav
 
@@ -109,6 +110,11 @@ def assert_inside(f: Flight, frame: bytes) -> None:
 
 def flight_in(state: str) -> Flight:
     """A flight that has just come to the state; of a mission that flies into a wall."""
+    return _flight_in(state).copy()
+
+
+@cache
+def _flight_in(state: str) -> Flight:
     vehicle = FakeVehicle(wall_north_m=3.0, battery_percent=80)
     f = flight(vehicle, items=ITEMS, on_collision=POLICY)
     f.run_to(state)

@@ -2,31 +2,10 @@
 
 import pytest
 
-from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, Flight, flight
+from tests.companion.fake_vehicle import LAND, LOITER, OFFBOARD, POSCTL, FakeVehicle, Flight, flight, flying_in
 
-INTO_WALL = [
-    {"takeoff": {"height_m": 1.5}},
-    {"go_to": {"position_ned_m": [5, 0, -1.5], "speed_m_s": 2.0}},
-    {"land": {}},
-]
 IN_THE_AIR = ["takeoff", "mission", "recovering", "holding", "landing"]
 ON_SETPOINTS = ["takeoff", "mission", "recovering", "holding"]
-
-
-def flying_in(state: str, vehicle: FakeVehicle | None = None, **changes) -> Flight:
-    """A flight in the middle of the given state, airborne."""
-    vehicle = vehicle or FakeVehicle()
-    vehicle.wall_north_m = 3.0
-    f = flight(vehicle, items=INTO_WALL, **changes)
-    if state == "takeoff":
-        f.run_until(lambda: vehicle.landed == 2)
-    elif state == "landing":
-        f.run_until(lambda: "landing" in f.kinds())
-    else:
-        f.run_to(state)
-    f.run_for(0.1)
-    assert f.state == state
-    return f
 
 
 def assert_silent_from_now(f: Flight) -> None:
@@ -87,7 +66,7 @@ def test_the_pilot_choosing_land_is_still_the_pilot():
 
 
 def test_without_current_mode_the_heartbeat_tells_the_pilot():
-    f = flying_in("mission", FakeVehicle(no_current_mode=True))
+    f = flying_in("mission", no_current_mode=True)
     f.vehicle.pilot_takes(POSCTL)
     f.run_for(1.1)
     since = f.now_us

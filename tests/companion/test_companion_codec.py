@@ -222,18 +222,20 @@ def test_answers_to_others_and_unmeasured_values_are_not_samples():
         assert listening_decoder().feed(packed(message))[0][1] is None
 
 
+# All three axes at the end of the widest range among PX4's drivers: 40 g and 4000 deg/s.
+FORCE, RATE = math.sqrt(3.0) * 40 * 9.80665, math.sqrt(3.0) * math.radians(4000)
 # Message, the fields that must be finite and bounded, and the largest value that PX4 can mean by them.
 MEASURED = [
-    ("HIGHRES_IMU", ("xacc", "yacc", "zacc"), 40 * 9.80665),
-    ("HIGHRES_IMU", ("xgyro", "ygyro", "zgyro"), math.radians(4000)),
+    ("HIGHRES_IMU", ("xacc", "yacc", "zacc"), FORCE),
+    ("HIGHRES_IMU", ("xgyro", "ygyro", "zgyro"), RATE),
     ("LOCAL_POSITION_NED", ("x", "y", "z"), 1e6),
     ("LOCAL_POSITION_NED", ("vx", "vy", "vz"), 100.0),
     ("ODOMETRY", ("x", "y", "z"), 1e6),
     ("ODOMETRY", ("vx", "vy", "vz"), 100.0),
-    ("ATTITUDE_QUATERNION", ("rollspeed", "pitchspeed", "yawspeed"), math.radians(4000)),
-    ("ATTITUDE_TARGET", ("thrust",), 1.0),
-    ("VIBRATION", ("vibration_y",), 2 * math.radians(4000)),
-    ("VIBRATION", ("vibration_z",), 2 * 40 * 9.80665),
+    ("ATTITUDE_QUATERNION", ("rollspeed", "pitchspeed", "yawspeed"), RATE),
+    ("ATTITUDE_TARGET", ("thrust",), math.sqrt(3.0)),
+    ("VIBRATION", ("vibration_y",), 2 * RATE),
+    ("VIBRATION", ("vibration_z",), 2 * FORCE),
 ]
 BROKEN = (math.nan, math.inf, -math.inf, 3e38, -3e38)
 
@@ -248,7 +250,7 @@ def test_a_value_that_no_vehicle_can_have_is_refused_and_the_greatest_it_can_hav
         message = copy.copy(measured(name))
         setattr(message, field, 0.99 * most)
         assert not isinstance(listening_decoder().feed(packed(message))[0][1], Refused | None), field
-        for value in (*BROKEN, 3.0 * most):
+        for value in (*BROKEN, -1.6 * most, 1.6 * most):
             setattr(message, field, value)
             refused = listening_decoder().feed(packed(message))[0][1]
             assert isinstance(refused, Refused) and refused.message == name, (field, value)
@@ -260,6 +262,23 @@ def test_what_is_no_rotation_is_refused(field, value):
     message = copy.copy(measured("ATTITUDE_QUATERNION"))
     setattr(message, field, value)
     assert isinstance(listening_decoder().feed(packed(message))[0][1], Refused)
+
+
+def test_the_square_of_a_rotations_length_is_one_to_a_thousandth():
+    message = copy.copy(measured("ATTITUDE_QUATERNION"))
+    message.q2 = message.q3 = message.q4 = 0.0
+    for square, is_believed in ((1.0009, True), (0.9991, True), (1.0011, False), (0.9989, False)):
+        message.q1 = math.sqrt(square)
+        sample = listening_decoder().feed(packed(message))[0][1]
+        assert isinstance(sample, Refused) is not is_believed, square
+
+
+@pytest.mark.parametrize(("force_m_s2", "is_off"), [(0.0, True), (0.75, True), (-0.75, True), (0.82, False)])
+def test_an_accelerometer_that_shows_no_more_than_its_zero_g_offset_is_off(force_m_s2, is_off):
+    # The widest among PX4's drivers: 80 mg, 0.785 m/s^2
+    message = copy.copy(measured("HIGHRES_IMU"))
+    message.xacc, message.yacc, message.zacc = force_m_s2, 0.0, 0.0
+    assert isinstance(listening_decoder().feed(packed(message))[0][1], Refused) is is_off
 
 
 def test_a_stamp_that_is_not_exact_in_double_precision_is_refused():

@@ -356,12 +356,14 @@ def test_an_item_that_cannot_be_reached_ends_in_the_vehicles_own_hold():
     assert f.vehicle.mode == LOITER
 
 
-def test_the_same_flight_twice_is_the_same_byte_for_byte():
-    flights = [at_wall(), at_wall()]
-    for f in flights:
+def test_the_same_flight_twice_is_the_same_byte_for_byte_and_so_is_a_copy_that_goes_on():
+    first, second = at_wall(), at_wall()
+    first.run_to("recovering")
+    third = first.copy()
+    for f in (first, second, third):
         f.run_to_end()
-    assert flights[0].sent == flights[1].sent
-    assert flights[0].events == flights[1].events
+    assert first.sent == second.sent == third.sent
+    assert first.events == second.events == third.events
 
 
 def test_imu_packets_that_come_late_or_twice_are_not_new_samples():

@@ -41,7 +41,7 @@ def test_heartbeats_of_other_components_are_not_a_vehicle():
     [
         (FakeVehicle(autopilot=3), "ArduPilot"),
         (FakeVehicle(vehicle_type=1), "fixed-wing"),
-        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 31"),
+        (FakeVehicle(imu_every=8), "HIGHRES_IMU arrives at 32"),
         (FakeVehicle(no_imu=True), "HIGHRES_IMU arrives at 0.0 Hz"),
         (FakeVehicle(no_positions=True), "LOCAL_POSITION_NED"),
         (FakeVehicle(armed=True), "armed already"),
@@ -219,7 +219,7 @@ def test_a_vehicle_that_restarts_while_the_plan_is_read_has_it_made_and_agreed_t
 
 
 def test_a_vehicle_that_restarts_while_its_streams_are_measured_is_measured_again():
-    f = flight()
+    f = flight(companion={"streams": {"window_s": 2.0}})
     f.run_until(lambda: "connected" in f.kinds())
     f.run_for(0.5)
     f.vehicle.silent = True
@@ -275,7 +275,7 @@ def test_the_companion_belongs_to_the_vehicles_system():
 def test_the_vehicles_time_requests_are_answered():
     f = flight(confirmed=False)
     f.run_to("ready")
-    assert len(f.vehicle.timesyncs) > 10
+    assert len(f.vehicle.timesyncs) > 5
     answer = f.vehicle.timesyncs[-1]
     assert answer.tc1 // 1000 == pytest.approx(f.now_us, abs=200_000)
     assert answer.ts1 // 1000 == pytest.approx(f.vehicle.time_us, abs=200_000)

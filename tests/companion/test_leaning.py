@@ -226,6 +226,7 @@ def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(
     assert all(collision.settled_after_s is not None for collision in flight.report.collisions[-1:])
 
 
+@pytest.mark.slow
 def test_a_crawl_onto_a_pole_that_was_felt_softly_ends_off_it():
     """On the way out of a recovery a pole is brushed and slid round, with a lean of 84 degrees and a fall of 2 m."""
     ended = work_out_mission(MissionCase(seed=15489, airframe="foldable", feed_forward=True))

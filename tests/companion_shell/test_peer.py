@@ -52,6 +52,15 @@ def test_a_vehicle_that_comes_back_from_another_address_is_heard_once_the_first_
     assert peer.answered == moved and not peer.accepts(IMU, VEHICLE, 2 * RELEASED_US + 2)
 
 
+@pytest.mark.parametrize(("silent_us", "is_heard"), [(490_000, False), (510_000, True)])
+def test_a_strangers_heartbeat_counts_once_the_vehicle_has_been_silent_for_half_a_second(silent_us, is_heard):
+    peer = Peer()
+    peer.accepts(HEARTBEAT, VEHICLE, 0)
+    peer.accepts(IMU, VEHICLE, 1_000_000)
+    assert peer.accepts(HEARTBEAT, STRANGER, 1_000_000 + silent_us) is is_heard
+    assert peer.answered == (STRANGER if is_heard else VEHICLE)
+
+
 def test_a_vehicle_that_moved_is_heard_and_answered_within_a_second():
     # Given a vehicle that streams at 50 Hz with a heartbeat a second, and moves just before a heartbeat, or just after
     for first_beat_us in (10_000, 990_000):

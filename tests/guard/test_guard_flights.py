@@ -271,7 +271,10 @@ def test_beside_a_program_on_another_link_the_vehicle_is_led_clear_by_a_command_
     assert {(m.param2, m.param3) for m in offboard_asked} <= {HOLD}
     assert air.setpoints("guard", hit_s - 0.5) == []
     # by one command, which a program's setpoints do not undo, it is led away from the wall
-    assert [m.command for _, who, m in air.on_wire if who == "guard" and m.get_type() == "COMMAND_INT"] == [192]
+    led = [(at, m.command) for at, who, m in air.on_wire if who == "guard" and m.get_type() == "COMMAND_INT"]
+    assert [command for _, command in led] == [192]
+    # once nothing has pushed for 40 ms, and before the program's setpoints push it into the wall again
+    assert 0.03 < led[0][0] - 1e-6 * air.vehicle.truth.hits[0].ended_at_boot_us < 0.1
     air.run(5.0)
     stop()
     assert air.vehicle_mode() == "AUTO.LOITER"

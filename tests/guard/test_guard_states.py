@@ -2,7 +2,9 @@
 
 import pytest
 
+from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
+from companion.messages import Sticks
 
 EXPECTED = {
     (State.CONNECTING, Trigger.REFUSED): State.ENDED,
@@ -65,6 +67,21 @@ def test_whoever_takes_the_vehicle_from_the_guard_has_it_and_a_hit_never_takes_i
         assert TABLE.next_state(state, Trigger.CONTROL_LOST) is State.STOOD_DOWN
     assert TABLE.next_state(State.STOOD_DOWN, Trigger.HIT) is State.STOOD_DOWN
     assert TABLE.next_state(State.STANDING_BY, Trigger.HIT) is State.STANDING_BY
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "counts"),
+    [
+        ((0.0, 0.0, 0.0, 0.0), (0.29, -0.29, 0.0, 0.29), False),
+        ((0.0, 0.0, 0.0, 0.0), (0.31, 0.0, 0.0, 0.0), True),
+        ((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, -0.31), True),
+        ((0.8, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), False),  # let go, as a startled pilot does
+        ((0.0, 0.0, -1.0, 0.0), (0.0, 0.0, -0.71, 0.0), False),  # a throttle lies anywhere
+        ((0.0, 0.0, -1.0, 0.0), (0.0, 0.0, -0.69, 0.0), True),
+    ],
+)
+def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
+    assert has_moved(Sticks(before), Sticks(now)) is counts
 
 
 def test_diagram_and_table_show_every_transition():

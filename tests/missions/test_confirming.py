@@ -24,8 +24,9 @@ name: forged
 items:
   - takeoff: {height_m: 1.5}
   - go_to: {position_ned_m: [6, 0, -1.5], speed_m_s: 2.0}
-  - return: {}
+  - land: {}
 on_collision: {then: continue, max_hits: 2}
+companion: {streams: {window_s: 0.5}}
 sim: {walls: []}
 """
 
@@ -37,6 +38,7 @@ class Air:
     sets: tuple[str, ...] = ()
     events: list[Event] = field(default_factory=list)
     pending: bytes = b""
+    heard: bytes = b""
     setpoints: list = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -51,9 +53,10 @@ class Air:
     def state(self) -> str:
         return self.companion.status().state
 
-    def step(self, forged: bytes = b"") -> None:
-        heard = b"".join(self.vehicle.step(self.pending))
-        result = self.companion.step(forged + heard, EPOCH_US + self.vehicle.time_boot_us)
+    def step(self, forged: bytes = b"", pilots: bytes = b"") -> None:
+        """`forged` reaches the companion before the vehicle's packets, `pilots` the vehicle after the companion's."""
+        self.heard = b"".join(self.vehicle.step(self.pending + pilots))
+        result = self.companion.step(forged + self.heard, EPOCH_US + self.vehicle.time_boot_us)
         self.pending = b"".join(result.sent_frames)
         self.events += result.events
         for frame in result.sent_frames:
@@ -130,6 +133,14 @@ def cruising(*sets: str) -> Air:
     return air
 
 
+def assert_goes_on(air: Air, unconfirmed: int) -> None:
+    """To the item's goal, as if nothing had been there."""
+    air.run_until(lambda: air.state == "landing", 4.0)
+    assert air.motion()[0] == pytest.approx(6.0, abs=0.3)
+    report = air.companion.report()
+    assert (report.collisions, report.unconfirmed, report.obstacles) == ((), unconfirmed, ())
+
+
 @pytest.mark.parametrize("force_m_s2", [-100.0, -40.0, -10.0, -5.0, 40.0])
 def test_one_forged_packet_costs_a_twitch(force_m_s2):
     air = cruising()
@@ -147,9 +158,7 @@ def test_one_forged_packet_costs_a_twitch(force_m_s2):
             assert math.dist((message.x, message.y, message.z), here) <= 5.0
         if not message.type_mask & 0x1C0:
             assert math.hypot(message.afx, message.afy) <= 9.81
-    air.run_until(lambda: air.companion.finished)
-    report = air.companion.report()
-    assert (report.outcome, report.collisions, report.unconfirmed, report.obstacles) == ("completed", (), 1, ())
+    assert_goes_on(air, unconfirmed=1)
 
 
 @pytest.mark.parametrize("hz", [250, 50])
@@ -170,9 +179,7 @@ def test_one_forged_velocity_or_rate_is_contradicted_by_the_velocities_after_it(
     air.run_until(lambda: air.state == "recovering", 0.1)
     air.run_until(lambda: air.state == "mission", 1.0)
     assert air.vehicle.time_boot_us - began_us <= 250_000
-    air.run_until(lambda: air.companion.finished)
-    report = air.companion.report()
-    assert (report.outcome, report.collisions, report.unconfirmed, report.obstacles) == ("completed", (), 1, ())
+    assert_goes_on(air, unconfirmed=1)
 
 
 @pytest.mark.parametrize(
@@ -182,9 +189,7 @@ def test_one_forged_velocity_or_rate_is_contradicted_by_the_velocities_after_it(
 def test_one_forged_position_or_velocity_of_local_position_is_no_hit(jump):
     air = cruising()
     air.step(air.local_position(*jump))
-    air.run_until(lambda: air.companion.finished)
-    report = air.companion.report()
-    assert (report.outcome, report.collisions, report.unconfirmed) == ("completed", (), 0)
+    assert_goes_on(air, unconfirmed=0)
 
 
 def stuck() -> Callable[[tuple[float, ...]], tuple[float, ...]]:
@@ -225,7 +230,7 @@ def test_places_that_are_not_believed_for_half_a_second_are_no_lean_on_an_obstac
     air = Air()
     air.run_until(lambda: air.state == "mission" and air.motion()[0] > 1.0)
     air.move_places(50.0, seconds=1.0)
-    air.run_until(lambda: air.companion.finished, 1.0)
+    air.run_until(lambda: air.companion.finished, 1.5)
     # Then it is handed over for being out of its fence, and nothing was in its way
     report = air.companion.report()
     assert "outside the fence" in report.reason
@@ -246,12 +251,11 @@ def test_the_hits_allowed_are_not_used_up_by_hits_that_were_none():
 
 @pytest.mark.parametrize("airframe", ["foldable", "rigid"])
 @pytest.mark.parametrize("hz", [250, 50])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_hit_on_a_wall_is_always_confirmed(airframe, hz, seed):
+def test_a_hit_on_a_wall_is_confirmed(airframe, hz):
     """By the velocity, where one sample alone shows the contact."""
     wall = "sim.walls=[{point_ned_m: [4, 0, 0], normal_ned: [-1, 0, 0]}]"
     rate = f"companion.streams.highres_imu_hz={hz}"
-    air = Air((wall, rate, f"sim.airframe={airframe}", f"sim.seed={seed}"))
+    air = Air((wall, rate, f"sim.airframe={airframe}"))
     air.run_until(lambda: air.state == "recovering")
     for _ in range(250):
         air.step()

@@ -91,6 +91,7 @@ def test_against_a_wind_it_speeds_up_by_what_that_leaves_of_the_lean(tmp_path):
     assert flight.report.outcome == "completed"
 
 
+@pytest.mark.slow
 def test_a_pole_that_spins_a_rigid_vehicle_is_not_braked_as_a_throw():
     # Given a random mission in which a pole meets one guard at 1.5 m/s and a lean of 15 degrees
     hit = work_out_mission(MissionCase(seed=11905, airframe="rigid", feed_forward=True))["hits"][0]

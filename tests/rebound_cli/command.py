@@ -1,11 +1,15 @@
-"""Runs the command as a person does, in a process of its own."""
+"""Runs the command as a person does: in a process of its own, or in this one, which has its libraries loaded."""
 
+import contextlib
+import io
 import json
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +47,21 @@ def run(*arguments, timeout_s=HANGS_S):
             process.kill()
             raise
     return subprocess.CompletedProcess(arguments, process.returncode, stdout, stderr)
+
+
+def run_here(*arguments):
+    """The same without a second of start-up, for what is no matter of processes, signals or pipes."""
+    stdout, stderr = io.StringIO(), io.StringIO()
+    handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    with contextlib.chdir(ROOT), contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+        try:
+            code = main([*map(str, arguments)])
+        except SystemExit as refused:  # argparse's
+            code = refused.code
+        finally:
+            for number, handler in handlers:
+                signal.signal(number, handler)
+    return subprocess.CompletedProcess(arguments, code, stdout.getvalue(), stderr.getvalue())
 
 
 def events_of(folder):

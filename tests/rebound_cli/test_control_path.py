@@ -281,6 +281,7 @@ def test_a_link_that_is_back_after_the_vehicle_took_care_of_itself_takes_nothing
     assert [event.kind for event in recorder.events].count("aborted") == 1
 
 
+@pytest.mark.realtime
 def test_in_a_real_flight_neither_a_limit_of_size_nor_a_pipe_that_closes_matters(tmp_path):
     # Given a vehicle in the air
     folder = tmp_path / "run"

@@ -22,7 +22,7 @@ from rebound_cli.identification.hit import IdentificationError
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.physics.plant import Plant
 from sim_vehicle.scene import Scene
-from tests.rebound_cli.command import WALL, assert_one_clear_sentence, run
+from tests.rebound_cli.command import WALL, assert_one_clear_sentence, run_here
 
 RATE_HZ = 120
 NOISE_M = 0.0003
@@ -135,12 +135,11 @@ def test_the_wall_may_stand_on_either_side_of_either_axis(tmp_path):
     assert ratios == pytest.approx([ratios[0]] * 4, abs=0.02)
 
 
-def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
+def test_a_flight_becomes_an_airframe_that_flies(wall_flight, tmp_path):
     # Given a flight of the foldable vehicle into the wall, above the speed that reaches the stop
-    flown = run("fly", WALL, "--lockstep", "--out", tmp_path / "run")
-    assert flown.returncode == 0, flown.stderr
+    folder, _ = wall_flight
     # When it is identified from its telemetry
-    identified = run("identify", tmp_path / "run", "--out", tmp_path / "found.yaml")
+    identified = run_here("identify", folder, "--out", tmp_path / "found.yaml")
     assert identified.returncode == 0, identified.stderr
     # Then the file has the vehicle's springs and stop
     document = load_document(tmp_path / "found.yaml")
@@ -150,22 +149,22 @@ def test_a_flight_becomes_an_airframe_that_flies(tmp_path):
     assert airframe.arms.stiffness_per_s2 == pytest.approx(500, rel=0.3)
     assert airframe.arms.fold_max_m == pytest.approx(0.03, abs=0.005)
     # whatever the file is called
-    named = run("identify", tmp_path / "run", "--out", tmp_path / "a: #b.yaml", "--name", 'an "own": vehicle')
+    named = run_here("identify", folder, "--out", tmp_path / "a: #b.yaml", "--name", 'an "own": vehicle')
     assert named.returncode == 0, named.stderr
     assert load_document(tmp_path / "a: #b.yaml").data["name"] == 'an "own": vehicle'
     # And flies the same mission
-    again = run("fly", WALL, "--lockstep", "--airframe", tmp_path / "found.yaml", "--out", tmp_path / "again")
+    again = run_here("fly", WALL, "--lockstep", "--airframe", tmp_path / "found.yaml", "--out", tmp_path / "again")
     assert again.returncode == 0, again.stderr
     assert json.loads((tmp_path / "again" / "summary.json").read_text())["recontacts"] == 0
 
 
 def test_bad_data_end_in_one_clear_sentence(tmp_path):
     missing = tmp_path / "missing.csv"
-    assert_one_clear_sentence(run("identify", missing), f"{missing}: No such file")
+    assert_one_clear_sentence(run_here("identify", missing), f"{missing}: No such file")
     no_column = tmp_path / "no_column.csv"
     no_column.write_text("time_s,position_x_m\n0,1\n")
-    assert_one_clear_sentence(run("identify", no_column), no_column, "position_y_m")
-    weightless = run("identify", no_column, "--mass", "nan")
+    assert_one_clear_sentence(run_here("identify", no_column), no_column, "position_y_m")
+    weightless = run_here("identify", no_column, "--mass", "nan")
     assert weightless.returncode == 2 and "'nan' is not a mass" in weightless.stderr
 
 

@@ -7,9 +7,9 @@ import yaml
 
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.main import main
-from tests.rebound_cli.command import QUICK, WALL, assert_comes_again, events_of, run
+from tests.rebound_cli.command import QUICK, WALL, assert_comes_again, events_of, run_here
 
-pytestmark = pytest.mark.flight
+pytestmark = [pytest.mark.flight, pytest.mark.usefixtures("without_pictures")]
 
 # Into the wall 4 m north, in a room that leaves a way round it; the second item asks for a place behind it.
 TO_WALL = "items=[{takeoff: {height_m: 1.5}}, {go_to: {position_ned_m: [6, 0, -1.5], speed_m_s: 2}}, {return: {}}]"
@@ -79,7 +79,7 @@ def test_what_is_wrong_in_the_file_is_named_with_its_line(tmp_path, capsys, text
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    result = run("check", WALL, "--set", f"obstacles.file={tmp_path}/none.json", "--no-picture")
+    result = run_here("check", WALL, "--set", f"obstacles.file={tmp_path}/none.json", "--no-picture")
     assert result.returncode == 1 and "none.json: no such file" in result.stderr
 
 

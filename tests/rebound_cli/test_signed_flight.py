@@ -104,31 +104,38 @@ def decisions(folder: Path) -> list[str]:
     return [event["text"] for event in events_of(folder) if event["kind"] not in ("link", "late")]
 
 
-def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flight(tmp_path: Path):
+@pytest.fixture(scope="module")
+def forged_at(tmp_path_factory) -> tuple[Path, Any]:
+    """The flight whose every packet comes with forged ones, in both directions: its folder, and the world after it."""
+    folder = tmp_path_factory.mktemp("signed") / "loud"
+    return folder, fly(folder, forges=True)
+
+
+def test_forged_and_replayed_packets_on_the_link_change_nothing_of_a_signed_flight(forged_at, tmp_path: Path):
     # Given the flight that nobody disturbs
     quiet = fly(tmp_path / "quiet", forges=False)
     assert decisions(tmp_path / "quiet")[-1] == "done: landed and disarmed, no hit"
     # When every packet comes with forged ones, in both directions
-    loud = fly(tmp_path / "loud", forges=True)
+    folder, loud = forged_at
     # Then what was heard, decided and sent is the same to the bit
-    assert decisions(tmp_path / "loud") == decisions(tmp_path / "quiet")
+    assert decisions(folder) == decisions(tmp_path / "quiet")
     for part in (heard, setpoints):
-        assert len(part(tmp_path / "loud")) > 200 and part(tmp_path / "loud") == part(tmp_path / "quiet")
+        assert len(part(folder)) > 200 and part(folder) == part(tmp_path / "quiet")
     # And it was counted by both, and told
     assert set(quiet.refused) <= {"old"}
     assert min(loud.refused[reason] for reason in ("unsigned", "forged", "replayed")) > 500
     refused = loud.vehicle._signing.refused
     assert refused.unsigned > 500 and refused.replayed > 500
-    told = [event["text"] for event in events_of(tmp_path / "loud") if event["kind"] == "link"]
+    told = [event["text"] for event in events_of(folder) if event["kind"] == "link"]
     assert any("without a signature are refused" in text for text in told)
 
 
-def test_a_signed_flights_log_has_no_signature_and_comes_again_without_the_key(tmp_path: Path):
-    fly(tmp_path / "run", forges=True)
-    packets = log_of(tmp_path / "run")
+def test_a_signed_flights_log_has_no_signature_and_comes_again_without_the_key(forged_at):
+    folder, _ = forged_at
+    packets = log_of(folder)
     assert len(packets) > 2000 and not any(packet[2] for packet in packets)
-    assert_comes_again(tmp_path / "run")
-    for file in (tmp_path / "run").iterdir():
+    assert_comes_again(folder)
+    for file in folder.iterdir():
         content = file.read_bytes()
         assert KEY not in content and KEY.hex().encode() not in content
 

@@ -1,5 +1,6 @@
 """`rebound check`: what it says of a mission, what it draws, and the schema that editors use."""
 
+import functools
 import json
 
 import jsonschema
@@ -16,10 +17,18 @@ from rebound_cli.documents import parse_document
 from rebound_cli.figure.ground import footprint
 from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.scene import Scene
-from tests.rebound_cli.command import ROOT, WALL, run
+from tests.rebound_cli.command import ROOT, WALL, run_here
 
 SCHEMA = ROOT / "missions" / "schema.json"
 MISSIONS = sorted((ROOT / "missions").glob("*.yaml"))
+
+
+@functools.cache
+def validator():
+    schema = mission_schema()
+    kind = jsonschema.validators.validator_for(schema)
+    kind.check_schema(schema)
+    return kind(schema)
 
 
 def planned(text: str):
@@ -87,7 +96,7 @@ def test_obstacles_seen_from_above():
 
 
 def test_a_person_reads_what_would_be_flown(tmp_path):
-    result = run("check", WALL, "--out", tmp_path)
+    result = run_here("check", WALL, "--out", tmp_path)
     assert result.returncode == 0, result.stderr
     for words in ("go to [7.00, 0.00, -1.50]", "7.0 m", "meets 'north wall'", "in all 15.5 m in 21 s", "Fence"):
         assert words in result.stdout
@@ -98,11 +107,11 @@ def test_a_person_reads_what_would_be_flown(tmp_path):
 def test_one_wrong_file_does_not_hide_another(tmp_path):
     wrong = tmp_path / "wrong.yaml"
     wrong.write_text("name: wrong\nitems:\n  - takeoff: {height: 1}\n  - land:\n")
-    result = run("check", wrong, WALL, "--no-picture", "--set", "on_interrupt=land")
+    result = run_here("check", wrong, WALL, "--no-picture", "--set", "on_interrupt=land")
     assert result.returncode == 1
     assert f"{wrong}:3: items.0.takeoff.height: unknown key" in result.stderr and "Traceback" not in result.stderr
     assert "hand the vehicle to land" in result.stdout
-    assert run("check").returncode == 1
+    assert run_here("check").returncode == 1
 
 
 # --- the schema
@@ -116,7 +125,7 @@ def test_the_schema_beside_the_missions_is_the_models():
 def test_every_shipped_mission_names_the_schema_and_keeps_to_it(path):
     text = path.read_text()
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
-    jsonschema.validate(yaml.safe_load(text), mission_schema())
+    validator().validate(yaml.safe_load(text))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +145,7 @@ def test_every_shipped_mission_names_the_schema_and_keeps_to_it(path):
 def test_the_schema_refuses_what_the_model_refuses(item):
     mission = {"name": "t", "items": [{"takeoff": {"height_m": 1}}, item, {"land": None}]}
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(mission, mission_schema())
+        validator().validate(mission)
 
 
 @pytest.mark.parametrize(
@@ -149,9 +158,9 @@ def test_the_schema_refuses_what_the_model_refuses(item):
 )
 def test_the_schema_knows_names_and_what_comes_first(changes):
     sound = {"name": "t", "items": [{"takeoff": {"height_m": 1}}, {"land": None}]}
-    jsonschema.validate(sound, mission_schema())
+    validator().validate(sound)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate({**sound, **changes}, mission_schema())
+        validator().validate({**sound, **changes})
 
 
 def test_an_editor_has_a_word_for_every_key_of_a_mission():

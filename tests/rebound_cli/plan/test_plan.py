@@ -16,7 +16,7 @@ from rebound_cli.main import main
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
 from sim_vehicle.hil.messages import Place
-from tests.rebound_cli.command import run as rebound
+from tests.rebound_cli.command import run_here as rebound
 
 HOME = Place(47.3977, 8.5456, 488.0)
 # A thousandth of a degree of latitude on PX4's sphere of 6371 km.

@@ -5,7 +5,7 @@ from companion.preflight import Preflight, Verdict
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
-from tests.rebound_cli.command import run
+from tests.rebound_cli.command import run_here
 
 
 def surveyed() -> tuple[Preflight, SimulatedVehicle]:
@@ -47,7 +47,7 @@ def test_a_remedy_that_is_taken_is_taken_by_the_vehicle():
 
 
 def test_an_address_that_is_none_is_one_sentence():
-    done = run("preflight", "--connect", "nowhere")
+    done = run_here("preflight", "--connect", "nowhere")
     assert done.returncode != 0
     assert "Traceback" not in done.stderr
     assert "'nowhere' is not a connection address" in done.stderr

@@ -8,20 +8,17 @@ import yaml
 
 from rebound_cli.main import main
 from rebound_cli.replay.recording import read_recording, reproduce
-from tests.rebound_cli.command import WALL
-
-
-@pytest.fixture(scope="module")
-def wall_flight(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("flights") / "wall"
-    assert main(["fly", str(WALL), "--lockstep", "--json", "--out", str(folder)]) == 0
-    return folder
 
 
 @pytest.fixture
-def flight(wall_flight, tmp_path):
+def flown(wall_flight):
+    return wall_flight[0]
+
+
+@pytest.fixture
+def flight(flown, tmp_path):
     """A copy to spoil."""
-    return shutil.copytree(wall_flight, tmp_path / "wall")
+    return shutil.copytree(flown, tmp_path / "wall")
 
 
 def replay(capsys, *arguments):
@@ -30,22 +27,22 @@ def replay(capsys, *arguments):
     return code, out.out, out.err
 
 
-def test_a_lockstep_flight_is_decided_again_to_the_bit(wall_flight, tmp_path, capsys):
-    code, text, _ = replay(capsys, wall_flight, "--expect", "1", "--out", tmp_path)
+def test_a_lockstep_flight_is_decided_again_to_the_bit(flown, tmp_path, capsys):
+    code, text, _ = replay(capsys, flown, "--expect", "1", "--out", tmp_path)
     assert code == 0
     assert "identical: every decision of the flight came again to the bit" in text
     assert "1 collision" in text
     # With its picture, and with the flight's own times
     (picture,) = tmp_path.iterdir()
     assert picture.name == "impact-1.png" and picture.stat().st_size > 20_000
-    (hit,) = json.loads((wall_flight / "summary.json").read_text())["collisions"]
+    (hit,) = json.loads((flown / "summary.json").read_text())["collisions"]
     assert f"{hit['detected_at_s']:.3f} s  HIT" in text
 
 
-def test_a_program_reads_the_same_and_an_expectation_that_fails_is_exit_code_1(wall_flight, tmp_path, capsys):
-    code, text, error = replay(capsys, wall_flight, "--json", "--expect", "none", "--out", tmp_path)
+def test_a_program_reads_the_same_and_an_expectation_that_fails_is_exit_code_1(flown, tmp_path, capsys):
+    code, text, error = replay(capsys, flown, "--json", "--expect", "none", "--out", tmp_path)
     found = json.loads(text)
-    (hit,) = json.loads((wall_flight / "summary.json").read_text())["collisions"]
+    (hit,) = json.loads((flown / "summary.json").read_text())["collisions"]
     (impact,) = found["impacts"]
     assert found["reproduction"]["identical"]
     assert impact["at_s"] == hit["detected_at_s"]
@@ -92,8 +89,8 @@ def test_steps_in_which_nothing_came_count(flight):
     assert reproduce(read_recording(flight)).first_difference is not None
 
 
-def test_another_detector_or_rate_is_looked_at_without_comparing(wall_flight, tmp_path, capsys):
-    code, text, _ = replay(capsys, wall_flight, "--rate", "50", "--detector", "fused", "--out", tmp_path)
+def test_another_detector_or_rate_is_looked_at_without_comparing(flown, tmp_path, capsys):
+    code, text, _ = replay(capsys, flown, "--rate", "50", "--detector", "fused", "--out", tmp_path)
     assert code == 0
     assert "with --detector, --rate the flight's own decisions cannot come again" in text
     assert "IMU at 50 Hz (recorded at 250)" in text
@@ -129,25 +126,25 @@ def test_a_damaged_folder_is_one_sentence(flight, spoil, words, capsys):
     assert error.startswith("rebound: ") and words in error and len(error.strip().splitlines()) == 1
 
 
-def test_arguments_that_make_no_sense_are_refused(wall_flight, tmp_path, capsys):
+def test_arguments_that_make_no_sense_are_refused(flown, tmp_path, capsys):
     for arguments, words in (
         ((tmp_path,), "no flight.tlog in this folder"),
         ((tmp_path / "none.ulg",), "No such file"),
-        ((wall_flight, "--detector", "magic"), "there is no detector 'magic'"),
-        ((wall_flight, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
-        ((wall_flight, "--detector", "lateral"), "a baseline of `python -m bench detectors`"),
-        ((wall_flight, "--set", "companion.lateral.threshold_m_s2=1"), "a baseline of `python -m bench detectors`"),
+        ((flown, "--detector", "magic"), "there is no detector 'magic'"),
+        ((flown, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
+        ((flown, "--detector", "lateral"), "a baseline of `python -m bench detectors`"),
+        ((flown, "--set", "companion.lateral.threshold_m_s2=1"), "a baseline of `python -m bench detectors`"),
     ):
         code, _, error = replay(capsys, *arguments)
         assert code == 1 and words in error, error
     for arguments in (("--rate", "0"), ("--rate", "fast"), ("--expect", "some")):
         with pytest.raises(SystemExit):
-            main(["replay", str(wall_flight), *arguments])
+            main(["replay", str(flown), *arguments])
 
 
-def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(wall_flight, tmp_path, capsys):
+def test_a_flight_that_was_not_watched_shows_no_absence_of_collisions(flown, tmp_path, capsys):
     # Given an IMU stream too slow to see a hit by
-    arguments = (wall_flight / "flight.tlog", "--rate", "10", "--expect", "none", "--out", tmp_path)
+    arguments = (flown / "flight.tlog", "--rate", "10", "--expect", "none", "--out", tmp_path)
     assert main(["replay", *map(str, arguments)]) == 1
     said = capsys.readouterr().out
     assert "0 % of the flight was watched" in said and "that shows none" in said

@@ -1,0 +1,88 @@
+"""The pilot chooses a mode at any instant of a recovery, on the simulated vehicle: from then on he alone has it."""
+
+import json
+import os
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import development as mav
+
+from companion.px4_mode import AUTO_LAND, AUTO_LOITER, POSCTL
+from tests.missions.test_confirming import Air
+
+pytestmark = pytest.mark.flight
+
+WALL = "sim.walls=[{point_ned_m: [3, 0, 0], normal_ned: [-1, 0, 0], width_m: 20, height_m: 20}]"
+GROUND_STATION = mav.MAVLink(None, srcSystem=255, srcComponent=190)
+# CURRENT_MODE comes twice a second, as from PX4; the vehicle takes an interval to obey, and the packet one to arrive.
+REPORTED_WITHIN = 125 + 2
+# A heartbeat alone pauses the setpoints; the next report ends the flight.
+WATCHED = REPORTED_WITHIN + 125
+SET_MODE, ARM = 176, 400
+
+
+def in_a_child(work: Callable[[], Any]) -> Any:
+    """What becomes of this instant, in a copy of the process: a simulated vehicle cannot be copied alone."""
+    reads, writes = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reads)
+        try:
+            found = work()
+        except BaseException as error:
+            found = {"error": repr(error)}
+        os.write(writes, json.dumps(found).encode())
+        os._exit(0)
+    os.close(writes)
+    with os.fdopen(reads) as pipe:
+        text = pipe.read()
+    os.waitpid(child, 0)
+    return json.loads(text)
+
+
+def messages_in(packets: bytes) -> list[Any]:
+    return mav.MAVLink(None).parse_buffer(bytearray(packets)) or []
+
+
+def flies(message: Any) -> bool:
+    """A setpoint, or a command that asks for a mode or for motors."""
+    is_command = message.get_type() == "COMMAND_LONG" and message.command in (SET_MODE, ARM)
+    return is_command or message.get_type() == "SET_POSITION_TARGET_LOCAL_NED"
+
+
+def taken_over(air: Air, mode: int) -> dict[str, Any]:
+    """After how many intervals the vehicle reported the pilot's mode, and what the companion sent from then on."""
+    fields = (1, 1, SET_MODE, 0, 1.0, float(mode >> 16 & 0xFF), float(mode >> 24), 0, 0, 0, 0)
+    asks = bytes(mav.MAVLink_command_long_message(*fields).pack(GROUND_STATION))
+    sticks = bytes(mav.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0).pack(GROUND_STATION))
+    reported, sent = None, []
+    for interval in range(WATCHED):
+        air.step(pilots=sticks + (asks if interval == 0 else b""))
+        if reported is None and mode in [getattr(message, "custom_mode", None) for message in messages_in(air.heard)]:
+            reported = interval
+        if reported is not None:
+            sent += [message.get_type() for message in messages_in(air.pending) if flies(message)]
+    return {"reported": reported, "sent": sent, "state": air.state, "mode": air.companion.status().vehicle_mode}
+
+
+# In intervals, with no part in common with the periods of the streams.
+@pytest.mark.parametrize(
+    ("mode", "name", "every"),
+    [(POSCTL, "POSCTL", 37), (AUTO_LOITER, "AUTO.LOITER", 101), (AUTO_LAND, "AUTO.LAND", 101)],
+)
+def test_a_pilots_mode_at_any_instant_of_a_recovery_is_followed_by_no_setpoint(mode, name, every):
+    # Given a vehicle that recovers from a hit on a wall
+    air = Air((WALL,))
+    air.run_until(lambda: air.state == "recovering")
+    tried = 0
+    while air.state == "recovering":
+        # When the pilot chooses a mode at this instant
+        found = in_a_child(lambda: taken_over(air, mode))
+        # Then from the step on that hears of it nothing is sent that flies, and the mode is his
+        assert found["reported"] is not None and found["reported"] <= REPORTED_WITHIN, (tried, found)
+        assert (found["sent"], found["state"], found["mode"]) == ([], "aborted", name), (tried, found)
+        tried += 1
+        for _ in range(every):
+            air.step()
+    assert tried * every > 250

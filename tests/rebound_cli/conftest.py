@@ -1,0 +1,19 @@
+"""One flight into the wall for all who look at its folder."""
+
+import pytest
+
+from rebound_cli import fly
+from tests.rebound_cli.command import WALL, run_here
+
+
+@pytest.fixture(scope="session")
+def wall_flight(tmp_path_factory):
+    """The wall mission, flown once: its folder, to be left as it is, and what the command printed."""
+    folder = tmp_path_factory.mktemp("flights") / "wall"
+    return folder, run_here("fly", WALL, "--lockstep", "--json", "--out", folder)
+
+
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """For flights whose flight.png nobody looks at: drawing takes as long as flying."""
+    monkeypatch.setattr(fly, "_draw", lambda *_: None)
