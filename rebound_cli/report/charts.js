@@ -5,6 +5,16 @@ const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]];
 const MICROSCOPE_MS = 150;
 const charts = [];
 
+// A threshold and a contact a hundred times as hard in one picture; below a tenth all is quiet.
+const QUIETEST = 0.1;
+const POWERS = { distr: 3, range: (plot, low, high) => [QUIETEST, 10 ** Math.max(1, Math.ceil(Math.log10(high || 1)))] };
+
+function powersOfTen(plot, number, low, high) {
+  const powers = [];
+  for (let power = low; power <= high * 1.01; power *= 10) powers.push(power);
+  return powers;
+}
+
 // Columns as uPlot takes them: null for "none".
 function plotted(values) {
   return Array.from(values, (value) => (Number.isFinite(value) ? value : null));
@@ -20,7 +30,7 @@ function addChart(parent, { title, unit, across, x, series, height = 180, marks 
     height,
     scales: { x: { time: false, ...(range ? { min: range[0], max: range[1] } : {}) }, y: up },
     cursor: { drag: { x: true, y: false } },
-    axes: [axis(), { ...axis(), size: 56 }],
+    axes: [axis(), { ...axis(), size: 56, ...(up === POWERS ? { splits: powersOfTen } : {}) }],
     series: [{ label: across }, ...series.map(lineOf)],
     hooks: {
       drawClear: [(plot) => shadeGaps(plot, gaps)],
@@ -200,7 +210,7 @@ function addMicroscope(parent, moment) {
   removeCharts(parent);
   const marks = [{ at: 0, colour: "--red" }];
   if (moment.touched_ms !== null) marks.push({ at: moment.touched_ms, colour: "--purple", dashed: true });
-  const shared = { across: "ms from the moment", marks, range: [-MICROSCOPE_MS, MICROSCOPE_MS] };
+  const shared = { across: "ms", marks, range: [-MICROSCOPE_MS, MICROSCOPE_MS] };
   const windowMs = flight.averaging_ms;
   const imu = near(tables.imu, moment, ["fx", "fy", "fz", "p", "q", "r", "side", "side_threshold", "beyond", "beyond_threshold"]);
   const means = (labels, first) =>
@@ -216,10 +226,10 @@ function addMicroscope(parent, moment) {
     const series = [
       { label: "push sideways", values: imu.columns[6], colour: "--blue", points: true },
       { label: "its threshold", values: imu.columns[7], colour: "--blue", number: 1, stepped: true },
-      { label: "beyond the thrust", values: imu.columns[8].map((push) => (push > 0 ? push : null)), colour: "--orange", points: true },
+      { label: "beyond the thrust", values: imu.columns[8].map((push) => (push > QUIETEST ? push : null)), colour: "--orange", points: true },
       { label: "its threshold", values: imu.columns[9], colour: "--orange", number: 1, stepped: true },
     ];
-    addChart(parent, { ...plain, title: "The test and its thresholds", unit: "m/s²", series, up: { distr: 3 } });
+    addChart(parent, { ...plain, title: "The test and its thresholds", unit: "m/s²", series, up: POWERS });
   }
   addFolds(parent, moment, shared);
 }

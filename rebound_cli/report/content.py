@@ -12,7 +12,7 @@ from companion.detection.interface import Phase
 from companion.memory.patch import Patch
 from companion.memory.surroundings import outline
 from rebound_cli.flights.archive import without_places
-from rebound_cli.report.flight import ShownFlight
+from rebound_cli.report.flight import ShownFlight, patch_of
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.packing import kept_rows, packed
 from rebound_cli.report.words import lines, link_rows, sentence
@@ -48,7 +48,7 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "modes": _modes(flight),
         "recovering": _recovering(flight),
         "obstacles": [] if no_position else _obstacles(flight),
-        "surfaces": [] if no_position else [_surface(flight, patch) for patch in flight.patches],
+        "surfaces": [] if no_position else _surfaces(flight),
         "vehicle": _vehicle(flight),
         "has_places": not no_position,
         "link": link_rows(flight),
@@ -227,8 +227,24 @@ def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None
     return {"t": times_s, "offsets": motion.offsets_ned_m}
 
 
-def _surface(flight: ShownFlight, patch: Patch) -> dict[str, Any]:
-    """What is believed of it, from its first touch on."""
+def _surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
+    """What was believed of each surface from when until when: from each touch of it to the next."""
+    told = [
+        (_seconds(flight, event["time_us"]), patch_of(event["data"]))
+        for event in flight.events
+        if event["kind"] == "obstacle"
+    ]
+    known = [(0.0, patch) for patch in flight.patches if patch.found_at_us < flight.started_at_us]
+    shown = []
+    for number, (since_s, patch) in enumerate([*known, *told]):
+        later = [*known, *told][number + 1 :]
+        until_s = next((at_s for at_s, one in later if patch.touches_ned_m[0] in one.touches_ned_m), None)
+        shown.append({"t": since_s, "until": until_s, "corners": _corners(flight, patch)})
+    return shown
+
+
+def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
+    """In the vehicle's local frame; a wall's in its plane, a ceiling's or a floor's at its height."""
     origin = flight.origin_ned_m
     if patch.is_steep:
         corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline(patch)[:-1]]
@@ -237,9 +253,7 @@ def _surface(flight: ShownFlight, patch: Patch) -> dict[str, Any]:
         (left_m, right_m), (low_m, high_m) = patch.believed_along_m(), patch.believed_heights_m()
         around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
         corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
-    placed = [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]
-    # One that an earlier flight found was known from the start.
-    return {"t": max(0.0, _seconds(flight, patch.found_at_us)), "corners": placed}
+    return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]
 
 
 def _vehicle(flight: ShownFlight) -> dict[str, Any]:

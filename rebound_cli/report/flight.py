@@ -1,6 +1,7 @@
 """A recorded flight with all that the report shows of it, from its folder or from any log that was replayed."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from rebound_cli.flight_log import FlightLog, flight_log_of, read_flight_log
 from rebound_cli.inputs import load_flown
 from rebound_cli.replay.recording import Recording, Reproduction, read_recording, reproduce, settings_file
 from rebound_cli.replay.report import Replay
-from rebound_cli.replay.watching import Findings
+from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.report.listening import Listener
 from rebound_cli.truth_match import FlightTruth
 from sim_vehicle.scene import Scene
@@ -50,6 +51,18 @@ class ShownFlight:
         armed = next((event for event in self.events if event["kind"] == "armed"), None)
         place = (armed or {}).get("data", {}).get("origin_ned_m") or (0.0, 0.0, 0.0)
         return (float(place[0]), float(place[1]), float(place[2]))
+
+    @property
+    def hits(self) -> Sequence[Finding]:
+        """Collisions, without those that nothing else bore out."""
+        return [hit for hit in self.findings.collisions if self.taken_back_us(hit) is None]
+
+    def taken_back_us(self, hit: Finding) -> float | None:
+        """When it was found to be none."""
+        after = (other.at_us for other in self.findings.impacts if other.at_us > hit.at_us)
+        until_us = min(after, default=math.inf)
+        times = (float(event["time_us"]) for event in self.events if event["kind"] == "unconfirmed")
+        return next((at_us for at_us in times if hit.at_us < at_us <= until_us), None)
 
     def seconds(self, at_us: float) -> float:
         """Since the flight began."""
@@ -138,6 +151,14 @@ def _patches(path: Path) -> Sequence[Patch]:
     if not path.exists():
         return ()
     try:
-        return [KnownPatch.model_validate(data).patch() for data in json.loads(path.read_text())["patches"]]
+        return [patch_of(data) for data in json.loads(path.read_text())["patches"]]
     except (ValueError, KeyError, TypeError) as error:
         raise ReboundError(f"{path}: not a file of obstacles; it is damaged.") from error
+
+
+def patch_of(data: Any) -> Patch:
+    """As a file or an event has it. Raises ReboundError."""
+    try:
+        return KnownPatch.model_validate(data).patch()
+    except ValueError as error:
+        raise ReboundError("What the flight says of an obstacle is damaged.") from error

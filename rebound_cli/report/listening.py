@@ -6,7 +6,7 @@ Nothing is judged here: all numbers are the detector's state and the answers of 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from companion.detection.force_signs import side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
@@ -55,7 +55,8 @@ class Listener:
 
     def listen(self, watch: Watch) -> None:
         """To this watch, from now on."""
-        watch.detector = _Heard(watch.detector, getattr(watch.config, watch.config.detector), self)
+        heard = _Heard(watch.detector, getattr(watch.config, watch.config.detector), self)
+        watch.detector = cast(Detector[Any], heard)
 
 
 class _Heard:

@@ -136,12 +136,9 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     yield f"Verdict: {kind.value}, {verdict}."
     if finding.final.is_lower_bound:
         yield "The sensor's range was too small for it, or part of it was not seen: it was at least as hard as stated."
-    taken_back = next(
-        (event for event in flight.events if event["kind"] == "unconfirmed" and event["time_us"] > finding.at_us), None
-    )
-    later = [other.at_us for other in flight.findings.impacts if other.at_us > finding.at_us]
-    if taken_back is not None and (not later or taken_back["time_us"] <= later[0]):
-        yield f"Taken back {(taken_back['time_us'] - finding.at_us) / 1e3:.0f} ms later: nothing else bore it out."
+    taken_back_us = flight.taken_back_us(finding)
+    if taken_back_us is not None:
+        yield f"Taken back {(taken_back_us - finding.at_us) / 1e3:.0f} ms later: nothing else bore it out."
     if flight.truth is not None and touch is None:
         yield "The simulator: a false alarm, nothing was touched."
 

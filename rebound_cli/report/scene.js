@@ -162,7 +162,7 @@ function shapeOf(obstacle) {
   return new THREE.BoxGeometry(...obstacle.sizes).applyMatrix4(new THREE.Matrix4().makeBasis(...axes)).translate(...obstacle.centre);
 }
 
-// What is remembered of a surface, from its first touch on.
+// What is remembered of a surface, from one touch of it to the next.
 function addSurface(world, known, make) {
   const corners = known.corners.flat();
   const triangles = [];
@@ -174,7 +174,7 @@ function addSurface(world, known, make) {
   filled.computeVertexNormals();
   const patch = new THREE.Mesh(filled, make.surface("--purple", 0.4));
   world.add(outline, patch);
-  return (time) => { outline.visible = patch.visible = time >= known.t; };
+  return (time) => { outline.visible = patch.visible = time >= known.t && (known.until === null || time < known.until); };
 }
 
 // Where it touched, the normal, and the cone that the normal lies in with two chances of three.

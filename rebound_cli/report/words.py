@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from companion.detection.interface import ImpactKind
 from rebound_cli.ending import ending_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.flight import ShownFlight
@@ -16,27 +17,23 @@ LOST_FROM = 1.5
 
 def sentence(flight: ShownFlight) -> str:
     """Hit what, how fast, when, and how it ended."""
-    hits = flight.findings.collisions
+    hits = flight.hits
     if not hits:
         touched = len(flight.findings.contacts)
-        told = "No hit" + (
-            f", {touched} touch{'' if touched == 1 else 'es'} that {_are(touched)} none" if touched else ""
-        )
-    elif len(hits) == 1:
-        told = f"Hit {_hit_text(flight, hits[0])}"
+        touches = "a touch that is none" if touched == 1 else f"{touched} touches that are none"
+        told = f"No hit, {touches}" if touched else "No hit"
     else:
-        hardest = max(hits, key=lambda hit: math.hypot(*hit.first.velocity_ned_m_s))
-        told = f"{len(hits)} hits, the fastest {_hit_text(flight, hardest)}"
+        fastest = max(hits, key=lambda hit: math.hypot(*hit.first.velocity_ned_m_s))
+        told = _hit_text(flight, fastest)
+        if len(hits) > 1:
+            told = f"{len(hits)} hits, the fastest: {told[:1].lower()}{told[1:]}"
     return f"{told}; {_end(flight)}."
 
 
-def _are(count: int) -> str:
-    return "is" if count == 1 else "are"
-
-
 def _hit_text(flight: ShownFlight, hit: Finding) -> str:
-    kind, first = hit.final.kind.value, hit.first
-    what = "something" if kind == "hit" else kind if kind.startswith("struck") else f"a {kind}"
+    kind, first = hit.final.kind, hit.first
+    struck = {ImpactKind.UNKNOWN: "Hit something", ImpactKind.STRUCK: "Struck by something"}
+    what = struck.get(kind, f"Hit a {kind.value}")
     speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
     return f"{what} at {speed}, {flight.seconds(hit.at_us):.2f} s into the flight"
 
@@ -107,7 +104,9 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         counts = summary.get(key) or {}
         if counts:
             rows.append((word, ", ".join(f"{name} {count}" for name, count in counts.items())))
-    return rows + [("Reconnects", str(summary["reconnects"]))] * ("reconnects" in summary)
+    if "reconnects" in summary:
+        rows.append(("Reconnects", str(summary["reconnects"])))
+    return rows
 
 
 def _again_rows(flight: ShownFlight) -> list[tuple[str, str]]:
