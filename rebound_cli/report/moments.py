@@ -128,9 +128,7 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
     else:
         yield "A landing: no, nobody had told the vehicle to go down."
     if shown is not None:
-        hovered = "it hovered, or had just done so" if shown.may_be_hand else "it had not hovered for half a second"
-        thinkable = "thinkable" if shown.may_be_hand else "no"
-        yield f"A person's hand: {thinkable}, {hovered}."
+        yield _hand_text(flight, finding, shown)
     kind = finding.final.kind
     verdict = "a collision, to be recovered from" if finding.is_collision else "nothing to recover from"
     yield f"Verdict: {kind.value}, {verdict}."
@@ -165,6 +163,17 @@ def _thrust_text(tested: Tested) -> str:
         return "Push along the thrust: within what the propellers can do: says nothing."
     says = "speaks for a contact" if beyond >= needed else "says nothing"
     return f"Push along the thrust: {beyond:.1f} m/s² beyond the propellers, a hit from {needed:.1f} on: {says}."
+
+
+def _hand_text(flight: ShownFlight, finding: Finding, shown: Shown) -> str:
+    if not shown.may_be_hand:
+        return "A person's hand: no, the vehicle had not hovered in the last half second."
+    if finding.first.impact.kind is ImpactKind.CONTACT:
+        return "A person's hand: yes, the vehicle hovered and the force rose slowly."
+    softest = flight.config.fused.soft_m_s2
+    if math.hypot(*finding.first.impact.specific_force_frd_m_s2) >= softest:
+        return f"A person's hand: no, on a vehicle that hovered, but harder than {softest:.0f} m/s²."
+    return "A person's hand: no, on a vehicle that hovered, but force or rates jumped."
 
 
 # --- what was none ----------------------------------------------------------------------------------------------
