@@ -36,12 +36,12 @@ def test_a_number_beyond_four_bytes_is_none_and_not_another_one():
 
 
 def test_all_rows_of_a_short_flight_stay():
-    assert kept_rows(np.arange(100.0), np.zeros(100), np.array([]), 1.0, 100).tolist() == list(range(100))
+    assert kept_rows(np.linspace(0.0, 99.0, 100), np.zeros(100), np.array([]), 1.0, 100).tolist() == list(range(100))
 
 
 def test_of_a_long_flight_all_round_a_hit_stay_and_the_loudest_of_everything_else():
     # Given 1000 s at 10 Hz, a hit at 500 s, and one loud sample far from it
-    seconds, loud = np.arange(10_000) * 0.1, np.full(10_000, np.nan)
+    seconds, loud = np.linspace(0.0, 999.9, 10_000), np.full(10_000, np.nan)
     loud[1234] = 0.9
     rows = kept_rows(seconds, loud, np.array([500.0]), 1.0, 500)
     assert set(np.flatnonzero(np.abs(seconds - 500.0) <= 1.0)) <= set(rows)
