@@ -6,11 +6,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from rebound_cli.console import Console
-from rebound_cli.run_folder import REPORT_NAME
+from rebound_cli.run_folder import REPORT_NAME, TLOG_NAME
 
 
 def offer_report(folder: Path, console: Console) -> None:
-    """Begin to write it where a person sits at a terminal of more than a drone's install, else say how it is made."""
+    """Begin to write it where a person sits at a terminal of more than a drone's install, else say how it is made.
+
+    Of a flight in which nothing was heard there is none.
+    """
+    if (folder / TLOG_NAME).stat().st_size == 0:
+        return
     if console.is_terminal and find_spec("matplotlib") is not None:
         nobody = subprocess.DEVNULL
         command = [sys.executable, "-m", "rebound_cli.report.writing", str(folder)]

@@ -193,14 +193,13 @@ def _modes(flight: ShownFlight) -> list[tuple[float, str]]:
 
 
 def _recovering(flight: ShownFlight) -> list[tuple[float, float]]:
-    """From each hit until it was recovered from, or the next."""
-    ends = [float(event["time_us"]) for event in flight.events if event["kind"] in ("recovered", "unconfirmed")]
-    hits = [hit.at_us for hit in flight.findings.collisions]
+    """From each hit that was answered until it was recovered from, or the next one, or the end."""
+    told = [(event["kind"], _seconds(flight, event["time_us"])) for event in flight.events]
     spans = []
-    for number, at_us in enumerate(hits):
-        following = [*hits[number + 1 :], *(end_us for end_us in ends if end_us > at_us)]
-        if following and flight.reproduction is not None:
-            spans.append((_seconds(flight, at_us), _seconds(flight, min(following))))
+    for number, (kind, at_s) in enumerate(told):
+        if kind == "detection":
+            ends = (end_s for end, end_s in told[number + 1 :] if end in ("recovered", "unconfirmed", "detection"))
+            spans.append((at_s, next(ends, flight.ended_s)))
     return spans
 
 

@@ -95,7 +95,8 @@ function turnAt(table, time) {
 }
 
 function addGround(world, make) {
-  const reach = flight.has_places && tables.path.length ? Math.max(4, ...tables.path.columns.n.map(Math.abs), ...tables.path.columns.e.map(Math.abs)) : 4;
+  let reach = 4;
+  for (const name of ["n", "e"]) for (const value of tables.path.columns[name] || []) reach = Math.max(reach, Math.abs(value) || 0);
   const size = Math.min(2000, 2 * Math.ceil(1.3 * reach));
   const points = [];
   const step = size > 200 ? 10 : 1;

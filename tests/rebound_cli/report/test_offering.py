@@ -23,7 +23,8 @@ def begun(monkeypatch):
     return commands
 
 
-def said(stream, folder):
+def said(stream, folder, packets=b"some"):
+    (folder / "flight.tlog").write_bytes(packets)
     console = Console(stream)
     offering.offer_report(folder, console)
     console.still()
@@ -42,6 +43,10 @@ def test_a_drone_is_left_alone(begun, stream, tmp_path, monkeypatch):
         monkeypatch.setattr(offering, "find_spec", lambda _: None)
     assert f"rebound report {tmp_path}" in said(stream(), tmp_path).replace("\n", "")
     assert begun == []
+
+
+def test_of_a_flight_in_which_nothing_was_heard_there_is_none(begun, tmp_path):
+    assert said(Terminal(), tmp_path, b"") == "" and begun == []
 
 
 def test_the_base_install_is_enough_to_write_one(wall_folder, tmp_path):
