@@ -259,6 +259,16 @@ def add_report(commands: Commands) -> None:
     _add_no_position(report)
 
 
+def add_watch(commands: Commands) -> None:
+    text = "The report's page while a flight goes on; only reads its folder; see docs/report.md."
+    watch = _command(commands, "watch", "report.watching:run_watch", "a flight in a browser while it is flown", text)
+    text = "the run's folder (default: that of the running guard or flight)"
+    watch.add_argument("flight", nargs="?", type=Path, metavar="RUN", help=text)
+    text = "where to listen (default: %(default)s, this machine alone)"
+    watch.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help=text)
+    watch.add_argument("--port", type=port, default=0, help="TCP port (default: any free one)")
+
+
 def add_doctor(commands: Commands) -> None:
     text = "Configuration without keys, versions, machine, journal, last flights; see docs/logs.md."
     summary = "one archive for whoever is asked for help"
@@ -408,6 +418,18 @@ def add_service(commands: Commands) -> None:
 
 # In the order of `rebound --help`.
 COMMANDS = (
-    *(add_fly, add_guard, add_init, add_check, add_plan, add_sim, add_preflight, add_status, add_logs, add_report),
+    *(
+        add_fly,
+        add_guard,
+        add_init,
+        add_check,
+        add_plan,
+        add_sim,
+        add_preflight,
+        add_status,
+        add_logs,
+        add_report,
+        add_watch,
+    ),
     *(add_doctor, add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
 )

@@ -53,8 +53,13 @@ class FlightLog:
 
 def read_flight_log(path: Path) -> FlightLog:
     """Read what figures, the report and the table of results need from a log."""
+    return flight_log_of_packets(read_tlog(path))
+
+
+def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
+    """The same of packets with their stamps."""
     decoder, rows = Decoder(), _Rows()
-    for at_us, packet in read_tlog(path):
+    for at_us, packet in packets:
         message_id = message_id_of(packet)
         if message_id == _SET_POSITION_TARGET_LOCAL_NED:
             payload = payload_of(packet).ljust(_SETPOINT_LENGTH, b"\0")

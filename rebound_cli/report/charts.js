@@ -135,40 +135,53 @@ function fitCharts() {
   for (const { plot, box } of charts) plot.setSize({ width: widthOf(box), height: plot.height });
 }
 
-// The whole flight: height, speed, and how near each sample came to a hit. A click goes there.
-function addOverview(parent, goTo) {
-  const made = [];
-  const path = tables.path;
-  const marks = flight.moments.map((moment) => ({ at: moment.t, colour: "--red", dashed: moment.kind !== "hit" }));
-  const range = [0, Math.max(flight.duration_s, 0.001)];
-  if (path.length) {
-    const { vn, ve, vd } = path.columns;
-    const speed = Array.from(vn, (north, row) => Math.hypot(north, ve[row], vd[row]));
-    const series = [{ label: "speed, m/s", values: plotted(speed), colour: "--blue" }];
-    if (path.has("d")) series.push({ label: "height, m", values: plotted(path.columns.d.map((down) => -down)), colour: "--orange" });
-    made.push(addChart(parent, { title: "Speed and height", unit: "m/s, m", across: "s", x: plotted(path.columns.t), series, marks, range }));
+// The whole flight: what there is to be seen of it, each as a chart with a function that gives its columns.
+function overviews() {
+  const found = [];
+  const { path, imu, force } = tables;
+  if (path.length || flight.live) {
+    const series = [{ label: "speed, m/s", colour: "--blue" }];
+    if (path.has("d")) series.push({ label: "height, m", colour: "--orange" });
+    found.push({ title: "Speed and height", unit: "m/s, m", series, columns: () => {
+      const { t, vn, ve, vd, d } = path.columns;
+      const speed = Array.from(vn, (north, row) => Math.hypot(north, ve[row], vd[row]));
+      return [t, speed, ...(d ? [d.map((down) => -down)] : [])].map(plotted);
+    } });
   }
-  const imu = tables.imu;
   if (imu.length) {
-    const { side, side_threshold, beyond, beyond_threshold, phase } = imu.columns;
-    const watches = flight.phases.indexOf("armed");
-    const ratio = Array.from(side, (push, row) =>
-      phase[row] >= watches ? Math.max(push / side_threshold[row], beyond[row] / beyond_threshold[row]) : NaN);
-    const series = [
-      { label: "push over threshold", values: plotted(ratio), colour: "--blue" },
-      { label: "a hit from here on", values: ratio.map(() => 1), colour: "--red", number: 1 },
-    ];
-    const title = "How near to a hit, while the detector was on";
+    const series = [{ label: "push over threshold", colour: "--blue" }, { label: "a hit from here on", colour: "--red", number: 1 }];
     // What a contact makes leaves the picture: what came near to one is looked for.
-    made.push(addChart(parent, { title, unit: "thresholds", across: "s", x: plotted(imu.columns.t), series, marks, range, up: { range: [0, 1.5] } }));
+    found.push({ title: "How near to a hit, while the detector was on", unit: "thresholds", series, up: { range: [0, 1.5] }, columns: () => {
+      const { t, side, side_threshold, beyond, beyond_threshold, phase } = imu.columns;
+      const watches = flight.phases.indexOf("armed");
+      const ratio = Array.from(side, (push, row) =>
+        phase[row] >= watches ? Math.max(push / side_threshold[row], beyond[row] / beyond_threshold[row]) : NaN);
+      return [t, ratio, ratio.map(() => 1)].map(plotted);
+    } });
   }
-  for (const chart of made) {
-    chart.now = element("div", undefined, "now");
-    chart.plot.over.append(chart.now);
+  if (force) {
+    const series = [{ label: "largest in a tenth of a second", colour: "--blue" }];
+    found.push({ title: "Specific force sideways", unit: "m/s²", series, columns: () => [force.columns.t, force.columns.peak].map(plotted) });
+  }
+  return found;
+}
+
+// A click goes to its time. `showNow` marks a time, `refill` takes what a live flight has brought.
+function addOverview(parent, goTo) {
+  const marks = flight.moments.map((moment) => ({ at: moment.t, colour: "--red", dashed: moment.kind !== "hit" }));
+  const range = flight.live ? undefined : [0, Math.max(flight.duration_s, 0.001)];
+  const made = overviews().map((one) => {
+    const [x, ...values] = one.columns();
+    const series = one.series.map((line, number) => ({ ...line, values: values[number] }));
+    const chart = addChart(parent, { ...one, across: "s", x, series, marks, range });
+    const now = element("div", undefined, "now");
+    chart.plot.over.append(now);
     chart.plot.over.addEventListener("click", () => goTo(chart.plot.posToVal(chart.plot.cursor.left, "x")));
-  }
-  return (time) => {
-    for (const chart of made) chart.now.style.left = `${chart.plot.valToPos(time, "x")}px`;
+    return { plot: chart.plot, now, columns: one.columns };
+  });
+  return {
+    showNow: (time) => made.forEach(({ plot, now }) => { now.style.left = `${plot.valToPos(time, "x")}px`; }),
+    refill: () => made.forEach(({ plot, columns }) => plot.setData(columns())),
   };
 }
 

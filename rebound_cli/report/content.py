@@ -15,6 +15,7 @@ from rebound_cli.flights.archive import without_places
 from rebound_cli.report.flight import ShownFlight, patch_of
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.packing import kept_rows, packed
+from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
 from sim_vehicle.world import Box, Motion, Obstacle, Pole
 
@@ -59,6 +60,16 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
     # Texts and the summary hold places of their own; what is drawn has none by then.
     shown = ("name", "sentence", "lines", "events", "summary", "moments")
     return data | {key: without_places(data[key]) for key in shown} if no_position else data
+
+
+def live_content(flight: ShownFlight) -> dict[str, Any]:
+    """Before anything has come: empty tables of what a live flight brings."""
+    empty = packed(np.array([]), 1.0)
+    tables = {
+        name: {"of": 0, "rows": 0, "columns": {column: {**empty, "kind": "i4"} for column in columns}}
+        for name, columns in {**COLUMNS, "imu": ("t",)}.items()
+    }
+    return content(flight) | {"live": True, "sentence": "Waiting for the flight.", "tables": tables}
 
 
 def _told(flight: ShownFlight) -> Sequence[Mapping[str, Any]]:

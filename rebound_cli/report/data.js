@@ -18,13 +18,14 @@ function decoded(column) {
   const bytes = Uint8Array.from(atob(column.data), (letter) => letter.charCodeAt(0));
   // Little-endian, as every processor that shows pages is.
   const whole = new ARRAYS[column.kind](bytes.buffer);
-  return Float64Array.from(whole, (step) => (step === NONE[column.kind] ? NaN : (step + column.offset) * column.resolution));
+  // A live table grows.
+  return (flight.live ? Array : Float64Array).from(whole, (step) => (step === NONE[column.kind] ? NaN : (step + column.offset) * column.resolution));
 }
 
 function tableOf(packed) {
   const columns = {};
   for (const name of Object.keys(packed.columns)) columns[name] = decoded(packed.columns[name]);
-  return { length: packed.rows, of: packed.of, columns, has: (name) => name in columns };
+  return { get length() { return columns.t.length; }, of: packed.of, columns, has: (name) => name in columns };
 }
 
 const tables = {};

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from companion.errors import ReboundError
+from companion.guard.config import GuardConfig
 from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.flight_log import FlightLog, flight_log_of, read_flight_log
-from rebound_cli.inputs import load_flown
+from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.replay.recording import Recording, Reproduction, read_recording, reproduce, settings_file
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
@@ -99,6 +100,24 @@ def decided_again(folder: Path, recording: Recording, again: Reproduction, liste
         patches=_patches(folder / run_folder.OBSTACLES_NAME),
         versions=recording.versions,
         reproduction=again,
+    )
+
+
+def unseen_flight(folder: Path) -> ShownFlight:
+    """One that is still flown: what is known of it beforehand. Raises ReboundError."""
+    file = settings_file(folder)
+    document = load_flown(file)
+    is_guard = file.name == run_folder.GUARD_NAME
+    settings = validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
+    return ShownFlight(
+        name=folder.resolve().name,
+        started_at_us=0,
+        log=flight_log_of(()),
+        config=settings.companion,
+        findings=Findings(),
+        listener=Listener(),
+        events=(),
+        scene=_scene(folder),
     )
 
 

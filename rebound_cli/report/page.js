@@ -10,10 +10,10 @@ function addRows(list, rows) {
 function addLegend(list) {
   const entries = [["--red", "recovering"]];
   modeNames.forEach((mode, number) => entries.push([MODE_COLOURS[(number + 1) % MODE_COLOURS.length], mode]));
-  entries.push(["--ink", "◆ setpoint"], ["--red", "➤ normal, with its cone"]);
+  if (flight.has_places) entries.push(["--ink", "◆ setpoint"], ["--red", "➤ normal, with its cone"]);
   if (flight.surfaces.length) entries.push(["--purple", "▱ remembered"]);
   if (flight.obstacles.length) entries.push(["--stone", "▰ obstacle"]);
-  if (tables.truth) entries.push(["--grey", "where it really was"]);
+  if (tables.truth && flight.has_places) entries.push(["--grey", "where it really was"]);
   list.replaceChildren(...entries.map(([variable, text]) => {
     const entry = element("li");
     const swatch = element("span", "", "swatch");
@@ -69,8 +69,8 @@ function addDownloads(list) {
   if (flight.summary) addDownload(list, `${stem}-summary.json`, "the summary", () => JSON.stringify(flight.summary, null, 2));
 }
 
-function addEvents(body, goTo) {
-  for (const event of flight.events) {
+function addEvents(body, events, goTo) {
+  for (const event of events) {
     const row = element("tr");
     row.append(element("td", event.t.toFixed(3)), element("td", event.kind), element("td", event.text));
     row.addEventListener("click", () => goTo(event.t));
@@ -117,12 +117,12 @@ function start() {
     byId("no-scene").hidden = false;
     byId("no-scene").textContent = `No replay in three dimensions here: ${error.message}`;
   }
-  let showNow = () => {};
+  let overview = { showNow: () => {}, refill: () => {} };
   const scrubber = byId("scrubber");
   Object.assign(scrubber, { min: 0, max: flight.duration_s, step: 0.001 });
   const player = makePlayer((time) => {
     if (scene) scene.show(time);
-    showNow(time);
+    overview.showNow(time);
     scrubber.value = time;
     byId("clock").textContent = `${time.toFixed(3)} s of ${flight.duration_s.toFixed(1)} s`;
     byId("play").textContent = player.isPlaying ? "Pause" : "Play";
@@ -160,13 +160,13 @@ function start() {
     follow: () => follow(!byId("follow").checked),
     nearer: (factor) => scene && scene.view.nearer(factor),
   });
-  addEvents(byId("events"), (time) => player.seek(time));
+  addEvents(byId("events"), flight.events, (time) => player.seek(time));
   addDownloads(byId("downloads"));
 
   const redraw = () => {
     for (const id of ["overview", "charts", "link-charts"]) removeCharts(byId(id));
     addLegend(byId("legend"));
-    showNow = addOverview(byId("overview"), player.seek);
+    overview = addOverview(byId("overview"), player.seek);
     addLink(byId("link-charts"));
     if (flight.moments.length) showMoment(shownMoment);
     if (scene) scene.restyle();
@@ -181,10 +181,11 @@ function start() {
     if (scene) scene.draw();
     if (window.innerWidth !== width) fitCharts();
     width = window.innerWidth;
-    showNow(player.time);
+    overview.showNow(player.time);
   });
   window.addEventListener("beforeprint", fitCharts);
   window.addEventListener("afterprint", fitCharts);
+  return { player, scene, scrubber, overview: () => overview };
 }
 
-start();
+const shown = start();

@@ -7,16 +7,18 @@ import base64
 import hashlib
 import html
 import json
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
-from rebound_cli.report.content import as_text, content
+from rebound_cli.report.content import as_text, content, live_content
 from rebound_cli.report.flight import ShownFlight
 
 LIBRARIES = ("three.min.js", "uPlot.iife.min.js")
 STYLES = ("assets/uPlot.min.css", "page.css")
 # In the order in which they need each other.
 SCRIPTS = ("data.js", "charts.js", "scene.js", "player.js", "page.js")
+LIVE_SCRIPT = "live.js"
 
 _PAGE = """<!doctype html>
 <html lang="en">
@@ -41,12 +43,20 @@ _PAGE = """<!doctype html>
 
 def page(flight: ShownFlight, no_position: bool = False) -> str:
     """The whole file; the same bytes for the same flight."""
-    data = content(flight, no_position)
+    return _assembled(content(flight, no_position), SCRIPTS)
+
+
+def live_page(flight: ShownFlight) -> str:
+    """Of a flight that goes on: the page asks whoever serves it, and nobody else, for what comes."""
+    return _assembled(live_content(flight), (*SCRIPTS, LIVE_SCRIPT), "; connect-src 'self'")
+
+
+def _assembled(data: dict[str, Any], ours: Sequence[str], may: str = "") -> str:
     data["libraries"] = libraries()
-    scripts = [file_text(f"assets/{name}") for name in LIBRARIES] + [file_text(name) for name in SCRIPTS]
+    scripts = [file_text(f"assets/{name}") for name in LIBRARIES] + [file_text(name) for name in ours]
     hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
     return _PAGE.format(
-        policy=f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:",
+        policy=f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:{may}",
         title=html.escape(f"{data['name']}: {data['sentence']}"),
         style="\n".join(map(file_text, STYLES)),
         body=file_text("page.html"),

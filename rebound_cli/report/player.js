@@ -6,18 +6,18 @@ const SLOW_BEFORE_S = 0.2;
 const SLOW_AFTER_S = 0.5;
 
 function makePlayer(show) {
-  const end = Math.max(flight.duration_s, 0.001);
+  const end = () => Math.max(flight.duration_s, 0.001); // a live flight's is later each time
   const hits = flight.moments.map((moment) => moment.t);
   const player = { time: 0, isPlaying: false, speed: 1, slows: true };
   let last = null;
 
   player.seek = (time) => {
-    player.time = Math.min(end, Math.max(0, time));
+    player.time = Math.min(end(), Math.max(0, time));
     show(player.time);
   };
 
   player.play = (plays) => {
-    if (plays && player.time >= end) player.time = 0;
+    if (plays && player.time >= end()) player.time = 0;
     player.isPlaying = plays;
     last = null;
     if (plays) requestAnimationFrame(frame);
@@ -30,7 +30,7 @@ function makePlayer(show) {
     const elapsed = last === null ? 0 : Math.min(0.1, (stamp - last) / 1000);
     last = stamp;
     player.seek(player.time + elapsed * player.speed * pace());
-    if (player.time >= end) player.play(false);
+    if (player.time >= end()) player.play(false);
     else requestAnimationFrame(frame);
   }
 

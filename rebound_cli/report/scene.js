@@ -204,24 +204,29 @@ function addContact(world, moment, make) {
 }
 
 function addPath(world, make) {
-  const { t, n, e, d } = tables.path.columns;
-  const places = new Float32Array(3 * t.length);
-  t.forEach((_, row) => places.set([n[row], e[row], d[row]], 3 * row));
-  const shape = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(places, 3));
-  const colours = new THREE.BufferAttribute(new Float32Array(3 * t.length), 3);
-  shape.setAttribute("color", colours);
+  const shape = new THREE.BufferGeometry();
+  // Filled anew with each style: a live path has grown by then.
   make.styled.push(() => {
+    const { t, n, e, d } = tables.path.columns;
+    const places = new Float32Array(3 * t.length);
+    const colours = new Float32Array(3 * t.length);
     const known = {};
     t.forEach((time, row) => {
+      places.set([n[row], e[row], d[row]], 3 * row);
       const variable = pathColour(time);
       known[variable] = known[variable] || new THREE.Color(colour(variable));
-      known[variable].toArray(colours.array, 3 * row);
+      known[variable].toArray(colours, 3 * row);
     });
-    colours.needsUpdate = true;
+    shape.setAttribute("position", new THREE.BufferAttribute(places, 3));
+    shape.setAttribute("color", new THREE.BufferAttribute(colours, 3));
   });
   // A line is a pixel wide whatever is asked for; its points make it a thick one.
-  world.add(new THREE.Line(shape, new THREE.LineBasicMaterial({ vertexColors: true })));
-  world.add(new THREE.Points(shape, new THREE.PointsMaterial({ vertexColors: true, size: 3, sizeAttenuation: false })));
+  const drawn = [
+    new THREE.Line(shape, new THREE.LineBasicMaterial({ vertexColors: true })),
+    new THREE.Points(shape, new THREE.PointsMaterial({ vertexColors: true, size: 3, sizeAttenuation: false })),
+  ];
+  for (const one of drawn) one.frustumCulled = false;
+  world.add(...drawn);
 }
 
 function addSetpoint(world, make) {

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import rebound_cli.report
-from rebound_cli.report.page import SCRIPTS, page
+from rebound_cli.report.page import LIVE_SCRIPT, SCRIPTS, page
 from tests.rebound_cli.report.opened import Opened
 from tests.rebound_cli.report.test_page import HOSTILE
 
@@ -28,7 +28,7 @@ SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swifts
 
 
 @pytest.mark.skipif(NODE is None, reason="node is not installed: `node --check` reads the scripts")
-@pytest.mark.parametrize("name", SCRIPTS)
+@pytest.mark.parametrize("name", [*SCRIPTS, LIVE_SCRIPT])
 def test_a_script_is_one(name):
     file = Path(rebound_cli.report.__file__).parent / name
     done = subprocess.run([NODE, "--check", file], capture_output=True, text=True, timeout=60)
