@@ -261,7 +261,7 @@ def add_report(commands: Commands) -> None:
 
 def add_watch(commands: Commands) -> None:
     text = "The report's page while a flight goes on; only reads its folder; see docs/report.md."
-    watch = _command(commands, "watch", "report.watching:run_watch", "a flight in a browser while it is flown", text)
+    watch = _command(commands, "watch", "report.live_server:run_watch", "a flight in a browser while it is flown", text)
     text = "the run's folder (default: that of the running guard or flight)"
     watch.add_argument("flight", nargs="?", type=Path, metavar="RUN", help=text)
     text = "where to listen (default: %(default)s, this machine alone)"

@@ -208,7 +208,7 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
 def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
     """Picture and page of the flight, beside and later where the person wants the prompt back."""
     from rebound_cli.figure.later import draw_later
-    from rebound_cli.report.writing import write_report
+    from rebound_cli.report.writer import write_report
 
     drawn = (flight.folder, flight.mission, world.scene, flown.report, flown.truth)
     try:

@@ -18,7 +18,7 @@ def offer_report(folder: Path, console: Console) -> None:
         return
     if console.is_terminal and find_spec("matplotlib") is not None:
         nobody = subprocess.DEVNULL
-        command = [sys.executable, "-m", "rebound_cli.report.writing", str(folder)]
+        command = [sys.executable, "-m", "rebound_cli.report.writer", str(folder)]
         subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody, start_new_session=True)
         console.print(f"{REPORT_NAME} follows.")
     else:

@@ -20,7 +20,7 @@ def draw_later(*flight: Any) -> None:
 
 if __name__ == "__main__":
     from rebound_cli.figure.flight import draw_flight
-    from rebound_cli.report.writing import write_report
+    from rebound_cli.report.writer import write_report
 
     flight = pickle.load(sys.stdin.buffer)
     draw_flight(*flight)

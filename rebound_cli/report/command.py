@@ -3,7 +3,7 @@
 from argparse import Namespace
 
 from rebound_cli.flights.kept import flight_named, runs_folder
-from rebound_cli.report.writing import write_report
+from rebound_cli.report.writer import write_report
 
 
 def run_report(options: Namespace) -> int:

@@ -12,9 +12,9 @@ from companion.detection.interface import Phase
 from companion.memory.patch import Patch
 from companion.memory.surroundings import outline
 from rebound_cli.flights.archive import without_places
-from rebound_cli.report.flight import ShownFlight, patch_of
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.packing import kept_rows, packed
+from rebound_cli.report.shown_flight import ShownFlight, patch_of
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
 from sim_vehicle.world import Box, Motion, Obstacle, Pole

@@ -55,11 +55,11 @@ class Listener:
 
     def listen(self, watch: Watch) -> None:
         """To this watch, from now on."""
-        heard = _Heard(watch.detector, getattr(watch.config, watch.config.detector), self)
-        watch.detector = cast(Detector[Any], heard)
+        listened_to = _ListenedTo(watch.detector, getattr(watch.config, watch.config.detector), self)
+        watch.detector = cast(Detector[Any], listened_to)
 
 
-class _Heard:
+class _ListenedTo:
     """A detector with a listener."""
 
     losses: Mapping[MessageId, str]

@@ -183,8 +183,13 @@ function start() {
     width = window.innerWidth;
     overview.showNow(player.time);
   });
-  window.addEventListener("beforeprint", fitCharts);
-  window.addEventListener("afterprint", fitCharts);
+  // Paper is white, whatever the screen is.
+  for (const [event, isPrinted] of [["beforeprint", true], ["afterprint", false]]) {
+    window.addEventListener(event, () => {
+      document.documentElement.classList.toggle("printed", isPrinted);
+      redraw();
+    });
+  }
   return { player, scene, scrubber, overview: () => overview };
 }
 

@@ -12,7 +12,7 @@ from importlib import resources
 from typing import Any
 
 from rebound_cli.report.content import as_text, content, live_content
-from rebound_cli.report.flight import ShownFlight
+from rebound_cli.report.shown_flight import ShownFlight
 
 LIBRARIES = ("three.min.js", "uPlot.iife.min.js")
 STYLES = ("assets/uPlot.min.css", "page.css")

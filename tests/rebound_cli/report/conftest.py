@@ -3,7 +3,7 @@
 import pytest
 
 from rebound_cli.main import main
-from rebound_cli.report.flight import recorded_flight
+from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL
 
 

@@ -33,7 +33,7 @@ def said(stream, folder, packets=b"some"):
 
 def test_a_person_at_a_terminal_gets_it_from_a_process_beside(begun, tmp_path):
     assert "report.html follows." in said(Terminal(), tmp_path)
-    assert begun == [[sys.executable, "-m", "rebound_cli.report.writing", str(tmp_path)]]
+    assert begun == [[sys.executable, "-m", "rebound_cli.report.writer", str(tmp_path)]]
 
 
 @pytest.mark.parametrize("stream", [io.StringIO, Terminal])
@@ -61,7 +61,7 @@ def test_a_process_beside_writes_it_whole(wall_folder, tmp_path):
     folder = shutil.copytree(wall_folder, tmp_path / "wall")
     (folder / "report.html").unlink()
     done = alone(
-        f"import runpy\nsys.argv = ['writing', {str(folder)!r}]\nrunpy.run_module('rebound_cli.report.writing', "
+        f"import runpy\nsys.argv = ['writer', {str(folder)!r}]\nrunpy.run_module('rebound_cli.report.writer', "
         "run_name='__main__')",
         tmp_path,
     )

@@ -11,8 +11,8 @@ import pytest
 
 from rebound_cli.flight_log import read_flight_log
 from rebound_cli.main import main
+from rebound_cli.report.live_server import Told, WatchServer
 from rebound_cli.report.tail import COLUMNS, Tail, as_line
-from rebound_cli.report.watching import Told, WatchServer
 from tests.rebound_cli.report.opened import Opened
 
 PATIENCE_S = 60.0

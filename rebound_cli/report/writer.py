@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from companion.shell.files import write_whole
-from rebound_cli.report.flight import ShownFlight, recorded_flight
 from rebound_cli.report.page import page
+from rebound_cli.report.shown_flight import ShownFlight, recorded_flight
 from rebound_cli.run_folder import REPORT_NAME
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rebound_cli import run_folder
-from rebound_cli.report.flight import unseen_flight
 from rebound_cli.report.page import live_page
+from rebound_cli.report.shown_flight import unseen_flight
 from rebound_cli.report.tail import Tail, as_line
 from rebound_cli.run_folder import RunFolderError
 from rebound_cli.status import ask
