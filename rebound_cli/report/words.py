@@ -32,7 +32,7 @@ def sentence(flight: ShownFlight) -> str:
 
 def _hit_text(flight: ShownFlight, hit: Finding) -> str:
     kind, first = hit.final.kind, hit.first
-    struck = {ImpactKind.UNKNOWN: "Hit something", ImpactKind.STRUCK: "Struck by something"}
+    struck = {ImpactKind.UNKNOWN: "Hit something", ImpactKind.STRUCK: "Struck by something, itself"}
     what = struck.get(kind, f"Hit a {kind.value}")
     speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
     return f"{what} at {speed}, {flight.seconds(hit.at_us):.2f} s into the flight"

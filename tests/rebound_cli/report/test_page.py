@@ -16,8 +16,10 @@ import rebound_cli.report
 from companion.shell.tlog import read_tlog
 from rebound_cli.flight_log import read_flight_log
 from rebound_cli.main import main
+from rebound_cli.report.content import content
 from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
+from sim_vehicle.obstacles import WallSpec
 from tests.rebound_cli.report.opened import Opened, rows
 
 PACKAGE = Path(rebound_cli.report.__file__).parent
@@ -128,6 +130,18 @@ def test_the_scene_holds_wall_path_truth_and_what_is_remembered(opened):
     assert [name for _, name in opened.data["modes"]] == ["AUTO.LOITER", "OFFBOARD", "AUTO.LAND", "OFFBOARD"]
     ((began_s, ended_s),) = opened.data["recovering"]
     assert 1.0 < ended_s - began_s < 5.0
+
+
+def test_an_obstacle_that_moves_does_so_by_the_clock_of_the_page(wall):
+    # Given a door that comes from 10 s of the vehicle's clock on; the flight's own began some milliseconds later
+    door = {"point_ned_m": (3, 0, -1.5), "normal_ned": (-1, 0, 0)}
+    moving = WallSpec(**door, motion={"velocity_ned_m_s": (-1.0, 0.0, 0.0), "from_s": 10.0, "until_s": 12.0})
+    scene = wall.scene.model_copy(update={"walls": (moving,)})
+    (obstacle,) = content(replace(wall, scene=scene))["obstacles"]
+    late_s = (wall.started_at_us - wall.truth.epoch_at_boot_us) * 1e-6
+    assert 0.0 < late_s < 0.1
+    assert obstacle["motion"]["t"] == pytest.approx([10.0 - late_s, 12.0 - late_s])
+    assert obstacle["motion"]["offsets"] == ((0.0, 0.0, 0.0), (-2.0, 0.0, 0.0))
 
 
 def test_nothing_heard_can_become_script(wall):
