@@ -249,6 +249,26 @@ def add_logs(commands: Commands) -> None:
     _add_no_position(exported)
 
 
+def add_report(commands: Commands) -> None:
+    text = "One file that any browser opens, without a network; see docs/report.md."
+    report = _command(commands, "report", "report.command:run_report", "a recorded flight as a page to look at", text)
+    text = "a run's folder, or a flight's name (default: last)"
+    report.add_argument("flight", nargs="?", default="last", metavar="RUN", help=text)
+    _add_runs(report)
+    _add_out(report, "FILE", "the page (default: report.html in the run's folder)")
+    _add_no_position(report)
+
+
+def add_watch(commands: Commands) -> None:
+    text = "The report's page while a flight goes on; only reads its folder; see docs/report.md."
+    watch = _command(commands, "watch", "report.live_server:run_watch", "a flight in a browser while it is flown", text)
+    text = "the run's folder (default: that of the running guard or flight)"
+    watch.add_argument("flight", nargs="?", type=Path, metavar="RUN", help=text)
+    text = "where to listen (default: %(default)s, this machine alone)"
+    watch.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help=text)
+    watch.add_argument("--port", type=port, default=0, help="TCP port (default: any free one)")
+
+
 def add_doctor(commands: Commands) -> None:
     text = "Configuration without keys, versions, machine, journal, last flights; see docs/how-to/flights.md."
     summary = "one archive for whoever is asked for help"
@@ -398,6 +418,18 @@ def add_service(commands: Commands) -> None:
 
 # In the order of `rebound --help`.
 COMMANDS = (
-    *(add_fly, add_guard, add_init, add_check, add_plan, add_sim, add_preflight, add_status, add_logs, add_doctor),
-    *(add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
+    *(
+        add_fly,
+        add_guard,
+        add_init,
+        add_check,
+        add_plan,
+        add_sim,
+        add_preflight,
+        add_status,
+        add_logs,
+        add_report,
+        add_watch,
+    ),
+    *(add_doctor, add_replay, add_tune, add_airframe, add_identify, add_key, add_completion, add_service),
 )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from companion.companion import Companion
-from companion.errors import ConfigurationError
+from companion.errors import ConfigurationError, ReboundError
 from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, udp_in
@@ -20,6 +20,7 @@ from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
+from rebound_cli.offering import offer_report
 from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, fly_realtime, watched
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
@@ -192,8 +193,9 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
     try:
         run_folder.write_json(flight.folder / run_folder.SUMMARY_NAME, summary)
         if world is not None:
-            # A drone draws nothing: `rebound replay` does, wherever the folder is taken.
             _draw(flight, flown, world)
+        else:
+            offer_report(flight.folder, console)
         console.print(f"\nEverything is in {flight.folder}/")
     finally:
         if json_on_stdout:
@@ -204,8 +206,9 @@ def _finish(flight: Flight, flown: Flown, json_on_stdout: bool) -> int:
 
 
 def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
-    """The picture of the flight, beside and later where the person wants the prompt back."""
+    """Picture and page of the flight, beside and later where the person wants the prompt back."""
     from rebound_cli.figure.later import draw_later
+    from rebound_cli.report.writer import write_report
 
     drawn = (flight.folder, flight.mission, world.scene, flown.report, flown.truth)
     try:
@@ -213,8 +216,13 @@ def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
             from rebound_cli.figure.flight import draw_flight
 
             draw_flight(*drawn)
+            write_report(flight.folder)
             return
     except KeyboardInterrupt:
         pass
+    except ReboundError as error:
+        # Of a flight in which nothing was heard there is nothing to show.
+        flight.console.print(f"\nNo {run_folder.REPORT_NAME}: {error}")
+        return
     draw_later(*drawn)
-    flight.console.print(f"\n{run_folder.FIGURE_NAME} follows.")
+    flight.console.print(f"\n{run_folder.FIGURE_NAME} and {run_folder.REPORT_NAME} follow.")

@@ -14,6 +14,7 @@ from rebound_cli.console import console_for
 from rebound_cli.documents import Document, Override, apply_override, apply_overrides, load_document, validated
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
+from rebound_cli.offering import offer_report
 from rebound_cli.realtime import Loop, watched
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
@@ -58,6 +59,7 @@ def run_guard(options: Namespace) -> int:
             run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
         left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
         console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
+        offer_report(folder, console)
         if interrupts.reason is None:
             raise ReboundError(
                 guard.outcome[:1].upper() + guard.outcome[1:] + ("" if guard.outcome.endswith("?") else ".")

@@ -67,11 +67,15 @@ class TlogWriter:
 
 
 def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Each packet with its stamp in microseconds since the epoch.
+    """Each packet with its stamp in microseconds since the epoch."""
+    return ((stamp_us, packet) for stamp_us, packet, _ in packets_in(path.read_bytes()))
+
+
+def packets_in(content: bytes) -> Iterator[tuple[int, bytes, int]]:
+    """Each packet of a log with its stamp and where it ends.
 
     Bytes that belong to no packet are passed over; a last packet cut short by a kill is left out.
     """
-    content = path.read_bytes()
     position = 0
     last_us: int | None = None
     while position + _STAMP.size < len(content):
@@ -83,7 +87,7 @@ def read_tlog(path: Path) -> Iterator[tuple[int, bytes]]:
             continue
         if start + length > len(content):
             return
-        yield stamp_us, content[start : start + length]
+        yield stamp_us, content[start : start + length], start + length
         last_us = stamp_us
         position = start + length
 

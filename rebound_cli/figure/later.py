@@ -1,4 +1,4 @@
-"""A flight's picture, drawn by a process of its own: the person has the prompt back meanwhile."""
+"""A flight's picture and page, made by a process of its own: the person has the prompt back meanwhile."""
 
 import pickle
 import subprocess
@@ -8,7 +8,7 @@ from typing import Any
 
 
 def draw_later(*flight: Any) -> None:
-    """What `draw_flight` takes. Returns at once; the picture is there when it is whole."""
+    """What `draw_flight` takes. Returns at once; each file is there when it is whole."""
     # Without a name: nobody else can put anything in its place.
     with tempfile.TemporaryFile() as file:
         pickle.dump(flight, file)
@@ -20,5 +20,8 @@ def draw_later(*flight: Any) -> None:
 
 if __name__ == "__main__":
     from rebound_cli.figure.flight import draw_flight
+    from rebound_cli.report.writer import write_report
 
-    draw_flight(*pickle.load(sys.stdin.buffer))
+    flight = pickle.load(sys.stdin.buffer)
+    draw_flight(*flight)
+    write_report(flight[0])

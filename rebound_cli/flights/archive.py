@@ -42,11 +42,11 @@ class Archive:
             return
         try:
             if name.endswith(".jsonl"):
-                kept = "".join(json.dumps(_without_places(json.loads(line))) + "\n" for line in text.splitlines())
+                kept = "".join(json.dumps(without_places(json.loads(line))) + "\n" for line in text.splitlines())
             elif name.endswith(".json"):
-                kept = json.dumps(_without_places(json.loads(text)), indent=2) + "\n"
+                kept = json.dumps(without_places(json.loads(text)), indent=2) + "\n"
             else:
-                kept = yaml.safe_dump(_without_places(yaml.safe_load(text)), sort_keys=False, allow_unicode=True)
+                kept = yaml.safe_dump(without_places(yaml.safe_load(text)), sort_keys=False, allow_unicode=True)
         except (ValueError, yaml.YAMLError):
             kept = "left out: damaged, so its coordinates cannot be told from the rest\n"
         self._add(name, kept)
@@ -86,9 +86,9 @@ def add_flight(archive: Archive, flight: KeptFlight, below: str) -> None:
             archive.add_data(name, read_text(file))
 
 
-def _without_places(data: Any) -> Any:
+def without_places(data: Any) -> Any:
     if isinstance(data, dict):
-        return {key: _without_places(value) for key, value in data.items() if not _PLACE_KEYS.fullmatch(str(key))}
+        return {key: without_places(value) for key, value in data.items() if not _PLACE_KEYS.fullmatch(str(key))}
     if isinstance(data, list):
-        return [_without_places(value) for value in data]
+        return [without_places(value) for value in data]
     return _PLACES.sub("[left out]", data) if isinstance(data, str) else data

@@ -3,7 +3,8 @@
 import json
 import re
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from rebound_cli.console import Console, console_for
@@ -12,23 +13,31 @@ from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.recording import is_run_folder, read_recording, settings_file
 from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
-from rebound_cli.run_folder import RUNS_FOLDER, TLOG_NAME, versions
+from rebound_cli.report.listening import Listener
+from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
+from rebound_cli.report.writer import write_page
+from rebound_cli.run_folder import REPORT_NAME, RUNS_FOLDER, TLOG_NAME, versions
 
 
 def run_replay(options: Namespace) -> int:
     """Print the findings and draw them. 1 when they are not what was expected, or a flight did not come again."""
     console = console_for(options.json)
-    replay = _replay(options, console)
+    replay, shown = _replay(options, console)
     slug = re.sub(r"[^A-Za-z0-9_.-]+", "-", options.log.resolve().name.removesuffix(options.log.suffix)) or "log"
-    pictures = _draw(replay, options.out or RUNS_FOLDER / f"replay-{slug}")
+    folder = options.out or RUNS_FOLDER / f"replay-{slug}"
+    pictures = _draw(replay, folder)
     if options.json:
         print(json.dumps(report_data(replay, pictures), indent=2))
     else:
         console.print(report_text(replay, pictures).rstrip())
+    if pictures:
+        console.print(f"page: {write_page(shown(), folder / REPORT_NAME)}")
     return _exit_code(replay, options.expect, options.least_watched, console)
 
 
-def _replay(options: Namespace, console: Console) -> Replay:
+def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], ShownFlight]]:
+    """What was found, and all that a page shows of it."""
+    listener = Listener()
     folder = options.log if is_run_folder(options.log) else None
     if options.log.is_dir() and folder is None:
         raise LogError(f"{options.log}: no {TLOG_NAME} in this folder; give a run's folder or a file.")
@@ -41,14 +50,17 @@ def _replay(options: Namespace, console: Console) -> Replay:
         other = [f"{name} {then[name]}, now {now.get(name)}" for name in then if now.get(name) != then[name]]
         if other:
             console.print(f"flown with other versions, so bits may differ: {'; '.join(other)}")
-        return replay_flight(read_telemetry(folder / TLOG_NAME), recording)
+        replay = replay_flight(read_telemetry(folder / TLOG_NAME), recording, listener.listen)
+        assert replay.reproduction is not None, "a flight of our own is decided again"
+        return replay, partial(decided_again, folder, recording, replay.reproduction, listener)
     settings = options.companion
     if folder is not None and settings is None:
         console.print(f"with {', '.join(changed)} the flight's own decisions cannot come again and are not compared")
         settings = settings_file(folder)
     config = companion_settings(settings, options.set, options.detector)
     log = read_log(options.log if folder is None else folder / TLOG_NAME)
-    return replay_log(log, config, options.rate)
+    replay = replay_log(log, config, options.rate, listener.listen)
+    return replay, partial(replayed_flight, replay, config, listener)
 
 
 def _draw(replay: Replay, folder: Path) -> Sequence[str]:

@@ -5,7 +5,7 @@ whole companion once more.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
@@ -14,6 +14,7 @@ from typing import Any
 
 from companion.companion import Companion
 from companion.detection.interface import Situation
+from companion.detection.watch import Watch
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
@@ -126,12 +127,13 @@ class Reproduction:
     first_difference: str | None
 
 
-def reproduce(recording: Recording) -> Reproduction:
-    """Fly the recording to its end, whatever differs."""
+def reproduce(recording: Recording, listen: Callable[[Watch], None] | None = None) -> Reproduction:
+    """Fly the recording to its end, whatever differs. `listen` is told of each watch before its first IMU sample."""
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
     findings, expected, differences = Findings(), list(recording.event_lines), []
     told: list[str] = []
+    watch: Watch | None = None
     for step in recording.steps:
         # What the flight knew when the packets came; they may move it on.
         known = _known(stepped)
@@ -149,6 +151,9 @@ def reproduce(recording: Recording) -> Reproduction:
             what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
             differences.append(f"at {step.time_us} us {what}")
         assert stepped.core is not None, "the first step begins it"
+        if stepped.core.watch is not watch and listen is not None:
+            listen(stepped.core.watch)
+        watch = stepped.core.watch
         findings.note(stepped.core.watch, known, step.time_us)
         for record in step.told:
             _tell(stepped, record)

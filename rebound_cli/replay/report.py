@@ -2,11 +2,12 @@
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.detection.interface import Evidence, ImpactKind
+from companion.detection.watch import Watch
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import WANTED, Log, LogError
@@ -42,21 +43,23 @@ class Replay:
         return max(math.hypot(*sample.specific_force_frd_m_s2) for _, sample in self.log.imu())
 
 
-def replay_log(log: Log, config: CompanionConfig, rate_hz: float | None) -> Replay:
+def replay_log(
+    log: Log, config: CompanionConfig, rate_hz: float | None, listen: Callable[[Watch], None] | None = None
+) -> Replay:
     """The detector over the log. Raises LogError when the rate leaves nothing."""
     recorded_hz = shaking(log).rate_hz
     if rate_hz is not None:
         log = replace(log, heard=tuple(thinned(log.heard, rate_hz)))
         if len(log.imu()) < 2:
             raise LogError(f"{log.path}: at {rate_hz:g} Hz fewer than two IMU samples of the log are left.")
-    findings = watch_log(log, config)
+    findings = watch_log(log, config, listen=listen)
     return Replay(log, config.detector, recorded_hz, shaking(log), findings, _losses(log, config), None)
 
 
-def replay_flight(log: Log, recording: Recording) -> Replay:
+def replay_flight(log: Log, recording: Recording, listen: Callable[[Watch], None] | None = None) -> Replay:
     """Our own flight decided again, from the first byte to the last."""
     config = recording.settings.companion
-    reproduction = reproduce(recording)
+    reproduction = reproduce(recording, listen)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)
     shown = shaking(log)

@@ -1,6 +1,6 @@
 """A log through the watch: the same detector code as in flight, at the recorded or at a requested rate."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
@@ -197,13 +197,23 @@ class Findings:
         self._note_span("off", None, at_us)
 
 
-def watch_log(log: Log, config: CompanionConfig, rate_hz: float | None = None) -> Findings:
-    """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded."""
+def watch_log(
+    log: Log,
+    config: CompanionConfig,
+    rate_hz: float | None = None,
+    listen: Callable[[Watch], None] | None = None,
+) -> Findings:
+    """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded.
+
+    `listen` is told of the watch before its first sample.
+    """
     heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
     circumstances, findings = Circumstances(), Findings()
     # A log begins with old news of every topic: until the first IMU sample nobody was on the watch.
     start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
     watch = start_watch(config, start_us)
+    if listen is not None:
+        listen(watch)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
         for notice in advance(watch, samples, circumstances.situation, now_us).notices:

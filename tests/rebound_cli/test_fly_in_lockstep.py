@@ -23,6 +23,7 @@ FILES = {
     "airframe.yaml",
     "events.jsonl",
     "flight.png",
+    "report.html",
     "obstacles.json",
     "flight.tlog",
     "inputs.jsonl",

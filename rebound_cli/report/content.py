@@ -1,0 +1,288 @@
+"""Everything that the page shows, as data: what `page.js` and its neighbours read."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from companion.detection.interface import Phase
+from companion.memory.patch import Patch
+from companion.memory.surroundings import outline
+from rebound_cli.flights.archive import without_places
+from rebound_cli.report.moments import Moment, moments_of
+from rebound_cli.report.packing import kept_rows, packed
+from rebound_cli.report.shown_flight import ShownFlight, patch_of
+from rebound_cli.report.tail import COLUMNS
+from rebound_cli.report.words import lines, link_rows, sentence
+from sim_vehicle.world import Box, Motion, Obstacle, Pole
+
+Floats = npt.NDArray[np.float64]
+
+# How fine numbers are kept: finer than any of the sensors, so that two bytes hold most.
+TIME_S, PLACE_M, SPEED_M_S, UNIT, FORCE_M_S2, RATE_RAD_S, FOLD_M = 1e-5, 1e-3, 1e-3, 1e-4, 1e-2, 1e-3, 1e-4
+# All rows of half a minute at 250 Hz, and ten a second more of what is longer: below 2 MB for minutes, 5 MB for half an
+# hour.
+_ROWS, _ROWS_PER_S = 7_000, 10.0
+# Around a moment all rows are kept: the microscope's 150 ms, and the slow motion's way there and back.
+AROUND_S = 1.0
+
+NED = ("n", "e", "d")
+_PHASES = tuple(Phase)
+
+
+def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
+    """Without coordinates where they are not wanted."""
+    moments = moments_of(flight)
+    events = [_event(flight, event) for event in _told(flight)]
+    data = {
+        "name": flight.name,
+        "sentence": sentence(flight),
+        "lines": lines(flight),
+        "duration_s": flight.ended_s,
+        "averaging_ms": flight.config.estimate.imu_averaging_interval_s * 1e3,
+        "tables": _tables(flight, moments, no_position),
+        "moments": [_moment(flight, moment, no_position) for moment in moments],
+        "phases": [phase.value for phase in _PHASES],
+        "modes": _modes(flight),
+        "recovering": _recovering(flight),
+        "obstacles": [] if no_position else _obstacles(flight),
+        "surfaces": [] if no_position else _surfaces(flight),
+        "vehicle": _vehicle(flight),
+        "has_places": not no_position,
+        "link": link_rows(flight),
+        "events": events,
+        "summary": flight.summary,
+        "versions": flight.versions,
+    }
+    # Texts and the summary hold places of their own; what is drawn has none by then.
+    shown = ("name", "sentence", "lines", "events", "summary", "moments")
+    return data | {key: without_places(data[key]) for key in shown} if no_position else data
+
+
+def live_content(flight: ShownFlight) -> dict[str, Any]:
+    """Before anything has come: empty tables of what a live flight brings."""
+    empty = packed(np.array([]), 1.0)
+    tables = {
+        name: {"of": 0, "rows": 0, "columns": {column: {**empty, "kind": "i4"} for column in columns}}
+        for name, columns in {**COLUMNS, "imu": ("t",)}.items()
+    }
+    return content(flight) | {"live": True, "sentence": "Waiting for the flight.", "tables": tables}
+
+
+def _told(flight: ShownFlight) -> Sequence[Mapping[str, Any]]:
+    """Events, and what was said to the ground station by whomever."""
+    texts = [{"time_us": at_us, "kind": "STATUSTEXT", "text": text} for at_us, text in flight.log.texts]
+    return sorted([*flight.events, *texts], key=lambda event: float(event["time_us"]))
+
+
+def _event(flight: ShownFlight, event: Mapping[str, Any]) -> dict[str, Any]:
+    return {"t": _seconds(flight, event["time_us"]), "kind": event["kind"], "text": str(event.get("text", ""))}
+
+
+def _seconds(flight: ShownFlight, at_us: float) -> float:
+    return round(flight.seconds(at_us), 6)
+
+
+# --- tables -----------------------------------------------------------------------------------------------------
+
+
+def _tables(flight: ShownFlight, moments: Sequence[Moment], no_position: bool) -> dict[str, Any]:
+    """Of each stream; `t` is seconds since the flight began, `boot` those of the vehicle's clock since its first."""
+    log, truth = flight.log, flight.truth
+    near_s = np.array([flight.seconds(moment.at_us) for moment in moments])
+    most = _ROWS + round(_ROWS_PER_S * flight.ended_s)
+    tested = _tested_columns(flight)
+    loud = np.fmax(
+        tested["side"] / tested["side_threshold"],
+        tested["beyond"] / tested["beyond_threshold"],
+    )
+    boot_s = log.imu_time_boot_us[0] if len(log.imu_time_boot_us) else 0.0
+    imu = {
+        **_times(flight, log.imu_at_us, (log.imu_time_boot_us - boot_s) * 1e-6),
+        **_vector(("fx", "fy", "fz"), log.specific_force_frd_m_s2, FORCE_M_S2),
+        **_vector(("p", "q", "r"), log.angular_velocity_frd_rad_s, RATE_RAD_S),
+        **{name: (values, FORCE_M_S2 if name != "phase" else 1.0) for name, values in tested.items()},
+    }
+    path = {
+        **_times(flight, log.position_at_us, (log.position_time_boot_us - boot_s) * 1e-6),
+        **_vector(NED, log.position_ned_m, PLACE_M),
+        **_vector(("vn", "ve", "vd"), log.velocity_ned_m_s, SPEED_M_S),
+    }
+    attitude = {**_times(flight, log.attitude_at_us), **_vector(("qw", "qx", "qy", "qz"), log.attitude_wxyz, UNIT)}
+    setpoint = {**_times(flight, log.setpoint_at_us), **_vector(NED, log.setpoint_ned_m, PLACE_M)}
+    tables = {"imu": (imu, loud), "path": (path, None), "attitude": (attitude, None), "setpoint": (setpoint, None)}
+    if truth is not None:
+        series = truth.series
+        boot_us = series["time_boot_us"]
+        true = {
+            **_times(flight, truth.at_us(boot_us), (boot_us - boot_s) * 1e-6),
+            **_vector(NED, series["position_ned_m"], PLACE_M),
+            **_vector(("vn", "ve", "vd"), series["velocity_ned_m_s"], SPEED_M_S),
+            **_vector(("qw", "qx", "qy", "qz"), series["attitude_wxyz"], UNIT),
+            **_vector(("fold1", "fold2", "fold3", "fold4"), series["arm_fold_m"], FOLD_M),
+        }
+        tables["truth"] = (true, None)
+    return {name: _packed(columns, loudness, near_s, most, no_position) for name, (columns, loudness) in tables.items()}
+
+
+def _times(flight: ShownFlight, at_us: Floats, boot_s: Floats | None = None) -> dict[str, tuple[Floats, float]]:
+    times = {"t": ((at_us - flight.started_at_us) * 1e-6, TIME_S)}
+    return times if boot_s is None else {**times, "boot": (boot_s, TIME_S)}
+
+
+def _vector(names: Sequence[str], rows: Floats, resolution: float) -> dict[str, tuple[Floats, float]]:
+    return {name: (rows[:, number], resolution) for number, name in enumerate(names)}
+
+
+def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
+    """What the detector made of each IMU sample of the log; NaN of those it never got."""
+    boot_us = flight.log.imu_time_boot_us
+    heard = {one.time_boot_us: one for one in flight.listener.tested}
+    rows = np.full((len(boot_us), 5), np.nan)
+    for row, time_us in enumerate(boot_us):
+        one = heard.get(int(time_us))
+        if one is not None:
+            rows[row] = (
+                *(_PHASES.index(one.phase), one.side_m_s2, one.side_threshold_m_s2),
+                *(one.beyond_thrust_m_s2, one.beyond_threshold_m_s2),
+            )
+    return dict(zip(("phase", "side", "side_threshold", "beyond", "beyond_threshold"), rows.T, strict=True))
+
+
+def _packed(
+    columns: Mapping[str, tuple[Floats, float]],
+    loudness: Floats | None,
+    near_s: Floats,
+    most: int,
+    no_position: bool,
+) -> dict[str, Any]:
+    seconds = columns["t"][0]
+    rows = kept_rows(seconds, np.zeros(len(seconds)) if loudness is None else loudness, near_s, AROUND_S, most)
+    return {
+        "of": len(seconds),
+        "rows": len(rows),
+        "columns": {
+            name: packed(values[rows], resolution)
+            for name, (values, resolution) in columns.items()
+            if not (no_position and name in NED)
+        },
+    }
+
+
+# --- what is drawn ----------------------------------------------------------------------------------------------
+
+
+def _moment(flight: ShownFlight, moment: Moment, no_position: bool) -> dict[str, Any]:
+    boot_us = flight.log.imu_time_boot_us
+    first_us = boot_us[0] if len(boot_us) else 0.0
+    touched_us = moment.touched_boot_us
+    place = None if no_position or moment.position_ned_m is None else moment.position_ned_m
+    return {
+        "kind": moment.kind,
+        "title": moment.title,
+        "t": _seconds(flight, moment.at_us),
+        "boot": round((moment.boot_us - first_us) * 1e-6, 6),
+        "touched_ms": None if touched_us is None else round((touched_us - moment.boot_us) / 1e3, 3),
+        "facts": moment.facts,
+        "reasons": moment.reasons,
+        "place": place,
+        "normal": moment.normal_ned,
+        "error_deg": round(moment.normal_error_deg, 1),
+    }
+
+
+def _modes(flight: ShownFlight) -> list[tuple[float, str]]:
+    """The vehicle's flight modes from when on."""
+    return [
+        (_seconds(flight, event["time_us"]), event["text"].removeprefix("mode "))
+        for event in flight.events
+        if event["kind"] == "mode" and str(event.get("text", "")).startswith("mode ")
+    ]
+
+
+def _recovering(flight: ShownFlight) -> list[tuple[float, float]]:
+    """From each hit that was answered until it was recovered from, or the next one, or the end."""
+    told = [(event["kind"], _seconds(flight, event["time_us"])) for event in flight.events]
+    spans = []
+    for number, (kind, at_s) in enumerate(told):
+        if kind == "detection":
+            ends = (end_s for end, end_s in told[number + 1 :] if end in ("recovered", "unconfirmed", "detection"))
+            spans.append((at_s, next(ends, flight.ended_s)))
+    return spans
+
+
+def _obstacles(flight: ShownFlight) -> list[dict[str, Any]]:
+    scene = flight.scene
+    return [] if scene is None else [_obstacle(flight, obstacle) for _, obstacle in scene.obstacles()]
+
+
+def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
+    motion = _motion(flight, obstacle.motion)
+    if isinstance(obstacle, Pole):
+        shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
+        return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
+    box = obstacle if isinstance(obstacle, Box) else obstacle.box()
+    shape = {"centre": box.centre_ned_m, "axes": box.axes_ned, "sizes": box.sizes_m}
+    return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
+
+
+def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None:
+    """By the page's own clock."""
+    if motion is None or flight.truth is None:
+        return None
+    times_s = [_seconds(flight, flight.truth.at_us(time_s * 1e6)) for time_s in motion.times_s]
+    return {"t": times_s, "offsets": motion.offsets_ned_m}
+
+
+def _surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
+    """What was believed of each surface from when until when: from each touch of it to the next."""
+    told = [
+        (_seconds(flight, event["time_us"]), patch_of(event["data"]))
+        for event in flight.events
+        if event["kind"] == "obstacle"
+    ]
+    known = [(0.0, patch) for patch in flight.patches if patch.found_at_us < flight.started_at_us]
+    shown = []
+    for number, (since_s, patch) in enumerate([*known, *told]):
+        later = [*known, *told][number + 1 :]
+        until_s = next((at_s for at_s, one in later if patch.touches_ned_m[0] in one.touches_ned_m), None)
+        shown.append({"t": since_s, "until": until_s, "corners": _corners(flight, patch)})
+    return shown
+
+
+def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
+    """In the vehicle's local frame; a wall's in its plane, a ceiling's or a floor's at its height."""
+    origin = flight.origin_ned_m
+    if patch.is_steep:
+        corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline(patch)[:-1]]
+    else:
+        (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
+        (left_m, right_m), (low_m, high_m) = patch.believed_along_m(), patch.believed_heights_m()
+        around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
+        corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
+    return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]
+
+
+def _vehicle(flight: ShownFlight) -> dict[str, Any]:
+    guards = flight.config.estimate.guards
+    return {"centre": guards.centre_m, "radius": guards.radius_m, "height": guards.height_m}
+
+
+def as_text(data: Mapping[str, Any]) -> str:
+    """JSON that a script element can hold, whatever was heard on the wire: no character in it can end the element."""
+    text = json.dumps(_finite(data), separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _finite(data: Any) -> Any:
+    """JSON has no NaN: it becomes null."""
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if isinstance(data, Mapping):
+        return {str(key): _finite(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_finite(value) for value in data]
+    return data

@@ -1,0 +1,128 @@
+"""`rebound watch`: the page of a flight while it is flown, from a program of its own that only reads files.
+
+A browser may be slow or vanish: each has a thread here, and none in the program that flies.
+"""
+
+import threading
+from argparse import Namespace
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+from rebound_cli import run_folder
+from rebound_cli.report.page import live_page
+from rebound_cli.report.shown_flight import unseen_flight
+from rebound_cli.report.tail import Tail, as_line
+from rebound_cli.run_folder import RunFolderError
+from rebound_cli.status import ask
+
+# The log is written twice a second; looked at twice as often it is at most a quarter of a second older.
+LOOK_S = 0.25
+# A browser that takes nothing for so long has gone, or sleeps: it asks again when it wakes.
+PATIENCE_S = 10.0
+_LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+
+
+class Told:
+    """Everything so far, for any number of readers, each at its own pace."""
+
+    def __init__(self) -> None:
+        self._lines: list[bytes] = []
+        self._news = threading.Condition()
+
+    def add(self, line: bytes) -> None:
+        with self._news:
+            self._lines.append(line)
+            self._news.notify_all()
+
+    def after(self, count: int, timeout_s: float) -> list[bytes]:
+        """The lines after the first `count`; none where nothing comes in time."""
+        with self._news:
+            self._news.wait_for(lambda: len(self._lines) > count, timeout_s)
+            return self._lines[count:]
+
+
+class WatchServer(ThreadingHTTPServer):
+    """Serves one page and its stream."""
+
+    daemon_threads = True
+
+    def __init__(self, folder: Path, host: str, port: int) -> None:
+        """Raises OSError, ReboundError."""
+        super().__init__((host, port), _Handler)
+        self.told, self.is_over = Told(), threading.Event()
+        self.page = live_page(unseen_flight(folder)).encode()
+        self.names = _LOOPBACK if host in _LOOPBACK else ()
+        self._tail = Tail(folder)
+        threading.Thread(target=self._read, name="rebound watch", daemon=True).start()
+
+    def _read(self) -> None:
+        while not self.is_over.is_set():
+            chunk = self._tail.read()
+            if chunk is not None:
+                self.told.add(as_line(chunk))
+            else:
+                self.is_over.wait(LOOK_S)
+
+    def server_close(self) -> None:
+        self.is_over.set()
+        super().server_close()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A browser that has gone is no news."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: WatchServer
+    timeout = PATIENCE_S
+
+    def do_GET(self) -> None:
+        # A name that leads here by somebody else's server of names is another site's, and gets nothing.
+        host = (self.headers.get("Host") or "").rpartition(":")[0]
+        if self.server.names and host not in self.server.names:
+            self.send_error(403)
+        elif self.path == "/":
+            self._answer("text/html; charset=utf-8")
+            self.wfile.write(self.server.page)
+        elif self.path == "/live":
+            self._answer("text/event-stream")
+            self._stream()
+        else:
+            self.send_error(404)
+
+    def _answer(self, kind: str) -> None:
+        self.send_response(200)
+        for name, value in (
+            ("Content-Type", kind),
+            ("Cache-Control", "no-store"),
+            ("X-Content-Type-Options", "nosniff"),
+        ):
+            self.send_header(name, value)
+        self.end_headers()
+
+    def _stream(self) -> None:
+        sent = 0
+        while not self.server.is_over.is_set():
+            lines = self.server.told.after(sent, 1.0)
+            # A comment finds out whether anybody is there.
+            self.wfile.write(b"".join(lines) or b": still\n\n")
+            sent += len(lines)
+
+    def log_message(self, format: str, *arguments: Any) -> None:
+        """Nothing: the terminal has one line, the address."""
+
+
+def run_watch(options: Namespace) -> int:
+    """Until Ctrl-C. Raises ReboundError where there is nothing to watch."""
+    folder = options.flight or Path(str(ask(None)["folder"]))
+    if not (folder / run_folder.TLOG_NAME).exists():
+        raise RunFolderError(f"{folder}: no flight is there; give a run's folder.")
+    server = WatchServer(folder, options.host, options.port)
+    print(f"{folder}: http://{options.host}:{server.server_port}/ (Ctrl-C ends it)", flush=True)
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        server.server_close()
+    return 0

@@ -1,0 +1,261 @@
+"""The moments of a flight that are worth a microscope: hits, touches that were none, hits nobody saw, the closest call.
+
+Each with what was measured and, in words, why it was a hit or why it was none.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from companion.detection.interface import Evidence, ImpactKind, Phase
+from companion.memory.patch import CLIPPED_ERROR_RAD, ERROR_RAD
+from companion.messages import Vector3
+from rebound_cli.ending import impact_text
+from rebound_cli.replay.watching import Finding
+from rebound_cli.report.listening import Shown, Tested
+from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.truth_match import index_of_hit
+
+if TYPE_CHECKING:
+    from sim_vehicle.truth import Hit
+
+# A page of more is read by nobody, and 40 of them at PX4's fastest stream are still half a megabyte.
+MOST_MOMENTS = 40
+# What a contact shakes belongs to it: an estimate swings for so long after one (`velocity_rest_s` and a recovery).
+_BESIDE_US = 500_000
+
+_SIGNS = {
+    "turn": "It turned from one sample to the next as no motor turns a vehicle",
+    "dip": "The thrust was gone in one sample and back in the next, as when a ceiling is touched",
+    "velocity": "Its velocity jumped by what the accelerometer did not show: the contact fell between the samples",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """`at_us` on the log's clock, `boot_us` on the vehicle's; `contact` what is drawn of it."""
+
+    kind: str  # hit, contact, missed or closest
+    title: str
+    at_us: float
+    boot_us: float
+    facts: Sequence[tuple[str, str]]
+    reasons: Sequence[str]
+    position_ned_m: Vector3 | None = None
+    normal_ned: Vector3 | None = None
+    normal_error_deg: float = 0.0
+    touched_boot_us: float | None = None  # the first touch, as the simulator knows it
+
+
+def moments_of(flight: ShownFlight) -> list[Moment]:
+    """In the order of time."""
+    found = [_impact(flight, finding) for finding in flight.findings.impacts[:MOST_MOMENTS]]
+    found += _missed(flight)[: MOST_MOMENTS - len(found)]
+    closest = _closest(flight, [moment.boot_us for moment in found])
+    return sorted([*found, *closest], key=lambda moment: moment.at_us)
+
+
+# --- impacts ----------------------------------------------------------------------------------------------------
+
+
+def _impact(flight: ShownFlight, finding: Finding) -> Moment:
+    first, final = finding.first, finding.final
+    boot_us = first.impact.sample_time_boot_us
+    touch = truth_of(flight, boot_us)
+    error_deg = math.degrees(_normal_error_rad(flight, finding))
+    kind = "hit" if finding.is_collision else "contact"
+    what = final.kind.value if final.kind is not ImpactKind.UNKNOWN else "something"
+    speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
+    contact_s = flight.seconds(finding.at_us - (boot_us - final.time_boot_us))
+    least = "at least " if final.is_lower_bound else ""
+    facts = [
+        ("Detected", f"{flight.seconds(finding.at_us):.3f} s"),
+        ("Contact began", f"{contact_s:.4f} s ± {final.time_error_us / 1e3:.1f} ms"),
+        ("Speed before it", speed),
+        ("Largest force in a sample", f"{least}{final.peak_specific_force_m_s2:.1f} m/s²"),
+        ("Impulse", f"{least}{final.impulse_m_s:.2f} m/s"),
+        ("Normal", f"{_bearing(final.normal_ned)} ± {error_deg:.0f}°"),
+        ("Taken for", f"{what}, confidence {first.confidence:.2f}"),
+    ]
+    if touch is not None and flight.truth is not None:
+        late_ms = (boot_us - touch.contact_at_boot_us) / 1e3
+        facts.append(
+            ("Simulator", f"{impact_text(touch.kind, touch.impact_velocity_ned_m_s)}, {late_ms:.1f} ms before")
+        )
+        facts.append(("Simulator's normal", f"{_bearing(touch.normal_ned)}; {touch.peak_force_n:.0f} N at most"))
+    return Moment(
+        kind=kind,
+        title=f"{what.capitalize()} at {speed}" if kind == "hit" else f"Touched, no collision: {what}",
+        at_us=finding.at_us,
+        boot_us=boot_us,
+        facts=facts,
+        reasons=list(_reasons(flight, finding, touch)),
+        position_ned_m=first.position_ned_m,
+        normal_ned=final.normal_ned,
+        normal_error_deg=error_deg,
+        touched_boot_us=None if touch is None else touch.contact_at_boot_us,
+    )
+
+
+def truth_of(flight: ShownFlight, boot_us: int) -> "Hit | None":
+    """The simulator's contact that an IMU sample belongs to."""
+    if flight.truth is None:
+        return None
+    index = index_of_hit(boot_us, flight.truth.hits)
+    return None if index is None else flight.truth.hits[index]
+
+
+def _normal_error_rad(flight: ShownFlight, finding: Finding) -> float:
+    """As the memory of this touch has it; before one is made, by whether the sensor clipped."""
+    for patch in flight.patches:
+        if patch.found_at_us == finding.at_us and patch.hits == 1:
+            return patch.normal_error_rad
+    return CLIPPED_ERROR_RAD if finding.final.is_lower_bound else ERROR_RAD
+
+
+def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iterator[str]:
+    """Sign by sign, then what else it could have been."""
+    impact, situation = finding.first.impact, finding.situation
+    shown = flight.listener.shown.get(impact.sample_time_boot_us)
+    if shown is not None:
+        yield from _signs(shown, impact.evidence)
+    if situation.descent_commanded:
+        height = "an unknown height" if situation.height_m is None else f"{situation.height_m:.2f} m"
+        yield f"A landing: thinkable, the vehicle was told to go down, at {height}."
+    else:
+        yield "A landing: no, nobody had told the vehicle to go down."
+    if shown is not None:
+        yield _hand_text(flight, finding, shown)
+    kind = finding.final.kind
+    verdict = "a collision, to be recovered from" if finding.is_collision else "nothing to recover from"
+    yield f"Verdict: {kind.value}, {verdict}."
+    if finding.final.is_lower_bound:
+        yield "The sensor's range was too small for it, or part of it was not seen: it was at least as hard as stated."
+    taken_back_us = flight.taken_back_us(finding)
+    if taken_back_us is not None:
+        yield f"Taken back {(taken_back_us - finding.at_us) / 1e3:.0f} ms later: nothing else bore it out."
+    if flight.truth is not None and touch is None:
+        yield "The simulator: a false alarm, nothing was touched."
+
+
+def _signs(shown: Shown, evidence: Evidence) -> Iterator[str]:
+    tested = shown.tested
+    if tested is not None and not math.isnan(tested.side_m_s2):
+        yield _side_text(tested)
+        yield _thrust_text(tested)
+    if evidence is Evidence.AFTERMATH:
+        size = "" if math.isnan(shown.spun_rad_s) else f", by {shown.spun_rad_s:.1f} rad/s"
+        yield f"{_SIGNS[shown.sign]}{size}: speaks for a contact."
+
+
+def _side_text(tested: Tested) -> str:
+    side, needed = tested.side_m_s2, tested.side_threshold_m_s2
+    says = "speaks for a contact" if side >= needed else "says nothing"
+    return f"Push sideways: {side:.1f} m/s², a hit from {needed:.1f} on ({side / needed:.1f} times): {says}."
+
+
+def _thrust_text(tested: Tested) -> str:
+    beyond, needed = tested.beyond_thrust_m_s2, tested.beyond_threshold_m_s2
+    if beyond < 0.0:
+        return "Push along the thrust: within what the propellers can do: says nothing."
+    says = "speaks for a contact" if beyond >= needed else "says nothing"
+    return f"Push along the thrust: {beyond:.1f} m/s² beyond the propellers, a hit from {needed:.1f} on: {says}."
+
+
+def _hand_text(flight: ShownFlight, finding: Finding, shown: Shown) -> str:
+    if not shown.may_be_hand:
+        return "A person's hand: no, the vehicle had not hovered in the last half second."
+    if finding.first.impact.kind is ImpactKind.CONTACT:
+        return "A person's hand: yes, the vehicle hovered and the force rose slowly."
+    softest = flight.config.fused.soft_m_s2
+    if math.hypot(*finding.first.impact.specific_force_frd_m_s2) >= softest:
+        return f"A person's hand: no, on a vehicle that hovered, but harder than {softest:.0f} m/s²."
+    return "A person's hand: no, on a vehicle that hovered, but force or rates jumped."
+
+
+# --- what was none ----------------------------------------------------------------------------------------------
+
+
+def _missed(flight: ShownFlight) -> list[Moment]:
+    """Contacts of the simulator's that no impact belongs to."""
+    if flight.truth is None:
+        return []
+    seen = [finding.first.impact.sample_time_boot_us for finding in flight.findings.impacts]
+    told = {index_of_hit(boot_us, flight.truth.hits) for boot_us in seen}
+    missed = [hit for index, hit in enumerate(flight.truth.hits) if index not in told]
+    return [
+        Moment(
+            kind="missed",
+            title=f"Not seen: {impact_text(hit.kind, hit.impact_velocity_ned_m_s)}",
+            at_us=flight.truth.at_us(hit.contact_at_boot_us),
+            boot_us=hit.contact_at_boot_us,
+            facts=[
+                ("Contact began", f"{flight.seconds(flight.truth.at_us(hit.contact_at_boot_us)):.3f} s"),
+                ("Lasted", f"{1e3 * hit.contact_duration_s:.0f} ms"),
+                ("Largest force", f"{hit.peak_force_n:.0f} N"),
+            ],
+            reasons=list(_why_missed(flight, hit)),
+            normal_ned=hit.normal_ned,
+            position_ned_m=hit.contact_position_ned_m,
+            touched_boot_us=hit.contact_at_boot_us,
+        )
+        for hit in missed
+    ]
+
+
+def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
+    assert flight.truth is not None, "a simulated flight has one"
+    at_us = flight.truth.at_us(hit.contact_at_boot_us)
+    for word, spans in (("off", flight.findings.off), ("blind", flight.findings.blind)):
+        for span in spans:
+            if span.start_us <= at_us <= span.end_us:
+                yield f"The detector was {word}: {span.reason}."
+    until_us = hit.ended_at_boot_us + flight.config.estimate.imu_averaging_interval_s * 1e6
+    near = [one for one in flight.listener.tested if hit.contact_at_boot_us <= one.time_boot_us <= until_us]
+    if not near:
+        yield "No IMU sample came while it lasted."
+    elif any(one.phase is Phase.CONTACT for one in near):
+        yield "It belonged to the contact before: one contact is told once."
+    elif near:
+        loudest = max(near, key=lambda one: one.ratio)
+        yield _side_text(loudest)
+        yield _thrust_text(loudest)
+
+
+def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Moment]:
+    """The sample that came nearest to being taken for a hit, and was not; none where nothing was watched."""
+    loudest: Tested | None = None
+    for one in flight.listener.tested:
+        if one.phase is not Phase.ARMED or (loudest is not None and not one.ratio > loudest.ratio):
+            continue
+        if not any(abs(one.time_boot_us - boot_us) < _BESIDE_US for boot_us in others_boot_us):
+            loudest = one
+    if loudest is None or math.isnan(loudest.ratio):
+        return []
+    row = int(np.argmax(flight.log.imu_time_boot_us == loudest.time_boot_us))
+    at_us = float(flight.log.imu_at_us[row])
+    return [
+        Moment(
+            kind="closest",
+            title=f"Closest call: {100 * loudest.ratio:.0f} % of a hit",
+            at_us=at_us,
+            boot_us=loudest.time_boot_us,
+            facts=[("At", f"{flight.seconds(at_us):.3f} s")],
+            reasons=[
+                _side_text(loudest),
+                _thrust_text(loudest),
+                "Verdict: no hit. Outside of the contacts above no sample of the flight came nearer to one.",
+            ],
+        )
+    ]
+
+
+def _bearing(normal_ned: Vector3) -> str:
+    """Where a surface faces."""
+    north, east, down = normal_ned
+    if abs(down) > math.hypot(north, east):
+        return "faces down" if down > 0.0 else "faces up"
+    return f"faces {math.degrees(math.atan2(east, north)) % 360.0:.0f}°"

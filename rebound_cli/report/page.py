@@ -1,0 +1,80 @@
+"""The page: one file, from the flight's data, our own scripts and two libraries as their makers publish them.
+
+A browser runs nothing in it but the scripts named by their hashes, and loads nothing: the page forbids itself both.
+"""
+
+import base64
+import hashlib
+import html
+import json
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+from rebound_cli.report.content import as_text, content, live_content
+from rebound_cli.report.shown_flight import ShownFlight
+
+LIBRARIES = ("three.min.js", "uPlot.iife.min.js")
+STYLES = ("assets/uPlot.min.css", "page.css")
+# In the order in which they need each other.
+SCRIPTS = ("data.js", "charts.js", "scene.js", "player.js", "page.js")
+LIVE_SCRIPT = "live.js"
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>{title}</title>
+<style>
+{style}
+</style>
+</head>
+<body>
+{body}
+<script type="application/json" id="flight">{data}</script>
+{scripts}
+</body>
+</html>
+"""
+
+
+def page(flight: ShownFlight, no_position: bool = False) -> str:
+    """The whole file; the same bytes for the same flight."""
+    return _assembled(content(flight, no_position), SCRIPTS)
+
+
+def live_page(flight: ShownFlight) -> str:
+    """Of a flight that goes on: the page asks whoever serves it, and nobody else, for what comes."""
+    return _assembled(live_content(flight), (*SCRIPTS, LIVE_SCRIPT), "; connect-src 'self'")
+
+
+def _assembled(data: dict[str, Any], ours: Sequence[str], may: str = "") -> str:
+    data["libraries"] = libraries()
+    scripts = [file_text(f"assets/{name}") for name in LIBRARIES] + [file_text(name) for name in ours]
+    hashes = " ".join(f"'sha256-{_digest(script)}'" for script in scripts)
+    return _PAGE.format(
+        policy=f"default-src 'none'; script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:{may}",
+        title=html.escape(f"{data['name']}: {data['sentence']}"),
+        style="\n".join(map(file_text, STYLES)),
+        body=file_text("page.html"),
+        data=as_text(data),
+        scripts="\n".join(f"<script>{script}</script>" for script in scripts),
+    )
+
+
+def libraries() -> list[dict[str, Any]]:
+    """What is in the page of others, each with its licence's whole text."""
+    listed = json.loads(file_text("assets/libraries.json"))
+    return [{**one, "licence_text": file_text(f"assets/{one['licence_file']}")} for one in listed]
+
+
+def file_text(name: str) -> str:
+    """Of a file beside this one, to the byte."""
+    return (resources.files(__package__) / name).read_bytes().decode("utf-8")
+
+
+def _digest(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

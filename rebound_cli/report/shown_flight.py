@@ -1,0 +1,183 @@
+"""A recorded flight with all that the report shows of it, from its folder or from any log that was replayed."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from companion.errors import ReboundError
+from companion.guard.config import GuardConfig
+from companion.memory.patch import Patch
+from companion.memory.stored import KnownPatch
+from companion.mission.config import CompanionConfig
+from rebound_cli import run_folder
+from rebound_cli.documents import validated
+from rebound_cli.flight_log import FlightLog, flight_log_of, read_flight_log
+from rebound_cli.inputs import load_flown, mission_from
+from rebound_cli.replay.recording import Recording, Reproduction, read_recording, reproduce, settings_file
+from rebound_cli.replay.report import Replay
+from rebound_cli.replay.watching import Finding, Findings
+from rebound_cli.report.listening import Listener
+from rebound_cli.truth_match import FlightTruth
+from sim_vehicle.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFlight:
+    """Times are the log's own clock; positions the vehicle's local NED.
+
+    `events` are as `events.jsonl` has them. None stands for what there is none of.
+    """
+
+    name: str
+    started_at_us: int
+    log: FlightLog
+    config: CompanionConfig
+    findings: Findings
+    listener: Listener
+    events: Sequence[Mapping[str, Any]]
+    summary: Mapping[str, Any] | None = None
+    scene: Scene | None = None
+    truth: FlightTruth | None = None
+    patches: Sequence[Patch] = ()
+    versions: Mapping[str, str] | None = None
+    reproduction: Reproduction | None = None
+
+    @property
+    def origin_ned_m(self) -> tuple[float, float, float]:
+        """Where it was armed: the zero of the mission, and of what is remembered."""
+        armed = next((event for event in self.events if event["kind"] == "armed"), None)
+        place = (armed or {}).get("data", {}).get("origin_ned_m") or (0.0, 0.0, 0.0)
+        return (float(place[0]), float(place[1]), float(place[2]))
+
+    @property
+    def hits(self) -> Sequence[Finding]:
+        """Collisions, without those that nothing else bore out."""
+        return [hit for hit in self.findings.collisions if self.taken_back_us(hit) is None]
+
+    def taken_back_us(self, hit: Finding) -> float | None:
+        """When it was found to be none."""
+        after = (other.at_us for other in self.findings.impacts if other.at_us > hit.at_us)
+        until_us = min(after, default=math.inf)
+        times = (float(event["time_us"]) for event in self.events if event["kind"] == "unconfirmed")
+        return next((at_us for at_us in times if hit.at_us < at_us <= until_us), None)
+
+    def seconds(self, at_us: float) -> float:
+        """Since the flight began."""
+        return (at_us - self.started_at_us) * 1e-6
+
+    @property
+    def ended_s(self) -> float:
+        times = (self.log.imu_at_us, self.log.position_at_us, self.log.setpoint_at_us)
+        return max((self.seconds(float(at_us[-1])) for at_us in times if len(at_us)), default=0.0)
+
+
+def recorded_flight(folder: Path) -> ShownFlight:
+    """Of a run's folder: what was recorded, decided again for all that the detector thought. Raises ReboundError."""
+    recording, listener = read_recording(folder), Listener()
+    return decided_again(folder, recording, reproduce(recording, listener.listen), listener)
+
+
+def decided_again(folder: Path, recording: Recording, again: Reproduction, listener: Listener) -> ShownFlight:
+    """The same where that was done already, with the listener. Raises ReboundError."""
+    summary = _summary(folder)
+    lines = "".join(recording.event_lines)
+    events = list(run_folder.read_records(folder / run_folder.EVENTS_NAME, lines))
+    return ShownFlight(
+        name=str((summary or {}).get("mission", folder.resolve().name)),
+        started_at_us=recording.steps[0].time_us,
+        log=read_flight_log(folder / run_folder.TLOG_NAME),
+        config=recording.settings.companion,
+        findings=again.findings,
+        listener=listener,
+        events=events,
+        summary=summary,
+        scene=_scene(folder),
+        truth=_truth(folder / run_folder.TRUTH_NAME),
+        patches=_patches(folder / run_folder.OBSTACLES_NAME),
+        versions=recording.versions,
+        reproduction=again,
+    )
+
+
+def unseen_flight(folder: Path) -> ShownFlight:
+    """One that is still flown: what is known of it beforehand. Raises ReboundError."""
+    file = settings_file(folder)
+    document = load_flown(file)
+    is_guard = file.name == run_folder.GUARD_NAME
+    settings = validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
+    return ShownFlight(
+        name=folder.resolve().name,
+        started_at_us=0,
+        log=flight_log_of(()),
+        config=settings.companion,
+        findings=Findings(),
+        listener=Listener(),
+        events=(),
+        scene=_scene(folder),
+    )
+
+
+def replayed_flight(replay: Replay, config: CompanionConfig, listener: Listener) -> ShownFlight:
+    """Of any log: what it holds and what was found in it."""
+    log = replay.log
+    told = replay.findings.happenings
+    return ShownFlight(
+        name=log.path.name,
+        started_at_us=log.started_at_us,
+        log=flight_log_of((heard.at_us, heard.sample) for heard in log.heard),
+        config=config,
+        findings=replay.findings,
+        listener=listener,
+        events=[{"time_us": one.at_us, "kind": _kind(one.text), "text": one.text, "data": {}} for one in told],
+    )
+
+
+def _kind(text: str) -> str:
+    """Of a line of a foreign log's timeline."""
+    return "mode" if text.startswith("mode ") else text if text in ("armed", "disarmed", "landed", "took off") else ""
+
+
+def _summary(folder: Path) -> Mapping[str, Any] | None:
+    """None of a flight that was cut off."""
+    with suppress(FileNotFoundError, ValueError):
+        return dict(json.loads((folder / run_folder.SUMMARY_NAME).read_text(encoding="utf-8")))
+    return None
+
+
+def _scene(folder: Path) -> Scene | None:
+    """Where the vehicle was a simulated one."""
+    file = settings_file(folder)
+    if not (folder / run_folder.AIRFRAME_NAME).exists():
+        return None
+    document = load_flown(file)
+    return validated(Scene, document, document.data.get("sim") or {}, ("sim",))
+
+
+def _truth(path: Path) -> FlightTruth | None:
+    if not path.exists():
+        return None
+    from sim_vehicle.shell.truth_file import load_faults, load_stalls, load_truth
+
+    return FlightTruth(*load_truth(path), load_faults(path), load_stalls(path))
+
+
+def _patches(path: Path) -> Sequence[Patch]:
+    """What was remembered at the end; nothing where nothing was."""
+    if not path.exists():
+        return ()
+    try:
+        return [patch_of(data) for data in json.loads(path.read_text())["patches"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ReboundError(f"{path}: not a file of obstacles; it is damaged.") from error
+
+
+def patch_of(data: Any) -> Patch:
+    """As a file or an event has it. Raises ReboundError."""
+    try:
+        return KnownPatch.model_validate(data).patch()
+    except ValueError as error:
+        raise ReboundError("What the flight says of an obstacle is damaged.") from error

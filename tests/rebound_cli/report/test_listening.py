@@ -1,0 +1,68 @@
+"""What the report says of the detector is what the detector did, and listening to it changes nothing."""
+
+import math
+from dataclasses import replace
+
+from companion.detection.interface import Phase
+from companion.mission.config import CompanionConfig
+from rebound_cli.replay.recording import read_recording, reproduce
+from rebound_cli.replay.report import replay_log
+from rebound_cli.replay.watching import Findings
+from rebound_cli.report.content import content
+from rebound_cli.report.listening import Listener
+from rebound_cli.report.moments import moments_of
+from rebound_cli.report.shown_flight import replayed_flight
+from tests.rebound_cli.replay.flying import HIT_US, flight
+
+
+def test_a_flight_that_is_listened_to_comes_again_to_the_bit(wall_folder):
+    listener = Listener()
+    assert reproduce(read_recording(wall_folder), listener.listen).first_difference is None
+    assert len(listener.tested) > 6000
+
+
+def test_a_sample_beyond_its_threshold_is_a_hit_and_no_other_is(wall):
+    fired = {finding.first.impact.sample_time_boot_us for finding in wall.findings.impacts}
+    beyond = {one.time_boot_us for one in wall.listener.tested if one.phase is Phase.ARMED and one.ratio >= 1.0}
+    assert beyond == fired and len(fired) == 1
+    (shown,) = wall.listener.shown.values()
+    assert shown.sign == "force" and not shown.may_be_hand and math.isnan(shown.spun_rad_s)
+
+
+def of_a_log(log):
+    listener, config = Listener(), CompanionConfig()
+    return replayed_flight(replay_log(log, config, None, listener.listen), config, listener)
+
+
+def test_a_log_of_anybodys_has_a_page_too():
+    # Given a push of 40 m/s^2 from ahead at 6 s, in flight at 1 m/s
+    shown = of_a_log(flight())
+    data = content(shown)
+    (moment,) = (moment for moment in data["moments"] if moment["kind"] == "hit")
+    assert abs(moment["t"] - HIT_US * 1e-6) < 0.01
+    assert data["sentence"].startswith("Hit ") and "of the flight was watched" in data["sentence"]
+    assert data["tables"]["imu"]["rows"] > 2000 and data["modes"][0][1] == "OFFBOARD"
+
+
+def test_a_healthy_flight_is_told_by_its_closest_call():
+    shown = of_a_log(flight(hit_us=None))
+    (moment,) = moments_of(shown)
+    assert moment.kind == "closest" and content(shown)["sentence"].startswith("No hit; ")
+
+
+def test_what_the_simulator_knows_and_nobody_saw_is_told_with_why(wall):
+    # Given the same flight by a detector that has told nothing
+    (off,) = [span for span in wall.findings.off if span.reason == "connect"]
+    blind = Findings(off=[replace(off, end_us=wall.started_at_us + 60_000_000)])
+    missed = [moment for moment in moments_of(replace(wall, findings=blind)) if moment.kind == "missed"]
+    assert len(missed) == 1 and "a wall at 1.96 m/s" in missed[0].title
+    assert missed[0].reasons[0] == "The detector was off: connect."
+
+
+def test_a_hit_that_nothing_bore_out_is_no_hit_of_the_sentence(wall):
+    (hit,) = wall.findings.collisions
+    event = {"time_us": hit.at_us + 150_000, "kind": "unconfirmed", "text": "not a hit", "data": {"count": 1}}
+    shown = replace(wall, events=[*wall.events, event])
+    (moment,) = [moment for moment in moments_of(shown) if moment.kind == "hit"]
+    assert "Taken back 150 ms later: nothing else bore it out." in moment.reasons
+    assert content(shown)["sentence"].startswith("No hit; ")

@@ -1,0 +1,229 @@
+"""The page of a flight: whole in one file, made of what was recorded, and safe whatever was heard."""
+
+import base64
+import hashlib
+import json
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import rebound_cli.report
+from companion.shell.tlog import read_tlog
+from rebound_cli.flight_log import read_flight_log
+from rebound_cli.main import main
+from rebound_cli.report.content import content
+from rebound_cli.report.page import SCRIPTS, file_text, page
+from rebound_cli.report.shown_flight import recorded_flight
+from sim_vehicle.obstacles import WallSpec
+from tests.rebound_cli.report.opened import Opened, rows
+
+PACKAGE = Path(rebound_cli.report.__file__).parent
+HOSTILE = "</script><img src=x onerror=alert(1)><script>alert(2)</script><!-- &amp;"
+MEGABYTE = 1_000_000
+
+
+@pytest.fixture(scope="session")
+def wall_page(wall_folder):
+    return (wall_folder / "report.html").read_text()
+
+
+@pytest.fixture(scope="session")
+def opened(wall_page):
+    return Opened(wall_page)
+
+
+def test_every_simulated_flight_leaves_one_below_two_megabytes(wall_page):
+    assert len(wall_page.encode()) < 2 * MEGABYTE
+
+
+def test_it_is_made_of_the_folder_alone_and_is_the_same_each_time(wall, wall_page):
+    assert page(wall) == wall_page
+
+
+def test_it_loads_nothing(opened):
+    # Given every element that could
+    assert opened.attributes("src") == [] and opened.attributes("href") == []
+    assert not {"link", "img", "iframe", "object", "embed", "base", "form"} & {tag for tag, _ in opened.tags}
+    styles = "".join(opened.styles)
+    assert "url(" not in styles and "@import" not in styles
+    # and every script of ours
+    ours = "".join(map(file_text, SCRIPTS))
+    for word in ("http", "fetch(", "XMLHttpRequest", "WebSocket", "EventSource", "import(", "innerHTML", "eval("):
+        assert word not in ours, word
+
+
+def test_a_browser_runs_the_scripts_that_it_names_and_no_others(opened):
+    (policy,) = opened.attributes("content")[:1]
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in opened.scripts]
+    assert policy.startswith("default-src 'none'; script-src ")
+    allowed = policy.partition("script-src ")[2].partition(";")[0].split()
+    assert allowed == [f"'sha256-{digest}'" for digest in hashes] and len(allowed) == 7
+
+
+def test_libraries_are_as_their_makers_publish_them_and_listed_with_their_licences(opened):
+    listed = json.loads(file_text("assets/libraries.json"))
+    hashes = {name: digest for library in listed for name, digest in library["sha256"].items()}
+    found = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in (PACKAGE / "assets").iterdir()
+        if path.name != "libraries.json"
+    }
+    assert found == hashes
+    in_page = {hashlib.sha256(script.encode()).hexdigest() for script in opened.scripts}
+    assert {hashes["three.min.js"], hashes["uPlot.iife.min.js"]} <= in_page
+    assert [library["licence"] for library in listed] == ["MIT", "MIT"]
+    assert all("Permission is hereby granted" in one["licence_text"] for one in opened.data["libraries"])
+
+
+def test_what_is_in_it_is_what_was_recorded(wall_folder, opened):
+    log = read_flight_log(wall_folder / "flight.tlog")
+    imu, path, setpoint = (opened.table(name) for name in ("imu", "path", "setpoint"))
+    started_us = log.imu_at_us[0] - round(imu["t"][0] * 1e6)
+    assert np.allclose(imu["t"], (log.imu_at_us - started_us) * 1e-6, atol=1e-5)
+    assert np.allclose(rows(imu["fx"], imu["fy"], imu["fz"]), log.specific_force_frd_m_s2, atol=0.0051)
+    assert np.allclose(rows(imu["p"], imu["q"], imu["r"]), log.angular_velocity_frd_rad_s, atol=0.00051)
+    assert np.allclose(rows(path["n"], path["e"], path["d"]), log.position_ned_m, atol=0.00051)
+    assert np.allclose(rows(path["vn"], path["ve"], path["vd"]), log.velocity_ned_m_s, atol=0.00051)
+    places = rows(setpoint["n"], setpoint["e"], setpoint["d"])
+    assert np.allclose(places, log.setpoint_ned_m, atol=0.00051, equal_nan=True)
+
+
+def test_it_says_first_what_was_hit_how_fast_when_and_how_it_ended(wall_folder, opened):
+    (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
+    told = opened.data["sentence"]
+    assert told.startswith(f"Hit a wall at {hit['impact_speed_m_s']:.2f} ± 0.0")
+    assert f"{hit['detected_at_s']:.2f} s into the flight; completed: landed and disarmed." in told
+
+
+def test_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(wall_folder, opened):
+    (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
+    (moment,) = (moment for moment in opened.data["moments"] if moment["kind"] == "hit")
+    assert moment["t"] == hit["detected_at_s"]
+    assert np.allclose(moment["normal"], hit["normal_ned"], atol=0.05) and moment["error_deg"] == 30.0
+    # The simulator's first touch, before the sample that shows it
+    assert moment["touched_ms"] == pytest.approx(-hit["truth"]["detection_latency_ms"], abs=0.001)
+    why = "\n".join(moment["reasons"])
+    assert re.search(r"Push sideways: 33\.\d m/s², a hit from 1\.\d on \(\d+\.\d times\): speaks for a contact\.", why)
+    assert "A landing: no" in why and "A person's hand: no" in why and "Verdict: wall, a collision" in why
+
+
+def test_what_came_nearest_to_a_hit_is_told_with_why_it_was_none(opened):
+    (moment,) = (moment for moment in opened.data["moments"] if moment["kind"] == "closest")
+    assert "Verdict: no hit." in moment["reasons"][-1]
+    imu = opened.table("imu")
+    row = int(np.argmin(np.abs(imu["boot"] - moment["boot"])))
+    assert 0.3 < imu["side"][row] / imu["side_threshold"][row] < 1.0
+
+
+def test_the_scene_holds_wall_path_truth_and_what_is_remembered(opened):
+    (wall,) = opened.data["obstacles"]
+    assert wall["name"] == "north wall" and wall["centre"] == [4.05, 0.0, -1.5] and wall["sizes"] == [0.1, 6.0, 3.0]
+    (surface,) = opened.data["surfaces"]
+    assert surface["until"] is None and len(surface["corners"]) == 4
+    assert abs(np.mean(surface["corners"], axis=0)[0] - 4.0) < 0.1
+    assert opened.table("truth")["fold1"].max() > 0.02
+    assert [name for _, name in opened.data["modes"]] == ["AUTO.LOITER", "OFFBOARD", "AUTO.LAND", "OFFBOARD"]
+    ((began_s, ended_s),) = opened.data["recovering"]
+    assert 1.0 < ended_s - began_s < 5.0
+
+
+def test_an_obstacle_that_moves_does_so_by_the_clock_of_the_page(wall):
+    # Given a door that comes from 10 s of the vehicle's clock on; the flight's own began some milliseconds later
+    door = {"point_ned_m": (3, 0, -1.5), "normal_ned": (-1, 0, 0)}
+    moving = WallSpec(**door, motion={"velocity_ned_m_s": (-1.0, 0.0, 0.0), "from_s": 10.0, "until_s": 12.0})
+    scene = wall.scene.model_copy(update={"walls": (moving,)})
+    (obstacle,) = content(replace(wall, scene=scene))["obstacles"]
+    late_s = (wall.started_at_us - wall.truth.epoch_at_boot_us) * 1e-6
+    assert 0.0 < late_s < 0.1
+    assert obstacle["motion"]["t"] == pytest.approx([10.0 - late_s, 12.0 - late_s])
+    assert obstacle["motion"]["offsets"] == ((0.0, 0.0, 0.0), (-2.0, 0.0, 0.0))
+
+
+def test_nothing_heard_can_become_script(wall):
+    # Given a mission, an airframe, an event and a text on the wire that would end the element they are in
+    log = replace(wall.log, texts=((wall.started_at_us, HOSTILE),))
+    events = [*wall.events, {"time_us": wall.started_at_us, "kind": HOSTILE, "text": f"mode {HOSTILE}", "data": {}}]
+    summary = {**wall.summary, "mission": HOSTILE, "airframe": HOSTILE, "reason": HOSTILE, "outcome": "aborted"}
+    hostile = Opened(page(replace(wall, name=HOSTILE, log=log, events=events, summary=summary)))
+    # Then elements and scripts are those of any page, the title and the policy included
+    plain = Opened(page(wall))
+    assert [tag for tag, _ in hostile.tags] == [tag for tag, _ in plain.tags]
+    assert hostile.scripts == plain.scripts
+    assert hostile.attributes("content")[0] == plain.attributes("content")[0]
+    # and the texts are there, letter by letter
+    assert hostile.data["name"] == HOSTILE and HOSTILE in hostile.data["sentence"]
+    told = [(event["kind"], event["text"]) for event in hostile.data["events"]]
+    assert ("STATUSTEXT", HOSTILE) in told and (HOSTILE, f"mode {HOSTILE}") in told
+
+
+def statustext(text, number=0, part=0):
+    """A packet of a vehicle's, MAVLink 2."""
+    payload = bytes([6]) + text.encode().ljust(50, b"\0") + number.to_bytes(2, "little") + bytes([part])
+    return bytes([0xFD, len(payload), 0, 0, 0, 1, 1, 253, 0, 0]) + payload + b"\0\0"
+
+
+def test_texts_on_the_wire_are_read_whole(tmp_path, wall_folder):
+    (at_us, _), *_ = list(read_tlog(wall_folder / "flight.tlog"))
+    stamp = at_us.to_bytes(8, "big")
+    packets = [statustext("short"), statustext("a" * 50, 7, 0), statustext("and on", 7, 1), statustext("other")]
+    (tmp_path / "flight.tlog").write_bytes(b"".join(stamp + packet for packet in packets))
+    assert [text for _, text in read_flight_log(tmp_path / "flight.tlog").texts] == [
+        "short",
+        "a" * 50 + "and on",
+        "other",
+    ]
+
+
+def test_without_position_no_place_is_left(wall_folder, tmp_path, capsys):
+    out = tmp_path / "shared.html"
+    assert main(["report", str(wall_folder), "--no-position", "--out", str(out)]) == 0
+    assert f"The report is in {out}" in capsys.readouterr().out
+    opened = Opened(out.read_text())
+    for table in opened.data["tables"].values():
+        assert not {"n", "e", "d"} & set(table["columns"])
+    assert opened.data["obstacles"] == [] and opened.data["surfaces"] == []
+    assert all(moment["place"] is None for moment in opened.data["moments"])
+    # As texts write places: [3.98, 0.04, -1.53]; and the keys of the summary
+    texts = [event["text"] for event in opened.data["events"]] + opened.data["lines"]
+    assert not [text for text in texts if re.search(r"\[-?\d+\.\d+, ", text)]
+    assert any("[left out]" in text for text in texts)
+    summary = json.dumps(opened.data["summary"])
+    assert "recovery_setpoint_ned_m" not in summary and "touches_ned_m" not in summary
+    # What is no place is still there
+    assert len(opened.table("imu")["fx"]) > 5000
+
+
+def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
+    # Given what a guard would have heard of the same flight
+    folder = shutil.copytree(wall_folder, tmp_path / "guard")
+    for name in ("resolved.yaml", "mission.yaml", "airframe.yaml", "truth.npz", "obstacles.json", "report.html"):
+        (folder / name).unlink()
+    flown = yaml.safe_load((wall_folder / "resolved.yaml").read_text())
+    guarded = {"companion": {"estimate": flown["companion"]["estimate"]}}
+    (folder / "guard.yaml").write_text(yaml.safe_dump(guarded))
+    (folder / "events.jsonl").write_text("")
+    summary = {"outcome": "stopped with Ctrl-C", "collisions": [], "left_alone": 1, "round_trip_ms": {"median": None}}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    data = Opened(page(recorded_flight(folder))).data
+    assert data["sentence"].startswith("Hit a wall at 1.98 ± ") and data["sentence"].endswith("stopped with Ctrl-C.")
+    assert data["obstacles"] == [] and "truth" not in data["tables"]
+
+
+def test_a_flight_that_was_cut_off_has_one(wall_folder, tmp_path):
+    folder = shutil.copytree(wall_folder, tmp_path / "cut")
+    (folder / "summary.json").unlink()
+    assert "the recording was cut off" in Opened(page(recorded_flight(folder))).data["sentence"]
+
+
+def test_of_a_folder_in_which_nothing_was_heard_one_sentence_says_so(wall_folder, tmp_path, capsys):
+    folder = shutil.copytree(wall_folder, tmp_path / "silent")
+    (folder / "flight.tlog").write_bytes(b"")
+    (folder / "report.html").unlink()
+    assert main(["report", str(folder)]) == 1
+    assert "nothing was ever heard in this flight" in capsys.readouterr().err
+    assert not (folder / "report.html").exists()
