@@ -62,6 +62,8 @@ class Document:
         """
         if (override := self.override_of(path)) is not None:
             return override.text
+        if not self.lines:
+            return self.name
         around = (self.lines[path[:length]] for length in range(len(path), 0, -1) if path[:length] in self.lines)
         return f"{self.name}:{next(around, 1)}"
 
@@ -110,6 +112,14 @@ def parse_document(text: str, name: str) -> Document:
     except RecursionError as error:
         raise DocumentError(f"{name}: nested too deeply, or in itself.") from error
     return Document(name, data, lines)
+
+
+def write_text(path: Path, text: str) -> None:
+    """What a command has made, where the person wants it. Raises DocumentError."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DocumentError(f"{path}: cannot be written: {error.strerror}.") from error
 
 
 def _line(node: yaml.Node) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import mean
 
 from rebound_cli import run_folder
-from rebound_cli.documents import load_document, parse_document, validated
+from rebound_cli.documents import load_document, parse_document, validated, write_text
 from rebound_cli.identification.capture import find_hit, read_table
 from rebound_cli.identification.fit import (
     FEWEST_FOR_LEAVE_ONE_OUT,
@@ -40,7 +40,7 @@ def run_identify(options: Namespace) -> int:
     # The file is read as `--airframe` will read it before anybody finds it on the disk.
     document = parse_document(text, str(out))
     validated(Airframe, document, with_base(document.data))
-    out.write_text(text, encoding="utf-8")
+    write_text(out, text)
     print(f"\nWritten to {out}. Fly it: rebound fly missions/wall.yaml --lockstep --airframe {out}")
     return 0
 

@@ -85,7 +85,9 @@ def test_the_springs_of_the_foldable_vehicle_are_found_again(tmp_path):
 def test_the_sigma_of_a_single_hits_damping_is_how_far_it_scatters(tmp_path):
     # Given one hit, captured two dozen times with other noise
     path = thrown(without_friction("foldable"), 1.0)
-    springs = [fit_spring([find_hit(read_table(write_capture(tmp_path / "hit.csv", *path, seed=n)))]) for n in range(24)]
+    springs = [
+        fit_spring([find_hit(read_table(write_capture(tmp_path / "hit.csv", *path, seed=n)))]) for n in range(24)
+    ]
     # Then b_s scatters by what each says of itself: frequency and damping ratio, found together, go together
     scatter = np.std([spring.damping_per_s.value for spring in springs], ddof=1)
     assert np.mean([spring.damping_per_s.sigma for spring in springs]) == pytest.approx(scatter, rel=0.2)
