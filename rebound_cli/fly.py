@@ -16,7 +16,6 @@ from rebound_cli import inputs, run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
 from rebound_cli.console import Console, console_for
-from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
@@ -55,8 +54,7 @@ def run_fly(options: Namespace) -> int:
     given = (options.airframe, options.seed, options.companion)
     document = inputs.load_mission_document(options.mission, options.set, *given)
     if options.obstacles is not None:
-        text = f"--obstacles {options.obstacles}"
-        apply_override(document, Override(text, ("obstacles", "file"), str(options.obstacles)))
+        document.put_option("--obstacles", ("obstacles", "file"), str(options.obstacles))
     world = inputs.world_from(document) if is_simulated else None
     mission = inputs.mission_from(document, world)
     if options.resume is not None:

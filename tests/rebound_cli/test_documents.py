@@ -228,7 +228,7 @@ def test_a_wire_fault_on_a_message_that_there_is_not_is_found_before_the_flight(
     assert text == "demo.yaml:12: no MAVLink message is called 'ATITUDE'."
 
 
-def test_thousands_of_faults_are_told_after_the_schema_was_looked_at_once(monkeypatch):
+def test_thousands_of_faults_are_told_without_a_schema_of_the_mission(monkeypatch):
     # Given a mission with the same mistake on every line
     asked = []
 
@@ -240,7 +240,7 @@ def test_thousands_of_faults_are_told_after_the_schema_was_looked_at_once(monkey
 
     lines = "".join(f"  - wait: {{mistake{n}: 1}}\n" for n in range(200))
     found = parse_document(f"name: demo\nitems:\n{lines}", "demo.yaml")
-    # When it is checked, then the answer is short, and did not take a schema a fault
+    # When it is checked, then the answer is short, and took no schema, which is a tenth of a second each
     text = complaint(validated, Counted, found, found.data)
     assert len(text.splitlines()) == 6 and "more" in text
-    assert len(asked) == 1
+    assert asked == []
