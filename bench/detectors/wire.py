@@ -27,7 +27,7 @@ from sim_vehicle.mavlink.streams import vibration
 from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
 from sim_vehicle.mavlink.streams.telemetry import quaternion_from_matrix
 from sim_vehicle.mavlink.streams.topics import Topic
-from sim_vehicle.physics.plant import PlantOutput
+from sim_vehicle.plant.plant import PlantOutput
 
 
 @dataclass(frozen=True, slots=True)

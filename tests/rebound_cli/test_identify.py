@@ -20,7 +20,7 @@ from rebound_cli.identification.fit import (
 )
 from rebound_cli.identification.hit import IdentificationError
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.rebound_cli.command import WALL, assert_one_clear_sentence, run
 
