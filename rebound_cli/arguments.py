@@ -252,7 +252,7 @@ def add_logs(commands: Commands) -> None:
 def add_doctor(commands: Commands) -> None:
     text = "Configuration without keys, versions, machine, journal, last flights; see docs/logs.md."
     summary = "one archive for whoever is asked for help"
-    doctor = _command(commands, "doctor", "flights.doctor:run_doctor", summary, text)
+    doctor = _command(commands, "doctor", "doctor:run_doctor", summary, text)
     _option(doctor, "--out", "the archive (default: %(default)s)", "FILE", default=Path("rebound-doctor.tar.gz"))
     _option(doctor, "--config", "settings beside those of /etc/rebound", "FILE", action="append", default=[])
     _option(doctor, "--preflight", "what `rebound preflight --json` printed", "FILE")

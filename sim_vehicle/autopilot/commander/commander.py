@@ -26,11 +26,11 @@ from sim_vehicle.autopilot.commander.modes import (
     missing,
 )
 from sim_vehicle.autopilot.commander.positioning import Positioning
-from sim_vehicle.autopilot.estimate import Quaternion
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardSignal
+from sim_vehicle.estimator.estimate import Quaternion
 from sim_vehicle.parameters.store import Parameters
 
 # How often the failsafes look when nothing calls for it: PX4's commander runs every 10 ms, its checks every 100.

@@ -7,7 +7,7 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
 from sim_vehicle.mavlink.streams.telemetry import Telemetry
