@@ -15,9 +15,8 @@ from companion.shell.tlog import read_tlog
 
 Floats = npt.NDArray[np.float64]
 
-_ATTITUDE = 30
 # Only these are decoded; a log holds many more.
-_DECODED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION, _ATTITUDE)
+_DECODED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION)
 _SET_POSITION_TARGET_LOCAL_NED = 84
 
 # SET_POSITION_TARGET_LOCAL_NED's payload: time_boot_ms, then x, y, z in metres; MAVLink 2 leaves out
