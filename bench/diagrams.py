@@ -8,7 +8,7 @@ from bench.marked import with_part
 from companion.flight.states import TABLE as FLIGHT
 from companion.guard.states import TABLE as GUARD
 from sim_vehicle.autopilot.commander.failsafe_table import markdown_table as failsafe_table
-from sim_vehicle.autopilot.commander.modes import mode_diagram
+from sim_vehicle.autopilot.modes import mode_diagram
 
 ROOT = Path(__file__).parent.parent
 
