@@ -1,4 +1,4 @@
-"""Hanging on what was hit: a vehicle that is pressed to it by its own thrust is let fall, where there is room."""
+"""What a recovery asks of a vehicle that hangs on what it hit, and of one that spins."""
 
 import math
 
@@ -10,7 +10,7 @@ from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import LocalPosition
+from companion.messages import Attitude, LocalPosition
 from companion.mission.config import EstimateConfig
 from companion.mission.model import Mission
 from companion.reflex.config import FALLS_M_S2
@@ -21,7 +21,13 @@ HIT_US, SINCE_US = 1_000_000, 100_000
 MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
-def asked(lean_deg: float, height_m: float = 2.0, down_m_s: float = 0.0) -> Target:
+def asked(
+    lean_deg: float,
+    height_m: float = 2.0,
+    down_m_s: float = 0.0,
+    attitude: Attitude | None = None,
+    is_whole: bool = False,
+) -> Target:
     """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much."""
     mission = Mission.model_validate(MISSION)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
@@ -32,7 +38,8 @@ def asked(lean_deg: float, height_m: float = 2.0, down_m_s: float = 0.0) -> Targ
     flight.collisions.append(
         CollisionRecord(0, HIT_US, "fused", contact, goal, contact.normal_ned, 20.0, HIT_US, reckoning)
     )
-    recover = Recover(flight, 0)
+    recover, flight.vehicle.attitude = Recover(flight, 0), attitude
+    reckoning.tell(is_whole, HIT_US)
     reckoning.lean_m_s2 = (GRAVITY_M_S2 * math.tan(math.radians(lean_deg)), 0.0, 0.0)
     sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
@@ -61,3 +68,23 @@ def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, fa
     target = asked(30.0, height_m, down_m_s)
     assert target.acceleration_ned_m_s2 is not None
     assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is falls
+
+
+LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("attitude", "rates", "spins"),
+    [
+        (LEVEL, None, False),
+        (LEVEL, (0.0, 0.0, -7.0), True),
+        (LEVEL, (7.0, 0.0, 0.0), False),
+        # Nose up by a right angle, the body's x axis is upright.
+        (NOSE_UP, (7.0, 0.0, 0.0), True),
+        (NOSE_UP, (0.0, 0.0, -7.0), False),
+    ],
+)
+def test_the_spin_that_counts_is_that_about_the_vertical(attitude, rates, spins):
+    # Given a hit that the vehicle's estimate knows whole: without a spin places are asked for
+    target = asked(-10.0, attitude=Attitude(HIT_US, attitude, rates), is_whole=True)
+    assert target.leans_only is spins
