@@ -189,7 +189,13 @@ def validated(model: type[Model], document: Document, data: Any, prefix: Documen
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = list(dict.fromkeys(_fault_text(model, document, data, prefix, item) for item in error.errors()))
+        # pydantic counts the sound items of a list: one that is wrong makes it no shorter.
+        found = [
+            fault
+            for fault in error.errors()
+            if fault["type"] != "too_short" or len(fault["input"]) < fault["ctx"]["min_length"]
+        ]
+        faults = list(dict.fromkeys(_fault_text(model, document, data, prefix, fault) for fault in found))
         shown = faults[:_MOST_ERRORS_SHOWN]
         if len(faults) > len(shown):
             shown.append(f"... and {len(faults) - len(shown)} more.")
