@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 

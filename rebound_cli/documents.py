@@ -4,10 +4,9 @@ import difflib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from operator import eq
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -62,8 +61,33 @@ class Document:
         """
         if (override := self.override_of(path)) is not None:
             return override.text
+        if not self.lines:
+            return self.name
         around = (self.lines[path[:length]] for length in range(len(path), 0, -1) if path[:length] in self.lines)
         return f"{self.name}:{next(around, 1)}"
+
+    def put(self, override: Override) -> None:
+        """Change one value; keys that are missing on the way are made, and the model judges them afterwards."""
+        target: Any = self.data
+        for depth, part in enumerate(override.path):
+            where = ".".join(map(str, override.path[:depth]))
+            if isinstance(target, dict):
+                part = str(part)
+            elif not isinstance(target, list):
+                raise DocumentError(f"{override.text}: '{where}' is a single value and has nothing below it.")
+            elif not isinstance(part, int) or part >= len(target):
+                text = f"'{where}' is a list of {len(target)}, counted from 0; it has no '{part}'"
+                raise DocumentError(f"{override.text}: {text}.")
+            if depth == len(override.path) - 1:
+                target[part] = override.value
+            elif isinstance(target, dict) and target.get(part) is None:
+                target[part] = {}
+            target = target[part]
+        self.overrides.append(override)
+
+    def put_option(self, option: str, path: DocumentPath, value: Any, given: object = None) -> None:
+        """The value of a command line's option; `given`: as the person typed it, where that differs."""
+        self.put(Override(f"{option} {value if given is None else given}", path, value))
 
 
 def load_document(path: Path) -> Document:
@@ -112,6 +136,14 @@ def parse_document(text: str, name: str) -> Document:
     return Document(name, data, lines)
 
 
+def write_text(path: Path, text: str) -> None:
+    """What a command has made, where the person wants it. Raises DocumentError."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DocumentError(f"{path}: cannot be written: {error.strerror}.") from error
+
+
 def _line(node: yaml.Node) -> int:
     return int(node.start_mark.line) + 1
 
@@ -146,30 +178,10 @@ def parse_override(text: str) -> Override:
     return Override(f"--set {text}", tuple(int(part) if part.isdecimal() else part for part in parts), value)
 
 
-def apply_override(document: Document, override: Override) -> None:
-    """Change one value; keys that are missing on the way are made, and the model judges them afterwards."""
-    target: Any = document.data
-    for depth, part in enumerate(override.path):
-        where = ".".join(map(str, override.path[:depth]))
-        if isinstance(target, dict):
-            part = str(part)
-        elif not isinstance(target, list):
-            raise DocumentError(f"{override.text}: '{where}' is a single value and has nothing below it.")
-        elif not isinstance(part, int) or part >= len(target):
-            text = f"'{where}' is a list of {len(target)}, counted from 0; it has no '{part}'"
-            raise DocumentError(f"{override.text}: {text}.")
-        if depth == len(override.path) - 1:
-            target[part] = override.value
-        elif isinstance(target, dict) and target.get(part) is None:
-            target[part] = {}
-        target = target[part]
-    document.overrides.append(override)
-
-
 def apply_overrides(document: Document, texts: Sequence[str]) -> None:
     """Apply every `--set` in order. Raises DocumentError."""
     for text in texts:
-        apply_override(document, parse_override(text))
+        document.put(parse_override(text))
 
 
 def validated(model: type[Model], document: Document, data: Any, prefix: DocumentPath = ()) -> Model:
@@ -177,7 +189,13 @@ def validated(model: type[Model], document: Document, data: Any, prefix: Documen
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        faults = list(dict.fromkeys(_fault_text(model, document, data, prefix, item) for item in error.errors()))
+        # pydantic counts the sound items of a list: one that is wrong makes it no shorter.
+        found = [
+            fault
+            for fault in error.errors()
+            if fault["type"] != "too_short" or len(fault["input"]) < fault["ctx"]["min_length"]
+        ]
+        faults = list(dict.fromkeys(_fault_text(model, document, data, prefix, fault) for fault in found))
         shown = faults[:_MOST_ERRORS_SHOWN]
         if len(faults) > len(shown):
             shown.append(f"... and {len(faults) - len(shown)} more.")
@@ -250,43 +268,23 @@ def nearest(word: str, choices: Sequence[str]) -> str | None:
     return found[0] if found else None
 
 
-@cache
-def _schema(model: type[BaseModel]) -> dict[str, Any]:
-    """Made once: it takes some 0.1 s, and a file can have thousands of faults."""
-    return model.model_json_schema()
-
-
 def keys_allowed_at(model: type[BaseModel], path: Sequence[str | int]) -> tuple[str, ...]:
     """Keys of every model that may stand at `path`, in the order of the model."""
-    schema = _schema(model)
-    definitions = schema.get("$defs", {})
-    places = list(_resolved(schema, definitions))
+    models = [model]
     for part in path:
-        places = [below for place in places for below in _below(place, part, definitions)]
-    keys: dict[str, None] = {}
-    for place in places:
-        keys.update(dict.fromkeys(place.get("properties", {})))
-    return tuple(keys)
+        # Whatever the place in a list, the models are the same.
+        if isinstance(part, str):
+            fields = [field for above in models for name, field in _written_keys(above) if name == part]
+            models = [below for field in fields for below in _models_in(field.annotation)]
+    return tuple(dict.fromkeys(name for below in models for name, _ in _written_keys(below)))
 
 
-def _resolved(schema: Any, definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The schema itself, its reference followed and its alternatives spread out."""
-    if not isinstance(schema, dict):
-        return
-    if "$ref" in schema:
-        yield from _resolved(definitions[schema["$ref"].rpartition("/")[2]], definitions)
-        return
-    alternatives = [*schema.get("anyOf", ()), *schema.get("oneOf", ()), *schema.get("allOf", ())]
-    if not alternatives or "properties" in schema:
-        yield schema
-    for alternative in alternatives:
-        yield from _resolved(alternative, definitions)
+def _written_keys(model: type[BaseModel]) -> Iterator[tuple[str, Any]]:
+    yield from ((field.alias or name, field) for name, field in model.model_fields.items())
 
 
-def _below(schema: dict[str, Any], part: str | int, definitions: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    if isinstance(part, str):
-        child = schema.get("properties", {}).get(part, schema.get("additionalProperties"))
-    else:
-        prefixed = schema.get("prefixItems", ())
-        child = prefixed[part] if part < len(prefixed) else schema.get("items")
-    yield from _resolved(child, definitions)
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models_in(part)

@@ -17,9 +17,8 @@ from rebound_cli.logs.log import Demand, Told
 
 Floats = npt.NDArray[np.float64]
 
-_ATTITUDE = 30
 # Only these are decoded; a log holds many more.
-_DECODED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION, _ATTITUDE)
+_DECODED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION)
 _SET_POSITION_TARGET_LOCAL_NED = 84
 _STATUSTEXT = 253
 

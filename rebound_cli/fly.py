@@ -16,17 +16,15 @@ from rebound_cli import inputs, run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
 from rebound_cli.console import Console, console_for
-from rebound_cli.documents import Override, apply_override
 from rebound_cli.ending import ending_text
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.offering import offer_report
-from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, fly_realtime, watched
+from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.status import StatusServer, served
 from rebound_cli.summary import FlightFacts, Flown, build_summary
-from rebound_cli.timing import Timing
 from rebound_cli.truth_match import FlightTruth
 from rebound_cli.vehicle_process import READY_WORDS, VehicleProcess
 
@@ -56,8 +54,7 @@ def run_fly(options: Namespace) -> int:
     given = (options.airframe, options.seed, options.companion)
     document = inputs.load_mission_document(options.mission, options.set, *given)
     if options.obstacles is not None:
-        text = f"--obstacles {options.obstacles}"
-        apply_override(document, Override(text, ("obstacles", "file"), str(options.obstacles)))
+        document.put_option("--obstacles", ("obstacles", "file"), str(options.obstacles))
     world = inputs.world_from(document) if is_simulated else None
     mission = inputs.mission_from(document, world)
     if options.resume is not None:
@@ -117,20 +114,17 @@ def _fly_connected(
     server: StatusServer | None = None,
     computer: Computer | None = None,
 ) -> Flown:
-    companion, interrupts = Companion(flight.mission), flight.interrupts
-    started_s = time.monotonic()
-    timing, fault = Timing(), None
+    companion, started_s, fault = Companion(flight.mission), time.monotonic(), None
+    loop = Loop(companion, connection, Clock(), flight.recorder, flight.console, flight.interrupts, server, computer)
     try:
-        timing = fly_realtime(
-            companion, connection, Clock(), flight.recorder, flight.console, confirmation, interrupts, server, computer
-        )
+        fly_realtime(companion, loop, confirmation)
     except FlightFaultError as error:
         # What is known of the flight is written first.
         fault = error
     finally:
         connection.close()
     duration_s, refused = time.monotonic() - started_s, refused_packets(connection)
-    return Flown(companion.report(), duration_s, None, timing, refused, connection.counts, fault)
+    return Flown(companion.report(), duration_s, None, loop.timing, refused, connection.counts, fault)
 
 
 def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -> Flown:

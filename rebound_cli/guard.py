@@ -11,7 +11,7 @@ from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
 from rebound_cli.console import console_for
-from rebound_cli.documents import Document, Override, apply_override, apply_overrides, load_document, validated
+from rebound_cli.documents import Document, apply_overrides, load_document, validated
 from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.offering import offer_report
@@ -73,7 +73,7 @@ def guard_config(options: Namespace) -> GuardConfig:
     apply_overrides(document, options.set)
     if options.modes is not None:
         modes = [mode.strip().upper() for mode in options.modes.split(",")]
-        apply_override(document, Override(f"--modes {options.modes}", ("modes",), modes))
+        document.put_option("--modes", ("modes",), modes, options.modes)
     if options.then is not None:
-        apply_override(document, Override(f"--then {options.then}", ("then",), options.then))
+        document.put_option("--then", ("then",), options.then)
     return validated(GuardConfig, document, document.data)

@@ -7,6 +7,7 @@ import shlex
 from argparse import Namespace
 
 from companion.errors import ConfigurationError
+from rebound_cli.documents import write_text
 
 
 def run_init(options: Namespace) -> int:
@@ -24,7 +25,7 @@ def run_init(options: Namespace) -> int:
     name = json.dumps(re.sub("[^A-Za-z0-9._-]+", "-", options.file.stem))
     text = re.sub(rf"^name: {options.model}$", f"name: {name}", text, flags=re.MULTILINE)
     options.file.parent.mkdir(parents=True, exist_ok=True)
-    options.file.write_text(text, encoding="utf-8")
+    write_text(options.file, text)
     print(f"{options.file} is a copy of the mission '{options.model}'. Change it, then:")
     file = shlex.quote(str(options.file))
     print(f"    rebound check {file}    # says and draws what it would do")

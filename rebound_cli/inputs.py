@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from companion.errors import ConfigurationError
 from rebound_cli import documents, run_folder
-from rebound_cli.documents import Document, DocumentError, DocumentPath, Override, load_document, validated
+from rebound_cli.documents import Document, DocumentError, DocumentPath, load_document, validated
 from rebound_cli.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
@@ -71,7 +71,7 @@ def companion_settings(path: Path | None, sets: Sequence[str], detector: str | N
         document = load_flown(path) if path.name in (run_folder.GUARD_NAME, RESOLVED_NAME) else load_document(path)
     documents.apply_overrides(document, sets)
     if detector is not None:
-        documents.apply_override(document, Override(f"--detector {detector}", ("companion", "detector"), detector))
+        document.put_option("--detector", ("companion", "detector"), detector)
     return validated(CompanionConfig, document, document.data.get("companion") or {}, ("companion",))
 
 
@@ -79,7 +79,7 @@ def _apply_options(document: Document, sets: Sequence[str], airframe: str | None
     documents.apply_overrides(document, sets)
     for option, value in (("airframe", airframe), ("seed", seed)):
         if value is not None:
-            documents.apply_override(document, Override(f"--{option} {value}", ("sim", option), value))
+            document.put_option(f"--{option}", ("sim", option), value)
 
 
 # A mission's models take a fifth of a simulated vehicle's start: imported where there is a mission.
@@ -218,7 +218,7 @@ def resume(document: Document, run: Path, mission: "Mission", knows_more: bool) 
     if knows_more and stored.exists():
         given |= {("obstacles", "known"): [], ("obstacles", "file"): str(stored)}
     for path, value in given.items():
-        documents.apply_override(document, Override(f"--resume {run}", path, value))
+        document.put_option("--resume", path, value, run)
 
 
 def _last(events: Sequence[dict[str, Any]], kind: str) -> dict[str, Any] | None:

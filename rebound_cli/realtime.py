@@ -250,31 +250,19 @@ class Loop:
                 self._step(received, self.clock.now_us())
 
 
-def fly_realtime(
-    companion: Companion,
-    connection: Connection,
-    clock: Clock,
-    recorder: FlightRecorder,
-    console: Console,
-    confirmation: ConfirmAtOnce | AskPerson,
-    interrupts: Interrupts,
-    server: StatusServer | None = None,
-    computer: Computer | None = None,
-) -> Timing:
-    """Run until the companion has finished; after the first interrupt it finishes by itself. How steadily it went."""
-    started_us = clock.now_us()
+def fly_realtime(companion: Companion, loop: Loop, confirmation: ConfirmAtOnce | AskPerson) -> None:
+    """Run the companion's loop until it has finished; after the first interrupt it finishes by itself."""
+    recorder, started_us = loop.recorder, loop.clock.now_us()
 
     def beside(now_us: int, result: StepResult) -> None:
         if result.events:
             recorder.record_obstacles(companion.obstacles())
             began_us = started_us if companion.core is None else companion.core.started_at_us
-            console.events(result.events, began_us)
+            loop.console.events(result.events, began_us)
         confirmation.poll(companion)
         look_for_file(companion, recorder, now_us)
         recorder.record_confirmation(now_us, companion.plan_is_confirmed)
         if companion.stop_reason is not None:
             recorder.record_stop(now_us, companion.stop_reason)
 
-    loop = Loop(companion, connection, clock, recorder, console, interrupts, server, computer)
     loop.run(beside)
-    return loop.timing

@@ -1,7 +1,7 @@
 """A flight that begins in the air, for studies of single hits: steady, straight, towards something."""
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.world import Vector3

@@ -11,12 +11,12 @@ from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.services.board import Board
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
-from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.slow_sensors import SlowSensors

@@ -4,6 +4,7 @@ import argparse
 import functools
 import graphlib
 import importlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,19 @@ def test_no_module_needs_itself_by_way_of_others() -> None:
         graphlib.TopologicalSorter(module_imports(ROOT)).prepare()
     except graphlib.CycleError as cycle:
         pytest.fail(" is imported by ".join(cycle.args[1]))
+
+
+def test_what_a_text_in_the_code_refers_to_is_there() -> None:
+    # "(see room.module)" and "(see module.name)" outlive the module when it is merged into another.
+    modules = {part for package in PACKAGES for path in sources(package) for part in path.with_suffix("").parts}
+    missing = [
+        f"{name(path)}: {reference}"
+        for package in PACKAGES
+        for path in sources(package)
+        for reference in re.findall(r"\(see ([a-z_]+\.[a-z_]+)\b", path.read_text())
+        if reference.split(".")[0] not in modules
+    ]
+    assert missing == []
 
 
 def commands_of(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:

@@ -21,7 +21,7 @@ from bench.detectors.watching import (
 from bench.detectors.wire import Wire
 from companion.detection.interface import Situation
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 
 SWEPT_RATE = 246

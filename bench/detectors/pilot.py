@@ -13,7 +13,7 @@ import numpy as np
 from companion.messages import LandedState
 from companion.ways.trajectory import LineProfile
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.setpoint import FREE, RatesSetpoint, Setpoint, TrajectorySetpoint
 from sim_vehicle.world import Vector3
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from companion.detection.interface import Situation
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.physics.layout import HIT_IMPULSE, HIT_START_US
-from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant, PlantOutput
 
 Floats = npt.NDArray[np.float64]
 Vector3 = tuple[float, float, float]

@@ -23,11 +23,11 @@ from companion.messages import (
     Sample,
     Vibration,
 )
-from sim_vehicle.mavlink.streams import vibration
+from sim_vehicle.mavlink import vibration
 from sim_vehicle.mavlink.streams.streams import KINDS, LateLoops, Stream, interval_from_request
-from sim_vehicle.mavlink.streams.telemetry import quaternion_from_matrix
 from sim_vehicle.mavlink.streams.topics import Topic
-from sim_vehicle.physics.plant import PlantOutput
+from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
+from sim_vehicle.plant.plant import PlantOutput
 
 
 @dataclass(frozen=True, slots=True)

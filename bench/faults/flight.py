@@ -29,7 +29,7 @@ from rebound_cli.background import Background
 from rebound_cli.inputs import resolved, with_guards
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.lockstep import EPOCH_US
-from rebound_cli.realtime import ConfirmAtOnce, FlightFaultError, fly_realtime
+from rebound_cli.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
 from rebound_cli.replay.recording import read_recording, reproduce
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.truth_match import FlightTruth
@@ -202,7 +202,8 @@ class _Flight:
     def _fly(self) -> None:
         air, console = self.air, self.injector.console()
         try:
-            fly_realtime(self.companion, air, _clock(air), self.recorder, console, ConfirmAtOnce(), self.interrupts)
+            loop = Loop(self.companion, air, _clock(air), self.recorder, console, self.interrupts)
+            fly_realtime(self.companion, loop, ConfirmAtOnce())
         except FlightFaultError as error:
             self.fault_text = str(error)
         except (Killed, Hung, Landing) as end:

@@ -15,7 +15,7 @@ from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, around, at_least, at_most, markdown, within_factor
 from rebound_cli.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 

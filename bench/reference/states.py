@@ -6,7 +6,7 @@ from bench.import_graph import package_diagram
 from companion.flight.states import TABLE as FLIGHT
 from companion.guard.states import TABLE as GUARD
 from sim_vehicle.autopilot.commander.failsafe_table import markdown_table as failsafe_table
-from sim_vehicle.autopilot.commander.modes import mode_diagram
+from sim_vehicle.autopilot.modes import mode_diagram
 
 ROOT = Path(__file__).parents[2]
 
@@ -35,7 +35,7 @@ def states_page() -> str:
             GUARD.markdown_table(),
             "## The simulated vehicle's modes",
             "",
-            "`sim_vehicle/autopilot/commander/modes.py` is the source.",
+            "`sim_vehicle/autopilot/modes.py` is the source.",
             "",
             f"```mermaid\n{mode_diagram().rstrip()}\n```",
             "",

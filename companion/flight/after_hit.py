@@ -25,26 +25,20 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
 
     A hit during a recovery, or during the hold after it, belongs to the step in which the first one happened.
     """
-    policy, hits = _policy_and_hits(flight)
+    flight.tally.hits += 1
+    own, action = flight.steps[flight.tally.index].item.on_collision, flight.steps[flight.tally.index].action
+    policy, hits = (
+        (own, flight.tally.hits) if own is not None else (flight.mission.on_collision, len(flight.collisions))
+    )
     then, reason = _verdict(flight, policy, hits)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
     flight.after_recovery = AfterRecovery(_TRIGGERS[then], policy.hold_s, reason)
     # What an interrupted flight resumes with.
-    is_left = then in _STEP_LEFT or (then == "detour" and not _has_goal(flight))
+    is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(action, _WITH_A_GOAL))
     flight.step_index = flight.tally.index + (1 if is_left else 0)
     if reason:
         flight.tell(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)
-
-
-def _has_goal(flight: FlightContext) -> bool:
-    return isinstance(flight.steps[flight.tally.index].action, _WITH_A_GOAL)
-
-
-def _policy_and_hits(flight: FlightContext) -> tuple[OnCollision, int]:
-    flight.tally.hits += 1
-    own = flight.steps[flight.tally.index].item.on_collision
-    return (own, flight.tally.hits) if own is not None else (flight.mission.on_collision, len(flight.collisions))
 
 
 def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str, str]:

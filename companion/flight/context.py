@@ -125,13 +125,6 @@ class Expectation:
     detail: str = ""
 
 
-class Touched(NamedTuple):
-    """A push too soft for a collision, NED: something is there."""
-
-    time_boot_us: int
-    push_ned_m_s2: Vector3
-
-
 @dataclass(slots=True)
 class FlightContext:
     """Shared and changed by the flight's parts within a step; nothing else holds or changes it."""
@@ -178,7 +171,6 @@ class FlightContext:
     leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     pressing: Pressing = field(default_factory=Pressing)
-    touch: Touched | None = None  # the latest that was no collision
     blind_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None

@@ -7,8 +7,8 @@ from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.detection.watch import Watch
 from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.rotation import body_to_ned, ned_to_body
-from companion.flight.context import FlightContext, Touched
+from companion.estimate.rotation import ned_to_body
+from companion.flight.context import FlightContext
 from companion.flight.leaning import Held
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 
@@ -105,7 +105,3 @@ def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) 
     text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
     flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
     flight.leaning.touch(estimate.impact.sample_time_boot_us)
-    attitude = flight.vehicle.attitude
-    if attitude is not None:
-        push_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
-        flight.touch = Touched(estimate.impact.sample_time_boot_us, push_ned)

@@ -67,19 +67,15 @@ def _condition(item: items.WaitForItem) -> str:
 
 
 def describe_after_recovery(on_collision: OnCollision) -> str:
-    match on_collision.then:
-        case "hold":
-            return f"hold for {on_collision.hold_s:g} s, then go on with the next item"
-        case "continue":
-            return "go on with the next item at once"
-        case "retry":
-            return f"try the item again at {on_collision.retry_speed_factor:.0%} of the speed"
-        case "detour":
-            return "fly round what is known by now"
-        case "return":
-            return "return to above the start and land"
-        case "land":
-            return "land"
+    words = {
+        "hold": f"hold for {on_collision.hold_s:g} s, then go on with the next item",
+        "continue": "go on with the next item at once",
+        "retry": f"try the item again at {on_collision.retry_speed_factor:.0%} of the speed",
+        "detour": "fly round what is known by now",
+        "return": "return to above the start and land",
+        "land": "land",
+    }
+    return words[on_collision.then]
 
 
 def describe_limit(on_collision: OnCollision) -> str:

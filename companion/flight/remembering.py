@@ -38,10 +38,6 @@ def surroundings(flight: FlightContext) -> Surroundings:
     is_retry = flight.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY and tally.index == flight.step_index
     if is_retry and tally.hits:
         patches = _with_hits(flight, len(flight.collisions) - tally.hits)
-    return surroundings_of(flight, patches)
-
-
-def surroundings_of(flight: FlightContext, patches: tuple[Patch, ...]) -> Surroundings:
     mission = flight.mission
     return Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
 

@@ -45,38 +45,25 @@ class Trigger(Enum):
     DISARMED = "vehicle disarmed itself"
 
 
+# What ends a flight wherever it is in the air, and what interrupts it.
+_IN_THE_AIR = {
+    Trigger.CONTROL_LOST: State.ABORTED,
+    Trigger.INTERRUPTED: State.ABORTED,
+    Trigger.COLLISION: State.RECOVERING,
+}
+_ON_THE_GROUND = {
+    Trigger.INTERRUPTED: State.ABORTED,
+    Trigger.REFUSED: State.ABORTED,
+    Trigger.HEARD_AGAIN: State.CONNECT,
+}
 TABLE = StateTable[State, Trigger](
     {
-        State.CONNECT: {
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.REFUSED: State.ABORTED,
-            Trigger.HEARD_AGAIN: State.CONNECT,
-            Trigger.VEHICLE_READY: State.READY,
-        },
-        State.READY: {
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.REFUSED: State.ABORTED,
-            Trigger.HEARD_AGAIN: State.CONNECT,
-            Trigger.PLAN_CONFIRMED: State.TAKEOFF,
-        },
-        State.TAKEOFF: {
-            Trigger.CONTROL_LOST: State.ABORTED,
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.REFUSED: State.ABORTED,
-            Trigger.COLLISION: State.RECOVERING,
-            Trigger.TAKEN_OFF: State.MISSION,
-        },
-        State.MISSION: {
-            Trigger.CONTROL_LOST: State.ABORTED,
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.COLLISION: State.RECOVERING,
-            Trigger.RETURN_DUE: State.RETURNING,
-            Trigger.LAND_DUE: State.LANDING,
-        },
+        State.CONNECT: {**_ON_THE_GROUND, Trigger.VEHICLE_READY: State.READY},
+        State.READY: {**_ON_THE_GROUND, Trigger.PLAN_CONFIRMED: State.TAKEOFF},
+        State.TAKEOFF: {**_IN_THE_AIR, Trigger.REFUSED: State.ABORTED, Trigger.TAKEN_OFF: State.MISSION},
+        State.MISSION: {**_IN_THE_AIR, Trigger.RETURN_DUE: State.RETURNING, Trigger.LAND_DUE: State.LANDING},
         State.RECOVERING: {
-            Trigger.CONTROL_LOST: State.ABORTED,
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.COLLISION: State.RECOVERING,
+            **_IN_THE_AIR,
             Trigger.RECOVERED_TO_HOLD: State.HOLDING,
             Trigger.RECOVERED_TO_CONTINUE: State.MISSION,
             Trigger.RECOVERED_TO_RETRY: State.MISSION,
@@ -85,25 +72,9 @@ TABLE = StateTable[State, Trigger](
             Trigger.RECOVERED_TO_LAND: State.LANDING,
             Trigger.RECOVERED_TO_ABORT: State.ABORTED,
         },
-        State.HOLDING: {
-            Trigger.CONTROL_LOST: State.ABORTED,
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.COLLISION: State.RECOVERING,
-            Trigger.HOLD_ENDED: State.MISSION,
-        },
-        State.RETURNING: {
-            Trigger.CONTROL_LOST: State.ABORTED,
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.COLLISION: State.RECOVERING,
-            Trigger.HOME_REACHED: State.LANDING,
-            Trigger.LAND_DUE: State.LANDING,
-        },
-        State.LANDING: {
-            Trigger.CONTROL_LOST: State.ABORTED,
-            Trigger.INTERRUPTED: State.ABORTED,
-            Trigger.COLLISION: State.RECOVERING,
-            Trigger.DISARMED: State.DONE,
-        },
+        State.HOLDING: {**_IN_THE_AIR, Trigger.HOLD_ENDED: State.MISSION},
+        State.RETURNING: {**_IN_THE_AIR, Trigger.HOME_REACHED: State.LANDING, Trigger.LAND_DUE: State.LANDING},
+        State.LANDING: {**_IN_THE_AIR, Trigger.DISARMED: State.DONE},
         State.DONE: {},
         State.ABORTED: {},
     }

@@ -59,6 +59,7 @@ class AttachedGuard:
         self._encoder = Encoder()
         self._encoder.speak_to(*self._source)
         self._gate = Gate()
+        self.kept_out = 0  # setpoints that did not go on
         self._arrived: list[Sample] = []
         self._drained_us: int | None = None  # after a stall: when what arrived in it has been heard
 
@@ -100,13 +101,8 @@ class AttachedGuard:
         self.core.flight.others_setpoint_us = now_us
         if not self.core.machine.holds:
             return True
-        self._gate.kept_out += 1
+        self.kept_out += 1
         return False
-
-    @property
-    def kept_out(self) -> int:
-        """Setpoints that did not go on."""
-        return self._gate.kept_out
 
     @property
     def finished(self) -> bool:
@@ -121,7 +117,6 @@ class Gate:
 
     def __init__(self) -> None:
         self._own: deque[Mark] = deque(maxlen=_MOST_ON_THE_WAY)
-        self.kept_out = 0
 
     def sends(self, fields: Mapping[str, object]) -> None:
         """The guard is about to send this one."""

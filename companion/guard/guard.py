@@ -22,19 +22,10 @@ class Guard(Stepped[GuardCore]):
     def _begun(self, now_us: int) -> GuardCore:
         return GuardCore(self._config, False, now_us)
 
-    def enable(self) -> None:
-        """Watch again after the guard has stood down."""
-        if self._core is not None:
-            self._core.is_enabled = True
-
     @property
     def outcome(self) -> str:
         """Why it ended."""
         return "" if self._core is None else self._core.machine.outcome
-
-    @property
-    def state(self) -> State:
-        return State.CONNECTING if self._core is None else self._core.machine.state
 
     def collisions(self) -> tuple[CollisionReport, ...]:
         return () if self._core is None else self._core.collisions()

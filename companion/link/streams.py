@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from companion import messages
+from companion.messages import LocalPosition, MessageId
 from companion.mission.config import StreamsConfig
 
 
@@ -11,7 +12,7 @@ from companion.mission.config import StreamsConfig
 class Stream:
     """A wanted stream; a flight does not begin below `min_hz`."""
 
-    message_id: messages.MessageId
+    message_id: MessageId
     sample_type: type
     asked_hz: float
     min_hz: float
@@ -20,27 +21,22 @@ class Stream:
         return messages.SetMessageInterval(self.message_id, round(1e6 / self.asked_hz))
 
 
-def wanted_streams(config: StreamsConfig, for_detector: Collection[messages.MessageId]) -> tuple[Stream, ...]:
+def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -> tuple[Stream, ...]:
     """Mode and landed state are wished for, not required: HEARTBEAT tells the mode too, if more slowly.
 
     What the detector makes use of beyond that is wished for, too: it says what it loses without.
     """
     always = (
-        Stream(messages.MessageId.HIGHRES_IMU, messages.ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
-        Stream(
-            messages.MessageId.LOCAL_POSITION_NED,
-            messages.LocalPosition,
-            config.local_position_hz,
-            config.min_local_position_hz,
-        ),
-        Stream(messages.MessageId.ATTITUDE_QUATERNION, messages.Attitude, config.attitude_hz, config.min_attitude_hz),
-        Stream(messages.MessageId.EXTENDED_SYS_STATE, messages.ExtendedState, config.extended_sys_state_hz, 0.0),
-        Stream(messages.MessageId.CURRENT_MODE, messages.CurrentMode, config.current_mode_hz, 0.0),
+        Stream(MessageId.HIGHRES_IMU, messages.ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
+        Stream(MessageId.LOCAL_POSITION_NED, LocalPosition, config.local_position_hz, config.min_local_position_hz),
+        Stream(MessageId.ATTITUDE_QUATERNION, messages.Attitude, config.attitude_hz, config.min_attitude_hz),
+        Stream(MessageId.EXTENDED_SYS_STATE, messages.ExtendedState, config.extended_sys_state_hz, 0.0),
+        Stream(MessageId.CURRENT_MODE, messages.CurrentMode, config.current_mode_hz, 0.0),
     )
     wished = (
-        Stream(messages.MessageId.ATTITUDE_TARGET, messages.AttitudeTarget, config.attitude_target_hz, 0.0),
-        Stream(messages.MessageId.ODOMETRY, messages.Odometry, config.odometry_hz, 0.0),
-        Stream(messages.MessageId.VIBRATION, messages.Vibration, config.vibration_hz, 0.0),
+        Stream(MessageId.ATTITUDE_TARGET, messages.AttitudeTarget, config.attitude_target_hz, 0.0),
+        Stream(MessageId.ODOMETRY, messages.Odometry, config.odometry_hz, 0.0),
+        Stream(MessageId.VIBRATION, messages.Vibration, config.vibration_hz, 0.0),
     )
     return always + tuple(stream for stream in wished if stream.message_id in for_detector)
 
@@ -50,7 +46,7 @@ class StreamMonitor:
 
     __slots__ = ("_counts", "_started_us", "_until_us", "streams")
 
-    def __init__(self, config: StreamsConfig, for_detector: Collection[messages.MessageId] = ()) -> None:
+    def __init__(self, config: StreamsConfig, for_detector: Collection[MessageId] = ()) -> None:
         self.streams = wanted_streams(config, for_detector)
         self._counts: dict[type, int] = {stream.sample_type: 0 for stream in self.streams}
         self._started_us: int | None = None

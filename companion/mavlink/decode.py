@@ -48,7 +48,6 @@ class Decoder:
         self._pending = b""
         self._vehicle: tuple[int, int] | None = None
         self._boot_us = 0  # newest 64-bit stamp
-        self.bad_bytes = 0
 
     def listen_to(self, system_id: int, component_id: int) -> None:
         self._vehicle = (system_id, component_id)
@@ -67,18 +66,14 @@ class Decoder:
             if start + length > end:
                 break
             if bad_start < start:
-                self._note_bad(data[bad_start:start], frames)
+                frames.append((data[bad_start:start], None))
             packet = data[start : start + length]
             frames.append((packet, self._sample(packet)))
             start = bad_start = start + length
         if bad_start < start:
-            self._note_bad(data[bad_start:start], frames)
+            frames.append((data[bad_start:start], None))
         self._pending = data[start:]
         return frames
-
-    def _note_bad(self, bad: bytes, frames: list[Frame]) -> None:
-        self.bad_bytes += len(bad)
-        frames.append((bad, None))
 
     def _sample(self, packet: bytes) -> Sample | None:
         message_id = message_id_of(packet)

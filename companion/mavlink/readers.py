@@ -14,17 +14,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
 from companion.mavlink.encode import COMPONENT_ID
-from companion.messages import (
-    ANGULAR_VELOCITY_RAD_S,
-    POSITION_M,
-    SPECIFIC_FORCE_M_S2,
-    TIME_US,
-    VELOCITY_M_S,
-    Refused,
-    Sample,
-    is_rotation,
-    within,
-)
+from companion.messages import Refused, Sample, is_rotation, within
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
@@ -75,14 +65,18 @@ def _imu(
     force, rates = (xacc, yacc, zacc), (xgyro, ygyro, zgyro)
     if within(messages.ZERO_G_OFFSET_M_S2, *force):
         return Refused("HIGHRES_IMU", "the accelerometer reads zero on all axes")
-    if not (within(SPECIFIC_FORCE_M_S2, *force) and within(ANGULAR_VELOCITY_RAD_S, *rates) and time_usec < TIME_US):
+    if not (
+        within(messages.SPECIFIC_FORCE_M_S2, *force)
+        and within(messages.ANGULAR_VELOCITY_RAD_S, *rates)
+        and time_usec < messages.TIME_US
+    ):
         text = f"specific force {_text(*force)} m/s^2, rates {_text(*rates)} rad/s at {time_usec} us"
         return Refused("HIGHRES_IMU", text)
     return messages.ImuSample(time_usec, force, rates)
 
 
 def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:
-    if not (within(POSITION_M, x, y, z) and within(VELOCITY_M_S, vx, vy, vz)):
+    if not (within(messages.POSITION_M, x, y, z) and within(messages.VELOCITY_M_S, vx, vy, vz)):
         return _moves_too_far("LOCAL_POSITION_NED", x, y, z, vx, vy, vz)
     return messages.LocalPosition(time_boot_ms * 1000, (x, y, z), (vx, vy, vz))
 
@@ -91,7 +85,7 @@ def _attitude(
     time_boot_ms: int, q1: float, q2: float, q3: float, q4: float, rollspeed: float, pitchspeed: float, yawspeed: float
 ) -> Sample:
     turn, rates = (q1, q2, q3, q4), (rollspeed, pitchspeed, yawspeed)
-    if not (is_rotation(*turn) and within(ANGULAR_VELOCITY_RAD_S, *rates)):
+    if not (is_rotation(*turn) and within(messages.ANGULAR_VELOCITY_RAD_S, *rates)):
         return Refused("ATTITUDE_QUATERNION", f"quaternion {_text(*turn)}, rates {_text(*rates)} rad/s")
     return messages.Attitude(time_boot_ms * 1000, turn, rates)
 
@@ -111,7 +105,11 @@ def _odometry(
     # PX4 sends NED velocity under child frame LOCAL_NED; any other frame would have to be turned first.
     if frame_id != dialect.MAV_FRAME_LOCAL_NED or child_frame_id != dialect.MAV_FRAME_LOCAL_NED:
         return None
-    if not (within(POSITION_M, x, y, z) and within(VELOCITY_M_S, vx, vy, vz) and time_usec < TIME_US):
+    if not (
+        within(messages.POSITION_M, x, y, z)
+        and within(messages.VELOCITY_M_S, vx, vy, vz)
+        and time_usec < messages.TIME_US
+    ):
         return _moves_too_far("ODOMETRY", x, y, z, vx, vy, vz)
     return messages.Odometry(time_usec, (x, y, z), (vx, vy, vz), reset_counter)
 
@@ -145,8 +143,11 @@ def _vibration(
     time_usec: int, vibration_y: float, vibration_z: float, clipping_0: int, clipping_1: int, clipping_2: int
 ) -> Sample:
     # How much a sample may differ from the one before: no more than the ranges.
-    turns, shakes = within(2.0 * ANGULAR_VELOCITY_RAD_S, vibration_y), within(2.0 * SPECIFIC_FORCE_M_S2, vibration_z)
-    if not (turns and shakes) or time_usec >= TIME_US:
+    turns, shakes = (
+        within(2.0 * messages.ANGULAR_VELOCITY_RAD_S, vibration_y),
+        within(2.0 * messages.SPECIFIC_FORCE_M_S2, vibration_z),
+    )
+    if not (turns and shakes) or time_usec >= messages.TIME_US:
         return Refused("VIBRATION", f"{vibration_y:g} rad/s, {vibration_z:g} m/s^2")
     return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))
 
@@ -205,7 +206,7 @@ def _autopilot_version(flight_sw_version: int) -> Sample:
 
 
 def _position_target(type_mask: int, x: float, y: float, z: float) -> Sample:
-    known = not type_mask & POSITION_IGNORED and within(POSITION_M, x, y, z)
+    known = not type_mask & POSITION_IGNORED and within(messages.POSITION_M, x, y, z)
     return messages.PositionTarget((x, y, z) if known else None)
 
 

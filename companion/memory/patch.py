@@ -138,7 +138,7 @@ def touch_of(
 ) -> Patch | None:
     """The one touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
 
-    ``normal_ned`` is horizontal, steep or zero (see recovery.direction). ``reach_m``: centre to the guards' rim.
+    ``normal_ned`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
     ``is_behind``: what was hit is known to have come after the vehicle.
     """
     n, e, d = velocity_ned_m_s

@@ -1,9 +1,12 @@
 """The geofence: where no setpoint lies and no vehicle should be. Mission coordinates, metres."""
 
 import math
+from functools import cached_property
 from typing import Annotated, Self
 
+import shapely
 from pydantic import Field, model_validator
+from shapely import LineString, Point, Polygon
 
 from companion.written import NotNegative, Number, PositionNed, Positive, Written
 
@@ -41,22 +44,29 @@ class Fence(Written):
     def _sound(self) -> Self:
         if self.min_height_m >= self.max_height_m:
             raise ValueError(f"min_height_m = {self.min_height_m:g} is not below max_height_m = {self.max_height_m:g}")
-        edges = _edges(self.polygon_ne_m or ())
-        for number, (a, b) in enumerate(edges):
-            if math.dist(a, b) < LEAST_EDGE_M:
-                raise ValueError(f"polygon_ne_m: corner {number + 1} is the same as the next")
-            for c, d in edges[number + 2 : len(edges) - (number == 0)]:
-                if _crossing(a, b, c, d) is not None:
-                    raise ValueError(f"polygon_ne_m: the edge after corner {number + 1} crosses another")
+        corners = self.polygon_ne_m or ()
+        for number, corner in enumerate(corners):
+            if math.dist(corner, corners[number - 1]) < LEAST_EDGE_M:
+                raise ValueError(f"polygon_ne_m: corner {number or len(corners)} is the same as the next")
+        if self._polygon is not None and not self._polygon.is_valid:
+            where = shapely.is_valid_reason(self._polygon).partition("[")[2].removesuffix("]").replace(" ", ", ")
+            raise ValueError(f"polygon_ne_m: an edge crosses another, at [{where}]")
         if not self.contains(0.0, 0.0):
             raise ValueError("polygon_ne_m does not contain the arming position [0, 0]")
         return self
+
+    @cached_property
+    def _polygon(self) -> Polygon | None:
+        """Prepared for many places to be looked for in it."""
+        polygon = None if self.polygon_ne_m is None else Polygon(self.polygon_ne_m)
+        shapely.prepare(polygon)
+        return polygon
 
     def contains(self, north_m: float, east_m: float) -> bool:
         """Whether a place is inside, whatever its height."""
         if self.radius_m is not None and math.hypot(north_m, east_m) > self.radius_m:
             return False
-        return self.polygon_ne_m is None or _in_polygon(north_m, east_m, self.polygon_ne_m)
+        return self._polygon is None or bool(self._polygon.covers(Point(north_m, east_m)))
 
     def outside_by_m(self, position_ned_m: PositionNed) -> float:
         """How far beyond the fence a position is, upwards or sideways; 0 inside. The floor does not count."""
@@ -89,11 +99,10 @@ class Fence(Written):
         if self.contains(north_m, east_m):
             return north_m, east_m
         place = (north_m, east_m)
-        if self.polygon_ne_m is not None and not _in_polygon(*place, self.polygon_ne_m):
-            place = min(
-                (_nearest_on_edge(place, a, b) for a, b in _edges(self.polygon_ne_m)),
-                key=lambda candidate: math.dist(candidate, (north_m, east_m)),
-            )
+        if self._polygon is not None and not self._polygon.covers(Point(place)):
+            edge = self._polygon.exterior
+            nearest = edge.interpolate(edge.project(Point(place)))
+            place = (nearest.x, nearest.y)
         distance_m = math.hypot(*place)
         if self.radius_m is not None and distance_m > self.radius_m:
             place = (place[0] * self.radius_m / distance_m, place[1] * self.radius_m / distance_m)
@@ -109,45 +118,8 @@ class Fence(Written):
             b = start[0] * way[0] + start[1] * way[1]
             c = start[0] ** 2 + start[1] ** 2 - self.radius_m**2
             leaves_at = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
-        for a_corner, b_corner in _edges(self.polygon_ne_m or ()):
-            crossing = _crossing(start, end, a_corner, b_corner)
-            if crossing is not None:
-                leaves_at = min(leaves_at, crossing)
+        if self._polygon is not None and way != (0.0, 0.0):
+            line = LineString((start, end))
+            for crossing in shapely.get_coordinates(line.intersection(self._polygon.exterior)):
+                leaves_at = min(leaves_at, line.project(Point(crossing), normalized=True))
         return (start[0] + leaves_at * way[0], start[1] + leaves_at * way[1])
-
-
-Corners = tuple[tuple[float, float], ...]
-
-
-def _edges(corners: Corners) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-    return [(corner, corners[(number + 1) % len(corners)]) for number, corner in enumerate(corners)]
-
-
-def _in_polygon(north_m: float, east_m: float, corners: Corners) -> bool:
-    """Even-odd rule: how often a ray to the north crosses the boundary."""
-    inside = False
-    for (n_1, e_1), (n_2, e_2) in _edges(corners):
-        if (e_1 > east_m) != (e_2 > east_m) and north_m < n_1 + (east_m - e_1) * (n_2 - n_1) / (e_2 - e_1):
-            inside = not inside
-    return inside
-
-
-def _crossing(
-    start: tuple[float, float], end: tuple[float, float], a: tuple[float, float], b: tuple[float, float]
-) -> float | None:
-    """How far along from start (0) to end (1) the two segments cross; None when they do not."""
-    way, edge = (end[0] - start[0], end[1] - start[1]), (b[0] - a[0], b[1] - a[1])
-    turn = way[0] * edge[1] - way[1] * edge[0]
-    if turn == 0.0:
-        return None
-    offset = (a[0] - start[0], a[1] - start[1])
-    along = (offset[0] * edge[1] - offset[1] * edge[0]) / turn
-    across = (offset[0] * way[1] - offset[1] * way[0]) / turn
-    return along if 0.0 <= along <= 1.0 and 0.0 <= across <= 1.0 else None
-
-
-def _nearest_on_edge(place: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
-    edge = (b[0] - a[0], b[1] - a[1])
-    along = ((place[0] - a[0]) * edge[0] + (place[1] - a[1]) * edge[1]) / (edge[0] ** 2 + edge[1] ** 2)
-    along = min(1.0, max(0.0, along))
-    return (a[0] + along * edge[0], a[1] + along * edge[1])

@@ -155,12 +155,11 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     pace = Pace.of(flight)
     for step in items.program(mission.items):
         action = step.action
-        way: Trajectory | None = None
         lasts_s: float | None = 0.0
         planned: Planned | None = None
         match action:
             case items.TakeoffItem():
-                way = climb(place, action.height_m, flight)
+                planned = Planned(climb(place, action.height_m, flight))
             case items.HoldItem():
                 lasts_s = action.duration_s
             case items.WaitForItem():
@@ -178,7 +177,7 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
                 lasts_s = _landing_s(place)
             case _:
                 planned = way_around(action, place, pace, known)
-        way = way if planned is None else planned.way
+        way = None if planned is None else planned.way
         if way is not None:
             assert lasts_s is not None
             lasts_s += way.duration_s

@@ -56,8 +56,11 @@ def _check(path: Path, options: Namespace) -> None:
         print(f"\nnot drawn: {needed_text(error)}")
         return
     picture = options.out / f"{mission.name}.png"
-    options.out.mkdir(parents=True, exist_ok=True)
-    draw_mission(picture, mission, world.scene, ways)
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        draw_mission(picture, mission, world.scene, ways)
+    except OSError as error:
+        raise ConfigurationError(f"{picture} cannot be written: {error.strerror}.") from error
     print(f"\ndrawn in {picture}")
 
 

@@ -1,1 +1,1 @@
-"""Flights on disk: which are kept, and `rebound logs`, `rebound doctor`."""
+"""Flights on disk: which are kept, and `rebound logs`."""

@@ -8,16 +8,10 @@ from pathlib import Path
 from statistics import mean
 
 from rebound_cli import run_folder
-from rebound_cli.documents import load_document, parse_document, validated
+from rebound_cli.documents import load_document, parse_document, validated, write_text
+from rebound_cli.identification import fit
 from rebound_cli.identification.capture import find_hit, read_table
-from rebound_cli.identification.fit import (
-    FEWEST_FOR_LEAVE_ONE_OUT,
-    Identified,
-    Number,
-    Spring,
-    identify,
-    leave_one_out,
-)
+from rebound_cli.identification.fit import Identified, Number, Spring, identify, leave_one_out
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
@@ -40,7 +34,7 @@ def run_identify(options: Namespace) -> int:
     # The file is read as `--airframe` will read it before anybody finds it on the disk.
     document = parse_document(text, str(out))
     validated(Airframe, document, with_base(document.data))
-    out.write_text(text, encoding="utf-8")
+    write_text(out, text)
     print(f"\nWritten to {out}. Fly it: rebound fly missions/wall.yaml --lockstep --airframe {out}")
     return 0
 
@@ -111,7 +105,7 @@ def _numbers(found: Identified) -> list[str]:
 
 
 def _left_out(hits: Sequence[Hit]) -> list[str]:
-    if len(hits) < FEWEST_FOR_LEAVE_ONE_OUT:
+    if len(hits) < fit.FEWEST_FOR_LEAVE_ONE_OUT:
         count = "1 hit is" if len(hits) == 1 else f"{len(hits)} hits are"
         return [f"{count} too few to leave one out: nothing checks these numbers against another hit."]
     columns = leave_one_out(hits)

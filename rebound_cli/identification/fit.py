@@ -59,6 +59,7 @@ class Spring:
     natural_rad_s: Number
     ratio: Number  # of damping, below 1
     hits: int = 1
+    covariance_rad_s: float = 0.0  # of these two: one hit shows both at once
 
     @property
     def stiffness_per_s2(self) -> Number:
@@ -68,8 +69,9 @@ class Spring:
     @property
     def damping_per_s(self) -> Number:
         natural, ratio = self.natural_rad_s, self.ratio
-        sigma = 2 * math.hypot(ratio.value * natural.sigma, natural.value * ratio.sigma)
-        return Number(2 * ratio.value * natural.value, sigma)
+        alone = (ratio.value * natural.sigma) ** 2 + (natural.value * ratio.sigma) ** 2
+        together = 2 * ratio.value * natural.value * self.covariance_rad_s
+        return Number(2 * ratio.value * natural.value, 2 * math.sqrt(max(0.0, alone + together)))
 
     def on(self, guards: int) -> tuple[float, float]:
         """Natural frequency (rad/s) and damping ratio, the latter kept below 1: more is not told apart."""
@@ -160,8 +162,8 @@ def fit_spring(hits: Sequence[Hit]) -> Spring | None:
     the residuals' for one hit, and no less than the spread's for more: one hit says little about the next.
     """
     alone = [spring for hit in hits if (spring := _spring_of(hit)) is not None]
-    if not alone:
-        return None
+    if len(alone) <= 1:
+        return alone[0] if alone else None
     naturals, ratios = [spring.natural_rad_s for spring in alone], [spring.ratio for spring in alone]
     return Spring(_median(naturals), _median(ratios), len(alone))
 
@@ -205,7 +207,10 @@ def _from_push(hit: Hit, push: Push) -> Spring | None:
     natural = math.sqrt(stiffness)
     ratio, relative = damping / (2 * natural), stiffness_sigma / stiffness / 2
     ratio_sigma = math.hypot(damping_sigma / (2 * natural), ratio * relative)
-    return Spring(Number(natural, natural * relative), Number(ratio, ratio_sigma))
+    # k_s and b_s are taken to be independent: the ratio falls as the frequency grows.
+    covariance_rad_s = -ratio * natural * relative**2
+    found = Number(natural, natural * relative), Number(ratio, ratio_sigma)
+    return Spring(*found, covariance_rad_s=covariance_rad_s)
 
 
 def _from_track(hit: Hit, data: Track) -> Spring:
@@ -227,9 +232,11 @@ def _from_track(hit: Hit, data: Track) -> Spring:
         fits.append(least_squares(residuals, start, bounds=_BOUNDS, x_scale=_SCALE, max_nfev=200))
     best = min(fits, key=lambda fit: float(fit.cost))
     variance = 2 * float(best.cost) / max(1, len(data.time_s) - len(best.x))
-    logarithm_sigma, ratio_sigma, *_ = np.sqrt(variance * np.diag(np.linalg.pinv(best.jac.T @ best.jac))).tolist()
-    natural = math.exp(best.x[0])
-    return Spring(Number(natural, natural * logarithm_sigma), Number(float(best.x[1]), ratio_sigma))
+    covariance = variance * np.linalg.pinv(best.jac.T @ best.jac)
+    # The fit has the frequency's logarithm.
+    natural, (logarithm_sigma, ratio_sigma, *_) = math.exp(best.x[0]), np.sqrt(np.diag(covariance)).tolist()
+    found = Number(natural, natural * logarithm_sigma), Number(float(best.x[1]), ratio_sigma)
+    return Spring(*found, covariance_rad_s=natural * float(covariance[0, 1]))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from companion.errors import ConfigurationError
-from rebound_cli.documents import parse_document
+from rebound_cli.documents import parse_document, write_text
 from rebound_cli.inputs import load_mission_document, mission_from
 from rebound_cli.plan.reading import mission_of_plan
 from rebound_cli.plan.writing import plan_of_mission
@@ -65,5 +65,5 @@ def _write(out: Path | None, text: str, notes: Sequence[str]) -> None:
     if out is None:
         print(text, end="")
         return
-    out.write_text(text, encoding="utf-8")
+    write_text(out, text)
     print(f"written to {out}", file=sys.stderr)

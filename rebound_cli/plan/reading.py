@@ -4,12 +4,11 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from pydantic import ValidationError
-
 from companion.errors import ConfigurationError
 from companion.mavlink.encode import command_name
 from companion.messages import Vector3
 from companion.mission.items import MAX_SPEED_M_S
+from rebound_cli.documents import Document, validated
 from rebound_cli.plan import shape
 from rebound_cli.plan.shape import PlanShape, SimpleItem
 from sim_vehicle.geography import Origin
@@ -31,13 +30,9 @@ def mission_of_plan(plan: Any, name: str) -> tuple[dict[str, Any], Sequence[str]
 
     Raises ConfigurationError where the file is no plan, or asks for something that a mission cannot do.
     """
-    try:
-        whole = PlanShape.model_validate(plan)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        text = f"{place or 'file'}: {first['msg'][:1].lower()}{first['msg'][1:]}"
-        raise ConfigurationError(f"this is no whole plan of QGroundControl: {text}.") from error
+    if not isinstance(plan, dict) or plan.get("fileType") != "Plan" or not isinstance(plan.get("mission"), dict):
+        raise ConfigurationError("this is no plan of QGroundControl: it has no fileType 'Plan' and mission.")
+    whole = validated(PlanShape, Document("this is no whole plan of QGroundControl"), plan)
     reader = _Reader(whole)
     return {"name": name, "items": reader.items, "fence": reader.fence(whole.geoFence)}, reader.notes
 
@@ -50,7 +45,7 @@ def _simple_items(plan: PlanShape) -> Iterator[SimpleItem]:
             continue
         parts = item.TransectStyleComplexItem.Items
         if parts is None:
-            kind = item.complexItemType
+            kind = item.complexItemType or item.type or "pattern"
             raise ConfigurationError(f"item {number} of the plan is a '{kind}', whose way the file does not state.")
         yield from parts
 

@@ -5,7 +5,7 @@ Source: QGroundControl's developer guide, "Plan File Format".
 
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict, Tag
 
 # MAV_CMD
 WAYPOINT, LOITER_TURNS, LOITER_TIME, RETURN_TO_LAUNCH, LAND, TAKEOFF = 16, 18, 19, 20, 21, 22
@@ -53,18 +53,27 @@ class Transect(_Part):
 
 
 class ComplexItem(_Part):
-    """A survey or another pattern."""
+    """A survey or another pattern, or what no version of QGroundControl has written so far."""
 
-    type: Literal["ComplexItem"]
-    complexItemType: str = "ComplexItem"  # noqa: N815
+    type: str | None = None
+    complexItemType: str | None = None  # noqa: N815
     TransectStyleComplexItem: Transect = Transect()
+
+
+def _kind(item: object) -> str:
+    return "simple" if isinstance(item, dict) and item.get("type") == "SimpleItem" else "complex"
+
+
+Item: TypeAlias = Annotated[
+    Annotated[SimpleItem, Tag("simple")] | Annotated[ComplexItem, Tag("complex")], Discriminator(_kind)
+]
 
 
 class MissionPart(_Part):
     plannedHomePosition: Annotated[list[Number], Field(min_length=2, max_length=3)]  # noqa: N815
     hoverSpeed: Number | None = None  # noqa: N815
     vehicleType: Whole | None = None  # noqa: N815
-    items: Annotated[list[Annotated[SimpleItem | ComplexItem, Field(discriminator="type")]], Field(min_length=1)]
+    items: Annotated[list[Item], Field(min_length=1)]
 
 
 class Circle(_Part):

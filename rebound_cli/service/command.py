@@ -7,7 +7,7 @@ from pathlib import Path
 
 from companion.guard.config import GuardConfig
 from rebound_cli import documents
-from rebound_cli.documents import DocumentError, Override, apply_override, load_document, parse_document, validated
+from rebound_cli.documents import DocumentError, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from
 from rebound_cli.run_folder import read_text
 from rebound_cli.service import files
@@ -89,7 +89,7 @@ def plan(
     if source is not None:
         document.data["run"] = "mission" if guard is None else "guard"
     if connect is not None:
-        apply_override(document, Override(f"--connect {connect}", ("connect",), connect))
+        document.put_option("--connect", ("connect",), connect)
     asked = validated(ServiceSettings, document, document.data)
     is_new = not stored.exists()
     settings = asked if is_new else settings

@@ -16,7 +16,7 @@ from companion.errors import ConfigurationError
 from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
 from rebound_cli.console import console_for, with_progress
-from rebound_cli.documents import parse_document, validated
+from rebound_cli.documents import parse_document, validated, write_text
 from rebound_cli.inputs import companion_settings, load_world
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
@@ -66,7 +66,7 @@ def run_tune(options: Namespace) -> int:
         console.print(tuning_text(tuning))
         console.print(text.rstrip())
     if out is not None:
-        out.write_text(text, encoding="utf-8")
+        write_text(out, text)
         console.print(f"\nWritten to {out}. Fly with it: rebound fly MISSION --companion {out} ...")
     return 0
 

@@ -4,8 +4,6 @@ from enum import IntEnum
 
 from sim_vehicle.autopilot import commands, flight_commands
 from sim_vehicle.autopilot.commander.commander import Commander, SystemStatus
-from sim_vehicle.autopilot.commander.modes import Mode
-from sim_vehicle.autopilot.estimate import Estimate, Vector3, yaw_of
 from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, wants_takeoff
 from sim_vehicle.autopilot.flight_tasks.target import Kind, View
@@ -25,8 +23,10 @@ from sim_vehicle.autopilot.messages import (
     StickInput,
 )
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardControl
+from sim_vehicle.estimator.estimate import Estimate, Vector3, yaw_of
 from sim_vehicle.parameters.airframe_values import origin_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import Setpoint, TrajectorySetpoint

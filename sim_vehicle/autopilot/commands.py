@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from sim_vehicle.autopilot import flight_commands, ground_commands
-from sim_vehicle.autopilot.commander.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.messages import EVERY_ID, Command, CommandAck, Identity, Result
+from sim_vehicle.autopilot.mode_numbers import AUTO_MAIN_MODE, CUSTOM_FLAG, mode_from_request
+from sim_vehicle.autopilot.modes import Mode
 
 NAV_RETURN_TO_LAUNCH = 20
 NAV_LAND = 21

@@ -9,10 +9,10 @@ from typing import Protocol
 
 from sim_vehicle.autopilot.commander.arming import Reason
 from sim_vehicle.autopilot.commander.commander import Commander
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, Vector3
 from sim_vehicle.autopilot.messages import Command, Result, Severity
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.mission import MissionCommand
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.geography import Origin

@@ -6,8 +6,8 @@ commander's offboardCheck.cpp and PositionControl::_inputValid; the delays are m
 
 import math
 
-from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, PositionTarget, Severity, StatusText
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.parameters.store import Parameters

@@ -1,7 +1,7 @@
 """A simulated vehicle around which obstacles and faults may change between two intervals."""
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.autopilot.commander.mode_numbers import NUMBERS
+from sim_vehicle.autopilot.mode_numbers import NUMBERS
 from sim_vehicle.errors import FaultError, SceneError
 from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.mavlink.faulty_link import FaultyLink

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.aiding import Aid, Compass, MotionCapture, OpticalFlow, RangeFinder
-from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.estimator.optics import (
     CAMERA_ROWS,
     DISTANCE,

@@ -18,7 +18,7 @@ from sim_vehicle.hil.sensors import (
     Gps,
     Magnetometer,
 )
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene, check_start_is_free
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.world import Vector3

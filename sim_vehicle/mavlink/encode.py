@@ -9,11 +9,11 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.commander.mode_numbers import NUMBERS, base_mode
-from sim_vehicle.autopilot.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
+from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
+from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
 # pymavlink's messages carry no types; only `Encoder.packet` looks inside.

@@ -11,7 +11,7 @@ from bench.detectors.wire import BUILDERS, Wire
 from companion.detection.interface import Situation
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState, MessageId
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 
 # --- the short cut --------------------------------------------------------------------------------------------------

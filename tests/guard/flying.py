@@ -54,7 +54,7 @@ class Air:
 
     @property
     def state(self) -> State:
-        return self.guard.state
+        return State.CONNECTING if self.guard.core is None else self.guard.core.machine.state
 
     def send(self, message: Any) -> None:
         self._others_bytes += message.pack(self._other)

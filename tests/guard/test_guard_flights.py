@@ -140,7 +140,7 @@ def test_a_pilot_who_chooses_a_mode_while_the_guard_holds_has_the_vehicle_at_onc
     assert air.vehicle_mode() == "POSCTL"
     assert air.setpoints("guard", let_go_s + 0.005) == []
     # another hit is the pilot's own affair, until somebody enables the guard again
-    air.guard.enable()
+    air.guard.core.is_enabled = True
     air.run(0.1)
     assert air.state is State.WATCHING
 

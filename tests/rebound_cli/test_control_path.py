@@ -175,7 +175,8 @@ def fly(folder, stream=sys.stderr, confirm=None, computer=None):
     confirmation = ConfirmAtOnce() if confirm is None else confirm(world)
     problem = None
     try:
-        fly_realtime(companion, world, world, recorder, console, confirmation, Interrupts(), None, computer)
+        loop = Loop(companion, world, world, recorder, console, Interrupts(), None, computer)
+        fly_realtime(companion, loop, confirmation)
     except FlightFaultError as error:
         problem = str(error)
     recorder.close()

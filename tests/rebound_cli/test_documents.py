@@ -55,6 +55,10 @@ def test_an_unknown_key_suggests_the_close_one_and_lists_all():
     text = complaint(mission_from, document("speed_m_s", "sped_m_s"))
     assert "demo.yaml:6: items.1.go_to.sped_m_s: unknown key 'sped_m_s'; did you mean 'speed_m_s'?" in text
     assert "position_ned_m, speed_m_s, acceleration_m_s2, yaw_deg" in text
+    repeated = ["items.1={repeat: {times: 2, items: [{hodl: {duration_s: 1}}]}}"]
+    text = complaint(mission_from, document(sets=repeated))
+    assert "unknown key 'hodl'; did you mean 'hold'?" in text
+    assert "needs at least" not in text, "the list is as long as it must be"
 
 
 def test_a_key_of_an_earlier_version_is_taken_with_a_warning():
@@ -228,7 +232,7 @@ def test_a_wire_fault_on_a_message_that_there_is_not_is_found_before_the_flight(
     assert text == "demo.yaml:12: no MAVLink message is called 'ATITUDE'."
 
 
-def test_thousands_of_faults_are_told_after_the_schema_was_looked_at_once(monkeypatch):
+def test_thousands_of_faults_are_told_without_a_schema_of_the_mission(monkeypatch):
     # Given a mission with the same mistake on every line
     asked = []
 
@@ -240,7 +244,7 @@ def test_thousands_of_faults_are_told_after_the_schema_was_looked_at_once(monkey
 
     lines = "".join(f"  - wait: {{mistake{n}: 1}}\n" for n in range(200))
     found = parse_document(f"name: demo\nitems:\n{lines}", "demo.yaml")
-    # When it is checked, then the answer is short, and did not take a schema a fault
+    # When it is checked, then the answer is short, and took no schema, which is a tenth of a second each
     text = complaint(validated, Counted, found, found.data)
     assert len(text.splitlines()) == 6 and "more" in text
-    assert len(asked) == 1
+    assert asked == []

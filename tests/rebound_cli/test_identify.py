@@ -20,7 +20,7 @@ from rebound_cli.identification.fit import (
 )
 from rebound_cli.identification.hit import IdentificationError
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.rebound_cli.command import WALL, assert_one_clear_sentence, run_here
 
@@ -80,6 +80,17 @@ def test_the_springs_of_the_foldable_vehicle_are_found_again(tmp_path):
     assert spring.damping_per_s.value == pytest.approx(30, rel=0.05)
     assert abs(spring.stiffness_per_s2.value - 500) < 3 * spring.stiffness_per_s2.sigma
     assert fit_restitution(hits).restitution.value == pytest.approx(0.22, abs=0.015)
+
+
+def test_the_sigma_of_a_single_hits_damping_is_how_far_it_scatters(tmp_path):
+    # Given one hit, captured two dozen times with other noise
+    path = thrown(without_friction("foldable"), 1.0)
+    springs = [
+        fit_spring([find_hit(read_table(write_capture(tmp_path / "hit.csv", *path, seed=n)))]) for n in range(24)
+    ]
+    # Then b_s scatters by what each says of itself: frequency and damping ratio, found together, go together
+    scatter = np.std([spring.damping_per_s.value for spring in springs], ddof=1)
+    assert np.mean([spring.damping_per_s.sigma for spring in springs]) == pytest.approx(scatter, rel=0.2)
 
 
 def test_one_guard_is_half_a_spring(tmp_path):

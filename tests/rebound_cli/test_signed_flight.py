@@ -18,7 +18,7 @@ from rebound_cli.background import Background
 from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import ConfirmAtOnce, fly_realtime
+from rebound_cli.realtime import ConfirmAtOnce, Loop, fly_realtime
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import SignedConnection
 from sim_vehicle.mavlink.signing import Signing
@@ -80,7 +80,8 @@ def fly(folder: Path, forges: bool) -> Any:
     stamps = StampFile(folder / "key")
     connection = SignedConnection(world, CompanionsSigning(KEY, stamps.first(world.now_us())), stamps, world)
     recorder, console = FlightRecorder(folder, Background("log")), Console(sys.stderr, Background("console"))
-    fly_realtime(Companion(mission), connection, world, recorder, console, ConfirmAtOnce(), Interrupts())
+    companion = Companion(mission)
+    fly_realtime(companion, Loop(companion, connection, world, recorder, console, Interrupts()), ConfirmAtOnce())
     recorder.close()
     world.refused = connection.signing.refused
     connection.close()

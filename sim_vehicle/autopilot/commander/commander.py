@@ -13,7 +13,10 @@ from sim_vehicle.autopilot.commander.failsafe_table import Action, FailsafeSitua
 from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
 from sim_vehicle.autopilot.commander.ground_station import GroundStation
 from sim_vehicle.autopilot.commander.manual_control import Gesture, ManualInput
-from sim_vehicle.autopilot.commander.modes import (
+from sim_vehicle.autopilot.commander.positioning import Positioning
+from sim_vehicle.autopilot.land_detector import LandDetector
+from sim_vehicle.autopilot.messages import Result, Severity, StatusText
+from sim_vehicle.autopilot.modes import (
     NEEDS,
     NOT_ARMABLE,
     Conditions,
@@ -25,12 +28,9 @@ from sim_vehicle.autopilot.commander.modes import (
     cannot_run,
     missing,
 )
-from sim_vehicle.autopilot.commander.positioning import Positioning
-from sim_vehicle.autopilot.estimate import Quaternion
-from sim_vehicle.autopilot.land_detector import LandDetector
-from sim_vehicle.autopilot.messages import Result, Severity, StatusText
 from sim_vehicle.autopilot.navigator.navigator import Navigator
 from sim_vehicle.autopilot.offboard import OffboardSignal
+from sim_vehicle.estimator.estimate import Quaternion
 from sim_vehicle.parameters.store import Parameters
 
 # How often the failsafes look when nothing calls for it: PX4's commander runs every 10 ms, its checks every 100.

@@ -15,7 +15,7 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     mode_fallback,
     responses_now,
 )
-from sim_vehicle.autopilot.commander.modes import Mode
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
 
 # Below this COM_FAIL_ACT_T there is no delay, and then sticks alone do not take over either.

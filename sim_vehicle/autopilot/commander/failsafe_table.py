@@ -9,7 +9,7 @@ from enum import IntEnum, StrEnum
 from typing import NamedTuple
 
 from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
-from sim_vehicle.autopilot.commander.modes import Mode
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
 
 

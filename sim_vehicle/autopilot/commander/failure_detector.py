@@ -5,7 +5,7 @@ Source: PX4's commander/failure_detector/FailureDetector.cpp (updateAttitudeStat
 
 import math
 
-from sim_vehicle.autopilot.estimate import Quaternion, roll_pitch_of
+from sim_vehicle.estimator.estimate import Quaternion, roll_pitch_of
 from sim_vehicle.parameters.store import Parameters
 
 # The greatest tilt and how long it has to last; a tilt of 0 or less switches the axis off.

@@ -6,10 +6,10 @@ mc_att_control, mc_rate_control.
 
 import math
 
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.flight_tasks.smoothing import towards
 from sim_vehicle.autopilot.flight_tasks.target import View
 from sim_vehicle.autopilot.messages import StickInput
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import AttitudeSetpoint, Axis3, RatesSetpoint, Setpoint, TrajectorySetpoint
 

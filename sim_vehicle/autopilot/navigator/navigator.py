@@ -3,7 +3,6 @@
 Source: PX4's navigator (navigator_main.cpp, loiter.cpp, takeoff.cpp, land.cpp) at its rate of 20 Hz.
 """
 
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.flight_tasks.auto_flight import AutoFlight
 from sim_vehicle.autopilot.flight_tasks.follow import Follow
 from sim_vehicle.autopilot.flight_tasks.orbit import Orbit, OrbitStatus
@@ -19,6 +18,7 @@ from sim_vehicle.autopilot.flight_tasks.target import (
 )
 from sim_vehicle.autopilot.messages import FollowTarget, Severity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore, Progress
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.geofence import Geofence
 from sim_vehicle.autopilot.navigator.mission import MissionFlight
 from sim_vehicle.autopilot.navigator.mission_feasibility import MissionCheck

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.mavlink.signing import Signing
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
 from sim_vehicle.mavlink.streams.topics import Topics
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.parameters.store import Parameters
 
 

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Place
 from sim_vehicle.mavlink.encode import Message
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Quaternion, Vector3
 
 _UNKNOWN_DISTANCE = -1.0

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message, boot_ms
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.telemetry import Telemetry
 
 # Between v1.16 and v1.17, the PX4 whose behaviour was measured: version 1.17.0, type alpha (64).
 FLIGHT_VERSION = 1 << 24 | 17 << 16 | 0 << 8 | 64

@@ -7,10 +7,10 @@ import math
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.estimate import yaw_of
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import NAN, Message, boot_ms
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import TrajectorySetpoint
 
 # What PX4's simulated receiver states (sensor_gps_sim).

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sim_vehicle.autopilot.commander.mode_numbers import NUMBERS
-from sim_vehicle.autopilot.commander.modes import Mode
+from sim_vehicle.autopilot.mode_numbers import NUMBERS
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink.encode import Message
 
 AVAILABLE_MODES_ID = 435

@@ -19,8 +19,8 @@ from sim_vehicle.mavlink.line import FAST_LINE, Line, Outbox
 from sim_vehicle.mavlink.streams import aiding, condition, navigation
 from sim_vehicle.mavlink.streams.on_request import ANSWERS
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
 from sim_vehicle.mavlink.streams.topics import NEVER_SENT, OPTIONAL, Topic, Topics
+from sim_vehicle.mavlink.telemetry import Telemetry
 
 NOT_STREAMED_US = -1
 EVERY_TIME_US = 0

@@ -2,11 +2,11 @@
 
 from enum import IntEnum
 
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.messages import RadioChannels, StickInput
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
+from sim_vehicle.mavlink.telemetry import Telemetry
 
 # vehicle_status is published when it changes and at least at 2 Hz.
 STATUS_PERIOD_US = 500_000

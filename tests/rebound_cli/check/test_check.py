@@ -114,6 +114,16 @@ def test_one_wrong_file_does_not_hide_another(tmp_path):
     assert run_here("check").returncode == 1
 
 
+def test_a_picture_that_cannot_be_written_does_not_hide_another_mission(tmp_path):
+    # Given a file where the folder of the pictures is to be
+    (tmp_path / "taken").write_text("")
+    result = run_here("check", WALL, ROOT / "missions" / "square.yaml", "--out", tmp_path / "taken")
+    # Then both missions are told, and both pictures that nobody has
+    assert result.returncode == 1 and "Traceback" not in result.stderr
+    assert "in all 15.5 m" in result.stdout and "square:" in result.stdout
+    assert [line.endswith("cannot be written: File exists.") for line in result.stderr.splitlines()] == [True, True]
+
+
 # --- the schema
 
 

@@ -6,7 +6,7 @@ import tarfile
 
 import pytest
 
-from rebound_cli.flights import doctor
+from rebound_cli import doctor
 from rebound_cli.main import main
 from tests.rebound_cli.flights.flying import pretend
 

@@ -144,8 +144,12 @@ def test_what_else_is_left_out_of_a_plan_is_told():
         (item(177, 2, -1, *[0] * 5), "for ever"),
         (item(177, 1, 1, *[0] * 5), "repeats a take-off"),
         (item(115, 45, 0, 0, 1, 0, 0, 0), "give it a heading"),
-        ({"type": "SimpleItem", "command": 16, "frame": 3, "params": [1]}, "params: list should have at least 7 items"),
+        (
+            {"type": "SimpleItem", "command": 16, "frame": 3, "params": [1]},
+            "params: needs at least 7 of them, and has 1",
+        ),
         ({"type": "ComplexItem", "complexItemType": "StructureScan"}, "'StructureScan', whose way"),
+        ({"type": "Corridor"}, "'Corridor', whose way"),
     ],
 )
 def test_what_a_mission_cannot_do_is_refused_by_number(part, words):
@@ -210,9 +214,20 @@ def test_both_ways_on_the_command_line(tmp_path):
     result = rebound("plan", "import", made, "--out", back)
     assert result.returncode == 0, result.stderr
     assert Mission.model_validate(yaml.safe_load(back.read_text())).name == "made"
+    nowhere = tmp_path / "none" / "made.plan"
+    result = rebound("plan", "export", mission, "--home", "47.3977,8.5456,488", "--out", nowhere)
+    assert result.returncode == 1 and f"{nowhere}: cannot be written: No such file" in result.stderr
 
 
-@pytest.mark.parametrize(("text", "words"), [("[]", "no whole plan"), ("{", "not JSON"), (None, "No such file")])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[]", "no fileType 'Plan'"),
+        ('{"fileType": "Plan", "mission": {}}', "mission.items: is missing; add it"),
+        ("{", "not JSON"),
+        (None, "No such file"),
+    ],
+)
 def test_a_file_that_is_no_plan(tmp_path, text, words):
     path = tmp_path / "x.plan"
     if text is not None:

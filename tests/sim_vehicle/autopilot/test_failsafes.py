@@ -14,11 +14,11 @@ from sim_vehicle.autopilot.commander.failsafe_table import (
     responses_now,
 )
 from sim_vehicle.autopilot.commander.failure_detector import TippingDetector
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.flight_commands import DO_FLIGHTTERMINATION
 from sim_vehicle.autopilot.ground_commands import INJECT_FAILURE
 from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.flying import hovering, set_mode, sticks
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, target

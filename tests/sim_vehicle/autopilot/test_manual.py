@@ -5,10 +5,10 @@ import math
 import pytest
 
 from sim_vehicle.autopilot.commander.manual_control import FIRST_LINK_SOURCE, RADIO_SOURCE, ManualInput
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
-from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.messages import RadioChannels, Result, StickInput
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.flying import set_mode, sticks
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight

@@ -5,14 +5,14 @@ from itertools import pairwise
 
 import pytest
 
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
-from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.flight_commands import DO_CHANGE_SPEED, MISSION_START
 from sim_vehicle.autopilot.messages import Result
 from sim_vehicle.autopilot.mission_protocol import mission_items as kinds
 from sim_vehicle.autopilot.mission_protocol.mission_messages import MissionType, StoredItem
 from sim_vehicle.autopilot.mission_protocol.mission_store import Plan
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.estimator.estimate import yaw_of
 from tests.sim_vehicle.autopilot.flying import action, hovering, item, set_mode, upload
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim_vehicle.autopilot.commander.mode_numbers import NUMBERS, base_mode, mode_from_request
-from sim_vehicle.autopilot.commander.modes import (
+from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode, mode_from_request
+from sim_vehicle.autopilot.modes import (
     NEEDS,
     TRANSITIONS,
     Conditions,

@@ -6,9 +6,9 @@ from itertools import pairwise
 import pytest
 
 from sim_vehicle.autopilot import offboard
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, DO_SET_MODE
 from sim_vehicle.autopilot.messages import Result
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.setpoint import FREE
 from tests.sim_vehicle.autopilot.kinematic_plant import Flight, attitude_of_yaw, target
 

@@ -7,10 +7,10 @@ import pytest
 
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.autopilot import offboard
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM
 from sim_vehicle.autopilot.messages import AttitudeTarget, GlobalTarget, Result, StatusText
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.autopilot.modes import Mode
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import FREE, AttitudeSetpoint, RatesSetpoint, TrajectorySetpoint
 from tests.sim_vehicle.autopilot.flying import ORIGIN, hovering, place, set_mode

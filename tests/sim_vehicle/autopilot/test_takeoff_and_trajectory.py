@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.commands import COMPONENT_ARM_DISARM, NAV_LAND, NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF
-from sim_vehicle.autopilot.estimate import yaw_of
 from sim_vehicle.autopilot.flight_tasks.auto_flight import land_speed_m_s
 from sim_vehicle.autopilot.flight_tasks.smoothing import Smoother, stop_point
 from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.autopilot.navigator.rtl import return_height_over
+from sim_vehicle.estimator.estimate import yaw_of
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.kinematic_plant import Estimate, Flight, attitude_of_yaw, target

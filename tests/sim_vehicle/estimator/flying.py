@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.estimator.onboard import OnboardEstimator
-from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 

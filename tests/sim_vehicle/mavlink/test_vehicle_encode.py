@@ -8,7 +8,6 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
 from sim_vehicle.autopilot.commander.failsafe_table import Action
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.messages import (
     CommandAck,
     Identity,
@@ -18,12 +17,13 @@ from sim_vehicle.autopilot.messages import (
     StatusText,
     TimeSyncRequest,
 )
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink import encode, framing
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.streams import condition
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
-from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.texts import TextLink
+from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate, attitude_of_yaw

@@ -8,16 +8,16 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.autopilot import Autopilot
-from sim_vehicle.autopilot.commander.modes import Mode
 from sim_vehicle.autopilot.messages import Identity
+from sim_vehicle.autopilot.modes import Mode
 from sim_vehicle.mavlink.encode import Encoder
 from sim_vehicle.mavlink.line import Buffer, Line, Outbox
 from sim_vehicle.mavlink.streams import streams as module
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.mavlink.streams.streams import Streams, interval_from_request
-from sim_vehicle.mavlink.streams.telemetry import Telemetry
 from sim_vehicle.mavlink.streams.topics import Topics
-from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
+from sim_vehicle.mavlink.telemetry import Telemetry
+from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.store import Parameters
 from tests.sim_vehicle.autopilot.kinematic_plant import HOVER, Estimate
 

@@ -14,9 +14,9 @@ from sim_vehicle.physics.layout import (
     constants_from,
     initial_state,
 )
-from sim_vehicle.physics.plant import Plant
 from sim_vehicle.physics.record import new_record
 from sim_vehicle.physics.rigid_body import runge_kutta_step
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import build_world
 from tests.sim_vehicle.physics.throwing import quiet, throw

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.physics.throwing import quiet, throw
 
 # As the built-in airframes, whose 0.12 s begin when an estimate 0.02 s late has seen the hit.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from tests.sim_vehicle.physics.throwing import closed_form_of_eq_2, quiet, throw
 

@@ -7,8 +7,8 @@ import pytest
 
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.errors import SceneError
-from sim_vehicle.physics.plant import Plant
 from sim_vehicle.physics.trim import _quaternion
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene, check_start_is_free
 from tests.sim_vehicle.physics.throwing import quiet
 

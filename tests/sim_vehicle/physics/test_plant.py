@@ -14,7 +14,7 @@ from sim_vehicle.physics.layout import (
     constants_from,
     initial_state,
 )
-from sim_vehicle.physics.plant import Plant, PlantOutput
+from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import TrajectorySetpoint
 from tests.sim_vehicle.estimator.flying import filtered

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 from sim_vehicle.airframe import Airframe
-from sim_vehicle.physics.interval import FINE_STEPS
-from sim_vehicle.physics.plant import Plant
+from sim_vehicle.plant.interval import FINE_STEPS
+from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit
 

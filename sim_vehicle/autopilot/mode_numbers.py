@@ -5,7 +5,7 @@ Sources: commander/px4_custom_mode.h, commander/Commander.cpp and mavlink/stream
 
 from dataclasses import dataclass
 
-from sim_vehicle.autopilot.commander.modes import Mode
+from sim_vehicle.autopilot.modes import Mode
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,14 +13,6 @@ from sim_vehicle.faults.plan import Faults, is_of_filter, with_losses
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.physics.asked import AskedSetpoint
 from sim_vehicle.physics.estimate import estimate_errors
-from sim_vehicle.physics.interval import (
-    FINE_STEPS,
-    MOTORS_DRIVEN,
-    MOTORS_FLYING,
-    MOTORS_IDLE,
-    MOTORS_OFF,
-    advance_boxed,
-)
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import Floats, boxed, new_record
@@ -36,6 +28,14 @@ from sim_vehicle.physics.report import (
 )
 from sim_vehicle.physics.surroundings import Surroundings
 from sim_vehicle.physics.trim import trim
+from sim_vehicle.plant.interval import (
+    FINE_STEPS,
+    MOTORS_DRIVEN,
+    MOTORS_FLYING,
+    MOTORS_IDLE,
+    MOTORS_OFF,
+    advance_boxed,
+)
 from sim_vehicle.scene import Scene
 from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.truth import TruthRecorder

@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.autopilot.autopilot import Autopilot
-from sim_vehicle.autopilot.estimate import Estimate
+from sim_vehicle.estimator.estimate import Estimate
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.geography import Origin
 from sim_vehicle.hil.messages import Air, HilGps
-from sim_vehicle.mavlink.streams.vibration import VibrationMetrics
+from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.world import Vector3
 
 

@@ -1,0 +1,1 @@
+"""The plant: body, loops, estimator and faults, joined an IMU interval at a time."""

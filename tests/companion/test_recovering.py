@@ -1,0 +1,90 @@
+"""What a recovery asks of a vehicle that hangs on what it hit, and of one that spins."""
+
+import math
+
+import pytest
+
+from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.flight.collision import CollisionRecord
+from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.recovering import Recover
+from companion.link.streams import StreamMonitor
+from companion.link.vehicle import Vehicle
+from companion.messages import Attitude, LocalPosition
+from companion.mission.config import EstimateConfig
+from companion.mission.model import Mission
+from companion.reflex.config import FALLS_M_S2
+from companion.reflex.laws import Contact
+from companion.reflex.reckoning import Reckoning
+
+HIT_US, SINCE_US = 1_000_000, 100_000
+MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
+
+
+def asked(
+    lean_deg: float,
+    height_m: float = 2.0,
+    down_m_s: float = 0.0,
+    attitude: Attitude | None = None,
+    is_whole: bool = False,
+) -> Target:
+    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much."""
+    mission = Mission.model_validate(MISSION)
+    flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
+    flight.origin_ned_m = (0.0, 0.0, 0.0)
+    contact = Contact(HIT_US, (3.0, 0.0, -height_m), (2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    reckoning = Reckoning(contact, HIT_US, contact.rebound(0.0), EstimateConfig())
+    goal = (2.6, 0.0, -height_m)
+    flight.collisions.append(
+        CollisionRecord(0, HIT_US, "fused", contact, goal, contact.normal_ned, 20.0, HIT_US, reckoning)
+    )
+    recover, flight.vehicle.attitude = Recover(flight, 0), attitude
+    reckoning.tell(is_whole, HIT_US)
+    reckoning.lean_m_s2 = (GRAVITY_M_S2 * math.tan(math.radians(lean_deg)), 0.0, 0.0)
+    sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
+    flight.vehicle.history.add(sample)
+    recover.step(flight, Inputs(positions=[sample]), SINCE_US)
+    target = recover.target(SINCE_US)
+    assert target is not None
+    return target
+
+
+@pytest.mark.parametrize(("lean_deg", "hangs"), [(10.0, False), (30.0, True), (-30.0, False)])
+def test_a_vehicle_hangs_that_leans_into_what_it_touches(lean_deg, hangs):
+    target = asked(lean_deg)
+    assert target.acceleration_ned_m_s2 is not None
+    assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is hangs
+    if hangs:
+        # Nothing but accelerations: its thrust is to press less, and away from the wall.
+        assert target.leans_only and target.is_height_free
+        assert target.acceleration_ned_m_s2[0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("height_m", "down_m_s", "falls"),
+    [(1.0, 0.0, True), (1.0, 1.5, True), (1.0, 2.0, False), (3.0, 2.0, True), (0.25, 0.0, False), (0.5, -2.0, True)],
+)
+def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, falls):
+    target = asked(30.0, height_m, down_m_s)
+    assert target.acceleration_ned_m_s2 is not None
+    assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is falls
+
+
+LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("attitude", "rates", "spins"),
+    [
+        (LEVEL, None, False),
+        (LEVEL, (0.0, 0.0, -7.0), True),
+        (LEVEL, (7.0, 0.0, 0.0), False),
+        # Nose up by a right angle, the body's x axis is upright.
+        (NOSE_UP, (7.0, 0.0, 0.0), True),
+        (NOSE_UP, (0.0, 0.0, -7.0), False),
+    ],
+)
+def test_the_spin_that_counts_is_that_about_the_vertical(attitude, rates, spins):
+    # Given a hit that the vehicle's estimate knows whole: without a spin places are asked for
+    target = asked(-10.0, attitude=Attitude(HIT_US, attitude, rates), is_whole=True)
+    assert target.leans_only is spins
