@@ -6,6 +6,7 @@ from typing import Any
 
 from companion.estimate.facing import normal_by
 from companion.estimate.push import unit
+from companion.reflex.planner import REST
 
 Arguments = tuple[Any, ...]
 
@@ -79,6 +80,13 @@ RULES = (
     Rule("kept off", "no acceleration into what is near", _REFLEX + "planner:kept_off", _argument(0)),
     Rule("harder", "brakes harder before a surface", _REFLEX + "planner:Plan.enters", _says(False)),
     Rule("replanned", "a new plan for one that is off it", _REFLEX + "planner:Plan.holds", _says(True)),
+    Rule(
+        "velocity by places",
+        "no velocity that the places deny",
+        _REFLEX + "reckoning:Reckoning._compare",
+        _says(None),
+        lambda arguments: setattr(arguments[0], "off_m_s", REST),
+    ),
     Rule("spinning", "gentle steering while it spins", _FLIGHT + "recovering:Recover._is_spinning", _says(False)),
     Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
     Rule(
