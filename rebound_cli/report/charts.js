@@ -11,7 +11,7 @@ const POWERS = { distr: 3, range: (plot, low, high) => [QUIETEST, 10 ** Math.max
 
 function powersOfTen(plot, number, low, high) {
   const powers = [];
-  for (let power = low; power <= high * 1.01; power *= 10) powers.push(power);
+  for (let power = QUIETEST; power <= high * 1.01; power *= 10) powers.push(power);
   return powers;
 }
 
