@@ -250,7 +250,7 @@ def add_logs(commands: Commands) -> None:
 
 
 def add_report(commands: Commands) -> None:
-    text = "One file that any browser opens, without a network; see docs/report.md."
+    text = "One file that any browser opens, without a network; see docs/how-to/report.md."
     report = _command(commands, "report", "report.command:run_report", "a recorded flight as a page to look at", text)
     _option(report, "flight", "a run's folder, or a flight's name (default: last)", "RUN", nargs="?", default="last")
     _add_runs(report)
@@ -259,7 +259,7 @@ def add_report(commands: Commands) -> None:
 
 
 def add_watch(commands: Commands) -> None:
-    text = "The report's page while a flight goes on; only reads its folder; see docs/report.md."
+    text = "The report's page while a flight goes on; only reads its folder; see docs/how-to/report.md."
     watch = _command(commands, "watch", "report.live_server:run_watch", "a flight in a browser while it is flown", text)
     text = "the run's folder (default: that of the running guard or flight)"
     _option(watch, "flight", text, "RUN", type=Path, nargs="?")
