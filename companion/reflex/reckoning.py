@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from companion.estimate.delay import DELAY_S
 from companion.estimate.rotation import body_to_ned
-from companion.estimate.strapdown import GRAVITY_M_S2, Strapdown
+from companion.estimate.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.messages import LocalPosition, Vector3
 from companion.mission.config import EstimateConfig
 from companion.reflex.config import (
@@ -254,6 +254,10 @@ class Reckoning:
             self._told_boot_us,
             1e-6 * (at_us - self._clock_boot_us),
         )
+        is_ahead = self._time_boot_us > 0 and at_us > self._time_boot_us + LONGEST_GAP_US
+        if is_ahead or at_us <= self._at_boot_us:
+            # Of a time that the sum has not come to, or has left behind, the filters cannot take anything.
+            return False
         self._told_boot_us = sample.time_boot_us
         every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
         # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
@@ -272,7 +276,7 @@ class Reckoning:
 
     def _correct(self, sample: LocalPosition) -> None:
         """By an estimate that is right: at once by the first, then by so much as is not its noise."""
-        elapsed_s = 1e-6 * (sample.time_boot_us - self._told_boot_us)
+        elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - self._told_boot_us))
         share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
         was, self._told_boot_us = self.motion, sample.time_boot_us
         self._compare(sample)

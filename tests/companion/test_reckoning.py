@@ -119,6 +119,26 @@ def test_it_is_believed_in_the_end_whatever_it_says():
     assert found.is_right
 
 
+@pytest.mark.parametrize("ahead_us", [1_000_000, 120_000, -70_000])
+@pytest.mark.parametrize("hides", [0.0, 1.0])
+def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(ahead_us, hides):
+    # Given a hit, and now and then in the second after it a place that is stamped ahead of its time, or behind
+    found, strapdown = reckoned(), Strapdown()
+    for tick in range(1, 600):
+        since_us = 4_000 * tick
+        strapdown.time_boot_us = HIT_US + since_us
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            lacks_m_s, lacks_m = missing(1e-6 * since_us, *PX4)
+            place = (3.0 - 0.4e-6 * since_us + 2.4 * hides * lacks_m, 0.0, -2.0)
+            at_us = since_us + (ahead_us if tick % 25 == 0 and tick < 250 else 0)
+            found.hear(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
+        # Then the motion stays one that a vehicle can have
+        assert all(map(math.isfinite, found.spread_m_s))
+        assert -2.5 < found.motion.velocity_ned_m_s[0] < 2.5
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-0.4, abs=0.15)
+
+
 def test_another_hit_while_the_estimate_is_put_right_leaves_it_wrong():
     # Given a clipped hit on a wall, then a soft one on another whose force was shown whole
     *_, (_, _, told_m_s, first) = followed(PX4, 2.0, 0.5, until_s=0.16)

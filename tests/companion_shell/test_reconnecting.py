@@ -6,7 +6,7 @@ import pty
 import socket
 import time
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
@@ -252,7 +252,8 @@ def test_whoever_is_gone_is_asked_for_five_times_in_the_second_after_which_px4_l
     def nobody():
         raise OSError(errno.ECONNREFUSED, "refused")
 
-    connection = StreamConnection(cast(Any, object()), nobody)
+    stream: Any = object()
+    connection = StreamConnection(stream, nobody)
     connection._closed = Patience()
     # When it is looked for again
     connection._reopen(None)
