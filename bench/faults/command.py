@@ -2,7 +2,7 @@
 
 import multiprocessing
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from bench.campaign.plan import Campaign, Json, Outcome
@@ -10,8 +10,7 @@ from bench.campaign.record import Record, append
 from bench.campaign.run import RECORDS_FOLDER
 from bench.faults import latency
 from bench.faults.catalogue import FILES, FLOWN
-from bench.faults.files import tried
-from bench.faults.flight import fly, fly_from_one_take_off
+from bench.faults.seeds import fly_faults, fly_seed
 from bench.faults.table import PART, TITLE, Row, text_of
 from bench.marked import checked_text, write_part
 from bench.processes import ctrl_c_waiting
@@ -92,25 +91,6 @@ def fly_numbered(case: tuple[int, Sequence[str], Path]) -> tuple[int, Json]:
 
     fly_faults(number, names, take)
     return number, results
-
-
-def fly_seed(case: tuple[int, Sequence[str]]) -> Json:
-    """What became of each of these faults with one seed, by name."""
-    results: Json = {}
-    fly_faults(*case, results.__setitem__)
-    return results
-
-
-def fly_faults(number: int, names: Sequence[str], take: Callable[[str, Json], object]) -> None:
-    """`take` is given each fault's name and what became of it with this seed."""
-    branching = [FLOWN[name] for name in names if name in FLOWN and not FLOWN[name].from_the_start]
-    if branching:
-        fly_from_one_take_off(number, branching, take)
-    for name in names:
-        if name in FILES:
-            take(name, tried(FILES[name], number))
-        elif FLOWN[name].from_the_start:
-            take(name, fly(number, FLOWN[name]))
 
 
 def _row(record: Record, name: str, seeds: int) -> Row:
