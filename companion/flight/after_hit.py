@@ -26,16 +26,16 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     A hit during a recovery, or during the hold after it, belongs to the step in which the first one happened.
     """
     flight.tally.hits += 1
-    own, action = flight.steps[flight.tally.index].item.on_collision, flight.steps[flight.tally.index].action
-    policy, hits = (
-        (own, flight.tally.hits) if own is not None else (flight.mission.on_collision, len(flight.collisions))
-    )
+    step = flight.steps[flight.tally.index]
+    own = step.item.on_collision
+    policy = own or flight.mission.on_collision
+    hits = flight.tally.hits if own else len(flight.collisions)
     then, reason = _verdict(flight, policy, hits)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
     flight.after_recovery = AfterRecovery(_TRIGGERS[then], policy.hold_s, reason)
     # What an interrupted flight resumes with.
-    is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(action, _WITH_A_GOAL))
+    is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
     flight.step_index = flight.tally.index + (1 if is_left else 0)
     if reason:
         flight.tell(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)

@@ -193,7 +193,7 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) 
     target = _with_acceleration(target, limits, reasons)
     target = _with_way(target, around, fence, reasons)
     target = _with_height(target, around, fence, reasons)
-    target = _with_tilt_error(target, limits)
+    target = _with_tilt(target, limits)
     if target.yaw_rad is not None and abs(target.yaw_rad) > math.pi:
         target = replace(target, yaw_rad=math.remainder(target.yaw_rad, math.tau))
     return target, ", ".join(reasons)
@@ -368,13 +368,16 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
 
 
-def _with_tilt_error(target: Target, limits: Limits) -> Target:
-    """The lean to ask for of a vehicle that is wrong about its tilt, so that it has the one that was meant."""
-    if target.expected is None or target.acceleration_ned_m_s2 is None:
-        return target
-    asked = plus(target.acceleration_ned_m_s2, -1.0, target.expected.acceleration_ned_m_s2)
-    is_told = replace(target.expected, acceleration_ned_m_s2=REST)
-    return _with_acceleration(replace(target, acceleration_ned_m_s2=asked, expected=is_told), limits, [])
+def _with_tilt(target: Target, limits: Limits) -> Target:
+    """Within the tilt after all else: what keeps off a slant makes sideways of down.
+
+    Of a vehicle that is wrong about its tilt, the lean to ask for so that it has the one that was meant.
+    """
+    if target.expected is not None and target.acceleration_ned_m_s2 is not None:
+        asked = plus(target.acceleration_ned_m_s2, -1.0, target.expected.acceleration_ned_m_s2)
+        is_told = replace(target.expected, acceleration_ned_m_s2=REST)
+        target = replace(target, acceleration_ned_m_s2=asked, expected=is_told)
+    return _with_acceleration(target, limits, [])
 
 
 def _within_step(place: Vector3, start: Vector3, most_m: float) -> tuple[Vector3, bool]:

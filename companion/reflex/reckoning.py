@@ -248,17 +248,12 @@ class Reckoning:
 
     def _reckon(self, sample: LocalPosition, at_us: int) -> bool:
         """Take what is told into the filters; whether it will be wrong by next to nothing from now on."""
-        config, bank, before_us, since_s = (
-            self.config,
-            self._bank,
-            self._told_boot_us,
-            1e-6 * (at_us - self._clock_boot_us),
-        )
         is_ahead = self._time_boot_us > 0 and at_us > self._time_boot_us + LONGEST_GAP_US
         if is_ahead or at_us <= self._at_boot_us:
             # Of a time that the sum has not come to, or has left behind, the filters cannot take anything.
             return False
-        self._told_boot_us = sample.time_boot_us
+        config, bank, before_us = self.config, self._bank, self._told_boot_us
+        self._told_boot_us, since_s = sample.time_boot_us, 1e-6 * (at_us - self._clock_boot_us)
         every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
         # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
@@ -294,10 +289,10 @@ class Reckoning:
         elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
         if not 0.0 < elapsed_s < COMPARED_S:
             return
-        half, share = 0.5 * elapsed_s, elapsed_s / (COMPARED_S + elapsed_s)
-        led = plus(plus(before.position_ned_m, half, before.velocity_ned_m_s), half, sample.velocity_ned_m_s)
-        further = plus(led, -1.0, sample.position_ned_m)
-        off = plus(self.off_m_s, share, plus(plus(REST, 1.0 / elapsed_s, further), -1.0, self.off_m_s))
+        half_s = 0.5 * elapsed_s
+        led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, sample.velocity_ned_m_s)
+        further_m = plus(led, -1.0, sample.position_ned_m)
+        off = plus(self.off_m_s, 1.0 / (COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, self.off_m_s))
         size = math.hypot(*off)
         self.off_m_s = off if size <= MOST_OFF_M_S else plus(REST, MOST_OFF_M_S / size, off)
 

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from bench.faults.packets import made
 from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.flight.context import Target
-from companion.flight.envelope import SetpointError, Surroundings, bounded
+from companion.flight.envelope import Known, SetpointError, Surroundings, bounded
 from companion.mission.fence import Fence
 from companion.mission.policy import Limits
+from companion.reflex.halfspace import Surface, plus
 from companion.ways.trajectory import LineProfile
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked
@@ -87,6 +88,17 @@ def test_a_lean_is_bounded_by_the_tilt_and_by_gravity():
     assert reason == "tilt above 45 degrees"
     target, _ = bounded(lean((0.0, 0.0, -80.0)), around(), FENCE, LIMITS)
     assert target.acceleration_ned_m_s2[2] >= -GRAVITY_M_S2
+
+
+def test_kept_off_a_slant_a_lean_that_falls_is_bounded_by_the_tilt_still():
+    # Given a roof that slants by 50 degrees close below, and a lean along it that falls as fast as may be
+    slant = (-math.sin(math.radians(40.0)), 0.0, -math.cos(math.radians(40.0)))
+    below = Known(Surface(plus(ORIGIN, -1.0, (0.0, 0.0, 1.0)), slant, 0.3))
+    beside = replace(around(), velocity_ned_m_s=(0.0, 0.0, 0.0), known=[below])
+    for n, e in ((0.0, 9.7), (-3.0, 9.3), (-6.0, -7.7)):
+        target, _ = bounded(lean((n, e, 9.0)), beside, Fence(radius_m=50, max_height_m=4), LIMITS)
+        # Then what is kept from falling onto it makes no steeper lean than the mission allows
+        assert math.hypot(*target.acceleration_ned_m_s2[:2]) <= GRAVITY_M_S2 + 1e-9
 
 
 def test_a_lean_stays_a_lean_wherever_the_estimate_that_is_not_flown_by_says_the_vehicle_is():
