@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from companion.detection.interface import Situation
-from companion.detection.watch import Watch, start_watch
-from companion.estimate.resets import Resets
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.detecting import collisions, follow_contact
@@ -26,7 +24,9 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, Sample, Vector3
 from companion.mission.model import Mission
+from companion.motion.resets import Resets
 from companion.px4_mode import mode_name
+from companion.reflex.watch import Watch, start_watch
 from companion.report import CollisionReport, Event, Status
 
 # MAVLink's heartbeat microservice: once a second.

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from companion import messages
-from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.link.round_trip import MOST_US as MOST_TRIP_US
 from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
@@ -18,6 +17,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
+from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.config import HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from companion.estimate.strapdown import Strapdown
 from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Attitude, ImuSample, LocalPosition, MessageId
+from companion.motion.strapdown import Strapdown
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import Demand, Told
 

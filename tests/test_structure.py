@@ -91,6 +91,21 @@ def test_no_module_needs_itself_by_way_of_others() -> None:
         pytest.fail(" is imported by ".join(cycle.args[1]))
 
 
+@pytest.mark.parametrize("package", ["companion", "sim_vehicle"])
+def test_no_folder_needs_itself_by_way_of_others(package: str) -> None:
+    # The way of the data is the way of the files. A file beside the folders counts as one of them.
+    arrows: dict[str, set[str]] = {}
+    for module, names in module_imports(ROOT).items():
+        room, *inside = module.split(".")
+        if room == package and inside:
+            below = {name.split(".")[1] for name in names if name.startswith(f"{package}.")}
+            arrows.setdefault(inside[0], set()).update(below - {inside[0]})
+    try:
+        graphlib.TopologicalSorter(arrows).prepare()
+    except graphlib.CycleError as cycle:
+        pytest.fail(f"in {package}, " + " is imported by ".join(cycle.args[1]))
+
+
 def test_what_a_text_in_the_code_refers_to_is_there() -> None:
     # "(see room.module)" and "(see module.name)" outlive the module when it is merged into another.
     modules = {part for package in PACKAGES for path in sources(package) for part in path.with_suffix("").parts}

@@ -31,9 +31,9 @@ import numpy.typing as npt
 
 from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
-from companion.estimate.rotation import body_to_ned
-from companion.estimate.strapdown import GRAVITY_M_S2, LEVEL
 from companion.messages import Attitude, ImuSample, MessageId, Quaternion, Sample, Vector3
+from companion.motion.rotation import body_to_ned
+from companion.motion.strapdown import GRAVITY_M_S2, LEVEL
 from companion.written import Positive, Written
 
 # Trapezoids: where each begins to rise, is whole, begins to fall, is nothing again.

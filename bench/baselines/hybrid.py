@@ -27,8 +27,8 @@ from typing import ClassVar
 from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.detection.thrust import ThrustGain
-from companion.estimate.strapdown import ZERO
 from companion.messages import AttitudeTarget, ImuSample, MessageId, Sample, Vector3
+from companion.motion.strapdown import ZERO
 from companion.written import Positive, Written
 
 

@@ -24,8 +24,6 @@ from typing import ClassVar
 from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.detection.thrust import ThrustGain
-from companion.estimate.rotation import body_to_ned, ned_to_body
-from companion.estimate.strapdown import GRAVITY_M_S2, LEVEL, ZERO
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -36,6 +34,8 @@ from companion.messages import (
     Sample,
     Vector3,
 )
+from companion.motion.rotation import body_to_ned, ned_to_body
+from companion.motion.strapdown import GRAVITY_M_S2, LEVEL, ZERO
 from companion.written import Positive, Written
 
 # Drag changes within a second; the model's error in seconds.

@@ -18,8 +18,8 @@ from pydantic import Field
 
 from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
-from companion.estimate.strapdown import GRAVITY_M_S2, ZERO
 from companion.messages import ImuSample, MessageId, Sample, Vector3
+from companion.motion.strapdown import GRAVITY_M_S2, ZERO
 from companion.written import Positive, Written
 
 

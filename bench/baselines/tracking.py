@@ -21,9 +21,9 @@ from typing import ClassVar
 
 from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
-from companion.estimate.rotation import ned_to_body
-from companion.estimate.strapdown import LEVEL
 from companion.messages import Attitude, LocalPosition, MessageId, Quaternion, Sample
+from companion.motion.rotation import ned_to_body
+from companion.motion.strapdown import LEVEL
 from companion.written import Positive, Written
 
 # The lag follows the speed within a second; velocities before that belong to another part of the path.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from companion.messages import LandedState
-from companion.ways.trajectory import LineProfile
+from companion.mission.trajectory import LineProfile
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.setpoint import FREE, RatesSetpoint, Setpoint, TrajectorySetpoint

@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from bench.detectors.watching import alarms_only
 from companion.errors import ReboundError
-from companion.estimate.rotation import body_to_ned
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
+from companion.motion.rotation import body_to_ned
 from rebound_cli.logs.log import Heard, Log, Told
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.watching import Circumstances, watch_log

@@ -8,11 +8,11 @@ from typing import Any
 from bench.baselines.config import BaselineConfig
 from bench.detectors.wire import BUILDERS, HeardStep
 from companion.detection.interface import Situation
-from companion.detection.watch import advance, start_watch
 from companion.estimate.impact import ImpactEstimate
 from companion.link.streams import wanted_streams
 from companion.messages import MessageId
 from companion.mission.config import CompanionConfig
+from companion.reflex.watch import advance, start_watch
 
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}

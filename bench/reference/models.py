@@ -15,9 +15,9 @@ import yaml
 from pydantic import BaseModel
 
 from bench.reference.markdown import code, table
+from companion.fence import Fence
 from companion.guard.config import GuardConfig
 from companion.mission.config import CompanionConfig
-from companion.mission.fence import Fence
 from companion.mission.model import Mission
 from companion.mission.policy import Limits
 from companion.reflex.config import RecoveryConfig

@@ -1,6 +1,6 @@
 """What a contact leaves behind: a step in the velocity that the accelerometer did not show.
 
-Between two velocities the vehicle's own estimate must change as the accelerometer says (see `estimate.strapdown`). A
+Between two velocities the vehicle's own estimate must change as the accelerometer says (see `motion.strapdown`). A
 contact that fell between the samples the wire carries, or into a lost one, makes the estimate jump and not the sum.
 The body's rates jump with it, for a push beside the centre turns; on their own they prove nothing, because a motor
 that fails turns the vehicle too.
@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from companion.estimate.delay import Delay
-from companion.estimate.strapdown import LONGEST_DELAY_US, ZERO, Strapdown
 from companion.messages import Vector3
+from companion.motion.delay import Delay
+from companion.motion.strapdown import LONGEST_DELAY_US, ZERO, Strapdown
 
 # The velocities before the newest that it is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3

@@ -28,8 +28,6 @@ from companion.detection.fused_state import FusedState
 from companion.detection.hidden_signs import Hidden, dipped, spun, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
-from companion.estimate.history import ODOMETRY_KEPT_US
-from companion.estimate.rotation import body_to_ned
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -40,6 +38,8 @@ from companion.messages import (
     Sample,
     Vector3,
 )
+from companion.motion.history import ODOMETRY_KEPT_US
+from companion.motion.rotation import body_to_ned
 
 # A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
 SHAKING = 2.0

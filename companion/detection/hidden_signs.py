@@ -9,9 +9,9 @@ from typing import NamedTuple
 from companion.detection.force_signs import CLEAR
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
-from companion.estimate.rotation import ned_to_body
-from companion.estimate.strapdown import ZERO
 from companion.messages import Vector3
+from companion.motion.rotation import ned_to_body
+from companion.motion.strapdown import ZERO
 
 # Three samples of 50 Hz with jitter: in more time thrust goes and comes back by itself.
 DIP_US = 50_000

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from companion.estimate.guards import MOTORS_RAD_S2
-from companion.estimate.history import STAMP_RESOLUTION_US
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
+from companion.motion.history import STAMP_RESOLUTION_US
+from companion.motion.strapdown import MOTORS_RAD_S2
 from companion.written import Positive, Written
 
 # The received rate is judged over this: 20 samples at the least rate, and no longer than a link's brief gap.

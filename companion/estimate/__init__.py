@@ -1,1 +1,1 @@
-"""Estimates made from telemetry, in the vehicle's boot clock: motion history, collision velocity, settling."""
+"""What an impact was: when, how fast, against which normal, how hard."""

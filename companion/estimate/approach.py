@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.estimate.delay import DELAY_S, DELAY_SPREAD_S
-from companion.estimate.kalman import Floats, KalmanFilter
-from companion.estimate.strapdown import LONGEST_DELAY_US
+from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
-from companion.mission.config import EstimateConfig
+from companion.motion.delay import DELAY_S, DELAY_SPREAD_S
+from companion.motion.kalman import Floats, KalmanFilter
+from companion.motion.strapdown import LONGEST_DELAY_US
 
 # Errors of a velocity estimate last for tenths of a second, and the accelerometer's bias is learnt in seconds: the
 # longer, the better, until the vehicle has turned its bias to another heading.

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.estimate.history import STAMP_RESOLUTION_US
-from companion.estimate.kalman import Floats, KalmanFilter
+from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
-from companion.mission.config import EstimateConfig
+from companion.motion.history import STAMP_RESOLUTION_US
+from companion.motion.kalman import Floats, KalmanFilter
 
 # The acceleration of half a second ago says nothing about now, and 25 velocities are enough.
 BATCH_US = 500_000

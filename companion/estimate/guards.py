@@ -23,6 +23,8 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 
+from companion.motion.strapdown import GRAVITY_M_S2, MOTORS_RAD_S2
+
 try:
     import numba
 except ImportError:
@@ -47,7 +49,6 @@ FLAT = -1
 MOST_FRICTION = 0.3
 
 STEP_S = 0.001
-GRAVITY_M_S2 = 9.80665
 # Unit vectors of the arms of a quad-x, body FRD.
 ARMS_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) / math.sqrt(2)
 # Leaning by this the hoop stands on one edge; less, on both of them in part.
@@ -58,8 +59,8 @@ LEAST_SHARE = 0.22
 ROUNDING_M = 1e-9
 # An arm at the end of its travel meets a stop that ends the motion within some milliseconds.
 STOP_PER_S2, STOP_DAMPING_PER_S = 60_000.0, 30.0
-# Motors follow within 20 ms and turn the vehicle with no more than this.
-MOTORS_S, MOTORS_RAD_S2, YAW_SHARE = 0.025, 100.0, 0.3
+# Motors follow within 20 ms.
+MOTORS_S, YAW_SHARE = 0.025, 0.3
 
 
 def _compiled(function: Kernel, inlined: bool = False) -> Kernel:

@@ -10,15 +10,15 @@ from companion.detection.interface import DetectorState, Evidence, Impact, Impac
 from companion.estimate.approach import BATCH_US, VelocityFix, free_until, position_at, velocity_at
 from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
 from companion.estimate.collision import ContactMotion, motion_before_contact
+from companion.estimate.config import EstimateConfig
 from companion.estimate.facing import normal_by, whole_normal
-from companion.estimate.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US, MotionHistory
 from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
 from companion.estimate.push import Push, unit
-from companion.estimate.rotation import body_to_ned, turned
-from companion.estimate.strapdown import Strapdown
 from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
-from companion.mission.config import EstimateConfig
+from companion.motion.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US, MotionHistory
+from companion.motion.rotation import body_to_ned, turned
+from companion.motion.strapdown import Strapdown
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)

@@ -23,9 +23,9 @@ from functools import lru_cache
 import numpy as np
 
 from companion.estimate import guards as g
+from companion.estimate.config import GuardsConfig
 from companion.estimate.suppositions import Floats, Known, Touch, Trials, known_of, residuals, supposed
 from companion.messages import Attitude, ImuSample, Vector3
-from companion.mission.config import GuardsConfig
 
 # Without machine code the search would take seconds.
 IS_AVAILABLE = g.IS_COMPILED

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass, field
 
 from companion.estimate.clipping import Clipping, may_have_clipped
-from companion.estimate.rotation import body_to_ned, turned
 from companion.estimate.suppositions import LOOKED_AT_US, Touch
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
+from companion.motion.rotation import body_to_ned, turned
 
 # Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
 CONTIGUOUS = 1.5

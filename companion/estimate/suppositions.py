@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.estimate import guards as g
-from companion.estimate.rotation import body_to_ned, turned
+from companion.estimate.config import GuardsConfig
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
-from companion.mission.config import GuardsConfig
+from companion.motion.rotation import body_to_ned, turned
 
 Floats = npt.NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from itertools import takewhile
 
 from companion.detection.interface import DetectorState
 from companion.estimate.approach import VelocityFix
-from companion.estimate.history import MotionHistory
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
-from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import DECIDED_US, Claim, Leap
 from companion.messages import LocalPosition, Vector3
+from companion.motion.history import MotionHistory
+from companion.motion.strapdown import Strapdown
 from companion.reflex.halfspace import away_from
 from companion.reflex.laws import Contact
 from companion.reflex.reckoning import Reckoning

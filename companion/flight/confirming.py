@@ -14,11 +14,11 @@ from statistics import fmean, median
 
 from companion.detection.interface import Evidence
 from companion.estimate.approach import HIT_LEAVES_M_S, VelocityFix
-from companion.estimate.guards import MOTORS_RAD_S2
-from companion.estimate.history import MotionHistory
+from companion.estimate.config import GuardsConfig
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.mission.config import GuardsConfig
+from companion.motion.history import MotionHistory
+from companion.motion.strapdown import MOTORS_RAD_S2
 
 # A push that moved the vehicle by as much is a hit: twice what an estimate has been seen to show of one that it missed.
 STRUCK_M_S = 0.5

@@ -16,11 +16,11 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
 from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, PositionTarget, Sticks, Vector3
+from companion.mission.course import Pace
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.reflex.planner import Moving
 from companion.report import Event, JsonValue, Outcome
-from companion.ways.course import Pace
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 
-from companion.detection import watch
 from companion.detection.interface import Impact, ImpactKind, Situation
-from companion.detection.watch import Watch
-from companion.estimate.history import REBOOT_US
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.rotation import ned_to_body
 from companion.flight.context import FlightContext
 from companion.flight.leaning import Held
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
+from companion.motion.history import REBOOT_US
+from companion.motion.rotation import ned_to_body
+from companion.reflex import watch
+from companion.reflex.watch import Watch
 
 
 def collisions(

@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
-from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.fence import Fence
 from companion.flight.context import Target
 from companion.memory.patch import Patch
 from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
-from companion.mission.fence import Fence
 from companion.mission.policy import Limits
+from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.config import (
     BEHIND_M,
     CLIMB_GAIN_PER_S,

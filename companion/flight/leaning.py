@@ -9,9 +9,9 @@ but for what the wind takes of it. The thrust is what the accelerometer shows al
 import math
 from dataclasses import dataclass, replace
 
-from companion.estimate.rotation import body_to_ned
-from companion.estimate.strapdown import GRAVITY_M_S2
 from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.motion.rotation import body_to_ned
+from companion.motion.strapdown import GRAVITY_M_S2
 
 Flat = tuple[float, float]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from companion.detection.interface import Phase
-from companion.detection.watch import Watch
 from companion.flight.collision import CollisionRecord
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from companion.reflex.watch import Watch
 from companion.report import Event, JsonValue
 
 # Numbers for plots.

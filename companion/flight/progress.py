@@ -10,8 +10,8 @@ from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
 from companion.messages import Vector3
 from companion.mission import items
-from companion.ways.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
-from companion.ways.trajectory import Motion, Trajectory
+from companion.mission.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
+from companion.mission.trajectory import Motion, Trajectory
 
 # Of a time-out, and of a goal out of reach; "continue" is no move.
 _TRIGGERS = {

@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.rotation import body_to_ned
-from companion.estimate.settling import SettlingMonitor
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.confirming import Claim, Leap, claim_of
@@ -14,6 +12,8 @@ from companion.flight.context import FlightContext, Inputs, Move, Target, as_tex
 from companion.flight.remembering import remembered_surfaces
 from companion.flight.telling import tell_detection
 from companion.messages import LocalPosition, Vector3
+from companion.motion.rotation import body_to_ned
+from companion.motion.settling import SettlingMonitor
 from companion.reflex.config import (
     AGREEING,
     BEHIND_M,

@@ -2,13 +2,13 @@
 
 import math
 
-from companion.estimate.rotation import yaw_rad
 from companion.flight.context import Activity, FlightContext, Inputs, Move, Target, as_text
 from companion.flight.states import Trigger
 from companion.messages import SetArmed, SetMode, Vector3
 from companion.mission.items import TakeoffItem
+from companion.mission.trajectory import LineProfile
+from companion.motion.rotation import yaw_rad
 from companion.px4_mode import AUTO_LAND, OFFBOARD
-from companion.ways.trajectory import LineProfile
 
 # The arming position is a mean over this: it takes the noise out of the zero of all mission coordinates.
 ORIGIN_MEAN_US = 1_000_000

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from companion.fence import Fence
 from companion.mission.config import CompanionConfig
-from companion.mission.fence import Fence
 from companion.mission.items import LandItem, MissionItem, TakeoffItem
 from companion.mission.model import KnownRecovery, Mission
 from companion.mission.policy import Limits

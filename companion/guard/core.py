@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from companion.core import Core
-from companion.detection.watch import start_watch
 from companion.flight.context import Inputs, Target
 from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
@@ -13,6 +12,7 @@ from companion.guard.watching import Connect, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import GlobalPosition, PositionTarget, Sample, Sticks
+from companion.reflex.watch import start_watch
 
 
 class GuardCore(Core[GuardContext, GuardMachine]):

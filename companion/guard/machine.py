@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from companion.estimate.rotation import yaw_rad
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
 from companion.flight.ending import HEARD_AGAIN, Holder, LetGo, silent_link, silent_position, who_decided
@@ -15,6 +14,7 @@ from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.guard.watching import Connect, StandBy, Watch
 from companion.messages import Sticks
+from companion.motion.rotation import yaw_rad
 from companion.px4_mode import OFFBOARD, mode_name
 
 # What is told of a move that has a story.

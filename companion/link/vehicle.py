@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from companion import messages
-from companion.estimate.history import MotionHistory
+from companion.motion.history import MotionHistory
 
 # MAV_COMP_ID_AUTOPILOT1: gimbals, cameras and ground stations on the same link have other numbers.
 AUTOPILOT_COMPONENT_ID = 1

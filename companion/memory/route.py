@@ -12,9 +12,9 @@ import shapely
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from companion.fence import Fence
 from companion.memory.surroundings import ROUNDING_M, Place, Surroundings, Walls
 from companion.messages import Vector3
-from companion.mission.fence import Fence
 
 # For ways along an edge of a polygon; less than what the safety envelope takes for rounding.
 FENCE_SLACK_M = 5e-6

@@ -8,9 +8,9 @@ import shapely
 from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from companion.fence import Fence
 from companion.memory.patch import Patch
 from companion.messages import Vector3
-from companion.mission.fence import Fence
 
 Place = tuple[float, float]
 

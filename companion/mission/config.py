@@ -1,13 +1,11 @@
 """The mission's `companion:` part: every key optional, every default with its reason."""
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import Annotated
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field
 
-from companion.detection.fused_config import FusedConfig
-from companion.detection.registry import BASELINES, DETECTORS, MakeDetector, check_known_detector
-from companion.detection.sight import SightConfig
+from companion.motion.settling import SettledConfig
+from companion.reflex.watch import WatchConfig
 from companion.written import NotNegative, Positive, Written
 
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
@@ -41,78 +39,6 @@ class StreamsConfig(Written):
     """A tenth of a second between positions is 0.2 m at 2 m/s, the most a setpoint may be wrong by."""
     min_attitude_hz: Positive = 10.0
     """A tenth of a second of turning at 1 rad/s is 6 degrees."""
-
-
-class GuardsConfig(Written):
-    """Where the vehicle's guards are and how a push turns it: from the direction of a push and the turning it makes
-    follows where the vehicle was touched. The defaults are the paper's vehicle, arms out and without their springs."""
-
-    centre_m: Positive = 0.145
-    """From the vehicle's middle to each guard's, a quad-x."""
-    radius_m: Positive = 0.08
-    """Of a guard, seen from above."""
-    height_m: NotNegative = 0.03
-    """Of a guard's rim; 0: a flat disc."""
-    stiffness_per_s2: Positive = 250.0
-    """Of one arm, per unit mass of the vehicle: half of the paper's k_s, which is two arms'."""
-    damping_per_s: NotNegative = 15.0
-    """The same of the paper's b_s."""
-    travel_m: NotNegative = 0.0
-    """How far an arm folds; 0: a frame that does not."""
-    gyration_frd_m: tuple[Positive, Positive, Positive] = (0.0553, 0.0553, 0.069)
-    """Radii of gyration about body x, y, z: roots of inertia over mass, 0.0034, 0.0034, 0.0053 kg m^2 for 1.112 kg."""
-
-
-class EstimateConfig(Written):
-    """Numbers of the estimate of a collision."""
-
-    inertial: bool = True
-    """v_c with the accelerometer's help (see estimate.approach); off: from positions and velocities alone."""
-
-    imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
-    """IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this."""
-    guards: GuardsConfig = GuardsConfig()
-    fits_normal: bool = True
-    """The normal by what the touch did to a vehicle whose arms fold: after a hit, some milliseconds of one core with
-    each of the next ten messages. Off, or where no arm folds: the direction of the push."""
-    velocity_noise_m_s: Positive = 0.04
-    """Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated."""
-    velocity_correlation_s: Positive = 0.3
-    """How long its errors last: those of optical flow and of a filter behind it change within a third of a second."""
-    accelerometer_range_m_s2: Positive = 156.9
-    """+-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g."""
-    position_noise_m: Positive = 0.03
-    """Of a good flow or motion-capture estimate, within the half second that v_c is found from."""
-    jerk_density_m2_s5: Positive = 4.0
-    """White-jerk density: a go_to's 2 m/s^2 may come or go within any second, (2 m/s^2)^2 / 1 s. It leaves
-    0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s."""
-
-    @property
-    def fits_arms(self) -> bool:
-        """Whether a touch is fitted for its normal. The fit knows spring arms; of a stiff frame it says no more than
-        the direction of the push."""
-        return self.fits_normal and self.guards.travel_m > 0.0
-
-    @property
-    def reach_m(self) -> float:
-        """From the vehicle's middle to the farthest place on a guard's rim."""
-        return self.guards.centre_m + self.guards.radius_m
-
-
-class SettledConfig(Written):
-    """When a recovery has ended."""
-
-    distance_m: Positive = 0.10
-    """Largest distance to the recovery setpoint."""
-    speed_m_s: Positive = 0.10
-    """Largest speed."""
-    duration_s: Positive = 0.5
-    """How long both must hold."""
-    timeout_s: Positive = 10.0
-    """A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it."""
-    smoothing_s: NotNegative = 0.1
-    """Mean over about five samples at 50 Hz: brings a 0.03 m/s RMS velocity noise per axis to 0.01 m/s, so that
-    the speed of a vehicle at rest stays clear of `speed_m_s` for the whole of `duration_s`."""
 
 
 class LinkConfig(Written):
@@ -175,44 +101,15 @@ class DiskConfig(Written):
     """Megabytes that are left free. Unset: 300 MiB, or a tenth of a smaller file system, as PX4's logger leaves."""
 
 
-class CompanionConfig(Written):
+class CompanionConfig(WatchConfig):
     """All settings of the companion."""
 
-    detectors: ClassVar[Mapping[str, MakeDetector]] = DETECTORS
-    """What `detector` may name. Whoever has others extends this class by them, and by a key for each one's settings."""
-
-    detector: str = "fused"
-    """Its own settings are those under its name."""
     min_detection_height_m: NotNegative = 0.5
     """Ground handling, landing gear and ground effect are below this height above the arming position: nothing is
     detected before a take-off has reached it, nor below it in a landing. In between a low flight is a flight."""
-    fused: FusedConfig = FusedConfig()
-    sight: SightConfig = SightConfig()
     streams: StreamsConfig = StreamsConfig()
-    estimate: EstimateConfig = EstimateConfig()
     settled: SettledConfig = SettledConfig()
     link: LinkConfig = LinkConfig()
     flight: FlightConfig = FlightConfig()
     operator: OperatorConfig = OperatorConfig()
     disk: DiskConfig = DiskConfig()
-
-    @property
-    def least_threshold_m_s2(self) -> float | None:
-        """What the chosen detector asks for sideways of a vehicle that does not shake; None if it looks at no force."""
-        settings = getattr(self, self.detector)
-        names = ("side_threshold_m_s2", "threshold_m_s2")
-        return next((float(getattr(settings, name)) for name in names if hasattr(settings, name)), None)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_settings_of_baselines(cls, data: object) -> object:
-        """They would have no effect; why not is said better than of any other unknown key."""
-        for key in sorted(BASELINES.intersection(data) if isinstance(data, dict) else ()):
-            check_known_detector(key, cls.detectors)
-        return data
-
-    @field_validator("detector")
-    @classmethod
-    def _known_detector(cls, name: str) -> str:
-        check_known_detector(name, cls.detectors)
-        return name

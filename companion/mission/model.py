@@ -10,19 +10,19 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from companion.fence import Fence
 from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.fence import Fence
+from companion.mission.course import Pace, Planned, climb, home_around, way_around
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, Resume
+from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.laws import RECOVERY_LAWS, check_known_law
-from companion.ways.course import Pace, Planned, climb, home_around, way_around
-from companion.ways.trajectory import Chain, LineProfile, Trajectory
 from companion.written import Written
 
 

@@ -1,1 +1,1 @@
-"""After a hit: where the vehicle is, what it must stay off, and the plan that brings it to rest."""
+"""Whether something was hit; after a hit where the vehicle is, what it must stay off, and the plan to rest."""

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from companion.fence import Fence
 from companion.messages import Vector3
-from companion.mission.fence import Fence
 from companion.reflex.config import BEHIND_M, FACING_EACH_OTHER, ROUNDS, STEEP
 
 

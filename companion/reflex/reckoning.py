@@ -19,11 +19,11 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from companion.estimate.delay import DELAY_S
-from companion.estimate.rotation import body_to_ned
-from companion.estimate.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
+from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
-from companion.mission.config import EstimateConfig
+from companion.motion.delay import DELAY_S
+from companion.motion.rotation import body_to_ned
+from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.reflex.config import (
     COMPARED_S,
     CORRECTED_S,

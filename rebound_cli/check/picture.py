@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
-from companion.mission.fence import Fence
+from companion.fence import Fence
 from companion.mission.model import Mission
 from rebound_cli.check.ways import Way
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint

@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from companion.fence import Fence
 from companion.messages import Vector3
 from companion.mission import items
-from companion.mission.fence import Fence
 from companion.mission.items import ExpectItem
 from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.plan import shape

@@ -14,13 +14,13 @@ from typing import Any
 
 from companion.companion import Companion
 from companion.detection.interface import Situation
-from companion.detection.watch import Watch
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import ComputerStatus
 from companion.mission.model import Mission
+from companion.reflex.watch import Watch
 from companion.shell.tlog import read_tlog
 from rebound_cli import run_folder
 from rebound_cli.documents import validated

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from companion.detection.interface import Evidence, ImpactKind
-from companion.detection.watch import Watch
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
+from companion.reflex.watch import Watch
 from rebound_cli.logs.log import WANTED, Log, LogError
 from rebound_cli.logs.shaking import Shaking, clipped, shaking
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce

@@ -12,8 +12,8 @@ from companion.detection.force_signs import side_threshold_m_s2, vertical_thresh
 from companion.detection.fused_state import FusedState
 from companion.detection.hidden_signs import spun
 from companion.detection.interface import Detector, DetectorState, Evidence, Impact, Phase, Situation
-from companion.detection.watch import Watch
 from companion.messages import ImuSample, MessageId, Sample
+from companion.reflex.watch import Watch
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,9 @@ from bench.baselines.config import BaselineConfig
 from bench.baselines.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
 from companion.detection.registry import BASELINES, DETECTORS
-from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.reflex.halfspace import plus
+from companion.reflex.watch import advance, start_watch
 
 TICK_US = 4_000
 HIT_US = 4_000_000

@@ -14,11 +14,11 @@ import time
 
 from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Situation
-from companion.detection.watch import advance, start_watch
+from companion.estimate.config import GuardsConfig
 from companion.estimate.normal import begin, further
 from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
-from companion.mission.config import GuardsConfig
+from companion.reflex.watch import advance, start_watch
 
 INTERVAL_US = 4_000
 SAMPLES = 20_000

@@ -6,10 +6,10 @@ import random
 import pytest
 
 from companion.estimate.collision import motion_before_contact
-from companion.estimate.history import MotionHistory
-from companion.estimate.rotation import body_to_ned, yaw_rad
+from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition
-from companion.mission.config import EstimateConfig
+from companion.motion.history import MotionHistory
+from companion.motion.rotation import body_to_ned, yaw_rad
 
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000

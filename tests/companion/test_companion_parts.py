@@ -5,7 +5,6 @@ import random
 
 import pytest
 
-from companion.estimate.settling import SettlingMonitor
 from companion.flight.ending import Holder, who_decided
 from companion.link.commands import ATTEMPTS, CommandClient
 from companion.link.vehicle import Identity, ModeReport, Vehicle, identify
@@ -19,9 +18,9 @@ from companion.messages import (
     SetArmed,
     SetMode,
 )
-from companion.mission.config import SettledConfig
+from companion.mission.trajectory import LineProfile
+from companion.motion.settling import SettledConfig, SettlingMonitor
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, mode_name
-from companion.ways.trajectory import LineProfile
 
 # --- trajectory
 

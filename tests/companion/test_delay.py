@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from companion.estimate.delay import DELAY_S, LATEST_S, Delay
+from companion.motion.delay import DELAY_S, LATEST_S, Delay
 
 NOISE_M_S = 0.05
 

@@ -6,12 +6,12 @@ import pickle
 import pytest
 
 from bench.baselines.config import BaselineConfig
-from companion.detection import watch as watching
 from companion.detection.interface import Phase, Situation
-from companion.detection.watch import advance, start_watch
 from companion.estimate import impact
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
+from companion.reflex import watch as watching
+from companion.reflex.watch import advance, start_watch
 
 INTERVAL_US = 4_000
 WANTED = Situation()

@@ -5,9 +5,9 @@ import math
 import pytest
 
 from companion.detection.interface import Situation
-from companion.detection.watch import advance, start_watch
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
+from companion.reflex.watch import advance, start_watch
 
 STILL = (0.0, 0.0, 0.0)
 LEVEL = (1.0, 0.0, 0.0, 0.0)

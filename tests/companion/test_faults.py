@@ -6,9 +6,9 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from companion.detection import watch
 from companion.flight.context import Target
 from companion.flight.progress import FlyItems
+from companion.reflex import watch
 from tests.companion.fake_vehicle import LOITER, Flight, flight
 
 

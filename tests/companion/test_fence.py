@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from companion.mission.fence import Fence
+from companion.fence import Fence
 from companion.reflex.halfspace import Envelope
 
 # An L: the room to the north-east is not ours.

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from companion.core import Limiter
+from companion.fence import Fence
 from companion.flight.context import Target
 from companion.flight.envelope import (
     Known,
@@ -20,7 +21,6 @@ from companion.flight.envelope import (
 from companion.flight.plan import mission_lines
 from companion.flight.remembering import known_surfaces
 from companion.memory.patch import Patch
-from companion.mission.fence import Fence
 from companion.mission.model import Mission
 from companion.mission.policy import Limits
 from companion.reflex.config import HELD_S, NOTICED_S

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from companion.detection.interface import ImpactKind, Situation
-from companion.detection.watch import advance, start_watch
 from companion.estimate import guards, normal
 from companion.estimate.approach import VelocityFix, free_until, velocity_at
+from companion.estimate.config import EstimateConfig, GuardsConfig
 from companion.estimate.facing import whole_normal
 from companion.estimate.normal import normal_of
 from companion.estimate.push import Push
 from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample, Vibration
-from companion.mission.config import CompanionConfig, EstimateConfig, GuardsConfig
+from companion.mission.config import CompanionConfig
+from companion.reflex.watch import advance, start_watch
 
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000

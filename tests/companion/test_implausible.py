@@ -8,9 +8,6 @@ from pymavlink.dialects.v20 import development as mav
 from bench.faults.packets import made
 from companion.detection.sight import Turning
 from companion.estimate.approach import VelocityFix
-from companion.estimate.history import MotionHistory
-from companion.estimate.resets import Resets
-from companion.estimate.strapdown import Strapdown
 from companion.flight.confirming import Claim, Leap
 from companion.messages import (
     Attitude,
@@ -21,6 +18,9 @@ from companion.messages import (
     PositionTarget,
     Refused,
 )
+from companion.motion.history import MotionHistory
+from companion.motion.resets import Resets
+from companion.motion.strapdown import Strapdown
 from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import Attacker, attacked, flight_in
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter as Reference
 
-from companion.estimate.kalman import KalmanFilter
+from companion.motion.kalman import KalmanFilter
 
 
 def covariance(random, size):

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from companion.mission.fence import Fence
+from companion.fence import Fence
 from companion.reflex.config import HARDER, LEAD_S, OFF_PLAN_M, TOUCHES_M, RecoveryConfig
 from companion.reflex.halfspace import Envelope, Room, Surface, away_from, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact

@@ -5,15 +5,15 @@ import random
 
 import pytest
 
-from companion.estimate.strapdown import Strapdown
+from companion.estimate.config import EstimateConfig
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
 from companion.flight.recovering import Recover, agreed_normal
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
-from companion.mission.config import EstimateConfig
 from companion.mission.model import Mission
+from companion.motion.strapdown import Strapdown
 from companion.reflex.config import MOST_OFF_M_S, OVER_US, RIGHT_M_S
 from companion.reflex.laws import Contact
 from companion.reflex.planner import Moving

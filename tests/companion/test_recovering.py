@@ -4,15 +4,15 @@ import math
 
 import pytest
 
-from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.estimate.config import EstimateConfig
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition
-from companion.mission.config import EstimateConfig
 from companion.mission.model import Mission
+from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.config import FALLS_M_S2
 from companion.reflex.laws import Contact
 from companion.reflex.reckoning import Reckoning

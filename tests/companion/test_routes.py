@@ -6,13 +6,13 @@ from itertools import pairwise
 import pytest
 from shapely import LineString, Point
 
+from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
 from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings, believed, core
-from companion.mission.fence import Fence
+from companion.mission.course import Pace, home_around, passed, way_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
-from companion.ways.course import Pace, home_around, passed, way_around
-from companion.ways.trajectory import CurveProfile
+from companion.mission.trajectory import CurveProfile
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M

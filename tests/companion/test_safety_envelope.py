@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.faults.packets import made
-from companion.estimate.strapdown import GRAVITY_M_S2
+from companion.fence import Fence
 from companion.flight.context import Target
 from companion.flight.envelope import Known, SetpointError, Surroundings, bounded
-from companion.mission.fence import Fence
 from companion.mission.policy import Limits
+from companion.mission.trajectory import LineProfile
+from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.halfspace import Surface, plus
-from companion.ways.trajectory import LineProfile
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from companion.mission.course import Pace, way_of
 from companion.mission.items import VelocityItem
-from companion.ways.course import Pace, way_of
-from companion.ways.trajectory import Chain, CircleProfile, CurveProfile, LineProfile
+from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile
 
 ZIGZAG = [(0.0, 0.0, -2.0), (2.0, 1.0, -2.0), (4.0, -1.0, -2.5), (6.0, 0.0, -3.0)]
 CIRCLE = CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, 1.5 * math.tau, 2.0, 2.0)

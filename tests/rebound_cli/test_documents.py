@@ -2,7 +2,7 @@
 
 import pytest
 
-from companion.mission.config import GuardsConfig
+from companion.estimate.config import GuardsConfig
 from companion.mission.model import Mission
 from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from, resolved, world_from

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from companion.estimate.rotation import body_to_ned, ned_to_body, turned
 from companion.messages import Quaternion, Vector3
+from companion.motion.rotation import body_to_ned, ned_to_body, turned
 
 GRAVITY_M_S2 = 9.80665
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -17,6 +17,8 @@ LONGEST_DELAY_US = 40_000
 # Cosine of 15 degrees: the tilt that a filter makes of 9 m/s missed, by what a real PX4 made of 2.4 m/s
 # (bench/notes/px4.md). Gyroscopes that show more are wrong themselves.
 MOST_WRONG = 0.966
+# Motors turn the vehicle with no more than this.
+MOTORS_RAD_S2 = 100.0
 
 
 @dataclass(slots=True)

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from companion.estimate.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US
 from companion.messages import (
     VELOCITY_M_S,
     LocalPosition,
@@ -20,6 +19,7 @@ from companion.messages import (
     Sample,
     Vector3,
 )
+from companion.motion.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US
 
 STILL: Vector3 = (0.0, 0.0, 0.0)
 

@@ -5,15 +5,20 @@ A `Watch` is changed only by `advance`: the same samples at the same times give 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
+from pydantic import field_validator, model_validator
+
+from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
-from companion.detection.sight import Sameness, Sight, Turning, heard, why_blind
-from companion.estimate.history import REBOOT_US
+from companion.detection.registry import BASELINES, DETECTORS, MakeDetector, check_known_detector
+from companion.detection.sight import Sameness, Sight, SightConfig, Turning, heard, why_blind
+from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.estimate.normal import prepare
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
-from companion.mission.config import CompanionConfig
+from companion.motion.history import REBOOT_US
+from companion.written import Written
 
 # What a detector may make use of besides HIGHRES_IMU; the slowest is PX4's VIBRATION, every two seconds by default.
 WISHED: dict[type, MessageId] = {
@@ -22,6 +27,40 @@ WISHED: dict[type, MessageId] = {
     Vibration: MessageId.VIBRATION,
 }
 HEARD_US = 3_000_000
+
+
+class WatchConfig(Written):
+    """Settings of the watch for collisions."""
+
+    detectors: ClassVar[Mapping[str, MakeDetector]] = DETECTORS
+    """What `detector` may name. Whoever has others extends this class by them, and by a key for each one's settings."""
+
+    detector: str = "fused"
+    """Its own settings are those under its name."""
+    fused: FusedConfig = FusedConfig()
+    sight: SightConfig = SightConfig()
+    estimate: EstimateConfig = EstimateConfig()
+
+    @property
+    def least_threshold_m_s2(self) -> float | None:
+        """What the chosen detector asks for sideways of a vehicle that does not shake; None if it looks at no force."""
+        settings = getattr(self, self.detector)
+        names = ("side_threshold_m_s2", "threshold_m_s2")
+        return next((float(getattr(settings, name)) for name in names if hasattr(settings, name)), None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_settings_of_baselines(cls, data: object) -> object:
+        """They would have no effect; why not is said better than of any other unknown key."""
+        for key in sorted(BASELINES.intersection(data) if isinstance(data, dict) else ()):
+            check_known_detector(key, cls.detectors)
+        return data
+
+    @field_validator("detector")
+    @classmethod
+    def _known_detector(cls, name: str) -> str:
+        check_known_detector(name, cls.detectors)
+        return name
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +76,7 @@ class Notice:
 class Watch:
     """All that is remembered between steps; copies and pickles as a whole."""
 
-    config: CompanionConfig
+    config: WatchConfig
     detector: Detector[Any]
     state: DetectorState
     estimator: ImpactEstimator
@@ -93,7 +132,7 @@ class Seen:
 NOTHING_SEEN = Seen((), (), ())
 
 
-def start_watch(config: CompanionConfig, now_us: int) -> Watch:
+def start_watch(config: WatchConfig, now_us: int) -> Watch:
     """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
     if config.estimate.fits_arms:
         prepare()

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeAlias
 
+from companion.fence import Fence
 from companion.memory.route import route
 from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
-from companion.mission.fence import Fence
-from companion.ways.trajectory import Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
+from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
 
 # What is left of the speeding up against a strong wind: 4 m/s after ten seconds.
 LEAST_SPEEDING_UP_M_S2 = 0.4
