@@ -179,7 +179,7 @@ class ImpactEstimator:
         while fixes[0].time_boot_us < time_us - BATCH_US:
             fixes.popleft()
         v, u = velocity_ned_m_s, sum_ned_m_s
-        self.trust.hear(time_us, (v[0] - u[0], v[1] - u[1], v[2] - u[2]))
+        self.trust.hear(time_us, (v[0] - u[0], v[1] - u[1], v[2] - u[2]), self.strapdown.level_leans_m_s2)
 
     def begin(self, impact: Impact, situation: Situation, by_velocity: bool = False) -> ImpactEstimate:
         """A new impact: what was known just before it, and what its first sample, or velocity, shows."""

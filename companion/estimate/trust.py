@@ -8,6 +8,7 @@ This judges for the detector, which must not take that swing for a second hit an
 has its own estimate, `reflex.reckoning`: it needs a velocity sooner, and knows the normal and the rebound to expect.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -16,12 +17,15 @@ from companion.messages import Vector3
 # The estimator has not yet begun to correct itself for 0.14 s, and swings through the truth at about 0.5 s.
 CORRECTED_US = 140_000
 LEAST_US = 600_000
-# By then the swing of the largest error seen is down to what a good estimate's own noise is.
-MOST_US = 1_500_000
+# By then what a filter has taken for a tilt, 15 degrees after 4.2 m/s, is down to the two that agree (0.5 per second,
+# bench/notes/px4.md).
+MOST_US = 4_500_000
 # Agreement is judged over this; the swing's turning points are shorter.
 AGREE_US = 300_000
-# A good velocity estimate's noise of 0.03 m/s, twice, and an accelerometer off by 0.3 m/s^2 in that time.
+# A good velocity estimate's noise of 0.03 m/s, twice, and an accelerometer off by 0.3 m/s^2 in that time. An attitude
+# that is off makes as much of gravity.
 AGREE_M_S = 0.15
+AGREE_M_S2 = AGREE_M_S / (1e-6 * AGREE_US)
 
 
 @dataclass(slots=True)
@@ -71,15 +75,17 @@ class Trust:
         if since_us is not None and now_us - since_us > MOST_US:
             self.restore()
 
-    def hear(self, time_us: int, velocity_less_sum_m_s: Vector3) -> None:
-        """Take one velocity less the accelerometer's sum: constant while the two agree."""
+    def hear(self, time_us: int, velocity_less_sum_m_s: Vector3, level_leans_m_s2: Vector3) -> None:
+        """Take one velocity less the accelerometer's sum: constant while the two agree. And the acceleration of a
+        vehicle that is level by its attitude, as its gyroscopes show it."""
         doubted_us, errors = self._since_us, self.errors
         if doubted_us is None:
             return
         errors.append((time_us, velocity_less_sum_m_s))
         while time_us - errors[0][0] > AGREE_US:
             errors.popleft()
-        if time_us - doubted_us > LEAST_US and self._agree():
+        is_level = math.hypot(*level_leans_m_s2) < AGREE_M_S2
+        if is_level and time_us - doubted_us > LEAST_US and self._agree():
             self.restore()
 
     def _agree(self) -> bool:

@@ -68,14 +68,18 @@ class Recover:
 
     def _planned(self, elapsed_s: float) -> Target:
         """Place, velocity and acceleration, by which PX4's own loops follow the plan."""
-        goal = self._record.setpoint_ned_m
+        record, reckoning, goal = self._record, self._record.reckoning, self._record.setpoint_ned_m
         motion = Moving(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
-        # PX4 takes its velocity for what it tells: as much is asked for beside the plan's.
-        (n, e, d), (u, v, w) = motion.position_ned_m, plus(motion.velocity_ned_m_s, 1.0, self._record.reckoning.off_m_s)
         a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
         if self._is_level:
-            d, w, c = goal[2], 0.0, self._height_m_s2(1.0)
-        return Target((n, e, d), self._yaw_rad, (u, v, w), (DAMPED * a, DAMPED * b, c))
+            (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
+            motion, c = Moving((n, e, goal[2]), (u, v, 0.0)), self._height_m_s2(1.0)
+        # PX4 takes place, velocity and tilt for what it tells: as much is asked for beside the plan's.
+        place, velocity = (
+            plus(motion.position_ned_m, 1.0, reckoning.off_m),
+            plus(motion.velocity_ned_m_s, 1.0, reckoning.off_m_s),
+        )
+        return Target(place, self._yaw_rad, velocity, plus((DAMPED * a, DAMPED * b, c), -1.0, record.level_leans_m_s2))
 
     def _leaning(self, elapsed_s: float) -> Target:
         """Accelerations alone: PX4's loops know nothing right of the motion, or would do harm to this one."""
@@ -139,13 +143,13 @@ class Recover:
                 if move is not None:
                     return move
             record.reckoning.hear(sample)
-            is_known = self._knows(sample)
+            is_known = self._knows(sample.time_boot_us)
             self._follow(flight, sample, now_us)
             if not is_known:
                 continue
-            record.follow_recovery(sample)
-            told_m_s = plus(sample.velocity_ned_m_s, -1.0, record.reckoning.off_m_s)
-            since_us = self._monitor.settled_since(replace(sample, velocity_ned_m_s=told_m_s))
+            right = record.reckoning.put_right(sample)
+            record.follow_recovery(right)
+            since_us = self._monitor.settled_since(right)
             if since_us is not None and not self._is_spinning:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
@@ -168,15 +172,15 @@ class Recover:
         flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
         return afterwards(flight)
 
-    def _knows(self, sample: LocalPosition) -> bool:
+    def _knows(self, time_boot_us: int) -> bool:
         """Whether the estimate shows the motion after the hit; until then the motion reckoned is planned from."""
         if self._is_known:
             return True
         record = self._record
-        since_us = sample.time_boot_us - record.sample_time_boot_us
+        since_us = time_boot_us - record.sample_time_boot_us
         self._is_known = record.reckoning.is_right and since_us >= KNOWN_US
         if self._is_known:
-            v, w = record.contact.velocity_ned_m_s, sample.velocity_ned_m_s
+            v, w = record.contact.velocity_ned_m_s, record.reckoning.motion.velocity_ned_m_s
             self._agreed = agreed_normal(record.normal_ned, v, w)
         return self._is_known
 

@@ -82,24 +82,21 @@ PUSHES_S = 0.2
 LEFT_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
 KNOWN_US = 80_000
-# How an estimate is put right after a clipped hit. Three hits of a real PX4 by motion capture took 0.12 s, 4.45 rad/s
-# and a damping of 0.59 (bench/notes/px4.md); others are up to twice as late, and half to twice as fast.
-PUT_RIGHT_AFTER_S = (0.05, 0.1, 0.15, 0.2, 0.25)
-PUT_RIGHT_RAD_S = (2.2, 3.1, 4.4, 6.2, 8.8)
-PUT_RIGHT_DAMPING = (0.45, 0.6, 0.85)
-# Of what was hidden, the share by which those three hits differ from that: 6 % RMS over 1.5 s (bench/notes/px4.md).
-MISFIT = 0.06
+# How an estimate is put right after a clipped hit. By motion capture a real PX4 took 0.18 s, 4.7 rad/s and a damping of
+# 0.67, by GPS 0.15 s, 2.4 rad/s and 0.69 (bench/notes/px4.md); others are up to twice as late, and twice as fast.
+PUT_RIGHT_AFTER_S = (0.06, 0.12, 0.18, 0.24)
+PUT_RIGHT_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
+PUT_RIGHT_DAMPING = (0.5, 0.67, 0.85)
+# A part of what is missing is taken for a tilt, and goes as slowly as that: 0.51 and 0.49 per second.
+TILT_PER_S = 0.5
+# Of what was hidden, the share by which velocity and, in seconds, place of those hits differ from that, RMS over 3 s.
+MISFIT, MISFIT_S = 0.03, 0.02
 # What the accelerometer's sum drifts by: a tilt that is off by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
 # Of where the hit was.
 PLACE_SPREAD_M = 0.1
 # Right is what is known to be wrong by no more than four times a good velocity's noise.
 RIGHT_M_S = 0.15
-# By then the slowest has passed through zero: with PX4's own parameters it was right within 1.5 s (bench/notes/px4.md).
-OVER_US = 1_500_000
-# A velocity that is told is held against the places that are told over this time: their noise of 0.02 m makes 0.04 m/s
-# of it. What is more than twice RIGHT_M_S is no rest of what was put right, but a place that jumped.
-COMPARED_S, MOST_OFF_M_S = 0.5, 0.3
 # Spreads of the velocity after a hit about the one expected: of the speed into the obstacle (frames give back 0.2 to
 # 0.9 of it, and the normal is good to 20 degrees), of the speed by friction, and upwards (0.6 m/s at 5 m/s).
 REBOUND_SPREAD, FRICTION_SPREAD, THROWN_SHARE, LEAST_SPREAD_M_S = 0.26, 0.1, 0.12, 0.1

@@ -1,7 +1,8 @@
 """Where a vehicle is after a hit, and how it moves, although its own estimate may lack a part of the hit.
 
 What clipping hides of a hit is missing in the vehicle's own velocity, and then in its place. Other sensors put both
-right, as an estimator of second order does. So t after the hit the vehicle tells, of its velocity v and its place x,
+right, as an estimator of place, velocity and tilt does. So t after the hit the vehicle tells, of its velocity v and its
+place x,
 
     v(t) + e g(t),    x(t) + e G(t)
 
@@ -13,7 +14,7 @@ At the hit v is the rebound that is expected, with a wide spread.
 
 import copy
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -25,7 +26,6 @@ from companion.motion.delay import DELAY_S
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.reflex.config import (
-    COMPARED_S,
     CORRECTED_S,
     DRIFT_M2_S3,
     FRICTION_SPREAD,
@@ -33,9 +33,8 @@ from companion.reflex.config import (
     LEAD_S,
     LEAST_SPREAD_M_S,
     MISFIT,
+    MISFIT_S,
     MOST_LEANT,
-    MOST_OFF_M_S,
-    OVER_US,
     PLACE_SPREAD_M,
     PUSHES_S,
     PUT_RIGHT_AFTER_S,
@@ -45,6 +44,7 @@ from companion.reflex.config import (
     RIGHT_M_S,
     SMOOTHED_S,
     THROWN_SHARE,
+    TILT_PER_S,
     WIND_S,
 )
 from companion.reflex.halfspace import away_from, plus, split
@@ -106,9 +106,9 @@ class Bank:
         many samples the same error shows.
         """
         g, way_s, _ = missing(since_s)
-        off2 = (MISFIT * np.array(self.missing_m_s)) ** 2
-        self._take(0, way_s, place_m, colour * (spread_m**2 + since_s**2 * off2))
-        self._take(1, g, velocity_m_s, colour * (spread_m_s**2 + off2))
+        hidden2 = np.array(self.missing_m_s) ** 2
+        self._take(0, way_s, place_m, colour * (spread_m**2 + min(MISFIT * since_s, MISFIT_S) ** 2 * hidden2))
+        self._take(1, g, velocity_m_s, colour * (spread_m_s**2 + MISFIT**2 * hidden2))
 
     def _take(self, which: int, of_e: Floats, told: Vector3, variance: Floats) -> None:
         """One measurement on each axis: the place (0) or the velocity (1) with so much of e in it."""
@@ -121,31 +121,51 @@ class Bank:
         self.likely = self.likely - (missed**2 / size + np.log(size)).sum(axis=1)
 
     def found(self, since_s: float) -> tuple[Moving, Vector3, float]:
-        """The motion, its velocity's spread, and by how much what is told may be off in all from now on."""
-        share = np.exp(0.5 * (self.likely - self.likely.max()))
-        share /= share.sum()
-        left = missing(since_s)[2]
+        """The motion, its velocity's spread, and how fast what is told may still swing about what is foreseen."""
+        share, left = self._shares(), missing(since_s)[2]
         (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
         spread2 = self.covariance[..., 1, 1] + (self.state[..., 1] - [u, v, w]) ** 2
         p, q, r = np.sqrt(share @ spread2).tolist()
         left2 = left**2 * (self.covariance[..., 2, 2] + self.state[..., 2] ** 2).sum(axis=1)
         return Moving((x, y, z), (u, v, w)), (p, q, r), math.sqrt(share @ left2)
 
+    def off(self, since_s: float) -> tuple[Vector3, Vector3]:
+        """What is missing in the told place and in the told velocity."""
+        share, (g, way_s, _) = self._shares(), missing(since_s)
+        (x, y, z), (u, v, w) = np.einsum("ow,wa->oa", share * np.stack([way_s, g]), self.state[..., 2]).tolist()
+        return (x, y, z), (u, v, w)
+
+    def _shares(self) -> Floats:
+        """How probable each way is."""
+        share: Floats = np.exp(0.5 * (self.likely - self.likely.max()))
+        share /= share.sum()
+        return share
+
 
 def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
-    """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and the most
-    that will ever be missing again."""
-    late_s, rad_s, damping = _WAYS.T
+    """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and how much of
+    the swing is left.
+
+    The errors p of the place, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
+    p = late_s, u = 1, a = 0; k, h and m so that a swing of frequency f and damping d and a slow rest c go on:
+    s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
+    """
+    (late_s, rad_s, damping), slow = _WAYS.T, TILT_PER_S
     slowing, turning = damping * rad_s, rad_s * np.sqrt(1.0 - damping**2)
+    k, h = 2.0 * slowing + slow, rad_s**2 + 2.0 * slowing * slow
     x = np.maximum(since_s - late_s, 0.0)
-    # The place's error p: p' = u - 2 d f p, u' = -f^2 p, from p = late_s, u = 1.
-    rate = (1.0 - slowing * late_s) / turning
+    rate = 1.0 - k * late_s
+    bend = -h * late_s - k * rate
+    rest = (bend + 2.0 * slowing * rate + rad_s**2 * late_s) / (slow * slow - 2.0 * slowing * slow + rad_s**2)
+    swung = late_s - rest
+    across = (rate + slow * rest + slowing * swung) / turning
     cos, sin, left = np.cos(turning * x), np.sin(turning * x), np.exp(-slowing * x)
-    place = left * (late_s * cos + rate * sin)
-    slope = left * (turning * (rate * cos - late_s * sin)) - slowing * place
+    rests = rest * np.exp(-slow * x)
+    swings = left * (swung * cos + across * sin)
+    slope = left * turning * (across * cos - swung * sin) - slowing * swings - slow * rests
     is_late = since_s <= late_s
-    g = np.where(is_late, 1.0, slope + 2.0 * slowing * place)
-    way_s = np.where(is_late, since_s, place)
+    g = np.where(is_late, 1.0, slope + k * (rests + swings))
+    way_s = np.where(is_late, since_s, rests + swings)
     return np.append(g, 0.0), np.append(way_s, 0.0), np.append(left, 0.0)
 
 
@@ -165,15 +185,16 @@ class Reckoning:
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # the slow external force, wind and drag: what it takes of the lean
     push_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
-    off_m_s: Vector3 = REST  # by what the told velocity is not that of the told places, once the estimate is right
+    off_m: Vector3 = REST  # what is missing still in the told place, once that is foreseen
+    off_m_s: Vector3 = REST  # the same of the velocity
     _bank: Bank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
     _at_boot_us: int = 0  # of the bank
     _moved_m_s: Vector3 = REST  # the sum up to there
     _time_boot_us: int = 0
-    _told_boot_us: int = 0
-    _told: LocalPosition | None = None  # the newest of the estimate that is right
+    _heard_boot_us: int = 0  # the newest told, by the bank
+    _told_boot_us: int = 0  # and since the estimate is right
     _pushed_boot_us: int = 0
     _is_shown: bool = False
     _clock_boot_us: int = 0  # from which on what was hidden is put right
@@ -201,7 +222,8 @@ class Reckoning:
             self._bank = self.earlier._bank.struck(
                 plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
             )
-        self._told_boot_us, self._told, self.is_right, self.off_m_s = 0, None, False, REST
+        self._heard_boot_us = self._told_boot_us = 0
+        self.is_right, self.off_m, self.off_m_s = False, REST, REST
 
     def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
         """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
@@ -239,21 +261,22 @@ class Reckoning:
         at_us = sample.time_boot_us - round(1e6 * DELAY_S)
         if at_us <= self.hit_boot_us:
             return
-        is_in_push = sample.time_boot_us <= self._pushed_boot_us
-        self.is_right |= self.is_whole or at_us - self._clock_boot_us >= OVER_US
-        if not (self.is_right or is_in_push):
-            self.is_right = self._reckon(sample, at_us)
-        if self.is_right:
+        was_right, is_in_push = self.is_right, sample.time_boot_us <= self._pushed_boot_us
+        if self.is_whole:
+            self.is_right, self.off_m, self.off_m_s = True, REST, REST
+        elif was_right or not is_in_push:
+            self._reckon(sample, at_us)
+        if was_right or self.is_right:
             self._correct(sample)
 
-    def _reckon(self, sample: LocalPosition, at_us: int) -> bool:
-        """Take what is told into the filters; whether it will be wrong by next to nothing from now on."""
+    def _reckon(self, sample: LocalPosition, at_us: int) -> None:
+        """Take what is told into the filters. It is right once it will swing by next to nothing from now on."""
         is_ahead = self._time_boot_us > 0 and at_us > self._time_boot_us + LONGEST_GAP_US
         if is_ahead or at_us <= self._at_boot_us:
             # Of a time that the sum has not come to, or has left behind, the filters cannot take anything.
-            return False
-        config, bank, before_us = self.config, self._bank, self._told_boot_us
-        self._told_boot_us, since_s = sample.time_boot_us, 1e-6 * (at_us - self._clock_boot_us)
+            return
+        config, bank, before_us = self.config, self._bank, self._heard_boot_us
+        self._heard_boot_us, since_s = sample.time_boot_us, 1e-6 * (at_us - self._clock_boot_us)
         every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
         # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
@@ -263,38 +286,35 @@ class Reckoning:
         self._at_boot_us, self._moved_m_s = at_us, summed
         v, x = sample.velocity_ned_m_s, sample.position_ned_m
         bank.hear(since_s, v, x, config.velocity_noise_m_s, config.position_noise_m, colour)
-        found, self.spread_m_s, left_m_s = bank.found(since_s)
+        found, spread_m_s, left_m_s = bank.found(since_s)
+        self.is_right = self.is_right or left_m_s <= RIGHT_M_S
+        if self.is_right:
+            self.off_m, self.off_m_s = bank.off(since_s)
+            return
         velocity = plus(found.velocity_ned_m_s, behind_s, self._acceleration)
         place = plus(found.position_ned_m, behind_s, velocity)
         self.motion = Moving(place, velocity, self.motion.acceleration_ned_m_s2)
-        return left_m_s <= RIGHT_M_S
+        self.spread_m_s = spread_m_s
 
     def _correct(self, sample: LocalPosition) -> None:
         """By an estimate that is right: at once by the first, then by so much as is not its noise."""
         elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - self._told_boot_us))
         share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
         was, self._told_boot_us = self.motion, sample.time_boot_us
-        self._compare(sample)
-        told_m_s = plus(sample.velocity_ned_m_s, -1.0, self.off_m_s)
-        place = plus(was.position_ned_m, share, plus(sample.position_ned_m, -1.0, was.position_ned_m))
-        velocity = plus(was.velocity_ned_m_s, share, plus(told_m_s, -1.0, was.velocity_ned_m_s))
+        told = self.put_right(sample)
+        place = plus(was.position_ned_m, share, plus(told.position_ned_m, -1.0, was.position_ned_m))
+        velocity = plus(was.velocity_ned_m_s, share, plus(told.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = Moving(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = REST
 
-    def _compare(self, sample: LocalPosition) -> None:
-        """The told velocity with the told places: after a clipped hit it is off for seconds, while they are not."""
-        before, self._told = self._told, sample
-        if before is None:
-            return
-        elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
-        if not 0.0 < elapsed_s < COMPARED_S:
-            return
-        half_s = 0.5 * elapsed_s
-        led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, sample.velocity_ned_m_s)
-        further_m = plus(led, -1.0, sample.position_ned_m)
-        off = plus(self.off_m_s, 1.0 / (COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, self.off_m_s))
-        size = math.hypot(*off)
-        self.off_m_s = off if size <= MOST_OFF_M_S else plus(REST, MOST_OFF_M_S / size, off)
+    def put_right(self, sample: LocalPosition) -> LocalPosition:
+        """What is told, with what is missing in it still."""
+        place, velocity = sample.position_ned_m, sample.velocity_ned_m_s
+        return replace(
+            sample,
+            position_ned_m=plus(place, -1.0, self.off_m),
+            velocity_ned_m_s=plus(velocity, -1.0, self.off_m_s),
+        )
 
 
 def lean_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
