@@ -127,6 +127,10 @@ def _add_peer_and_key(parser: Parser) -> None:
     _option(parser, "--signing-key", text, "FILE")
 
 
+def _add_wait(parser: Parser, where: str = "") -> None:
+    _flag(parser, "--wait", f"{where}wait without end for a vehicle that is missing or restarts on the ground")
+
+
 def _add_companion(parser: Parser) -> None:
     _option(parser, "--companion", "settings from this file's companion: part, as tune writes it", "FILE")
 
@@ -155,6 +159,7 @@ def add_fly(commands: Commands) -> None:
     _option(fly, "--obstacles", "what is known beforehand, e.g. another run's obstacles.json", "FILE")
     _add_json(fly, "summary")
     _add_peer_and_key(fly)
+    _add_wait(fly, "with --connect: ")
     _flag(fly, "--yes", "with --connect: fly the plan without asking")
 
 
@@ -162,6 +167,7 @@ def add_guard(commands: Commands) -> None:
     text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/how-to/guard.md."
     guard = _command(commands, "guard", "guard:run_guard", "protect a flight that something else commands", text)
     _add_connect(guard, required=True)
+    _add_wait(guard)
     _add_peer_and_key(guard)
     _option(guard, "--config", "settings, as in docs/how-to/guard.md", "FILE")
     _add_set(guard, "change a setting, e.g. max_hits=5")
