@@ -220,6 +220,7 @@ def add_preflight(commands: Commands) -> None:
     _add_connect(preflight, required=True)
     _add_peer_and_key(preflight)
     _add_companion(preflight)
+    _option(preflight, "--card", "write the card of the first flight, to be printed", "FILE")
     _flag(preflight, "--fix", "offer to set the parameters that would mend it")
     _flag(preflight, "--yes", "with --fix: set them without asking")
     _add_json(preflight, "findings")

@@ -57,11 +57,11 @@ def open_connection(
     return TcpInConnection(host, port)
 
 
-def serial_device(url: str) -> str | None:
-    """The device of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
+def serial_device(url: str) -> tuple[str, int] | None:
+    """Device and baud rate of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
     scheme, rest = _scheme_and_rest(url)
     if scheme == "serial":
-        return _device_and_baud(url, rest)[0]
+        return _device_and_baud(url, rest)
     _host_and_port(url, rest)
     return None
 

@@ -39,10 +39,10 @@ _WRITTEN_BY = _UNIT.partition("\n")[0]
 
 def _address(url: str) -> str:
     try:
-        device = serial_device(url)
+        device, _ = serial_device(url) or ("", 0)
     except AddressError as error:
         raise ValueError(str(error)) from error
-    if device is not None and (_DEVICE.fullmatch(device) is None or ".." in device):
+    if device and (_DEVICE.fullmatch(device) is None or ".." in device):
         raise ValueError(f"{device!r} is not the name of a device, such as /dev/ttyAMA0")
     return url
 
@@ -61,7 +61,8 @@ class ServiceSettings(Written):
     @property
     def device(self) -> str | None:
         """The serial device; None on a network."""
-        return serial_device(self.connect)
+        serial = serial_device(self.connect)
+        return None if serial is None else serial[0]
 
     def arguments(self) -> Sequence[str]:
         """What the service runs, after `rebound`."""
