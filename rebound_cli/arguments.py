@@ -240,7 +240,7 @@ def add_logs(commands: Commands) -> None:
     ways = {
         "list": "every flight, the oldest first",
         "show": "what happened in a flight",
-        "export": "one archive of a flight",
+        "export": "one file of a flight",
     }
     listed, shown, exported = (
         _command(whats, name, f"flights.command:run_{name}", text, f"{text.capitalize()}.")
@@ -252,7 +252,9 @@ def add_logs(commands: Commands) -> None:
         _add_runs(parser)
     _add_json(listed, "flights")
     _add_json(shown, "flight")
-    _option(exported, "--out", "the archive (default: FLIGHT.tar.gz)", "FILE")
+    text = "archive: all its files (default); mcap: for Foxglove; ulg: for Flight Review and PlotJuggler"
+    _option(exported, "--format", text, choices=("archive", "mcap", "ulg"), default="archive")
+    _option(exported, "--out", "the file (default: FLIGHT.tar.gz, .mcap or .ulg)", "FILE")
     _add_no_position(exported)
 
 
@@ -337,6 +339,8 @@ def add_replay(commands: Commands) -> None:
     _option(replay, "--expect", "exit 1 unless there are exactly so many collisions", "none|N", type=_expected)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
+    text = "PX4's own log of a run: write a copy of it with the run's events, hits and setpoints"
+    _option(replay, "--merge", text, "FILE")
     _option(replay, "--out", "folder of the pictures (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 
