@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 WHEEL := $(abspath .venv-wheel)
 READY := $(VENV)/.ready
 
-.PHONY: fly test rest sandbox clients check lint types results paper schema docs diagrams site stamps release wheel requirements audit aarch64 clean
+.PHONY: fly test rest browser sandbox clients check lint types results paper schema docs diagrams site stamps release wheel requirements audit aarch64 clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml
@@ -16,6 +16,10 @@ test: $(READY)
 # What takes long, or runs by the clock.
 rest: $(READY)
 	$(BIN)/python -m pytest -m "slow or realtime"
+
+# The report and the live page in a headless Chromium of the distribution's; fails where there is none.
+browser: $(READY)
+	$(BIN)/python -m pytest -n 0 tests/browser
 
 # Other people's clients on the simulated vehicle, each in an environment of its own: MAVSDK 3 and 4 cannot share one.
 # In real time: some minutes.

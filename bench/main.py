@@ -12,6 +12,7 @@ from bench.faults.arguments import add_faults
 from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
 from bench.reference.arguments import add_docs, add_stamps
+from bench.speed.arguments import add_speed
 from rebound_cli.main import run
 
 
@@ -32,6 +33,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_ablation(commands)
     add_kills(commands)
     add_faults(commands)
+    add_speed(commands)
     add_docs(commands)
     add_stamps(commands)
     return parser

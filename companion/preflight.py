@@ -14,6 +14,7 @@ from companion.link.round_trip import RoundTrip
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle, identify, is_autopilot
 from companion.mavlink.decode import Decoder
+from companion.mavlink.delivery import Delivery
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
@@ -53,6 +54,31 @@ DOUBTFUL_TRIP_US = 20_000
 DOUBTFUL_BATTERY, BAD_BATTERY = 50, 20
 # A vehicle that stands still does not clip; a sensor that does shakes in its mount.
 STANDS_M_S2 = 1.0
+# A converter of FTDI's holds bytes back for up to 16 ms by default (FTDI's AN232B-04). Delays that differ by half of
+# that are no wire's.
+UNEVEN_US = 8_000
+# PX4's names and numbers of serial ports (Tools/serial/generate_config.py), which MAV_n_CONFIG has, and its instances.
+PORTS, INSTANCES = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4"}, range(3)
+# MAV_n_MODE, and the rate that PX4's guide to companion computers recommends.
+ONBOARD, COMPANION_BAUD = 2, 921_600
+# CBRK_USB_CHK with which PX4 arms while a cable is in its USB port.
+USB_ALLOWED = 197_848
+ROTORS = ("CA_ROTOR_COUNT", *(f"CA_ROTOR{number}_P{axis}" for number in range(4) for axis in "XY"))
+# Asked of a vehicle on a serial line, and of one on its USB port.
+OF_A_LINE = (
+    *(f"MAV_{number}_{what}" for number in INSTANCES for what in ("CONFIG", "MODE", "RATE", "FORWARD")),
+    *(f"SER_{port}_BAUD" for port in PORTS.values()),
+)
+OF_USB = ("CBRK_USB_CHK",)
+
+
+@dataclass(frozen=True, slots=True)
+class SerialLine:
+    """What the link goes through. `baud` None: the vehicle's own USB port, which has none."""
+
+    baud: int | None
+    latency_timer_ms: int | None = None
+    """Of the converter's driver, where it has one."""
 
 
 @dataclass(slots=True)
@@ -62,6 +88,8 @@ class Survey:
     config: CompanionConfig
     started_us: int
     streams: StreamMonitor
+    line: SerialLine | None = None
+    delivery: Delivery = field(default_factory=Delivery)
     vehicle: Vehicle = field(default_factory=Vehicle)
     refusal: str | None = None
     heard_since_us: int | None = None
@@ -77,13 +105,25 @@ class Survey:
     ask_due_us: int = 0
 
     @property
+    def asked(self) -> tuple[str, ...]:
+        """The parameters to be read."""
+        if self.line is None:
+            return PARAMETERS
+        return (*PARAMETERS, *(OF_USB if self.line.baud is None else OF_A_LINE))
+
+    @property
+    def flies(self) -> bool:
+        """Somebody hovers it: what shakes then is the propellers' doing."""
+        return self.vehicle.armed is True and self.vehicle.landed is messages.LandedState.IN_AIR
+
+    @property
     def finished(self) -> bool:
         since_us = self.listening_since_us
         return self.refusal is not None or (since_us is not None and self.now_us >= since_us + LISTENING_US)
 
 
-def start_survey(config: CompanionConfig, now_us: int) -> Survey:
-    return Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)))
+def start_survey(config: CompanionConfig, now_us: int, line: SerialLine | None = None) -> Survey:
+    return Survey(config, now_us, StreamMonitor(config.streams, (MessageId.VIBRATION,)), line)
 
 
 def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[messages.Outgoing]:
@@ -119,7 +159,7 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
                 survey.refusal = identity
             else:
                 survey.vehicle.identity, survey.heard_since_us = identity, now_us
-        case messages.Parameter(name, value) if name in PARAMETERS:
+        case messages.Parameter(name, value) if name in survey.asked:
             survey.parameters[name] = value
         case messages.EstimatorStatus():
             survey.estimator.append(sample)
@@ -129,6 +169,7 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
             survey.round_trip.hear(sample, now_us)
         case messages.ImuSample() if listens:
             survey.imu.append(sample)
+            survey.delivery.arrived(sample.time_boot_us, now_us)
         case messages.LocalPosition() if listens:
             survey.positions.append(sample)
         case messages.Vibration() if listens:
@@ -141,7 +182,7 @@ def _ask(survey: Survey, outgoing: list[messages.Outgoing]) -> None:
     if survey.now_us < survey.ask_due_us:
         return
     survey.ask_due_us = survey.now_us + ASK_AGAIN_US
-    outgoing += [messages.ReadParameter(name) for name in PARAMETERS if name not in survey.parameters]
+    outgoing += [messages.ReadParameter(name) for name in survey.asked if name not in survey.parameters]
     commands: list[messages.VehicleCommand] = []
     if survey.vehicle.version is None:
         commands.append(messages.RequestMessage(MessageId.AUTOPILOT_VERSION))
@@ -195,7 +236,7 @@ def _judged(
 
 def findings(survey: Survey) -> list[Finding]:
     """All items, in the order in which they would be mended."""
-    found = [_frame(survey), *_streams(survey)]
+    found = [_frame(survey), *_rotors(survey), *_port(survey), *_delivery(survey), *_streams(survey)]
     for name, judge in _SETTINGS.items():
         value = survey.parameters.get(name)
         unread = Finding(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
@@ -209,6 +250,88 @@ def _frame(survey: Survey) -> Finding:
     remedy = "companion.estimate.fits_normal: false in the mission: the normal is the push's direction then"
     is_fitted = kind != "quadrotor" and survey.config.estimate.fits_arms
     return _judged("frame", kind, (is_fitted, DOUBTFUL, remedy), beyond=": a hit's normal is fitted for a quad-x")
+
+
+def _rotors(survey: Survey) -> Iterator[Finding]:
+    """Where PX4's control allocation has them; before 1.13 it had no such parameters."""
+    told, guards = survey.parameters, survey.config.estimate.guards
+    if not all(name in told for name in ROTORS):
+        return
+    count, *places = (float(told[name]) for name in ROTORS)
+    rotors = list(zip(places[::2], places[1::2], strict=True))
+    kind = "" if survey.vehicle.identity is None else survey.vehicle.identity.vehicle_type
+    if kind != "quadrotor" or count != len(rotors):
+        others = f"MAV_TYPE says {kind}, CA_ROTOR_COUNT {count:g}"
+        yield _judged("rotors", others, (kind == "quadrotor", DOUBTFUL, "choose the airframe in QGroundControl"))
+        return
+    along_m = guards.centre_m / math.sqrt(2)
+    off_m = max(math.dist((abs(x), abs(y)), (along_m, along_m)) for x, y in rotors)
+    middle_m = sum(math.hypot(*rotor) for rotor in rotors) / count
+    remedy = "measure; then correct CA_ROTORn_PX, _PY or companion.estimate.guards.centre_m"
+    # Further off than a guard is wide, a touch is taken for another arm's.
+    yield _judged(
+        "rotors",
+        f"{middle_m:.2f} m from the middle by PX4, {guards.centre_m:g} m by companion.estimate.guards",
+        (survey.config.estimate.fits_arms and off_m > guards.radius_m, DOUBTFUL, remedy),
+        beyond=f"; one is {off_m:.2f} m from where the fit has it",
+    )
+
+
+def _port(survey: Survey) -> Iterator[Finding]:
+    """The port of PX4's that this line is plugged into, by its baud rate."""
+    told, line = survey.parameters, survey.line
+    if line is None:
+        return
+    if line.baud is None:
+        remedy = f"a wire to TELEM2; or CBRK_USB_CHK = {USB_ALLOWED}, then reboot"
+        is_refused = told.get("CBRK_USB_CHK") != USB_ALLOWED
+        yield _judged(
+            "port", "PX4's USB port", (is_refused, DOUBTFUL, remedy), beyond=": with a cable in it PX4 may not arm"
+        )
+        return
+    ports = {number: PORTS.get(int(told.get(f"MAV_{number}_CONFIG", 0)), "") for number in INSTANCES}
+    fitting = [number for number, port in ports.items() if port and told.get(f"SER_{port}_BAUD") == line.baud]
+    if not fitting:
+        remedy = "MAV_1_CONFIG = 102 (TELEM2), SER_TEL2_BAUD as in --connect, MAV_1_MODE = 2; then reboot"
+        yield Finding("port", DOUBTFUL, f"none of PX4's TELEM ports is told to have {line.baud} baud", remedy)
+        return
+    # Of two with the same rate the one that was meant for this.
+    number = next((number for number in fitting if told.get(f"MAV_{number}_MODE") == ONBOARD), fitting[-1])
+    port, prefix = ports[number], f"MAV_{number}"
+    yield _judged(
+        "port",
+        f"{prefix} on {port}, {line.baud} baud",
+        (line.baud < COMPANION_BAUD, DOUBTFUL, f"SER_{port}_BAUD = {COMPANION_BAUD}, reboot, the same in --connect"),
+    )
+    wanted = {
+        "MODE": (ONBOARD, "not the onboard streams"),
+        "RATE": (0, "bytes a second at most; 0 is half of the line"),
+        "FORWARD": (1, "texts for the ground station end here"),
+    }
+    for what, (wish, why) in wanted.items():
+        name, value = f"{prefix}_{what}", told.get(f"{prefix}_{what}")
+        is_less = value is not None and (value != wish if what != "RATE" else 0 < value < line.baud / 20)
+        found = "the vehicle did not tell it" if value is None else f"{value:g}"
+        cases = (value is None, DOUBTFUL, "ask again"), (is_less, DOUBTFUL, f"{name} = {wish}, then reboot")
+        yield _judged(name, found, *cases, mended=wish, beyond=f": {why}" if is_less else "")
+
+
+def _delivery(survey: Survey) -> Iterator[Finding]:
+    delivery, line = survey.delivery, survey.line
+    if delivery.received:
+        lost, bad, sent = delivery.lost, delivery.unreadable_bytes, delivery.received + delivery.lost
+        remedy = "a wire loses nothing: ground beside it, short, the same baud rate at both ends"
+        found = f"{lost} of {sent} packets lost ({100.0 * lost / sent:.1f} %), {bad} unreadable bytes"
+        yield _judged("packets", found, (lost > 0 or bad > 0, DOUBTFUL, remedy))
+    jitter_us, timer_ms = delivery.jitter_us, None if line is None else line.latency_timer_ms
+    if jitter_us is not None:
+        held = "an FTDI converter's latency timer" + (
+            " is 16 ms by default" if timer_ms is None else f" is {timer_ms} ms"
+        )
+        remedy = f"{held}; 1 ms is best (`rebound service install` sets it); a busy computer does the same"
+        is_held = timer_ms is not None and timer_ms > 1
+        found = f"delays of samples differ by {jitter_us / 1e3:.1f} ms"
+        yield _judged("arrival", found, (is_held or jitter_us > UNEVEN_US, DOUBTFUL, remedy))
 
 
 def _streams(survey: Survey) -> Iterator[Finding]:
@@ -292,7 +415,7 @@ _SETTINGS: dict[str, Callable[[str, float, Survey], Finding]] = {
     "CBRK_FLIGHTTERM": _termination,
     "MPC_ACC_HOR": _speeding_up,
 }
-PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE")
+PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE", *ROTORS)
 
 
 def _estimate(survey: Survey) -> Iterator[Finding]:
@@ -300,16 +423,17 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
         remedy = "wait for GPS, flow or motion capture; QGroundControl's arming checks name what is missing"
         yield Finding("position", BAD, "no LOCAL_POSITION_NED", remedy)
         return
-    wander_m = spread([sample.position_ned_m for sample in survey.positions])
-    noise_m_s = spread([sample.velocity_ned_m_s for sample in survey.positions])
-    seconds = LISTENING_US / 1e6
-    remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
-    yield _judged(
-        "position",
-        f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)",
-        (wander_m > MOST_WANDER_M, BAD, remedy),
-        (wander_m > DOUBTFUL_WANDER_M, DOUBTFUL, remedy),
-    )
+    if not survey.flies:
+        wander_m = spread([sample.position_ned_m for sample in survey.positions])
+        noise_m_s = spread([sample.velocity_ned_m_s for sample in survey.positions])
+        seconds = LISTENING_US / 1e6
+        remedy = "better position: RTK, flow with a range sensor, motion capture; or a larger recovery distance"
+        yield _judged(
+            "position",
+            f"standing, it wandered by {wander_m:.2f} m and {noise_m_s:.2f} m/s (RMS, {seconds:.0f} s)",
+            (wander_m > MOST_WANDER_M, BAD, remedy),
+            (wander_m > DOUBTFUL_WANDER_M, DOUBTFUL, remedy),
+        )
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
         yield Finding("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
@@ -327,12 +451,22 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
 
 
 def _vibration(survey: Survey) -> Iterator[Finding]:
+    doing = "hovering" if survey.flies else "standing"
     if survey.vibration:
         clipped = sum(survey.vibration[-1].clipping_counts) - sum(survey.vibration[0].clipping_counts)
         remedy = "fasten the flight controller; check the accelerometer"
-        yield _judged("clipping", f"{clipped} clipped samples while standing", (clipped != 0, BAD, remedy))
-    if survey.imu:
-        shakes_m_s2 = spread([sample.specific_force_frd_m_s2 for sample in survey.imu])
+        yield _judged("clipping", f"{clipped} clipped samples while {doing}", (clipped != 0, BAD, remedy))
+    forces = [sample.specific_force_frd_m_s2 for sample in survey.imu]
+    threshold_m_s2 = survey.config.least_threshold_m_s2
+    if forces and survey.flies and threshold_m_s2 is not None:
+        most_m_s2 = max(math.hypot(x, y) for x, y, _ in forces)
+        remedy = "balance or replace propellers, tighten motors, soften the mount; then `rebound tune` on this flight"
+        found = (
+            f"{spread(forces):.2f} m/s^2 (RMS) hovering; sideways {most_m_s2:.1f} of {threshold_m_s2:g} that tell a hit"
+        )
+        yield _judged("vibration", found, (most_m_s2 >= threshold_m_s2, DOUBTFUL, remedy))
+    elif forces:
+        shakes_m_s2 = spread(forces)
         remedy = "let the vehicle stand still, motors off, and ask again"
         found = f"{shakes_m_s2:.2f} m/s^2 (RMS) while standing"
         yield _judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
@@ -375,18 +509,22 @@ def _sight(survey: Survey) -> Iterator[Finding]:
 class Preflight:
     """Joins the codec with the pure survey; holds no clock and no socket. Times are microseconds, any epoch."""
 
-    def __init__(self, config: CompanionConfig, now_us: int) -> None:
+    def __init__(self, config: CompanionConfig, now_us: int, line: SerialLine | None = None) -> None:
         self._decoder, self._encoder = Decoder(), Encoder()
-        self.survey: Survey = start_survey(config, now_us)
+        self.survey: Survey = start_survey(config, now_us, line)
 
     def step(self, received: bytes, now_us: int) -> tuple[bytes, ...]:
         """Call with what was received since the last call; what is to be sent."""
         survey = self.survey
-        samples = [sample for _, sample in self._decoder.feed(received) if sample is not None]
-        is_known = survey.vehicle.identity is not None
+        frames = self._decoder.feed(received)
+        samples = [sample for _, sample in frames if sample is not None]
+        known = survey.vehicle.identity
+        if known is not None and survey.listening_since_us is not None:
+            for frame, _ in frames:
+                survey.delivery.take(frame, (known.system_id, known.component_id))
         outgoing = advance(survey, samples, now_us)
         identity = survey.vehicle.identity
-        if identity is not None and not is_known:
+        if identity is not None and known is None:
             self._decoder.listen_to(identity.system_id, identity.component_id)
             self._encoder.speak_to(identity.system_id, identity.component_id)
         return tuple(packet for message in outgoing for packet in self._encoder.packets(message))

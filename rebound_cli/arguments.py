@@ -127,6 +127,10 @@ def _add_peer_and_key(parser: Parser) -> None:
     _option(parser, "--signing-key", text, "FILE")
 
 
+def _add_wait(parser: Parser, where: str = "") -> None:
+    _flag(parser, "--wait", f"{where}wait without end for a vehicle that is missing or restarts on the ground")
+
+
 def _add_companion(parser: Parser) -> None:
     _option(parser, "--companion", "settings from this file's companion: part, as tune writes it", "FILE")
 
@@ -155,6 +159,7 @@ def add_fly(commands: Commands) -> None:
     _option(fly, "--obstacles", "what is known beforehand, e.g. another run's obstacles.json", "FILE")
     _add_json(fly, "summary")
     _add_peer_and_key(fly)
+    _add_wait(fly, "with --connect: ")
     _flag(fly, "--yes", "with --connect: fly the plan without asking")
 
 
@@ -162,6 +167,7 @@ def add_guard(commands: Commands) -> None:
     text = "Watches; at a hit takes the vehicle over, recovers and gives it back; see docs/how-to/guard.md."
     guard = _command(commands, "guard", "guard:run_guard", "protect a flight that something else commands", text)
     _add_connect(guard, required=True)
+    _add_wait(guard)
     _add_peer_and_key(guard)
     _option(guard, "--config", "settings, as in docs/how-to/guard.md", "FILE")
     _add_set(guard, "change a setting, e.g. max_hits=5")
@@ -214,6 +220,7 @@ def add_preflight(commands: Commands) -> None:
     _add_connect(preflight, required=True)
     _add_peer_and_key(preflight)
     _add_companion(preflight)
+    _option(preflight, "--card", "write the card of the first flight, to be printed", "FILE")
     _flag(preflight, "--fix", "offer to set the parameters that would mend it")
     _flag(preflight, "--yes", "with --fix: set them without asking")
     _add_json(preflight, "findings")
@@ -233,7 +240,7 @@ def add_logs(commands: Commands) -> None:
     ways = {
         "list": "every flight, the oldest first",
         "show": "what happened in a flight",
-        "export": "one archive of a flight",
+        "export": "one file of a flight",
     }
     listed, shown, exported = (
         _command(whats, name, f"flights.command:run_{name}", text, f"{text.capitalize()}.")
@@ -245,7 +252,9 @@ def add_logs(commands: Commands) -> None:
         _add_runs(parser)
     _add_json(listed, "flights")
     _add_json(shown, "flight")
-    _option(exported, "--out", "the archive (default: FLIGHT.tar.gz)", "FILE")
+    text = "archive: all its files (default); mcap: for Foxglove; ulg: for Flight Review and PlotJuggler"
+    _option(exported, "--format", text, choices=("archive", "mcap", "ulg"), default="archive")
+    _option(exported, "--out", "the file (default: FLIGHT.tar.gz, .mcap or .ulg)", "FILE")
     _add_no_position(exported)
 
 
@@ -330,6 +339,8 @@ def add_replay(commands: Commands) -> None:
     _option(replay, "--expect", "exit 1 unless there are exactly so many collisions", "none|N", type=_expected)
     text = "with --expect none: exit 1 where less of the flight was watched (default 0.5: most of it was not)"
     _option(replay, "--least-watched", text, "SHARE", type=share, default=0.5)
+    text = "PX4's own log of a run: write a copy of it with the run's events, hits and setpoints"
+    _option(replay, "--merge", text, "FILE")
     _option(replay, "--out", "folder of the pictures (default: runs/replay-<name of the log>)", "DIR")
     _add_json(replay, "findings")
 

@@ -51,8 +51,12 @@ def run_fly(options: Namespace) -> int:
         raise ConfigurationError("--airframe and --seed belong to simulated vehicles: leave them out with --connect.")
     if is_simulated and options.signing_key is not None:
         raise ConfigurationError("--signing-key belongs to --connect: leave it out where the vehicle is simulated.")
+    if options.wait and is_simulated:
+        raise ConfigurationError("--wait belongs to --connect: leave it out where the vehicle is simulated.")
     given = (options.airframe, options.seed, options.companion)
     document = inputs.load_mission_document(options.mission, options.set, *given)
+    if options.wait:
+        document.put_option("--wait", ("companion", "link", "wait"), True)
     if options.obstacles is not None:
         document.put_option("--obstacles", ("obstacles", "file"), str(options.obstacles))
     world = inputs.world_from(document) if is_simulated else None
@@ -60,13 +64,15 @@ def run_fly(options: Namespace) -> int:
     if options.resume is not None:
         inputs.resume(document, options.resume, mission, knows_more=options.obstacles is None)
         mission = inputs.mission_from(document, world)
+    if mission.companion.link.wait and options.yes:
+        raise ConfigurationError("--wait with --yes would arm a vehicle whenever it appears: leave one of them out.")
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
         prepare_companion(console, mission.companion)
         if world is not None and options.lockstep:
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-        connection = open_signed(options) if options.connect is not None else None
+        connection = None if is_simulated else open_signed(options, mission.companion.link.wait)
         if is_simulated and options.sim == "px4":
             connection = udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance)
         folder = run_folder.create_run_folder(options.out, mission.name)

@@ -28,7 +28,7 @@ def run_guard(options: Namespace) -> int:
     with console_for(False, Background("console")) as console:
         prepare_companion(console, config.companion)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
-        connection = open_signed(options)
+        connection = open_signed(options, config.companion.link.wait)
         folder = run_folder.create_run_folder(options.out, "guard")
         run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
         run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
@@ -74,6 +74,8 @@ def guard_config(options: Namespace) -> GuardConfig:
     if options.modes is not None:
         modes = [mode.strip().upper() for mode in options.modes.split(",")]
         document.put_option("--modes", ("modes",), modes, options.modes)
+    if options.wait:
+        document.put_option("--wait", ("companion", "link", "wait"), True)
     if options.then is not None:
         document.put_option("--then", ("then",), options.then)
     return validated(GuardConfig, document, document.data)

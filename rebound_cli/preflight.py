@@ -4,12 +4,17 @@ import json
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict
+from pathlib import Path
 
 from companion.errors import ConfigurationError
-from companion.preflight import Finding, Preflight, Verdict
+from companion.preflight import Finding, Preflight, SerialLine, Verdict
+from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
+from companion.shell.files import write_whole
+from rebound_cli.card import card
 from rebound_cli.console import Console, console_for
 from rebound_cli.inputs import companion_settings
 from rebound_cli.signed_connection import open_signed
@@ -27,7 +32,7 @@ def run_preflight(options: Namespace) -> int:
     config = companion_settings(options.companion, (), None)
     connection = open_signed(options)
     try:
-        preflight = Preflight(config, clock.now_us())
+        preflight = Preflight(config, clock.now_us(), serial_line(options.connect))
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
         while not preflight.finished:
             _exchange(preflight, connection, clock)
@@ -41,9 +46,28 @@ def run_preflight(options: Namespace) -> int:
             print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
         if options.fix:
             found = _fix(console, preflight, connection, clock, found, options.yes)
+        if options.card is not None:
+            try:
+                write_whole(options.card, card(preflight.survey, found, options.connect).encode())
+            except OSError as error:
+                raise ConfigurationError(f"{options.card}: cannot be written: {error.strerror}.") from error
+            console.print(f"\nThe card of the first flight is {options.card}.")
     finally:
         connection.close()
     return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0
+
+
+def serial_line(url: str, system: Path = Path("/")) -> SerialLine | None:
+    """What the link goes through; None on a network. `system` is where sys is."""
+    serial = serial_device(url)
+    if serial is None:
+        return None
+    device, baud = serial
+    name, timer_ms = Path(device).resolve().name, None
+    # The driver of FTDI's converters has it, and no other.
+    with suppress(OSError, ValueError):
+        timer_ms = int((system / "sys/bus/usb-serial/devices" / name / "latency_timer").read_text())
+    return SerialLine(None if name.startswith("ttyACM") else baud, timer_ms)
 
 
 def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> None:

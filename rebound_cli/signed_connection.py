@@ -52,13 +52,13 @@ class SignedConnection:
         self._writer.close()
 
 
-def open_signed(options: Namespace) -> Connection:
+def open_signed(options: Namespace, waits: bool = False) -> Connection:
     """To the vehicle at --connect. Raises ConnectionSetupError, SigningFileError."""
     if options.signing_key is None:
-        return open_connection(options.connect, options.peer)
+        return open_connection(options.connect, options.peer, waits=waits)
     clock, stamps = Clock(), StampFile(options.signing_key)
     signing = Signing(read_key(options.signing_key), stamps.first(clock.now_us()))
-    connection = open_connection(options.connect, options.peer, signing.is_genuine)
+    connection = open_connection(options.connect, options.peer, signing.is_genuine, waits)
     try:
         return SignedConnection(connection, signing, stamps, clock)
     except Exception:

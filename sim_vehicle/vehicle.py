@@ -18,7 +18,6 @@ from sim_vehicle.parameters.airframe_values import defaults_from, position_gains
 from sim_vehicle.parameters.store import Parameters
 from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
-from sim_vehicle.setpoint import Setpoint
 from sim_vehicle.slow_sensors import SlowSensors
 from sim_vehicle.truth import TruthRecorder
 
@@ -144,11 +143,16 @@ class SimulatedVehicle:
         if self._reboot_at_us is not None and self._is_rebooting(self._reboot_at_us):
             return
         self._communicate()
-        self._tune()
-        sample = self._fly(self._autopilot.run_control())
+        if self.parameters.changes != self._tuned_at:
+            self._tuned_at = self.parameters.changes
+            self._plant.tune(position_gains(self.parameters))
+        autopilot = self._autopilot
+        sample = self._plant.step(autopilot.run_control(), autopilot.motors_run)
+        autopilot.observe(sample)
+        self.time_boot_us = sample.time_boot_us + self._plant.booted_at_us
         self._topics.count(new_position=self._publish(sample))
-        texts = self.texts = tuple(self._autopilot.texts)
-        self._autopilot.texts.clear()
+        texts = self.texts = tuple(autopilot.texts)
+        autopilot.texts.clear()
         for link in self._links:
             link.update(sample.time_boot_us, texts)
 
@@ -199,17 +203,6 @@ class SimulatedVehicle:
         telemetry.air, telemetry.gps = slow.air, slow.gps
         telemetry.magnetic_field_frd_gauss = slow.magnetic_field_frd_gauss
 
-    def _tune(self) -> None:
-        if self.parameters.changes != self._tuned_at:
-            self._tuned_at = self.parameters.changes
-            self._plant.tune(position_gains(self.parameters))
-
-    def _fly(self, setpoint: Setpoint | None) -> PlantOutput:
-        sample = self._plant.step(setpoint, self._autopilot.motors_run)
-        self._autopilot.observe(sample)
-        self.time_boot_us = sample.time_boot_us + self._plant.booted_at_us
-        return sample
-
     def _publish(self, sample: PlantOutput) -> bool:
         """Hand the sample to the streams; whether position and velocity are published with it."""
         telemetry = self._telemetry
@@ -217,7 +210,8 @@ class SimulatedVehicle:
         onboard = self._plant.onboard
         if onboard is not None:
             telemetry.flow, telemetry.range = onboard.flow, onboard.range
-        self._sense(telemetry)
+        if self._plant.faults is not None or sample.time_boot_us >= self._slow.due_us:
+            self._sense(telemetry)
         telemetry.vibration.update(sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         if sample.time_boot_us - telemetry.published.time_boot_us < POSITION_PERIOD_US:
             return False

@@ -20,6 +20,7 @@ class Meet(Silent, ABC, Generic[MoveT]):
         self._started_us = now_us
         self._requests: Iterator[VehicleCommand] | None = None
         self._measuring_since_us: int | None = None
+        self._is_told = False  # what is waited for
 
     @abstractmethod
     def _refused(self, text: str) -> MoveT:
@@ -37,11 +38,16 @@ class Meet(Silent, ABC, Generic[MoveT]):
         identity, companion = flight.vehicle.identity, flight.mission.companion
         if identity is None:
             wait_s = companion.link.heartbeat_wait_s
-            if now_us - self._started_us < wait_s * 1e6:
+            if self._is_told or now_us - self._started_us < wait_s * 1e6:
                 return None
-            return self._refused(f"no HEARTBEAT from an autopilot within {wait_s:g} s; is the address right?")
+            text = f"no HEARTBEAT from an autopilot within {wait_s:g} s"
+            if not companion.link.wait:
+                return self._refused(f"{text}; is the address right?")
+            self._is_told = True
+            flight.tell(now_us, "link", f"{text}: waiting for it")
+            return None
         if self._requests is None:
-            self._requests, flight.was_silent = iter(self._commands(flight)), False
+            self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
             text = f"connected to a PX4 {identity.vehicle_type}, system {identity.system_id}"
             flight.tell(now_us, "connected", text, system_id=identity.system_id)
         if self._measuring_since_us is None:
@@ -64,6 +70,13 @@ class Meet(Silent, ABC, Generic[MoveT]):
             self._measuring_since_us = now_us
             flight.streams.start(now_us)
 
+    def _ask_again(self, flight: FlightContext, text: str, now_us: int) -> None:
+        """What is missing may come: a vehicle that has just started has no position."""
+        if not self._is_told:
+            self._is_told = True
+            flight.tell(now_us, "link", text)
+        self._requests, self._measuring_since_us = iter(self._commands(flight)), None
+
     def _tell_streams(self, flight: FlightContext, now_us: int) -> None:
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
@@ -77,9 +90,13 @@ class Connect(Meet[Move]):
     def _refused(self, text: str) -> Move:
         return Move(Trigger.REFUSED, text)
 
-    def _judge(self, flight: FlightContext, now_us: int) -> Move:
+    def _judge(self, flight: FlightContext, now_us: int) -> Move | None:
+        too_slow = flight.streams.too_slow()
+        if too_slow is not None and flight.mission.companion.link.wait:
+            self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
+            return None
         self._tell_streams(flight, now_us)
-        complaint = flight.streams.too_slow() or ground_check(flight)
+        complaint = too_slow or ground_check(flight)
         return Move(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
 
 

@@ -79,7 +79,7 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | Non
         return None
     silent_s = flight.silent_s(now_us)
     if state in ON_THE_GROUND:
-        if silent_s > link.heartbeat_wait_s:
+        if silent_s > link.patience_s:
             return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
         flight.note_silence(now_us)
         if flight.is_silent(now_us) or not flight.was_silent:

@@ -50,13 +50,13 @@ class Texts:
         return kind not in self.sent or now_us - self.sent[kind][0] >= TEXT_INTERVAL_US
 
 
-# Kinds of events that are told in their own words.
-_AS_THEY_STAND = frozenset(
-    (
-        *("in_the_way", "policy", "unreachable", "timeout", "envelope", "link", "implausible", "unconfirmed"),
-        *("take_over", "given_back", "let_go", "refused", "crossed", "left_alone", "lost", "late", "round_trip"),
-    )
+# Kinds of events that are told in their own words. What a pilot may have to act on is a warning.
+_WARNING = (
+    *("in_the_way", "unreachable", "timeout", "link", "implausible", "take_over", "let_go", "refused", "crossed"),
+    *("left_alone", "lost", "late", "round_trip"),
 )
+_NOTICE = ("policy", "envelope", "unconfirmed", "given_back")
+_AS_THEY_STAND = dict.fromkeys(_WARNING, Severity.WARNING) | dict.fromkeys(_NOTICE, Severity.NOTICE)
 
 
 def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
@@ -85,7 +85,7 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
             severity = Severity.INFO if is_good else Severity.ERROR
             return StatusText(severity, f"Mission {mission} {data['outcome']}, hits: {hits}{why}")
         case kind if kind in _AS_THEY_STAND:
-            return StatusText(Severity.WARNING, event.text[:1].upper() + event.text[1:])
+            return StatusText(_AS_THEY_STAND[kind], event.text[:1].upper() + event.text[1:])
     return None
 
 

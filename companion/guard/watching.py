@@ -43,7 +43,7 @@ class Connect(Meet[Move]):
 
     def __init__(self, now_us: int, is_first: bool = True) -> None:
         super().__init__(now_us)
-        self._is_first, self._is_told = is_first, False
+        self._is_first = is_first
 
     def _commands(self, flight: FlightContext) -> list[VehicleCommand]:
         return [
@@ -57,11 +57,8 @@ class Connect(Meet[Move]):
 
     def _judge(self, flight: FlightContext, now_us: int) -> Move | None:
         complaint = flight.streams.too_slow() or flight.round_trip.complaint()
-        if complaint is not None and not self._is_first:
-            if not self._is_told:
-                self._is_told = True
-                flight.tell(now_us, "link", f"not guarded by now: {complaint}")
-            self._requests, self._measuring_since_us = iter(self._commands(flight)), None
+        if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
+            self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
             return None
         self._tell_streams(flight, now_us)
         flight.tell(now_us, "unattended", unattended_text(flight.mission.limits.max_speed_m_s))

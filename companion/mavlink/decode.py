@@ -28,8 +28,10 @@ Frame = tuple[bytes, Sample | None]
 WRAP_US = (1 << 32) * 1000
 # Stamps of one boot differ by as much as their messages are apart, which is far less than an hour.
 SAME_BOOT_US = 3_600_000_000
-# Packets with other ids have a checksum that cannot be checked.
-KNOWN_IDS = frozenset(dialect.mavlink_map)
+# What the checksum counts beside the packet: CRC_EXTRA, by message id. Packets with other ids have one that cannot be
+# checked.
+_CRC_EXTRA = {number: bytes((message.crc_extra,)) for number, message in dialect.mavlink_map.items()}
+KNOWN_IDS = frozenset(_CRC_EXTRA)
 
 
 class Decoder:
@@ -77,9 +79,10 @@ class Decoder:
 
     def _sample(self, packet: bytes) -> Sample | None:
         message_id = message_id_of(packet)
-        reader, source = self._readers.get(message_id), source_of(packet)
+        reader = self._readers.get(message_id)
         if reader is None:
             return None
+        source = source_of(packet)
         if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
             return None
         sample = reader.from_payload(payload_of(packet), source)
@@ -101,8 +104,8 @@ def checksum_holds(data: bytes, start: int, length: int) -> bool:
     else:
         message_id = data[start + 5]
         end = start + HEADER_V1 + data[start + 1]
-    message = dialect.mavlink_map.get(message_id)
-    if message is None:
+    crc_extra = _CRC_EXTRA.get(message_id)
+    if crc_extra is None:
         return start + length == len(data) or data[start + length] in (MAGIC_V1, MAGIC_V2)
-    expected: int = mcrf4xx(data[start + 1 : end] + bytes((message.crc_extra,)))
+    expected: int = mcrf4xx(data[start + 1 : end] + crc_extra)
     return expected == data[end] | data[end + 1] << 8

@@ -27,6 +27,11 @@ def source_of(packet: bytes) -> tuple[int, int]:
     return (packet[5], packet[6]) if packet[0] == MAGIC_V2 else (packet[3], packet[4])
 
 
+def sequence_of(packet: bytes) -> int:
+    """The sender counts its packets in one byte."""
+    return packet[4] if packet[0] == MAGIC_V2 else packet[2]
+
+
 def message_id_of(packet: bytes) -> int:
     return packet[7] | packet[8] << 8 | packet[9] << 16 if packet[0] == MAGIC_V2 else packet[5]
 

@@ -4,6 +4,7 @@ The layout is pymavlink's own; its message objects, which take most of the time,
 """
 
 import math
+import re
 import struct
 from collections.abc import Callable, Mapping
 from inspect import signature
@@ -29,19 +30,26 @@ class Reader:
         names = list(signature(make).parameters)
         self._takes_source = names[0] == "source"
         self._names = names[self._takes_source :]
-        # One name may stand for several values: q[4].
-        places, count = dict[str, int | slice](), 0
-        for name, length in zip(message.ordered_fieldnames, message.lengths, strict=True):
+        # The fields that are not named are passed over. One name may stand for several values: q[4].
+        places, count, layout = dict[str, int | slice](), 0, "<"
+        parts = re.findall(r"\d*[a-zA-Z]", message.unpacker.format)
+        for name, length, part in zip(message.ordered_fieldnames, message.lengths, parts, strict=True):
+            if name not in self._names:
+                layout += f"{struct.calcsize('<' + part)}x"
+                continue
+            layout += part
             places[name] = count if length == 1 else slice(count, count + length)
             count += length
         picked = [places[name] for name in self._names]
-        self._pick = itemgetter(*picked) if len(picked) > 1 else lambda values: (values[picked[0]],)
-        self._unpacker, self._make, self.name = message.unpacker, make, str(message.msgname)
+        self._pick = None if picked == list(range(count)) else itemgetter(*picked)
+        self._unpacker, self._make, self.name = struct.Struct(layout), make, str(message.msgname)
 
     def from_payload(self, payload: bytes, source: tuple[int, int]) -> Sample | None:
         """MAVLink 2 leaves out the zeros at a payload's end."""
         unpacker = self._unpacker
-        fields = self._pick(unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size]))
+        fields = unpacker.unpack(payload.ljust(unpacker.size, b"\0")[: unpacker.size])
+        if self._pick is not None:
+            fields = self._pick(fields)
         return self._make(source, *fields) if self._takes_source else self._make(*fields)
 
     def from_fields(self, values: Mapping[str, Any], source: tuple[int, int]) -> Sample | None:

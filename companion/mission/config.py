@@ -1,5 +1,6 @@
 """The mission's `companion:` part: every key optional, every default with its reason."""
 
+import math
 from typing import Annotated
 
 from pydantic import Field
@@ -46,11 +47,18 @@ class LinkConfig(Written):
 
     heartbeat_wait_s: Positive = 10.0
     """PX4 announces itself once a second; ten misses are not bad luck."""
+    wait: bool = False
+    """On the ground, wait without end for a vehicle that is missing, restarts, or has no position yet (`--wait`)."""
     silence_s: Annotated[Positive, Field(ge=0.2)] = 1.5
     """More than the one-second HEARTBEAT interval, so that a lost packet is not a lost link, and still sooner
     than anyone notices a vehicle flying on its own."""
     position_silence_s: Annotated[Positive, Field(ge=0.1)] = 1.0
     """A position this old is 2 m wrong at 2 m/s: nothing flown on it is safe."""
+
+    @property
+    def patience_s(self) -> float:
+        """How long a vehicle on the ground may stay silent."""
+        return math.inf if self.wait else self.heartbeat_wait_s
 
 
 class FlightConfig(Written):

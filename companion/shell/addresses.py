@@ -26,10 +26,14 @@ _FORMS = "udpin://HOST:PORT, udpout://HOST:PORT, tcpout://HOST:PORT, tcpin://HOS
 
 
 def open_connection(
-    url: str, peer: str | None = None, is_genuine: Callable[[bytes], bool] = lambda packet: True
+    url: str,
+    peer: str | None = None,
+    is_genuine: Callable[[bytes], bool] = lambda packet: True,
+    waits: bool = False,
 ) -> Connection:
     """Open the address; `peer`, HOST or HOST:PORT, is the only one heard on udpin, and only genuine packets pin it.
 
+    `waits`: a port that is not there, or a server that does not answer, is looked for until it is.
     Raises ConnectionSetupError with one clear sentence.
     """
     scheme, rest = _scheme_and_rest(url)
@@ -38,7 +42,7 @@ def open_connection(
     if peer is not None and scheme != "udpin":
         raise AddressError(f"--peer {peer} is for udpin://; {url!r} names its peer itself.")
     if scheme == "serial":
-        return serial_port(*_device_and_baud(url, rest))
+        return serial_port(*_device_and_baud(url, rest), waits)
     host, port = _host_and_port(url, rest)
     if scheme in ("udpout", "tcpout") and (not host or port == 0):
         raise AddressError(f"{url!r} names no remote host and port: use {scheme}://HOST:PORT.")
@@ -49,15 +53,15 @@ def open_connection(
     if scheme == "udpout":
         return udp_out(host, port)
     if scheme == "tcpout":
-        return tcp_out(host, port)
+        return tcp_out(host, port, waits)
     return TcpInConnection(host, port)
 
 
-def serial_device(url: str) -> str | None:
-    """The device of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
+def serial_device(url: str) -> tuple[str, int] | None:
+    """Device and baud rate of a serial address; None for a network's. Nothing is opened. Raises AddressError."""
     scheme, rest = _scheme_and_rest(url)
     if scheme == "serial":
-        return _device_and_baud(url, rest)[0]
+        return _device_and_baud(url, rest)
     _host_and_port(url, rest)
     return None
 

@@ -89,12 +89,13 @@ class StreamConnection:
     seconds.
     """
 
-    def __init__(self, stream: Stream | None, open_anew: Callable[[], Stream]) -> None:
-        """`open_anew` raises where it fails. Without a stream it is opened for the first time."""
+    def __init__(self, stream: Stream | None, open_anew: Callable[[], Stream], missing: str | None = None) -> None:
+        """`open_anew` raises where it fails. Without a stream it is opened for the first time; `missing` says why."""
         self._stream, self._open_anew = stream, open_anew
         self._found: SimpleQueue[Stream] = SimpleQueue()
         self._closed = threading.Event()
-        self._news: deque[str] = deque()
+        self._news = deque([] if missing is None else [f"{missing} Waiting for it."])
+        self._is_missed = missing is not None
         self._lost_s: float | None = None
         self._reconnects = 0
         if stream is None:
@@ -120,6 +121,8 @@ class StreamConnection:
         if self._lost_s is not None:
             self._reconnects += 1
             self._news.append(f"connected again after {time.monotonic() - self._lost_s:.1f} s: {self._stream.at}")
+        elif self._is_missed:
+            self._news.append(f"connected: {self._stream.at}")
 
     def _begin(self, old: Stream | None) -> None:
         threading.Thread(target=self._reopen, args=(old,), name="rebound link", daemon=True).start()
@@ -155,14 +158,20 @@ class StreamConnection:
             self._stream.close()
 
 
-def tcp_out(host: str, port: int) -> StreamConnection:
+def tcp_out(host: str, port: int, waits: bool = False) -> StreamConnection:
     """A client of a TCP server."""
+
+    def open_anew() -> Stream:
+        return _connected(host, port, ATTEMPT_S)
+
     try:
         stream = _connected(host, port, TCP_CONNECT_TIMEOUT_S)
     except (OSError, UnicodeError) as error:
         text = f"Cannot connect to {host}:{port} over TCP: {plain(error)}."
+        if waits:
+            return StreamConnection(None, open_anew, text)
         raise ConnectionSetupError(text) from error
-    return StreamConnection(stream, lambda: _connected(host, port, ATTEMPT_S))
+    return StreamConnection(stream, open_anew)
 
 
 def _connected(host: str, port: int, timeout_s: float) -> Stream:
@@ -231,10 +240,14 @@ class SerialDevice:
         return stream
 
 
-def serial_port(path: str, baud: int) -> StreamConnection:
-    if not os.path.exists(path):
-        raise ConnectionSetupError(f"Serial port {path} does not exist: is the cable plugged in?")
+def serial_port(path: str, baud: int, waits: bool = False) -> StreamConnection:
+    """A port that may not be opened is waited for by nobody: that is a matter of rights."""
     device = SerialDevice(path, baud)
+    if not os.path.exists(path):
+        text = f"Serial port {path} does not exist: is the cable plugged in?"
+        if waits:
+            return StreamConnection(None, device.open, text)
+        raise ConnectionSetupError(text)
     try:
         stream = device.open()
     except (OSError, ValueError) as error:

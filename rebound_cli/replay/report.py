@@ -206,12 +206,15 @@ def report_data(replay: Replay, pictures: Sequence[str]) -> dict[str, Any]:
 
 
 def _finding_data(replay: Replay, finding: Finding) -> dict[str, Any]:
+    times = {"at_s": _seconds(replay, finding.at_us), "contact_at_s": _seconds(replay, _on_log(finding))}
+    return {**times, "contact_error_s": finding.first.time_error_us / 1e6, **finding_data(finding)}
+
+
+def finding_data(finding: Finding) -> dict[str, Any]:
+    """Of an impact, without the times that are some log's own."""
     first, final, situation = finding.first, finding.final, finding.situation
     return {
-        "at_s": _seconds(replay, finding.at_us),
         "sample_time_boot_us": first.impact.sample_time_boot_us,
-        "contact_at_s": _seconds(replay, _on_log(finding)),
-        "contact_error_s": first.time_error_us / 1e6,
         "is_collision": finding.is_collision,
         "kind": final.kind.value,
         "evidence": first.impact.evidence.value,

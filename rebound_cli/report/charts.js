@@ -276,5 +276,7 @@ function addLink(parent) {
   for (let row = 0; row < t.length; row += 1) least = Math.min(least, t[row] - boot[row]);
   const late = Array.from(t, (time, row) => 1e3 * (time - boot[row] - least));
   const series = [{ label: "later by", values: plotted(late), colour: "--blue" }];
-  addChart(parent, { title: "IMU samples: later than the quickest", unit: "ms", across: "s", x: plotted(t), series, height: 140, up: { range: (plot, low, high) => [0, Math.max(1, high)] } });
+  // Room below: a link without any lateness is a line, and no part of the axis.
+  const up = { range: (plot, low, high) => [-0.1, 1.1].map((share) => share * Math.max(1, high)) };
+  addChart(parent, { title: "IMU samples: later than the quickest", unit: "ms", across: "s", x: plotted(t), series, height: 140, up });
 }

@@ -49,7 +49,7 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "modes": _modes(flight),
         "recovering": _recovering(flight),
         "obstacles": [] if no_position else _obstacles(flight),
-        "surfaces": [] if no_position else _surfaces(flight),
+        "surfaces": [] if no_position else surfaces(flight),
         "vehicle": _vehicle(flight),
         "has_places": not no_position,
         "link": link_rows(flight),
@@ -237,7 +237,7 @@ def _motion(flight: ShownFlight, motion: Motion | None) -> dict[str, Any] | None
     return {"t": times_s, "offsets": motion.offsets_ned_m}
 
 
-def _surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
+def surfaces(flight: ShownFlight) -> list[dict[str, Any]]:
     """What was believed of each surface from when until when: from each touch of it to the next."""
     told = [
         (_seconds(flight, event["time_us"]), patch_of(event["data"]))

@@ -39,10 +39,10 @@ _WRITTEN_BY = _UNIT.partition("\n")[0]
 
 def _address(url: str) -> str:
     try:
-        device = serial_device(url)
+        device, _ = serial_device(url) or ("", 0)
     except AddressError as error:
         raise ValueError(str(error)) from error
-    if device is not None and (_DEVICE.fullmatch(device) is None or ".." in device):
+    if device and (_DEVICE.fullmatch(device) is None or ".." in device):
         raise ValueError(f"{device!r} is not the name of a device, such as /dev/ttyAMA0")
     return url
 
@@ -61,12 +61,14 @@ class ServiceSettings(Written):
     @property
     def device(self) -> str | None:
         """The serial device; None on a network."""
-        return serial_device(self.connect)
+        serial = serial_device(self.connect)
+        return None if serial is None else serial[0]
 
     def arguments(self) -> Sequence[str]:
         """What the service runs, after `rebound`."""
         file = f"/{FOLDER}/{self.run}.yaml"
-        first = ["guard", "--config", file] if self.run == "guard" else ["fly", file, "--yes"]
+        # A mission does not wait: it would arm a vehicle that appears hours after the person has started it.
+        first = ["guard", "--config", file, "--wait"] if self.run == "guard" else ["fly", file, "--yes"]
         options = {"--connect": self.connect, "--peer": self.peer, "--signing-key": self.signing_key}
         return [*first, *(word for name, value in options.items() if value is not None for word in (name, value))]
 
@@ -137,8 +139,10 @@ def _link(device: str | None, serial_group: str) -> str:
         # udev ends the names of converters, which are ttyUSB, with the number of their port (60-serial.rules).
         name = "ttyUSB" if re.search(r"-port\d+$", name) else "ttyACM"
     major = _USB_MAJORS.get(name[:6])
+    # systemd allows a device by its number of this moment: one that comes later would stay closed to whoever waits.
+    present = f"ExecStartPre=/usr/bin/test -c {device}\n" if major is None else ""
     return f"""# The link: {device}
-DevicePolicy=closed
+{present}DevicePolicy=closed
 DeviceAllow={device if major is None else f"char-{major}"} rw
 SupplementaryGroups={serial_group}
 PrivateNetwork=yes

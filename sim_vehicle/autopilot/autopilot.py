@@ -63,7 +63,7 @@ class Autopilot:
             first.time_boot_us,
             first.position_ned_m,
             first.velocity_ned_m_s,
-            yaw_of(first.attitude_wxyz),
+            first.attitude_wxyz,
             home_ned_m=first.position_ned_m,
             home_yaw_rad=yaw_of(first.attitude_wxyz),
         )
@@ -127,7 +127,8 @@ class Autopilot:
         """Commands, failsafes, arming: everything that can change mode or arming."""
         self._look()
         self.commander.run(self._now_us, self._estimate.attitude_wxyz)
-        self._run_mission_commands()
+        if self.navigator.mission.commands:
+            self._run_mission_commands()
         acks: list[CommandAck] = []
         if self._commands:
             self.navigator.notice_changes()  # a list that has just come is judged before it is to be flown
@@ -211,15 +212,12 @@ class Autopilot:
         """Let the navigator see where the vehicle is."""
         view, estimate = self.navigator.view, self._estimate
         view.now_us, view.position_ned_m = estimate.time_boot_us, estimate.position_ned_m
-        view.velocity_ned_m_s, view.yaw_rad = estimate.velocity_ned_m_s, yaw_of(estimate.attitude_wxyz)
+        view.velocity_ned_m_s, view.attitude_wxyz = estimate.velocity_ned_m_s, estimate.attitude_wxyz
         view.landed, view.armed = self.detector.landed, self.arming.armed
 
     def _run_mission_commands(self) -> None:
         """In the interval after the items that gave them: what was reached until then has been told by now."""
-        queue = self.navigator.mission.commands
-        if not queue:
-            return
-        given, self.navigator.mission.commands = queue, []
+        given, self.navigator.mission.commands = self.navigator.mission.commands, []
         for item in given:
             commands.execute(flight_commands.from_mission(item), self)
 

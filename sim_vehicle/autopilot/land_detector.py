@@ -32,15 +32,16 @@ class _Stage:
         self._holds_us = holds_us
         self._since_us: int | None = None
 
-    def update(self, condition: bool, now_us: int) -> None:
+    def update(self, condition: bool, now_us: int) -> bool:
         if not condition:
             self.state = False
             self._since_us = None
-            return
+            return False
         if self._since_us is None:
             self._since_us = now_us
         if now_us - self._since_us >= self._holds_us:
             self.state = True
+        return self.state
 
 
 class LandDetector:
@@ -53,21 +54,12 @@ class LandDetector:
         self._maybe = _Stage(STAGE_US, True)
         self._landed = _Stage(STAGE_US, True)
         self._free_fall = _Stage(FREE_FALL_US, False)
-
-    @property
-    def ground_contact(self) -> bool:
+        self.ground_contact = True
         """First stage: commanded down, yet not moving. The position control gives way here."""
-        return self._contact.state
-
-    @property
-    def maybe_landed(self) -> bool:
+        self.maybe_landed = True
         """Second stage: and next to no thrust. Disarming by command is accepted from here on."""
-        return self._maybe.state
-
-    @property
-    def landed(self) -> bool:
+        self.landed = True
         """Third stage: all of it for long enough."""
-        return self._landed.state
 
     def update(
         self,
@@ -88,8 +80,9 @@ class LandDetector:
             for stage in (self._contact, self._maybe, self._landed):
                 stage.update(True, now_us)
                 stage.state = True
+            self.ground_contact = self.maybe_landed = self.landed = True
             return
-        on_ground = self._maybe.state or self._landed.state
+        on_ground = self.maybe_landed or self.landed
         descent_m_s = DESCENT_FACTOR * self._parameters["LNDMC_Z_VEL_MAX"]
         descends = asked_down_m_s is not None and asked_down_m_s >= descent_m_s
         still = self._is_still(velocity_ned_m_s)
@@ -97,15 +90,15 @@ class LandDetector:
         gives_way = thrust_fraction <= self._thrust(LOW_THRUST_SHARE)
         gives_way = gives_way and (descends or on_ground or not controls_climb)
         none = self._thrust(NO_THRUST_SHARE) if controls_climb else self._parameters["MPC_MANTHR_MIN"] + 0.01
-        self._contact.update(gives_way and still, now_us)
-        self._maybe.update(
+        self.ground_contact = self._contact.update(gives_way and still, now_us)
+        self.maybe_landed = self._maybe.update(
             thrust_fraction <= none
-            and self._contact.state
+            and self.ground_contact
             and not self._free_fall.state
             and not self._rotates(angular_velocity_frd_rad_s),
             now_us,
         )
-        self._landed.update(self._maybe.state, now_us)
+        self.landed = self._landed.update(self.maybe_landed, now_us)
 
     def _thrust(self, share: float) -> float:
         least = self._parameters["MPC_THR_MIN"]
@@ -113,9 +106,9 @@ class LandDetector:
 
     def _is_still(self, velocity_ned_m_s: Vector3) -> bool:
         north, east, down = velocity_ned_m_s
-        vertical = self._parameters["LNDMC_Z_VEL_MAX"] * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
+        vertical = self._parameters["LNDMC_Z_VEL_MAX"] * (WIDER_WHEN_LANDED if self.landed else 1.0)
         return abs(down) < vertical and math.hypot(north, east) <= self._parameters["LNDMC_XY_VEL_MAX"]
 
     def _rotates(self, angular_velocity_frd_rad_s: Vector3) -> bool:
-        limit = math.radians(self._parameters["LNDMC_ROT_MAX"]) * (WIDER_WHEN_LANDED if self._landed.state else 1.0)
+        limit = math.radians(self._parameters["LNDMC_ROT_MAX"]) * (WIDER_WHEN_LANDED if self.landed else 1.0)
         return math.hypot(angular_velocity_frd_rad_s[0], angular_velocity_frd_rad_s[1]) > limit

@@ -60,18 +60,19 @@ class OffboardSignal:
         self._last_us = now_us
         self.ever_arrived = True
 
-    def update(self, now_us: int) -> None:
-        """Judge the stream; call at every step."""
+    def update(self, now_us: int) -> bool:
+        """Judge the stream, at every step; whether the judgement is another."""
         if self._last_us is None:
-            return
+            return False
+        arrived, was_back = self.arrives, self.is_back
         self.arrives = True
         self.is_back = now_us - self._first_us >= BACK_AFTER_US
-        if now_us < self._next_check_us:
-            return
-        self._next_check_us = now_us + CHECK_PERIOD_US
-        if now_us - self._last_us >= 1e6 * self._parameters["COM_OF_LOSS_T"] + NOTICED_AFTER_US:
-            self.arrives = self.is_back = False
-            self._last_us = None
+        if now_us >= self._next_check_us:
+            self._next_check_us = now_us + CHECK_PERIOD_US
+            if now_us - self._last_us >= 1e6 * self._parameters["COM_OF_LOSS_T"] + NOTICED_AFTER_US:
+                self.arrives = self.is_back = False
+                self._last_us = None
+        return self.arrives is not arrived or self.is_back is not was_back
 
 
 def refusal(target: PositionTarget) -> StatusText | None:

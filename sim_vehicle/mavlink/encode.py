@@ -5,18 +5,21 @@ Source: PX4's mavlink/streams/*.hpp. All times are the vehicle's boot clock.
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any, TypeAlias
 
+from fastcrc.crc16 import mcrf4xx
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, StatusText, TimeSyncRequest
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.mavlink import framing
+from sim_vehicle.mavlink.framing import HEADER, MAGIC, Packed
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
-# pymavlink's messages carry no types; only `Encoder.packet` looks inside.
+# One of pymavlink's, which carry no types, or a `framing.Packed`; only `Encoder.packet` looks inside.
 Message: TypeAlias = Any
 
 NAN = math.nan
@@ -38,9 +41,30 @@ class Encoder:
     def packet(self, message: Message) -> bytes | None:
         """The message as a packet; None for one whose number MAVLink 1 has no room for."""
         link = self._link
+        if type(message) is tuple:
+            if self.speaks_mavlink_1 or link.signing.sign_outgoing:
+                return self._whole(message)
+            layout, payload = message
+            # Zeros at the end of a payload are left out, but for its first byte.
+            sent = payload.rstrip(b"\0") or payload[:1]
+            header = HEADER.pack(len(sent), 0, link.seq, link.srcSystem, link.srcComponent)
+            link.seq = (link.seq + 1) & 0xFF
+            framed: bytes = header + layout.number_bytes + sent
+            checksum: int = mcrf4xx(framed + layout.checked)
+            return MAGIC + framed + checksum.to_bytes(2, "little")
         if self.speaks_mavlink_1 and message.get_msgId() > _GREATEST_MAVLINK_1_ID:
             return None
         packet: bytes = message.pack(link, force_mavlink1=self.speaks_mavlink_1)
+        link.seq = (link.seq + 1) & 0xFF
+        return packet
+
+    def _whole(self, message: Packed) -> bytes | None:
+        """A signed packet or one of MAVLink 1: pymavlink's whole."""
+        layout, payload = message
+        if self.speaks_mavlink_1 and layout.number > _GREATEST_MAVLINK_1_ID:
+            return None
+        link, theirs = self._link, dialect.MAVLink_message(layout.number, layout.name)
+        packet: bytes = theirs._pack(link, layout.checked[0], payload, self.speaks_mavlink_1)
         link.seq = (link.seq + 1) & 0xFF
         return packet
 
@@ -81,7 +105,7 @@ def highres_imu(state: Telemetry) -> Message:
         pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
         if air_is_new:
             fields |= _AIR_FIELDS
-    return framing.HighresImu(
+    return framing.HIGHRES_IMU, framing.HIGHRES_IMU.pack(
         sample.time_boot_us,
         *sample.specific_force_frd_m_s2,
         *sample.angular_velocity_frd_rad_s,
@@ -97,18 +121,20 @@ def highres_imu(state: Telemetry) -> Message:
 
 def local_position_ned(state: Telemetry) -> Message:
     estimate = state.published
-    return framing.LocalPositionNed(boot_ms(estimate), *estimate.position_ned_m, *estimate.velocity_ned_m_s)
+    return framing.LOCAL_POSITION_NED, framing.LOCAL_POSITION_NED.pack(
+        boot_ms(estimate), *estimate.position_ned_m, *estimate.velocity_ned_m_s
+    )
 
 
 def attitude(state: Telemetry) -> Message:
     sample = state.sample
     angles = (*roll_pitch_of(sample.attitude_wxyz), yaw_of(sample.attitude_wxyz))
-    return framing.PackedAttitude(boot_ms(sample), *angles, *sample.angular_velocity_frd_rad_s)
+    return framing.ATTITUDE, framing.ATTITUDE.pack(boot_ms(sample), *angles, *sample.angular_velocity_frd_rad_s)
 
 
 def attitude_quaternion(state: Telemetry) -> Message:
     sample = state.sample
-    return framing.AttitudeQuaternion(
+    return framing.ATTITUDE_QUATERNION, framing.ATTITUDE_QUATERNION.pack(
         boot_ms(sample), *sample.attitude_wxyz, *sample.angular_velocity_frd_rad_s, *_NO_OFFSET
     )
 
@@ -116,7 +142,7 @@ def attitude_quaternion(state: Telemetry) -> Message:
 def odometry(state: Telemetry) -> Message:
     """Velocity is NED too (child frame 1), unlike what the message's definition suggests."""
     estimate = state.published
-    return framing.PackedOdometry(
+    return framing.ODOMETRY, framing.ODOMETRY.pack(
         estimate.time_boot_us,
         *estimate.position_ned_m,
         *estimate.attitude_wxyz,
@@ -208,12 +234,13 @@ def boot_ms(estimate: Estimate) -> int:
     return (estimate.time_boot_us // 1000) & 0xFFFFFFFF
 
 
-def diagonal_covariance(first: float, second: float) -> list[float]:
+@lru_cache(maxsize=2)
+def diagonal_covariance(first: float, second: float) -> tuple[float, ...]:
     """Upper right triangle of a 6x6 matrix, row by row, with ``first`` and ``second`` three times each."""
     triangle = [0.0] * 21
     triangle[0] = triangle[6] = triangle[11] = first
     triangle[15] = triangle[18] = triangle[20] = second
-    return triangle
+    return tuple(triangle)
 
 
 def _filled(vector: Axis3) -> tuple[float, float, float]:

@@ -166,8 +166,9 @@ class Link:
             self._sign()
         for text in texts:
             self._texts.add(text, now_us)
-        for message in self._texts.due(now_us):
-            self.send(message)
+        if self._texts.waiting:
+            for message in self._texts.due(now_us):
+                self.send(message)
         for service in self._busy:
             service.update(now_us)
         self.streams.update()

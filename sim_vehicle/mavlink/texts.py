@@ -26,7 +26,7 @@ class TextLink:
     """Texts waiting for a ground station."""
 
     def __init__(self) -> None:
-        self._waiting: deque[tuple[int, StatusText]] = deque(maxlen=QUEUE_LENGTH)
+        self.waiting: deque[tuple[int, StatusText]] = deque(maxlen=QUEUE_LENGTH)
         self._heard_us: int | None = None
         self._sent_us = -TEXT_INTERVAL_US
         self._number = 0
@@ -38,16 +38,16 @@ class TextLink:
 
     def add(self, text: StatusText, now_us: int) -> None:
         """Queue a text."""
-        self._waiting.append((now_us, text))
+        self.waiting.append((now_us, text))
 
     def due(self, now_us: int) -> Iterator[Message]:
         """The messages of the next text, if it is time for one and somebody listens."""
-        if not self._waiting or self._heard_us is None:
+        if self._heard_us is None:
             return
         if now_us - self._heard_us > GROUND_STATION_TIMEOUT_US or now_us - self._sent_us < TEXT_INTERVAL_US:
             return
-        while self._waiting:
-            written_us, text = self._waiting.popleft()
+        while self.waiting:
+            written_us, text = self.waiting.popleft()
             if now_us - written_us < STALE_US:
                 self._sent_us = now_us
                 yield from encode.status_texts(text, self._number)

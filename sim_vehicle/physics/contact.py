@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GUARDS, HUB, ContactSprings, PlantState, Scratch
 from sim_vehicle.physics.meeting import meet
 from sim_vehicle.physics.proximity import IN_FRONT, INSIDE, NEAR, points_at
@@ -19,7 +19,7 @@ Ints = npt.NDArray[np.int64]
 FRICTION_SPEED_M_S = 0.02
 
 
-@njit
+@inlined
 def arm_force(fold_m: float, fold_speed_m_s: float, contact: ContactSprings) -> float:
     """Force along an arm at this fold and folding speed, newtons, never negative (eq. 2, then the stop)."""
     force = contact.arm_stiffness * fold_m + contact.arm_damping * fold_speed_m_s
@@ -29,7 +29,7 @@ def arm_force(fold_m: float, fold_speed_m_s: float, contact: ContactSprings) -> 
     return max(0.0, force)
 
 
-@njit
+@inlined
 def point_force(
     point: int, depth: float, speed_in: float, share: float, relaxed_m: float, contact: ContactSprings
 ) -> float:
@@ -52,7 +52,7 @@ def point_force(
     return max(0.0, contact.foot_stiffness * depth + contact.foot_damping * speed_in)
 
 
-@njit
+@inlined
 def contact_wrench(
     body: Floats,
     rotation: Floats,
@@ -100,7 +100,7 @@ def contact_wrench(
                 _add_push(normal, speed_in, friction, face != 0, rotation, scratch)
 
 
-@njit
+@inlined
 def _add_push(
     normal_n: float, speed_in: float, friction: float, is_obstacle: bool, rotation: Floats, scratch: Scratch
 ) -> None:
@@ -124,7 +124,7 @@ def _add_push(
         scratch.moment_frd[i] += rotation[0, i] * x + rotation[1, i] * y + rotation[2, i] * z
 
 
-@njit
+@inlined
 def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxed_m: Floats) -> None:
     """Write how far each arm would be folded after ``step_s`` with nothing pressing it.
 
@@ -134,6 +134,9 @@ def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxe
     """
     for arm in range(4):
         fold = state.fold_m[arm]
+        if fold == 0.0 and state.fold_rate_m_s[arm] == 0.0:
+            relaxed_m[arm] = 0.0
+            continue
         held = min(fold, contact.hysteresis_m)
         if contact.arm_damping <= 0.0:
             relaxed_m[arm] = held
@@ -158,7 +161,7 @@ def _returning_m_s(fold_m: float, contact: ContactSprings) -> float:
     return returning
 
 
-@njit
+@inlined
 def settle_arms(
     state: PlantState,
     behind: Ints,
@@ -181,10 +184,11 @@ def settle_arms(
         state.share[:] = 0.0
     state.was_near = 1 if touches else 0
     for arm in range(GUARDS):
-        state.fold_rate_m_s[arm] = (state.fold_m[arm] - scratch.fold_before_m[arm]) / step_s
+        folded_m = state.fold_m[arm] - scratch.fold_before_m[arm]
+        state.fold_rate_m_s[arm] = folded_m / step_s if folded_m != 0.0 else 0.0
 
 
-@njit
+@inlined
 def settle_contacts(
     state: PlantState, behind: Ints, near: Ints, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim_vehicle.physics.inertia import turning_energy
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import (
     HIT_ACTIVE,
     HIT_ENERGY_AFTER_J,
@@ -35,7 +35,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-@njit
+@inlined
 def note_contact(
     state: PlantState,
     offset_us: float,

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState, Scratch
 
 Floats = npt.NDArray[np.float64]
 
 
-@njit
+@inlined
 def add_raw_sample(
     state: PlantState, scratch: Scratch, noise: Floats, raw: int, constants: Constants, disturbance: Disturbance
 ) -> None:

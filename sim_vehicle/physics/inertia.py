@@ -8,7 +8,7 @@ arms folded fully move it by 2 mm.
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, Constants
 
 Floats = npt.NDArray[np.float64]
@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.float64]
 XX, YY, ZZ, XY = range(4)
 
 
-@njit
+@inlined
 def inertia_of(fold_m: Floats, fold_rate_m_s: Floats, constants: Constants, inertia: Floats, rate: Floats) -> None:
     """Write J (kg m^2) and its rate (kg m^2/s) at these folds, entries XX, YY, ZZ, XY, body frame."""
     for entry in range(3):
@@ -39,7 +39,7 @@ def inertia_of(fold_m: Floats, fold_rate_m_s: Floats, constants: Constants, iner
             total[XY] -= change * x * y
 
 
-@njit
+@inlined
 def times(inertia: Floats, p: float, q: float, r: float) -> tuple[float, float, float]:
     """An inertia times a vector in the body frame."""
     return inertia[XX] * p + inertia[XY] * q, inertia[XY] * p + inertia[YY] * q, inertia[ZZ] * r

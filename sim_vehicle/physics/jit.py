@@ -29,7 +29,10 @@ def njit(function: Kernel) -> Kernel:
 
 
 def inlined(function: Kernel) -> Kernel:
-    """The same, put into whatever calls it: for small functions that are called with whole arrays again and again."""
+    """The same, put into whatever calls it: what is called in every step of the physics.
+
+    An array is handed over as nine numbers, which costs such a function more than its own work.
+    """
     return cast(Kernel, numba.njit(cache=NOT_KEPT is None, fastmath=False, forceinline=True)(function))
 
 

@@ -168,6 +168,7 @@ class Scratch:
     trial: Annotated[Floats, (13,)]
     force_ned: Vector3
     moment_frd: Vector3
+    thrusts_moment_frd: Vector3  # of the moment, what the motors give over a step
     contact_ned: Vector3  # of the force, what the walls give
     where: Vector3
     normal: Vector3

@@ -81,7 +81,7 @@ def deepest_point(
     return share, further
 
 
-@njit
+@inlined
 def meet(
     point: int, face: int, rotation: Floats, position: Floats, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> tuple[float, float]:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import FEET, POINTS, ContactSprings, Scratch
 from sim_vehicle.physics.meeting import deepest_point, depth_in, meet, nearest_on_line, part_centre, within
 from sim_vehicle.world import FACE_MEETS_FEET, FACE_NORMAL, FACE_POINT, FACE_RADIUS, FACE_VELOCITY
@@ -43,7 +43,7 @@ def wake_faces(
     return awake
 
 
-@njit
+@inlined
 def find_near(body: Floats, contact: ContactSprings, faces: Floats, near: Ints, scratch: Scratch) -> bool:
     """Mark the faces that some part could reach; return whether there is any."""
     found = False
@@ -57,7 +57,7 @@ def find_near(body: Floats, contact: ContactSprings, faces: Floats, near: Ints, 
     return found
 
 
-@njit
+@inlined
 def _is_within_reach(body: Floats, face: int, reach_m: float, faces: Floats, scratch: Scratch) -> bool:
     """Whether a face's plane, or a round's surface, is less than ``reach_m`` from the vehicle's centre."""
     if faces[face, FACE_RADIUS] == 0.0:
@@ -69,7 +69,7 @@ def _is_within_reach(body: Floats, face: int, reach_m: float, faces: Floats, scr
     return bool(squared < (reach_m + faces[face, FACE_RADIUS]) ** 2)
 
 
-@njit
+@inlined
 def find_close(
     body: Floats, behind: Ints, near: Ints, margin_m: float, contact: ContactSprings, faces: Floats, scratch: Scratch
 ) -> bool:
@@ -115,7 +115,7 @@ def note_passing(
         behind[point, face] = PASSED
 
 
-@njit
+@inlined
 def points_at(face: int, near: Ints, faces: Floats) -> tuple[int, int]:
     """The range of points worth looking at: feet meet level faces alone, guards and hub what is close."""
     last = POINTS if faces[face, FACE_MEETS_FEET] == 1.0 else FEET

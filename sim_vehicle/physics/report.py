@@ -6,9 +6,9 @@ from sim_vehicle.physics.record import Floats
 
 # What really is: time (us), position, velocity, attitude, folds, contact force. `truth.py` keeps these.
 TRUTH = slice(0, 16)
-# What the vehicle's own software may know: mean specific force, mean rates and clip counts; its estimate.
-SENSED, ESTIMATE = slice(16, 25), slice(25, 35)
-ACCELERATION, MOTORS = slice(35, 38), slice(38, 42)
+# What the vehicle's own software may know: mean specific force, mean rates and clip counts; after them its estimate of
+# position, velocity, attitude and acceleration, and the motors' commands.
+SENSED, KNOWN = slice(16, 25), slice(16, 42)
 # How many hits ended in the interval.
 HITS_ENDED = 42
 REPORT_COLUMNS = 43

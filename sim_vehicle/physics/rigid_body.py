@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from sim_vehicle.physics.contact import contact_wrench
 from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import (
     ARM_DIRECTIONS_FRD,
     BODY_SIZE,
@@ -24,10 +24,11 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-@njit
+@inlined
 def derivative(
     body: Floats,
-    thrusts_n: Floats,
+    thrust_n: float,
+    mass_kg: float,
     inertia: Floats,
     inertia_rate: Floats,
     behind: Ints,
@@ -43,21 +44,16 @@ def derivative(
     slope: Floats,
 ) -> None:
     """Write d(body)/dt of eq. 1 into ``slope``: m v' = m g e3 - f R e3 + drag + contact and
-    J W' = tau - W x J W - J' W, the last for the arms' folding; J and J' are held over a step.
+    J W' = tau - W x J W - J' W, the last for the arms' folding; J and J' are held over a step, as f and the thrusts'
+    moment (`thrusts_moment`) are.
 
     ``touches`` off skips the contacts: no face is near.
     """
     matrix_from_quaternion(body, rotation)
     force, moment = scratch.force_ned, scratch.moment_frd
-    total_n = thrusts_n[0] + thrusts_n[1] + thrusts_n[2] + thrusts_n[3]
     for i in range(3):
-        force[i] = -total_n * rotation[i, 2] - constants.drag_n_s_m * (body[3 + i] - disturbance.wind_ned_m_s[i])
-        moment[i] = 0.0
-    for motor in range(4):
-        thrust = thrusts_n[motor]
-        moment[0] -= contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
-        moment[1] += contact.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust
-        moment[2] += ROTOR_YAW_SIGNS[motor] * constants.moment_per_thrust_m * thrust
+        force[i] = -thrust_n * rotation[i, 2] - constants.drag_n_s_m * (body[3 + i] - disturbance.wind_ned_m_s[i])
+        moment[i] = scratch.thrusts_moment_frd[i]
     if disturbance.pushes == 1:
         add_push(rotation, disturbance, scratch)
     if disturbance.holds == 1:
@@ -69,7 +65,7 @@ def derivative(
     p, q, r = body[10], body[11], body[12]
     for i in range(3):
         slope[i] = body[3 + i]
-        slope[3 + i] = force[i] / (constants.mass_kg + disturbance.carried_kg)
+        slope[3 + i] = force[i] / mass_kg
     slope[5] += GRAVITY_M_S2
     slope[6] = -0.5 * (body[7] * p + body[8] * q + body[9] * r)
     slope[7] = 0.5 * (body[6] * p + body[8] * r - body[9] * q)
@@ -82,6 +78,17 @@ def derivative(
     slope[10] = (inertia[YY] * tx - inertia[XY] * ty) / determinant
     slope[11] = (inertia[XX] * ty - inertia[XY] * tx) / determinant
     slope[12] = (moment[2] - (p * y - q * x) - fz) / inertia[ZZ]
+
+
+@inlined
+def thrusts_moment(thrusts_n: Floats, constants: Constants, moment: Floats) -> None:
+    """Write the moment (FRD, N m) of the motors' thrusts and of their drag."""
+    moment[:] = 0.0
+    for motor in range(4):
+        thrust = thrusts_n[motor]
+        moment[0] -= constants.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
+        moment[1] += constants.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust
+        moment[2] += ROTOR_YAW_SIGNS[motor] * constants.moment_per_thrust_m * thrust
 
 
 @njit
@@ -115,7 +122,7 @@ def move_faces(moving: Ints, step_s: float, faces: Floats) -> None:
             faces[row, FACE_POINT + i] += step_s * faces[row, FACE_VELOCITY + i]
 
 
-@njit
+@inlined
 def runge_kutta_step(
     state: PlantState,
     behind: Ints,
@@ -137,6 +144,9 @@ def runge_kutta_step(
     """
     body, thrusts_n, inertia, inertia_rate = state.body, state.motor_thrust_n, state.inertia, state.inertia_rate
     inertia_of(state.fold_m, state.fold_rate_m_s, constants, inertia, inertia_rate)
+    thrusts_moment(thrusts_n, constants, scratch.thrusts_moment_frd)
+    thrust_n = thrusts_n[0] + thrusts_n[1] + thrusts_n[2] + thrusts_n[3]
+    mass_kg = constants.mass_kg + disturbance.carried_kg
     k, trial = scratch.slopes, scratch.trial
     for stage in range(4):
         if moving.shape[0] > 0 and (stage == 1 or stage == 3):
@@ -146,7 +156,8 @@ def runge_kutta_step(
             trial[i] = body[i] + part_s * k[max(stage - 1, 0), i]
         derivative(
             trial,
-            thrusts_n,
+            thrust_n,
+            mass_kg,
             inertia,
             inertia_rate,
             behind,

@@ -9,12 +9,12 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim_vehicle.physics.jit import njit
+from sim_vehicle.physics.jit import inlined, njit
 
 Floats = npt.NDArray[np.float64]
 
 
-@njit
+@inlined
 def matrix_from_quaternion(body: Floats, rotation: Floats) -> None:
     """Write the rotation matrix R (body to NED) of a body's unit quaternion into ``rotation`` (3, 3)."""
     w, x, y, z = body[6], body[7], body[8], body[9]
@@ -29,7 +29,7 @@ def matrix_from_quaternion(body: Floats, rotation: Floats) -> None:
     rotation[2, 2] = 1 - 2 * (x * x + y * y)
 
 
-@njit
+@inlined
 def normalise(body: Floats) -> None:
     """Scale a body's quaternion to unit length in place: integration lets it drift by rounding."""
     w, x, y, z = body[6], body[7], body[8], body[9]

@@ -5,14 +5,14 @@ import math
 import numpy as np
 
 from sim_vehicle.physics.estimate import EstimateErrors
-from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState
+from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Constants, Disturbance, PlantState
 from sim_vehicle.physics.record import Floats
 from sim_vehicle.world import Vector3
 
 
 def trim(
     state: PlantState,
-    errors: EstimateErrors,
+    remembered: tuple[EstimateErrors, Floats],
     constants: Constants,
     disturbance: Disturbance,
     position_ned_m: Vector3,
@@ -35,15 +35,15 @@ def trim(
     state.yaw_setpoint_rad = yaw_rad
     state.collective_n = constants.mass_kg * float(np.linalg.norm(upheld))
     state.motor_command_n[:] = state.motor_thrust_n[:] = state.collective_n / 4
-    _remember(state, errors, 1e-6 * constants.raw_interval_us * constants.raw_per_interval)
+    _remember(state, *remembered, 1e-6 * constants.raw_interval_us * constants.raw_per_interval)
 
 
-def _remember(state: PlantState, errors: EstimateErrors, interval_s: float) -> None:
+def _remember(state: PlantState, errors: EstimateErrors, past: Floats, interval_s: float) -> None:
     """Let the estimate have seen the steady flight before."""
-    slots, position, velocity = len(errors.past), state.body[0:3].copy(), state.body[3:6]
+    slots, position, velocity = len(past), state.body[0:3].copy(), state.body[3:6]
     for step in range(slots):
-        row = errors.past[(errors.cursor[0] + step) % slots]
-        row[:] = state.body
+        row = past[(errors.cursor + step) % slots]
+        row[:BODY_SIZE] = state.body
         row[0:3] = position + (step - slots + 1) * interval_s * velocity
     delayed_s = max(slots - 1, 0) * interval_s
     state.estimate[:] = state.body[:10]

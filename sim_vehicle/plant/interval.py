@@ -17,7 +17,7 @@ from sim_vehicle.physics.contact import relax_arms, settle_arms
 from sim_vehicle.physics.estimate import EstimateErrors, update_estimate, update_slope
 from sim_vehicle.physics.hits import close_old_hit, note_contact
 from sim_vehicle.physics.imu import add_raw_sample
-from sim_vehicle.physics.jit import borrowed, njit
+from sim_vehicle.physics.jit import borrowed, inlined, njit
 from sim_vehicle.physics.layout import (
     ASKED_ATTITUDE,
     ASKED_RATES,
@@ -67,6 +67,7 @@ def advance_interval(
     forces: Floats,
     scratch: Scratch,
     errors: EstimateErrors,
+    past: Floats,
     report: Floats,
 ) -> None:
     """Advance ``state`` by one integration interval, renew the vehicle's estimate, fill ``report``.
@@ -77,7 +78,7 @@ def advance_interval(
     standard normal: six values a raw sample, then nine for the estimate.
     ``behind`` (POINTS, n faces) is 1 where a point is behind a face without having met it and belongs to
     the state; ``near`` (n faces) and ``forces`` (2, POINTS, n faces) are working memory. ``moving`` are the rows of
-    ``faces`` that have a velocity: they are moved on.
+    ``faces`` that have a velocity: they are moved on. ``past`` without rows: the estimate comes from elsewhere.
     """
     state.peak_force_n = 0.0
     state.finished_count = 0
@@ -86,21 +87,23 @@ def advance_interval(
     state.clipped_off_m_s[:] = 0.0
     interval_s = 1e-6 * constants.raw_per_interval * constants.raw_interval_us
     awake = wake_faces(state.body, interval_s, constants, faces, near, scratch)
+    spun = 1.0 - math.exp(-1e-6 * constants.raw_interval_us / constants.motor_time_constant_s)
+    if motors in (MOTORS_OFF, MOTORS_IDLE):
+        rest_loops(state)
+        state.motor_command_n[:] = constants.motor_idle_n if motors == MOTORS_IDLE else 0.0
     for raw in range(constants.raw_per_interval):
         if motors == MOTORS_FLYING:
             run_loops(state, asked, constants)
-        elif motors != MOTORS_DRIVEN:
-            rest_loops(state)
-            state.motor_command_n[:] = constants.motor_idle_n if motors == MOTORS_IDLE else 0.0
-        spin_motors(state, constants, disturbance)
+        spin_motors(state, spun, constants, disturbance)
         for i in range(3):
             scratch.velocity_before[i] = state.body[3 + i]
         move_body(state, awake, fine_steps, constants, disturbance, faces, moving, behind, near, forces, scratch)
         add_raw_sample(state, scratch, noise, raw, constants, disturbance)
         state.time_us += constants.raw_interval_us
     close_old_hit(state)
-    update_estimate(state, errors, noise[6 * constants.raw_per_interval :], disturbance)
-    update_slope(state, errors, interval_s)
+    if past.shape[0] > 0:
+        update_estimate(state, errors, past, noise, disturbance)
+        update_slope(state, errors, interval_s)
     if motors == MOTORS_DRIVEN:
         state.frame_offset_ned_m[:] = 0.0
     write_report(state, constants, report)
@@ -121,7 +124,8 @@ def advance_boxed(
     near: Ints,
     forces: Floats,
     scratches: Floats,
-    errors: EstimateErrors,
+    errors: Floats,
+    past: Floats,
     report: Floats,
 ) -> None:
     """The same, with each record as an array of one."""
@@ -139,8 +143,9 @@ def advance_boxed(
         borrowed(near),
         borrowed(forces),
         scratches[0],
-        errors,
-        report,
+        errors[0],
+        borrowed(past),
+        borrowed(report),
     )
 
 
@@ -176,17 +181,16 @@ def rest_loops(state: PlantState) -> None:
     state.yaw_setpoint_rad = yaw_of(state.estimate)
 
 
-@njit
-def spin_motors(state: PlantState, constants: Constants, disturbance: Disturbance) -> None:
-    """First-order lag of each motor's thrust towards what it gives of its command, over one raw interval."""
-    share = 1.0 - math.exp(-1e-6 * constants.raw_interval_us / constants.motor_time_constant_s)
+@inlined
+def spin_motors(state: PlantState, share: float, constants: Constants, disturbance: Disturbance) -> None:
+    """First-order lag of each motor's thrust: in a raw interval by ``share`` nearer to what it gives of its command."""
     for motor in range(4):
         command = min(max(state.motor_command_n[motor], 0.0), constants.motor_max_n)
         given = disturbance.motor_share[motor] * command
         state.motor_thrust_n[motor] += share * (given - state.motor_thrust_n[motor])
 
 
-@njit
+@inlined
 def move_body(
     state: PlantState,
     awake: bool,
@@ -228,7 +232,7 @@ def move_body(
             note_contact(state, 1e6 * step * step_s, step_s, near, forces[0], contact, faces, mass_kg, scratch)
 
 
-@njit
+@inlined
 def fastest_m_s(moving: Ints, faces: Floats) -> float:
     """An upper bound of the speed of anything that moves."""
     fastest = 0.0

@@ -16,16 +16,7 @@ from sim_vehicle.physics.estimate import estimate_errors
 from sim_vehicle.physics.layout import HIT_ACTIVE, HIT_FACE, Constants, Scratch, calm, constants_from, initial_state
 from sim_vehicle.physics.proximity import points_behind
 from sim_vehicle.physics.record import Floats, boxed, new_record
-from sim_vehicle.physics.report import (
-    ACCELERATION,
-    ESTIMATE,
-    HITS_ENDED,
-    MOTORS,
-    REPORT_COLUMNS,
-    SENSED,
-    TRUTH,
-    report_estimate,
-)
+from sim_vehicle.physics.report import HITS_ENDED, KNOWN, REPORT_COLUMNS, SENSED, TRUTH, report_estimate
 from sim_vehicle.physics.surroundings import Surroundings
 from sim_vehicle.physics.trim import trim
 from sim_vehicle.plant.interval import (
@@ -97,7 +88,8 @@ class Plant:
         self.state = initial_state(centre, math.radians(scene.start.yaw_deg))
         self.interval_us = airframe.imu.integration_interval_us
         self._around = Surroundings(scene.world(), centre, 0, self.interval_us)
-        self._errors = estimate_errors(airframe, self.state.body, self._rng)
+        self._errors, self._past = estimate_errors(airframe, self.state.body, self._rng)
+        self._errors_box = boxed(self._errors)
         self.onboard: OnboardEstimator | None = None
         if airframe.estimate.kind == "ekf":
             self.onboard = _onboard_estimator(airframe, self._around.flat_faces, self.state.body, seed)
@@ -105,6 +97,7 @@ class Plant:
         self._frame_offset_ned_m = self.state.frame_offset_ned_m
         self._acceleration_ned_m_s2 = self.state.acceleration_ned_m_s2
         self._body = self.state.body
+        self._noise = np.empty(6 * self._raw_samples + 9)
         self._report = np.zeros(REPORT_COLUMNS)
         self._true_columns, self._sensed_columns = self._report[TRUTH], self._report[SENSED]
         self._asked = AskedSetpoint()
@@ -205,7 +198,8 @@ class Plant:
 
     def cruise(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3, yaw_rad: float) -> None:
         """Put the vehicle into a flight that has been steady for a while."""
-        trim(self.state, self._errors, self._constants, self.disturbance, position_ned_m, velocity_ned_m_s, yaw_rad)
+        remembered = (self._errors, self._past)
+        trim(self.state, remembered, self._constants, self.disturbance, position_ned_m, velocity_ned_m_s, yaw_rad)
         self._around.behind[:] = points_behind(self._around.faces, position_ned_m)
         if self.onboard is not None:
             self.onboard.start(self.state.body, self.state.time_us)
@@ -233,7 +227,7 @@ class Plant:
             self._state_box,
             self._asked.box,
             motors,
-            self._rng.standard_normal(6 * self._raw_samples + 9),
+            self._rng.standard_normal(out=self._noise),
             self._fine_steps,
             self._constants_box,
             self._disturbance_box,
@@ -243,10 +237,15 @@ class Plant:
             around.near,
             around.forces,
             self._scratch_box,
-            self._errors,
+            self._errors_box,
+            self._past,
             self._report,
         )
-        self._record_truth()
+        report = self._report
+        self.truth.record(self._true_columns)
+        if report[HITS_ENDED]:
+            for row in self._finished_hits[: int(report[HITS_ENDED])]:
+                self.truth.add_hit(row, self.world)
         if self.onboard is not None and motors != MOTORS_DRIVEN:
             self._estimate_state(self.onboard, motors == MOTORS_FLYING)
         return self._output()
@@ -259,24 +258,13 @@ class Plant:
             estimate[0:6] += self.disturbance.estimate_jump
         report_estimate(self._body, estimate, acceleration, self._frame_offset_ned_m, self._report)
 
-    def _reset_counter(self) -> int:
-        own = 0 if self.onboard is None else self.onboard.reset_counter
-        return own if self.faults is None else own + self.faults.reset_counter
-
-    def _record_truth(self) -> None:
-        self.truth.record(self._true_columns)
-        ended = int(self._report[HITS_ENDED])
-        for row in self._finished_hits[:ended] if ended else ():
-            self.truth.add_hit(row, self.world)
-
     def _output(self) -> PlantOutput:
-        row: list[float] = self._report.tolist()
-        fx, fy, fz, p, q, r, clip_x, clip_y, clip_z = row[SENSED]
-        px, py, pz, vx, vy, vz, qw, qx, qy, qz = row[ESTIMATE]
-        ax, ay, az = row[ACCELERATION]
-        m1, m2, m3, m4 = row[MOTORS]
+        onboard, faults, report = self.onboard, self.faults, self._report.tolist()
+        fx, fy, fz, p, q, r, clip_x, clip_y, clip_z, px, py, pz, vx, vy, vz, *others = report[KNOWN]
+        qw, qx, qy, qz, ax, ay, az, m1, m2, m3, m4 = others
+        resets = 0 if onboard is None else onboard.reset_counter
         return PlantOutput(
-            int(row[0]) - self.booted_at_us,
+            int(report[0]) - self.booted_at_us,
             (fx, fy, fz),
             (p, q, r),
             (int(clip_x), int(clip_y), int(clip_z)),
@@ -286,5 +274,5 @@ class Plant:
             (qw, qx, qy, qz),
             (m1 + m2 + m3 + m4) / 4,
             (m1, m2, m3, m4),
-            self._reset_counter(),
+            resets if faults is None else resets + faults.reset_counter,
         )

@@ -61,6 +61,50 @@ def failed_keeping_arms(vehicle):
     return f, f.companion.report()
 
 
+WAITS = {"link": {"wait": True, "heartbeat_wait_s": 1.0}, "streams": {"window_s": 0.5}}
+
+
+def test_a_flight_that_waits_outlasts_a_vehicle_that_is_missing_restarts_and_has_no_position_at_first():
+    # Given nobody on the link for a minute
+    f = flight(FakeVehicle(silent=True, no_positions=True), confirmed=False, companion=WAITS)
+    f.run_for(60.0)
+    assert f.texts() == ["link: no HEARTBEAT from an autopilot within 1 s: waiting for it"]
+    # When a vehicle starts that has no position yet
+    f.vehicle.silent = False
+    f.run_for(10.0)
+    assert f.state == "connect"
+    told = [text for text in f.texts() if "not ready by now" in text]
+    assert len(told) == 1 and "LOCAL_POSITION_NED arrives at 0.0 Hz" in told[0]
+    # Then its plan is ready once it has one, and again after it was silent for a minute; nothing is armed meanwhile
+    for spoiled in ("no_positions", "silent"):
+        setattr(f.vehicle, spoiled, False)
+        f.run_to("ready", 5.0)
+        f.vehicle.silent = True
+        f.run_for(60.0)
+        assert not f.companion.finished
+    assert [m for _, m in f.vehicle.commands if m.command in (176, 400)] == []
+    f.vehicle.silent = False
+    f.run_for(3.0)
+    f.companion.confirm_plan()
+    f.run_to_end()
+    assert f.companion.report().outcome == "completed"
+
+
+def test_a_flight_that_waits_does_not_take_a_vehicle_back_after_a_silence_in_the_air():
+    f = flight(companion=WAITS)
+    f.run_to("mission")
+    # When the link falls silent in flight, and is there again
+    f.vehicle.silent = True
+    f.run_for(6.0)
+    assert f.companion.finished
+    f.vehicle.silent = False
+    before = len(f.vehicle.commands)
+    f.run_for(5.0)
+    # Then the flight has ended, as without --wait, and nothing is commanded any more
+    assert f.companion.report().outcome == "aborted"
+    assert len(f.vehicle.commands) == before
+
+
 def test_a_vehicle_armed_by_someone_else_while_the_plan_is_read_is_not_taken():
     f = flight(confirmed=False)
     f.run_to("ready")

@@ -5,9 +5,10 @@ import itertools
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
-from companion.flight.operator import Texts
+from companion.flight.operator import Texts, status_text
 from companion.mavlink.encode import Encoder
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
+from companion.report import Event
 from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
 
 INTO_WALL = [
@@ -135,6 +136,25 @@ def spoken(steps, ends_at=None):
 )
 def test_of_each_subject_one_text_a_second_is_sent_and_none_twice(told, sent):
     assert spoken(told) == sent
+
+
+@pytest.mark.parametrize(
+    ("kind", "severity"),
+    [("link", 4), ("take_over", 4), ("let_go", 4), ("given_back", 5), ("policy", 5), ("envelope", 5), ("mode", None)],
+)
+def test_what_a_pilot_may_have_to_act_on_warns_and_what_goes_as_planned_does_not(kind, severity):
+    text = status_text(Event(EPOCH_US, kind, "something is so", {}), "test", 0)
+    assert text == (None if severity is None else StatusText(Severity(severity), "Something is so"))
+
+
+def test_the_companion_is_an_onboard_controller_of_the_vehicles_system_and_no_autopilot():
+    # As QGroundControl and PX4 tell one from a vehicle: MAV_TYPE 18, MAV_AUTOPILOT 8, component 191
+    f = flight(FakeVehicle(system_id=7))
+    f.run_to("mission")
+    beats = [message for _, message in f.vehicle.heartbeats][2:]
+    assert beats and {(one.type, one.autopilot, one.base_mode) for one in beats} == {(18, 8, 0)}
+    assert {(one.get_srcSystem(), one.get_srcComponent()) for one in beats} == {(7, 191)}
+    assert [one.system_status for one in beats][-1] == 4, "active"
 
 
 def test_a_flood_of_texts_is_one_a_second():

@@ -1,13 +1,18 @@
 """Preflight: what the companion says of a vehicle's settings, streams and estimate, and the remedy it names."""
 
+from dataclasses import replace
+
 import pytest
 
+from companion.mavlink.delivery import Delivery
 from companion.messages import (
     Attitude,
     Battery,
     EstimatorStatus,
+    ExtendedState,
     Heartbeat,
     ImuSample,
+    LandedState,
     LocalPosition,
     Parameter,
     ReadParameter,
@@ -17,7 +22,7 @@ from companion.messages import (
     Vibration,
 )
 from companion.mission.config import CompanionConfig
-from companion.preflight import PARAMETERS, Survey, Verdict, advance, findings, start_survey
+from companion.preflight import PARAMETERS, SerialLine, Survey, Verdict, advance, findings, start_survey
 
 PX4 = Heartbeat(1, 1, 2, 12, False, 0, 3)
 HEALTHY = {
@@ -28,21 +33,56 @@ HEALTHY = {
     "CBRK_FLIGHTTERM": 121212,
     "IMU_INTEG_RATE": 250,
     "MPC_ACC_HOR": 2.0,
+    "CA_ROTOR_COUNT": 4,
+    # The paper's vehicle, its arms 0.145 m long, in PX4's order.
+    **{f"CA_ROTOR{n}_PX": ahead * 0.1025 for n, ahead in enumerate((1, -1, 1, -1))},
+    **{f"CA_ROTOR{n}_PY": right * 0.1025 for n, right in enumerate((1, -1, -1, 1))},
 }
+ON_TELEM2 = {
+    "MAV_0_CONFIG": 101,
+    "MAV_0_MODE": 0,
+    "MAV_0_RATE": 1200,
+    "MAV_0_FORWARD": 1,
+    "MAV_2_CONFIG": 0,
+    "MAV_1_CONFIG": 102,
+    "MAV_1_MODE": 2,
+    "MAV_1_RATE": 0,
+    "MAV_1_FORWARD": 1,
+    "SER_TEL1_BAUD": 57_600,
+    "SER_TEL2_BAUD": 921_600,
+}
+UART = SerialLine(921_600)
 
 
 def surveyed(
-    parameters=HEALTHY, imu_hz=250, wander_m=0.0, ratio=0.1, trip_us=2_000, battery=90, clipped=0, velocity=True
+    parameters=HEALTHY,
+    imu_hz=250,
+    wander_m=0.0,
+    ratio=0.1,
+    trip_us=2_000,
+    battery=90,
+    clipped=0,
+    velocity=True,
+    line=None,
+    held_us=0,
+    flies=False,
+    shakes_m_s2=0.0,
+    companion=None,
 ) -> Survey:
-    """A vehicle that was listened to for the whole time."""
-    survey = start_survey(CompanionConfig(), 0)
+    """A vehicle that was listened to for the whole time; its samples arrive in batches, every `held_us`."""
+    survey = start_survey(CompanionConfig.model_validate(companion or {}), 0, line)
     advance(survey, [PX4], 0)
     step_us, asked = 4_000, []
+    held: list[Sample] = []
     for number in range(11_200_000 // step_us):
         now_us = (number + 1) * step_us
         samples: list[Sample] = []
         if number * imu_hz // 250 != (number + 1) * imu_hz // 250:
-            samples.append(ImuSample(now_us, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)))
+            side_m_s2 = shakes_m_s2 * (-1) ** number
+            held.append(ImuSample(now_us, (side_m_s2, 0.0, -9.81), (0.0, 0.0, 0.0)))
+        if not held_us or number % (held_us // step_us) == 0:
+            samples += held
+            held = []
         if number % 5 == 0:
             north_m = wander_m if number % 2 else -wander_m
             samples += [LocalPosition(now_us, (north_m, 0.0, 0.0), (0.0, 0.0, 0.0)), Attitude(now_us, (1.0, 0, 0, 0))]
@@ -50,6 +90,7 @@ def surveyed(
             samples += [EstimatorStatus((ratio, ratio, ratio), velocity, False), Battery(battery)]
             samples += [Vibration(now_us, 0.0, 0.0, (clipped * number, 0, 0))]
             samples += [Parameter(name, value) for name, value in parameters.items()]
+            samples += [replace(PX4, armed=flies), ExtendedState(LandedState(2 if flies else 1))]
         if asked and now_us - asked[0] // 1000 >= trip_us:
             samples.append(TimeSyncAnswer(asked.pop(0), 1))
         sent = advance(survey, samples, now_us)
@@ -62,8 +103,87 @@ def verdicts(survey: Survey) -> dict[str, Verdict]:
     return {finding.item: finding.verdict for finding in findings(survey)}
 
 
+def found_in(survey: Survey):
+    return {finding.item: finding for finding in findings(survey)}
+
+
 def test_a_healthy_vehicle_has_nothing_to_mend():
     assert set(verdicts(surveyed()).values()) == {Verdict.GOOD}
+    on_a_line = verdicts(surveyed({**HEALTHY, **ON_TELEM2}, line=UART))
+    assert set(on_a_line.values()) == {Verdict.GOOD} and {"port", "MAV_1_MODE", "arrival", "rotors"} <= set(on_a_line)
+
+
+@pytest.mark.parametrize(
+    ("changed", "line", "item", "remedy"),
+    [
+        ({"SER_TEL1_BAUD": 115_200, "SER_TEL2_BAUD": 0}, UART, "port", "MAV_1_CONFIG = 102"),
+        ({"MAV_1_MODE": 0}, UART, "MAV_1_MODE", "MAV_1_MODE = 2, then reboot"),
+        ({"MAV_1_RATE": 1200}, UART, "MAV_1_RATE", "MAV_1_RATE = 0, then reboot"),
+        ({"MAV_1_FORWARD": 0}, UART, "MAV_1_FORWARD", "MAV_1_FORWARD = 1, then reboot"),
+        # A radio's port, which is all that runs at this rate
+        ({}, SerialLine(57_600), "port", "SER_TEL1_BAUD = 921600"),
+        ({}, SerialLine(57_600), "MAV_0_MODE", "MAV_0_MODE = 2"),
+        ({}, SerialLine(None), "port", "CBRK_USB_CHK = 197848"),
+    ],
+)
+def test_the_port_at_the_end_of_the_line_is_named_with_what_is_wrong_with_it(changed, line, item, remedy):
+    finding = found_in(surveyed({**HEALTHY, **ON_TELEM2, **changed}, line=line))[item]
+    assert finding.verdict is Verdict.DOUBTFUL and remedy in finding.remedy
+
+
+def test_a_rate_above_px4s_own_and_a_usb_port_that_is_allowed_are_in_order():
+    fast = surveyed({**HEALTHY, **ON_TELEM2, "MAV_1_RATE": 80_000}, line=UART)
+    assert verdicts(fast)["MAV_1_RATE"] is Verdict.GOOD
+    on_usb = surveyed({**HEALTHY, "CBRK_USB_CHK": 197_848}, line=SerialLine(None))
+    assert verdicts(on_usb)["port"] is Verdict.GOOD
+
+
+def test_clocks_that_drift_apart_are_no_uneven_arrival():
+    delivery = Delivery()
+    for number in range(2_500):
+        delivery.arrived(5_000_000 + 4_000 * number, 10**15 + round(1.01 * 4_000 * number))
+    assert delivery.jitter_us == pytest.approx(0.0, abs=10.0)
+
+
+def test_samples_that_are_held_back_are_told_with_the_timer_that_holds_them():
+    # Given FTDI's 16 ms, in which four samples gather
+    assert verdicts(surveyed())["arrival"] is Verdict.GOOD
+    finding = found_in(surveyed(held_us=16_000))["arrival"]
+    assert finding.verdict is Verdict.DOUBTFUL and "latency timer is 16 ms by default" in finding.remedy
+    assert "differ by 12.0 ms" in finding.found
+    # The driver's own word counts whatever was measured
+    known = found_in(surveyed(line=SerialLine(921_600, 16), parameters={**HEALTHY, **ON_TELEM2}))["arrival"]
+    assert known.verdict is Verdict.DOUBTFUL and "is 16 ms;" in known.remedy
+    quick = surveyed(line=SerialLine(921_600, 1), parameters={**HEALTHY, **ON_TELEM2})
+    assert verdicts(quick)["arrival"] is Verdict.GOOD
+
+
+@pytest.mark.parametrize(
+    ("changed", "companion", "verdict"),
+    [
+        ({"CA_ROTOR_COUNT": 6}, {}, Verdict.DOUBTFUL),
+        # A stretched frame, 10 cm from the X that the fit knows: a guard's radius is 8
+        ({"CA_ROTOR0_PX": 0.2025}, {"estimate": {"guards": {"travel_m": 0.03}}}, Verdict.DOUBTFUL),
+        ({"CA_ROTOR0_PX": 0.1525}, {"estimate": {"guards": {"travel_m": 0.03}}}, Verdict.GOOD),
+        ({"CA_ROTOR0_PX": 0.2025}, {}, Verdict.GOOD),
+    ],
+)
+def test_rotors_that_are_elsewhere_than_the_fit_has_them_are_told(changed, companion, verdict):
+    assert verdicts(surveyed({**HEALTHY, **changed}, companion=companion))["rotors"] is verdict
+
+
+def test_a_px4_that_does_not_know_its_rotors_places_is_not_asked_about_them_in_the_findings():
+    known = {name: value for name, value in HEALTHY.items() if not name.startswith("CA_")}
+    assert "rotors" not in verdicts(surveyed(known))
+
+
+def test_what_hovers_is_judged_by_how_it_shakes_and_not_by_how_it_wanders():
+    hovering = found_in(surveyed(flies=True, wander_m=2.0, shakes_m_s2=1.0, clipped=3))
+    assert "position" not in hovering and "shaking" not in hovering
+    assert hovering["vibration"].verdict is Verdict.GOOD
+    assert hovering["clipping"].verdict is Verdict.BAD and "hovering" in hovering["clipping"].found
+    worn = found_in(surveyed(flies=True, shakes_m_s2=6.0))["vibration"]
+    assert worn.verdict is Verdict.DOUBTFUL and "propellers" in worn.remedy
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,38 @@ def test_a_serial_device_without_a_link_is_looked_for_at_its_path(tmp_path, by_i
     assert until_heard(connection) == b"after"
 
 
+def test_whoever_waits_begins_without_a_device(by_id, closing):
+    # Given a Pixhawk that is not plugged in
+    link = by_id / "usb-3D_Robotics_PX4_FMU_v5-if00"
+    connection = closing(open_connection(f"serial://{link}:115200", waits=True))
+    assert until_told(connection, "Waiting") == (
+        f"Serial port {link} does not exist: is the cable plugged in? Waiting for it."
+    )
+    through_attempts(connection)
+    # When it is, then bytes pass, and no reconnect is counted
+    line = closing(Line(link))
+    assert until_told(connection, "connected") == f"connected: {link}"
+    line.say(b"first")
+    assert until_heard(connection) == b"first" and connection.counts.reconnects == 0
+
+
+def test_whoever_waits_begins_without_a_server(closing):
+    with socket.create_server((LOCAL, 0)) as listener:
+        port = listener.getsockname()[1]
+    connection = closing(open_connection(f"tcpout://{LOCAL}:{port}", waits=True))
+    assert "connection refused. Waiting" in until_told(connection, "Waiting")
+    listener = closing(socket.create_server((LOCAL, port)))
+    assert until_told(connection, "connected") == f"connected: {LOCAL}:{port}"
+    closing(listener.accept()[0]).sendall(b"first")
+    assert until_heard(connection) == b"first"
+
+
+def test_a_port_that_may_not_be_opened_is_told_at_once_to_whoever_waits(tmp_path):
+    # Waiting gives nobody the rights to a device; here it is a folder
+    with pytest.raises(ConnectionSetupError, match="cannot be opened"):
+        open_connection(f"serial://{tmp_path}:115200", waits=True)
+
+
 def test_a_port_that_cannot_be_closed_is_opened_anew_all_the_same(by_id, closing, monkeypatch):
     link = by_id / "vehicle"
     line = closing(Line(link))

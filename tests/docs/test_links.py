@@ -45,6 +45,13 @@ def test_every_path_in_the_manual_exists(path):
     assert [named for named in _PATH.findall(text) if not (ROOT / named).exists()] == []
 
 
+@pytest.mark.parametrize("path", manual(), ids=name_of)
+def test_every_test_that_the_manual_names_exists(path):
+    named = set(re.findall(r"`(test_\w+)`", path.read_text(encoding="utf-8")))
+    written = (file.read_text(encoding="utf-8") for file in (ROOT / "tests").rglob("test_*.py")) if named else ()
+    assert named - {name for text in written for name in re.findall(r"^def (test_\w+)", text, re.MULTILINE)} == set()
+
+
 def test_every_page_that_the_code_names_exists():
     found = {
         f"{name_of(path)}: {named}"

@@ -7,9 +7,11 @@ import pytest
 
 from companion.detection.interface import Phase
 from companion.estimate.normal import further
+from companion.guard.config import GuardConfig
 from companion.guard.states import State
+from companion.link.streams import StreamMonitor
 from tests.guard.attached_air import AttachedAir
-from tests.guard.flying import Air
+from tests.guard.flying import EPOCH_US, Air
 
 REBOOT = 246
 
@@ -39,6 +41,26 @@ def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_
     if isinstance(air, AttachedAir):
         # And the next flight's hit is answered: this ends when the guard holds
         air.fly_into_the_wall()
+
+
+def test_a_guard_that_waits_begins_where_nobody_is_or_a_vehicle_without_a_position():
+    # Given a vehicle that is heard after a minute, and a computer that was up before it
+    air = Air(GuardConfig.model_validate({"companion": {"link": {"wait": True}}}))
+    for second in range(60):
+        air.guard.step(b"", EPOCH_US - 60_000_000 + second * 1_000_000)
+    core = air.guard.core
+    assert core is not None and not air.guard.finished
+    # And whose satellites are not there yet
+    core.flight.streams.streams = tuple(
+        replace(one, min_hz=1000.0) if one.message_id.name == "LOCAL_POSITION_NED" else one
+        for one in core.flight.streams.streams
+    )
+    air.run(12.0)
+    assert air.state is State.CONNECTING
+    assert [text.partition(":")[0] for text in links(air)] == ["not guarded by now"]
+    # Then it stands by once they are
+    core.flight.streams.streams = StreamMonitor(core.flight.mission.companion.streams).streams
+    air.until(lambda: air.state is State.STANDING_BY, 10.0)
 
 
 def test_a_vehicle_without_a_position_after_its_restart_is_asked_until_it_has_one(monkeypatch):

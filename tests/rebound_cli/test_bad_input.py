@@ -95,6 +95,14 @@ def test_options_of_the_simulated_vehicle_with_a_real_one():
     assert_one_clear_sentence(run_here("fly", SQUARE, "--connect", "udpin://:14540", "--seed", "2"), "--seed")
 
 
+def test_nothing_waits_to_arm_a_vehicle_that_nobody_has_looked_at_and_none_for_a_simulated_one(tmp_path):
+    connected = ("fly", SQUARE, "--connect", "udpin://127.0.0.1:0", "--out", tmp_path / "run", "--yes")
+    for wish in (("--wait",), ("--set", "companion.link.wait=true")):
+        assert_one_clear_sentence(run_here(*connected, *wish), "--wait with --yes")
+    assert_one_clear_sentence(run_here("fly", SQUARE, "--lockstep", "--wait"), "--wait belongs to --connect")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_folder_that_holds_a_flight(tmp_path):
     (tmp_path / "flight.tlog").write_bytes(b"")
     assert_one_clear_sentence(run_here("fly", WALL, "--lockstep", "--out", tmp_path), "already holds a flight")

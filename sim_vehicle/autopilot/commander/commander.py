@@ -143,16 +143,17 @@ class Commander:
     def run(self, now_us: int, attitude_wxyz: Quaternion) -> None:
         """Everything that changes mode or arming by itself; call it at every step."""
         self._now_us = now_us
-        heard = (self.signal.arrives, self.signal.is_back)
-        self.signal.update(now_us)
+        setpoints_changed = self.signal.update(now_us)
         if self.sticks.sticks is not None:
             self.sticks.update(now_us)
             self._obey_sticks()
-        over = None if self._detector.landed else self._what_is_over()
-        if over is not None and self.modes.apply(over, self._conditions):
-            self._judge()
-        self._disarm_by_itself()
-        if now_us - self._judged_us >= PERIOD_US or heard != (self.signal.arrives, self.signal.is_back):
+        if self.modes.flown in _ENDS_BY_ITSELF and not self._detector.landed:
+            over = self._what_is_over()
+            if over is not None and self.modes.apply(over, self._conditions):
+                self._judge()
+        if self.arming.armed:
+            self._disarm_by_itself()
+        if now_us - self._judged_us >= PERIOD_US or setpoints_changed:
             self._watch(attitude_wxyz)
             self._judge()
 
@@ -161,7 +162,7 @@ class Commander:
         progress = self._navigator.progress
         if self.modes.flown is Mode.MISSION:
             return ModeEvent.MISSION_FINISHED if progress.finished else None
-        if self.modes.flown is not Mode.TAKEOFF or not self._navigator.takeoff_is_over:
+        if not self._navigator.takeoff_is_over:
             return None
         goes_on = self._parameters["COM_TAKEOFF_ACT"] == 1 and progress.valid
         return ModeEvent.MISSION_AFTER_TAKEOFF if goes_on else ModeEvent.TAKEOFF_REACHED
@@ -193,8 +194,6 @@ class Commander:
         return Need.STICKS not in NEEDS[mode] and bool(mask & _OVERRIDES_AUTO)
 
     def _disarm_by_itself(self) -> None:
-        if not self.arming.armed:
-            return
         landed = self._detector.landed
         if not landed and self._taken_off_us is None:
             self._taken_off_us = self._now_us
@@ -308,6 +307,7 @@ class Commander:
         self.texts.append(StatusText(severity, text))
 
 
+_ENDS_BY_ITSELF = (Mode.MISSION, Mode.TAKEOFF)
 _CLIMB_CONTROLLED = (Mode.ALTCTL, Mode.POSCTL, Mode.POSITION_SLOW)
 # Modes in which the pilot's throttle is the thrust: there COM_DISARM_MAN lets him disarm in the air.
 _BY_THRUST = (Mode.MANUAL, Mode.STABILIZED, Mode.ACRO)

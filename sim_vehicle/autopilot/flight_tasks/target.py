@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from sim_vehicle.estimator.estimate import Quaternion, yaw_of
 from sim_vehicle.parameters.store import Parameters
 
 Vector3 = tuple[float, float, float]
@@ -42,11 +43,15 @@ class View:
     now_us: int
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
-    yaw_rad: float
+    attitude_wxyz: Quaternion
     landed: bool = True
     armed: bool = False
     home_ned_m: Vector3 = (0.0, 0.0, 0.0)
     home_yaw_rad: float = 0.0
+
+    @property
+    def yaw_rad(self) -> float:
+        return yaw_of(self.attitude_wxyz)
 
     @property
     def height_m(self) -> float:

@@ -173,7 +173,7 @@ def flight_information(state: Telemetry) -> Message:
 
 def attitude_target(state: Telemetry) -> Message:
     """The attitude control's setpoint; it has none for the rates."""
-    return framing.PackedAttitudeTarget(
+    return framing.ATTITUDE_TARGET, framing.ATTITUDE_TARGET.pack(
         boot_ms(state.sample), *state.attitude_setpoint_wxyz(), 0.0, 0.0, 0.0, state.sample.thrust_fraction, 0
     )
 

@@ -26,7 +26,7 @@ def global_position_int(state: Telemetry) -> Message:
     estimate = state.published
     place = state.origin.place_at(estimate.position_ned_m)
     v_north, v_east, v_down = estimate.velocity_ned_m_s
-    return framing.GlobalPositionInt(
+    return framing.GLOBAL_POSITION_INT, framing.GLOBAL_POSITION_INT.pack(
         boot_ms(estimate),
         round(1e7 * place.latitude_deg),
         round(1e7 * place.longitude_deg),

@@ -165,7 +165,7 @@ class Stream:
 
     def renewed(self, versions: list[int]) -> tuple[bool, ...]:
         """Which of the noted topics have news since the last message."""
-        noted, self.noted = self.noted, [versions[topic] for topic in self.kind.notes]
+        noted, self.noted = self.noted, list(map(versions.__getitem__, self.kind.notes))
         return tuple(map(ne, self.noted, noted))
 
     def sent(self, now_us: int) -> None:

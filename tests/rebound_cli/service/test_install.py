@@ -122,6 +122,7 @@ def test_a_link_that_is_a_network_now_leaves_no_rule_for_a_port(system):
 def test_a_guard_without_a_file_has_all_defaults(system):
     service(system, "install")
     assert "then: hold" in (system.root / "etc/rebound/guard.yaml").read_text()
+    assert "--wait" in values((system.root / UNIT).read_text(), "ExecStart")[0].split()
     assert values((system.root / UNIT).read_text(), "WantedBy") == ["multi-user.target"]
 
 
@@ -225,6 +226,8 @@ def test_one_device_is_open_to_it_under_whatever_name_it_comes_back(device, rule
     text = unit(connect=f"serial://{device}:921600")
     assert values(text, "DeviceAllow") == [f"{rule} rw"] and values(text, "DevicePolicy") == ["closed"]
     assert values(text, "PrivateNetwork") == ["yes"]
+    # One that is open by its present number has to be there first.
+    assert values(text, "ExecStartPre") == ([f"/usr/bin/test -c {device}"] if rule == device else [])
     match = 'KERNEL=="' if device.startswith("/dev/tty") else 'SYMLINK=="'
     rules = udev_text(device).splitlines()[1:]
     assert all(f'{match}{device.removeprefix("/dev/")}"' in rule for rule in rules) and len(rules) == 2

@@ -1,0 +1,238 @@
+"""A recorded flight for Foxglove: an MCAP file of JSON messages, with Foxglove's own schemas and ours.
+
+Foxglove's scene has z up. Its topics are in two frames: `local` is ENU about the origin of the vehicle's local frame,
+`vehicle` is FLU about its centre. Our own topics keep NED and FRD, as their fields' names say.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from importlib import resources
+from typing import IO, Any, TypeAlias
+
+import numpy as np
+from mcap.writer import Writer
+
+from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
+from rebound_cli import __version__
+from rebound_cli.export.ulog import boot_us
+from rebound_cli.logs.log import Log
+from rebound_cli.replay.report import finding_data
+from rebound_cli.report.content import surfaces
+from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.run_folder import HIT_KINDS
+from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
+from sim_vehicle.world import Box, Obstacle, Pole
+
+Json: TypeAlias = dict[str, Any]
+# When, on which topic, and what.
+Message: TypeAlias = tuple[float, str, Json]
+
+# Topics with a schema of Foxglove's. All others have one of ours, named after the topic.
+_FOXGLOVE = {
+    "/tf": "FrameTransform",
+    "/pose": "PoseInFrame",
+    "/truth": "PoseInFrame",
+    "/scene": "SceneUpdate",
+    "/location": "LocationFix",
+    "/log": "Log",
+}
+# foxglove.LogLevel, PositionCovarianceType, LinePrimitive's LINE_STRIP.
+_INFO, _WARNING, _UNKNOWN, _STRIP = 2, 3, 0, 0
+# Okabe and Ito's colours, which the colour-blind tell apart.
+_ORANGE, _BLUE, _PURPLE, _RED = (
+    {"r": r, "g": g, "b": b, "a": a}
+    for r, g, b, a in ((0.9, 0.6, 0.0, 1.0), (0.0, 0.45, 0.7, 0.8), (0.8, 0.6, 0.7, 0.5), (0.84, 0.37, 0.0, 1.0))
+)
+_PRIMITIVES = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models")
+_LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+def write_mcap(flight: ShownFlight, log: Log, file: IO[bytes]) -> None:
+    """Whole, in the order of time."""
+    foxglove = json.loads((resources.files(__package__) / "assets/foxglove.json").read_text("utf-8"))["schemas"]
+    writer = Writer(file)
+    writer.start(library=f"px4-rebound {__version__}")
+    channels: dict[str, int] = {}
+    for at_us, topic, data in sorted(_messages(flight, log), key=lambda message: message[0]):
+        if topic not in channels:
+            name = f"foxglove.{_FOXGLOVE[topic]}" if topic in _FOXGLOVE else f"rebound.{topic[1:]}"
+            schema = json.dumps(foxglove.get(name) or {"title": name, **_kind(data)}).encode()
+            schema_id = writer.register_schema(name, "jsonschema", schema)
+            channels[topic] = writer.register_channel(topic, "json", schema_id)
+        at_ns = round(at_us) * 1000
+        writer.add_message(channels[topic], at_ns, json.dumps(data, allow_nan=False).encode(), at_ns)
+    writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _kind(value: Any) -> Json:
+    """The schema of what is like this. Each event has data of its own: nothing is said of them."""
+    match value:
+        case dict():
+            return {"type": "object", "properties": {key: _kind(one) for key, one in value.items() if key != "data"}}
+        case list() | tuple():
+            return {"type": "array", "items": {"type": "number"}}
+        case bool():
+            return {"type": "boolean"}
+        case int() | float():
+            return {"type": "number"}
+        case str():
+            return {"type": "string"}
+    return {}
+
+
+def _messages(flight: ShownFlight, log: Log) -> Iterator[Message]:
+    yield from _scene(flight, log)
+    attitude = _LEVEL
+    at_us: float
+    for heard in log.heard:
+        at_us, sample = heard.at_us, heard.sample
+        match sample:
+            case Attitude():
+                attitude = sample.attitude_wxyz
+            case LocalPosition():
+                yield at_us, "/local_position", _fields(sample)
+                pose = _pose(sample.position_ned_m, attitude)
+                yield at_us, "/pose", {"timestamp": _time(at_us), "frame_id": "local", "pose": pose}
+                moved = {"translation": pose["position"], "rotation": pose["orientation"]}
+                frames = {"parent_frame_id": "local", "child_frame_id": "vehicle"}
+                yield at_us, "/tf", {"timestamp": _time(at_us), **frames, **moved}
+            case ImuSample():
+                yield at_us, "/imu", _fields(sample)
+            case GlobalPosition():
+                yield at_us, "/location", _location(at_us, sample)
+    if flight.truth is not None:
+        series = flight.truth.series
+        times = flight.truth.at_us(series["time_boot_us"]).tolist()
+        rows = zip(times, series["position_ned_m"].tolist(), series["attitude_wxyz"].tolist(), strict=True)
+        for at_us, place, turned in rows:
+            yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": _pose(place, turned)}
+    for at_us, place in zip(flight.log.setpoint_at_us.tolist(), flight.log.setpoint_ned_m.tolist(), strict=True):
+        if math.isfinite(sum(place)):
+            yield at_us, "/setpoint", {"position_ned_m": place}
+    for event in flight.events:
+        at_us, kind, text = float(event["time_us"]), str(event["kind"]), str(event.get("text", ""))
+        yield at_us, "/event", {"kind": kind, "text": text, "data": event.get("data", {})}
+        yield _log(at_us, _WARNING if kind in HIT_KINDS else _INFO, "rebound", f"{kind}: {text}")
+    for at_us, text in flight.log.texts:
+        yield _log(at_us, _INFO, "STATUSTEXT", text)
+    for impact in flight.findings.impacts:
+        yield impact.at_us, "/hit", finding_data(impact)
+
+
+def _scene(flight: ShownFlight, log: Log) -> Iterator[Message]:
+    """Obstacles, moving ones again and again; the vehicle and its setpoint; hits; remembered surfaces."""
+    began_us, guards = flight.started_at_us, flight.config.estimate.guards
+    size, aside_m = _xyz(2 * guards.radius_m, 2 * guards.radius_m, guards.height_m), math.sqrt(0.5) * guards.centre_m
+    places = [_xyz(x, y, 0.0) for x in (aside_m, -aside_m) for y in (aside_m, -aside_m)]
+    hoops = [_cylinder({"position": place, "orientation": _wxyz(*_LEVEL)}, size, _BLUE) for place in places]
+    yield _entity(began_us, "vehicle", "vehicle", cylinders=hoops)
+    moving_us = [heard.at_us for heard in log.heard if isinstance(heard.sample, LocalPosition)]
+    clock_s = (boot_us(log, moving_us) * 1e-6).tolist()
+    for _, obstacle in () if flight.scene is None else flight.scene.obstacles():
+        name, motion = f"obstacle {obstacle.name}", obstacle.motion
+        if motion is None:
+            yield _entity(began_us, name, **_shape(obstacle, (0.0, 0.0, 0.0)))
+            continue
+        for at_us, boot_s in zip(moving_us, clock_s, strict=True):
+            yield _entity(at_us, name, **_shape(obstacle, motion.offset_ned_m(boot_s)))
+    for number, surface in enumerate(surfaces(flight), start=1):
+        corners = [_enu(corner) for corner in (*surface["corners"], surface["corners"][0])]
+        until_us = None if surface["until"] is None else began_us + 1e6 * surface["until"]
+        pose = {"position": _xyz(0.0, 0.0, 0.0), "orientation": _wxyz(*_LEVEL)}
+        line = {"type": _STRIP, "pose": pose, "thickness": 3, "scale_invariant": True}
+        drawn = {**line, "points": corners, "color": _PURPLE, "colors": [], "indices": []}
+        yield _entity(began_us + 1e6 * surface["t"], f"surface {number}", until_us=until_us, lines=[drawn])
+    for number, impact in enumerate(flight.findings.impacts, start=1):
+        # The arrow points out of the surface, as long as the speed before the contact.
+        speed_m_s = math.hypot(*impact.first.velocity_ned_m_s)
+        sizes = {"shaft_length": speed_m_s, "shaft_diameter": 0.04, "head_length": 0.12, "head_diameter": 0.1}
+        pose = {"position": _enu(impact.first.position_ned_m), "orientation": _along(impact.final.normal_ned, 0)}
+        yield _entity(impact.at_us, f"hit {number}", arrows=[{"pose": pose, **sizes, "color": _RED}])
+
+
+# --- Foxglove's own messages --------------------------------------------------------------------------------------
+
+
+def _fields(sample: ImuSample | LocalPosition) -> Json:
+    return {name: getattr(sample, name) for name in sample.__slots__}
+
+
+def _time(at_us: float) -> Json:
+    return {"sec": int(at_us // 1_000_000), "nsec": round(at_us % 1_000_000) * 1000}
+
+
+def _log(at_us: float, level: int, name: str, text: str) -> Message:
+    nowhere = {"file": "", "line": 0}
+    return at_us, "/log", {"timestamp": _time(at_us), "level": level, "message": text, "name": name, **nowhere}
+
+
+def _location(at_us: float, sample: GlobalPosition) -> Json:
+    place = {"latitude": sample.latitude_deg, "longitude": sample.longitude_deg, "altitude": sample.altitude_m}
+    error = {"position_covariance": [0.0] * 9, "position_covariance_type": _UNKNOWN}
+    return {"timestamp": _time(at_us), "frame_id": "vehicle", **place, **error}
+
+
+def _entity(at_us: float, name: str, frame: str = "local", until_us: float | None = None, **drawn: Any) -> Message:
+    """One thing of the scene, in the place of what it was before; without `until_us` it stays."""
+    entity = {
+        "timestamp": _time(at_us),
+        "frame_id": frame,
+        "id": name,
+        "metadata": [],
+        "lifetime": _time(0.0 if until_us is None else until_us - at_us),
+        "frame_locked": True,
+        **{primitive: drawn.get(primitive, []) for primitive in _PRIMITIVES},
+    }
+    return at_us, "/scene", {"deletions": [], "entities": [entity]}
+
+
+def _shape(obstacle: Obstacle, moved_ned_m: Vector3) -> Json:
+    """Its primitive, so far from where it was described."""
+    if isinstance(obstacle, Pole):
+        middle = np.array(obstacle.foot_ned_m) + 0.5 * obstacle.height_m * np.array(obstacle.axis_ned) + moved_ned_m
+        pose = {"position": _enu(middle.tolist()), "orientation": _along(obstacle.axis_ned, 2)}
+        size = _xyz(2 * obstacle.radius_m, 2 * obstacle.radius_m, obstacle.height_m)
+        return {"cylinders": [_cylinder(pose, size, _ORANGE)]}
+    box = obstacle if isinstance(obstacle, Box) else obstacle.box()
+    pose = {"position": _enu((np.array(box.centre_ned_m) + moved_ned_m).tolist()), "orientation": _turn(box.axes_ned)}
+    return {"cubes": [{"pose": pose, "size": _xyz(*box.sizes_m), "color": _ORANGE}]}
+
+
+def _cylinder(pose: Json, size: Json, color: Json) -> Json:
+    return {"pose": pose, "size": size, "bottom_scale": 1, "top_scale": 1, "color": color}
+
+
+def _pose(position_ned_m: Vector3, attitude_wxyz: Quaternion) -> Json:
+    """Of the vehicle. From NED to ENU is half a turn about north-east, from FRD to FLU one about forward."""
+    w, x, y, z = (math.sqrt(0.5) * part for part in attitude_wxyz)
+    return {"position": _enu(position_ned_m), "orientation": _wxyz(w + z, x + y, x - y, w - z)}
+
+
+def _along(direction_ned: Vector3, axis: int) -> Json:
+    """The turn that lays this axis along a direction."""
+    first = np.array(direction_ned)
+    second = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
+    second /= np.linalg.norm(second)
+    axes = np.roll([first, second, np.cross(first, second)], axis, axis=0)
+    return _turn(axes.tolist())
+
+
+def _turn(axes_ned: Sequence[Sequence[float]]) -> Json:
+    """That of a body with these axes; a body that looks the same both ways along its last one."""
+    columns = np.array(axes_ned)[:, (1, 0, 2)] * (1.0, 1.0, -1.0)
+    columns[2] *= np.sign(np.linalg.det(columns))
+    return _wxyz(*quaternion_from_matrix(columns.T.tolist()))
+
+
+def _enu(ned: Sequence[float]) -> Json:
+    north, east, down = ned
+    return _xyz(east, north, -down)
+
+
+def _xyz(x: float, y: float, z: float) -> Json:
+    return {"x": float(x), "y": float(y), "z": float(z)}
+
+
+def _wxyz(w: float, x: float, y: float, z: float) -> Json:
+    return {**_xyz(x, y, z), "w": float(w)}

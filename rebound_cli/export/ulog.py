@@ -1,0 +1,230 @@
+"""Flights as PX4's own logs (.ulg), and more in a log that PX4 wrote: docs.px4.io, ULog File Format.
+
+Topics and fields are PX4's own, with what its link has carried of them: `rebound_cli.logs.ulog` reads them back.
+"""
+
+import math
+import struct
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from companion import messages
+from rebound_cli.logs.log import Demand, Log, LogError
+from rebound_cli.logs.ulog import NAV_STATES
+from rebound_cli.replay.report import finding_data
+from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.run_folder import HIT_KINDS
+
+Floats = npt.NDArray[np.float64]
+
+_MAGIC = b"ULog\x01\x12\x35\x01"
+_HEAD = struct.Struct("<HB")
+_KINDS = b"BFIMPQARDLCSO"
+_FLAG_BITS_SIZE, _OFFSETS_AT = 40, 16
+_LETTERS = {"float": "f", "double": "d", "uint8_t": "B", "uint32_t": "I", "uint64_t": "Q", "bool": "?"}
+# Of a logged message: Linux's levels, as digits.
+_WARNING, _INFO = b"4", b"6"
+_UNSET = (math.nan,) * 3
+
+# Each sample as PX4 logs it: topic, fields after the timestamp, values. A quaternion turns body to NED.
+_TOPICS: Mapping[type, tuple[str, str, Any]] = {
+    messages.ImuSample: (
+        "sensor_combined",
+        "float[3] gyro_rad;float[3] accelerometer_m_s2",
+        lambda s: (*s.angular_velocity_frd_rad_s, *s.specific_force_frd_m_s2),
+    ),
+    messages.LocalPosition: (
+        "vehicle_local_position",
+        "float x;float y;float z;float vx;float vy;float vz",
+        lambda s: (*s.position_ned_m, *s.velocity_ned_m_s),
+    ),
+    messages.Attitude: ("vehicle_attitude", "float[4] q", lambda s: s.attitude_wxyz),
+    messages.AttitudeTarget: (
+        "vehicle_attitude_setpoint",
+        "float[4] q_d;float[3] thrust_body",
+        lambda s: (*(s.attitude_wxyz or (*_UNSET, math.nan)), 0.0, 0.0, -s.thrust_fraction),
+    ),
+    messages.Odometry: (
+        "vehicle_odometry",
+        "float[3] position;float[3] velocity;uint8_t reset_counter",
+        lambda s: (*s.position_ned_m, *s.velocity_ned_m_s, s.reset_counter),
+    ),
+    messages.Vibration: (
+        "vehicle_imu_status",
+        "uint32_t[3] accel_clipping;float gyro_vibration_metric;float accel_vibration_metric",
+        lambda s: (*s.clipping_counts, s.gyroscope_rad_s, s.accelerometer_m_s2),
+    ),
+    messages.Heartbeat: (
+        "vehicle_status",
+        "uint8_t arming_state;uint8_t nav_state;uint8_t system_type",
+        lambda s: (2 if s.armed else 1, NAV_STATES.get(s.custom_mode, 0), s.vehicle_type),
+    ),
+    messages.ExtendedState: (
+        "vehicle_land_detected",
+        "bool landed",
+        lambda s: (s.landed_state is messages.LandedState.ON_GROUND,),
+    ),
+    messages.GlobalPosition: (
+        "vehicle_global_position",
+        "double lat;double lon;float alt",
+        lambda s: (s.latitude_deg, s.longitude_deg, s.altitude_m),
+    ),
+    Demand: (
+        "vehicle_local_position_setpoint",
+        "float x;float y;float z;float vx;float vy;float vz",
+        lambda s: (*(s.position_ned_m or _UNSET), *(s.velocity_ned_m_s or _UNSET)),
+    ),
+}
+_SETPOINT = ("rebound_setpoint", "float[3] position_ned_m")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Of a topic at a time of PX4's clock; or, of no topic, a text and its level."""
+
+    boot_us: int
+    topic: tuple[str, str] | None
+    values: Sequence[Any]
+
+
+def boot_us(log: Log, at_us: Sequence[float] | Floats) -> npt.NDArray[np.int64]:
+    """The vehicle's clock at times of the log's: the newest heard IMU sample's, and what went by since."""
+    imu = log.imu()
+    heard = np.array([heard_us for heard_us, _ in imu], np.int64)
+    sampled = np.array([sample.time_boot_us for _, sample in imu], np.int64)
+    wanted = np.asarray(at_us).astype(np.int64)
+    newest = np.maximum(np.searchsorted(heard, wanted, side="right") - 1, 0)
+    times: npt.NDArray[np.int64] = sampled[newest] + wanted - heard[newest]
+    return times
+
+
+def own_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
+    """What the companion knew and PX4 did not: its events, its hits, its setpoints."""
+    texts = [(float(e["time_us"]), _WARNING if e["kind"] in HIT_KINDS else _INFO, e) for e in flight.events]
+    for time_us, (_, level, event) in zip(boot_us(log, [at for at, *_ in texts]), texts, strict=True):
+        yield Row(int(time_us), None, (level, f"[rebound] {event.get('text', '')}"))
+    for impact in flight.findings.impacts:
+        # Words have no place in a topic: they are in the event's text.
+        hit = {name: value for name, value in finding_data(impact).items() if not isinstance(value, str)}
+        fields = ";".join(f"{_kind(value)} {name}" for name, value in hit.items())
+        values = [math.nan if v is None else v for value in hit.values() for v in _several(value)]
+        yield Row(impact.first.impact.sample_time_boot_us, ("rebound_hit", fields), values)
+    asked = flight.log
+    for time_us, place in zip(boot_us(log, asked.setpoint_at_us), asked.setpoint_ned_m.tolist(), strict=True):
+        yield Row(int(time_us), _SETPOINT, place)
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, list):
+        return f"float[{len(value)}]"
+    return "bool" if isinstance(value, bool) else "uint64_t" if isinstance(value, int) else "float"
+
+
+def _several(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, list) else [value]
+
+
+def new_ulog(flight: ShownFlight, log: Log) -> bytes:
+    """A whole log of what was heard on the link, and of what the companion made of it."""
+    heard = [one for one in log.heard if type(one.sample) in _TOPICS]
+    clock = boot_us(log, [one.at_us for one in heard])
+    rows = [
+        Row(getattr(one.sample, "time_boot_us", int(time_us)), (name, fields), values(one.sample))
+        for one, time_us in zip(heard, clock, strict=True)
+        for name, fields, values in (_TOPICS[type(one.sample)],)
+    ]
+    said = flight.log.texts
+    times_us = boot_us(log, [at_us for at_us, _ in said])
+    rows += [Row(int(time_us), None, (_INFO, text)) for time_us, (_, text) in zip(times_us, said, strict=True)]
+    rows += own_rows(flight, log)
+    started_us = min(row.boot_us for row in rows)
+    kind = next(
+        (s.vehicle_type for _, s in ((h.at_us, h.sample) for h in heard) if isinstance(s, messages.Heartbeat)), 2
+    )
+    head = _MAGIC + struct.pack("<Q", started_us) + _message("B", bytes(_FLAG_BITS_SIZE))
+    head += _keyed("I", "char[7] sys_name", b"Rebound") + _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
+    return with_rows(head, rows)
+
+
+def with_rows(content: bytes, rows: Sequence[Row]) -> bytes:
+    """A log with these in it, each before what is later. Raises LogError for one without a whole head."""
+    parts = list(_parts(content))
+    if not parts or parts[0][1] != "B":
+        raise LogError("the log's head is damaged, or older than PX4 v1.8: nothing can be added to it")
+    logged = [content[at + _HEAD.size : _end(content, at)] for at, kind in parts if kind == "A"]
+    ids, before = [int.from_bytes(one[1:3], "little") for one in logged], Counter(one[3:].decode() for one in logged)
+    topics = list(dict.fromkeys(row.topic for row in rows if row.topic is not None))
+    numbers = {topic: max(ids, default=-1) + 1 + number for number, topic in enumerate(topics)}
+    begins = next((at for at, kind in parts if kind in "ADL"), len(content))
+    added = [(begins, b"".join(map(_format, topics)))]
+    for topic, number in numbers.items():
+        # A second run's are PX4's second instance of the topic.
+        added.append((begins, _message("A", struct.pack("<BH", before[topic[0]], number) + topic[0].encode())))
+    waiting = sorted(rows, key=lambda row: row.boot_us)
+    taken = 0
+    for at, kind in parts:
+        if kind == "D" and at >= begins:
+            (time_us,) = struct.unpack_from("<Q", content, at + _HEAD.size + 2)
+            while taken < len(waiting) and waiting[taken].boot_us < time_us:
+                added.append((at, _written(waiting[taken], numbers)))
+                taken += 1
+    # Behind the last whole message: one that is cut off would swallow what comes after it.
+    ends = _end(content, parts[-1][0])
+    added += [(ends, _written(row, numbers)) for row in waiting[taken:]]
+    return _spliced(content, added)
+
+
+def _spliced(content: bytes, added: Sequence[tuple[int, bytes]]) -> bytes:
+    """The bytes at their places; offsets of what PX4 has appended after a crash move with them."""
+    places = [0, *(at for at, _ in added), len(content)]
+    pieces = [content[start:end] for start, end in pairwise(places)]
+    out = bytearray(pieces[0] + b"".join(new + piece for (_, new), piece in zip(added, pieces[1:], strict=True)))
+    at = len(_MAGIC) + 8 + _HEAD.size + _OFFSETS_AT
+    offsets = struct.unpack_from("<3Q", content, at)
+    moved = [offset and offset + sum(len(new) for place, new in added if place < offset) for offset in offsets]
+    struct.pack_into("<3Q", out, at, *moved)
+    return bytes(out)
+
+
+def _parts(content: bytes) -> Iterator[tuple[int, str]]:
+    """Place and kind of each message, up to where the log is cut off or damaged."""
+    at = len(_MAGIC) + 8
+    while at + _HEAD.size <= len(content):
+        kind = content[at + 2]
+        if kind not in _KINDS or _end(content, at) > len(content):
+            return
+        yield at, chr(kind)
+        at = _end(content, at)
+
+
+def _end(content: bytes, at: int) -> int:
+    size, _ = _HEAD.unpack_from(content, at)
+    return int(at + _HEAD.size + size)
+
+
+def _message(kind: str, content: bytes) -> bytes:
+    return _HEAD.pack(len(content), ord(kind)) + content
+
+
+def _keyed(kind: str, key: str, value: bytes) -> bytes:
+    return _message(kind, bytes([len(key)]) + key.encode() + value)
+
+
+def _format(topic: tuple[str, str]) -> bytes:
+    name, fields = topic
+    return _message("F", f"{name}:uint64_t timestamp;{fields};".encode())
+
+
+def _written(row: Row, numbers: Mapping[tuple[str, str], int]) -> bytes:
+    if row.topic is None:
+        level, text = row.values
+        return _message("L", level + struct.pack("<Q", row.boot_us) + text.encode())
+    kinds = (field.split()[0].rstrip("]").partition("[") for field in row.topic[1].split(";"))
+    letters = "".join((count or "1") + _LETTERS[kind] for kind, _, count in kinds)
+    return _message("D", struct.pack("<HQ" + letters, numbers[row.topic], row.boot_us, *row.values))

@@ -1,0 +1,29 @@
+"""The calls of an interval in lockstep are counted: a number without noise, which a busy machine does not change."""
+
+import pytest
+
+from bench.speed.calls import calls_an_interval, held_to
+from bench.speed.flight import fly
+from bench.speed.parts import PARTS
+
+# A change that costs more is looked at: it is made cheaper, or the count is renewed by `python -m bench speed --calls`.
+MOST_MORE = 1.05
+
+
+@pytest.fixture(scope="module")
+def calls():
+    fly()  # what is imported or compiled at first counts for nothing
+    return calls_an_interval()
+
+
+@pytest.mark.parametrize("program", ["plant", "vehicle", "companion", "log"])
+def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, program):
+    # Given the flight of wall.yaml, hit and recovery in it, and what its intervals were last held to
+    parts = [part.name for part in PARTS if part.name.startswith(program)]
+    now, held = (sum(found[name] for name in parts) for found in (calls, held_to()))
+    # When it is flown now, then no part of the loop has become dearer unseen
+    assert 0.0 < now <= MOST_MORE * held, f"{now:.1f} calls, held to {held:.1f}: docs/explanation/performance.md"
+
+
+def test_the_count_is_the_same_in_every_flight(calls):
+    assert calls_an_interval() == calls

@@ -1,0 +1,72 @@
+"""One recorded flight and one browser for all tests here."""
+
+import shutil
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+from rebound_cli.report.shown_flight import recorded_flight
+from rebound_cli.report.writer import write_page
+from tests.browser.opened_page import OpenedPage
+from tests.rebound_cli.command import WALL, run_here
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+# Three dimensions without a graphics card, and a browser that asks its maker for nothing. As root there is no sandbox.
+ARGUMENTS = (
+    *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic"),
+)
+
+
+def pytest_sessionstart():
+    if not any(map(shutil.which, NAMES)):
+        pytest.exit("No browser is installed: apt-get install chromium (on Ubuntu: chromium-browser).", returncode=1)
+
+
+@pytest.fixture(scope="session")
+def browser():
+    executable = next(filter(None, map(shutil.which, NAMES)))
+    with sync_playwright() as playwright:
+        yield playwright.chromium.launch(executable_path=executable, args=ARGUMENTS)
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """Of the flight into the wall."""
+    path = tmp_path_factory.mktemp("flights") / "wall"
+    run_here("fly", WALL, "--lockstep", "--json", "--out", path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def flight(folder):
+    return recorded_flight(folder)
+
+
+@pytest.fixture(scope="session")
+def file(flight, tmp_path_factory):
+    """Its page, where nothing else is."""
+    return write_page(flight, tmp_path_factory.mktemp("page") / "flight.html")
+
+
+@pytest.fixture
+def opened(browser):
+    """Opens an address as a person would."""
+
+    @contextmanager
+    def opening(address, width=1280, height=900, **options):
+        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        try:
+            yield OpenedPage(context.new_page(), address)
+        finally:
+            context.close()
+
+    return opening
+
+
+@pytest.fixture(params=[390, 1280], ids=["phone", "desktop"])
+def shown(request, opened, file):
+    """The flight's page, as wide as a phone and as a desktop's window."""
+    with opened(file.as_uri(), request.param) as page:
+        yield page

@@ -1,0 +1,137 @@
+"""A flight's report as a person opens it: from a file, without a network, at a desk and on a phone."""
+
+import json
+import re
+from dataclasses import replace
+
+import pytest
+
+from rebound_cli.report.content import content
+from rebound_cli.report.page import page
+from tests.browser.opened_page import drawn_share, line_share, pixels
+from tests.rebound_cli.report.test_page import HOSTILE
+
+# Speed and height, how near to a hit; six of the hit; lateness.
+CHART_COUNT = 9
+# A line one pixel high across a chart of 113.
+LINE = 0.5 / 113
+
+
+def saved(shown, button):
+    """What a download holds."""
+    with shown.page.expect_download() as waiting:
+        shown.page.get_by_role("button", name=button).click()
+    return waiting.value.path().read_text()
+
+
+def test_it_opens_without_a_complaint_and_asks_for_nothing_but_itself(shown, file):
+    assert shown.text("#sentence").startswith("Hit a wall at 1.98 ± 0.0")
+    assert shown.time_s == pytest.approx(11.724, abs=0.01)
+    assert shown.asked == [file.as_uri()] and shown.complaints == []
+
+
+def test_nothing_on_it_is_empty_covers_another_or_leaves_the_window(shown):
+    # Given the moment of the hit, at which it opens
+    assert drawn_share(shown.scene()) > 0.05
+    charts = shown.charts()
+    assert len(charts) == CHART_COUNT
+    assert [title for title, chart in charts if line_share(chart) < LINE] == []
+    # Then each legend stands below its data
+    assert shown.overlaps() == []
+    assert shown.page.evaluate("document.documentElement.scrollWidth") <= shown.page.viewport_size["width"]
+
+
+def test_every_moment_is_reached_by_keys_alone(shown, flight):
+    moments_s = [moment["t"] for moment in content(flight)["moments"]]
+    assert len(moments_s) > 1
+    shown.press("Home")
+    assert shown.time_s == 0.0
+    for moment_s in moments_s:
+        shown.press("n")
+        assert shown.time_s == pytest.approx(moment_s, abs=1e-3)
+        assert shown.text("#moment-title").startswith(f"{moment_s:.3f} s: ")
+    for moment_s in moments_s[-2::-1]:
+        shown.press("p")
+        assert shown.time_s == pytest.approx(moment_s, abs=1e-3)
+    # and by the tab of each, for who cannot see where a key leads
+    for tab, moment_s in zip(shown.page.locator("#tabs button").all(), moments_s, strict=True):
+        tab.focus()
+        shown.press("Enter")
+        assert shown.time_s == pytest.approx(moment_s, abs=1e-3) and tab.get_attribute("aria-pressed") == "true"
+
+
+def test_scrubbing_moves_the_vehicle_the_readout_and_the_clock(shown):
+    there = shown.scene(), shown.text("#readout")
+    shown.page.locator("#scrubber").fill("5")
+    assert shown.time_s == 5.0
+    assert shown.text("#readout") != there[1]
+    assert (shown.scene() != there[0]).any()
+    # and an arrow goes one sample of 4 ms on
+    shown.press("ArrowRight")
+    assert 0.0 < shown.time_s - 5.0 < 0.01
+
+
+def test_it_plays_by_its_own_clock_and_ten_times_slower_round_a_hit(opened, file):
+    with opened("about:blank") as blank:
+        # Given a clock that goes on when it is told to
+        blank.page.clock.install(time=0)
+        blank.page.goto(file.as_uri())
+        blank.page.clock.pause_at(3600)
+        blank.page.locator("#scrubber").fill("2")
+        blank.press("Space")
+        blank.page.clock.run_for(1000)
+        assert blank.time_s == pytest.approx(3.0, abs=0.05)
+        blank.press("Space")
+        blank.page.clock.run_for(1000)
+        assert blank.time_s == pytest.approx(3.0, abs=0.05)
+        blank.press("n", "n", "Space")
+        hit_s = blank.time_s
+        blank.page.clock.run_for(1000)
+        assert blank.time_s - hit_s == pytest.approx(0.1, abs=0.01)
+
+
+def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, flight, tmp_path):
+    # Given a flight with texts that would be elements where a page took them for such
+    log = replace(flight.log, texts=((flight.started_at_us, HOSTILE),))
+    file = tmp_path / "hostile.html"
+    events = [*flight.events, {"time_us": flight.started_at_us, "kind": HOSTILE, "text": HOSTILE, "data": {}}]
+    file.write_text(page(replace(flight, name=HOSTILE, log=log, events=events)))
+    with opened(file.as_uri()) as shown:
+        assert shown.text("#name") == HOSTILE
+        cells = shown.page.locator("#events td").all_inner_texts()
+        assert cells.count(HOSTILE) == 3 and cells.count("STATUSTEXT") > 0
+        assert shown.page.locator("img").count() == 0
+        assert shown.asked == [file.as_uri()] and shown.complaints == []
+
+
+def test_downloads_hold_all_rows_with_their_units(shown, flight):
+    header, *rows = saved(shown, "wall-imu.csv").splitlines()
+    assert header.startswith("t [s],boot [s],fx [m/s2]") and len(rows) == len(flight.log.imu_at_us)
+    assert json.loads(saved(shown, "wall-summary.json")) == json.loads(json.dumps(flight.summary))
+
+
+def test_without_position_nothing_shows_where_it_was(opened, flight, tmp_path):
+    file = tmp_path / "shared.html"
+    file.write_text(page(flight, no_position=True))
+    with opened(file.as_uri()) as shown:
+        assert shown.text("#readout").splitlines()[0] == "recovering, OFFBOARD"
+        assert "north" not in shown.text("#readout") and shown.complaints == []
+        # No place in a text, such as [3.98, 0.04, -1.53]
+        assert not re.search(r"\[-?\d+\.\d+, ", shown.text("body"))
+        for name in ("path", "setpoint", "truth"):
+            header = saved(shown, f"wall-{name}.csv").partition("\n")[0].split(",")
+            assert header[0] == "t [s]" and not {"n [m]", "e [m]", "d [m]"} & set(header)
+        # The vehicle still turns and folds, where it is drawn
+        assert drawn_share(shown.scene()) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("media", "lightness"), [("screen", range(75)), ("print", range(180, 256))], ids=["screen", "paper"]
+)
+def test_it_is_dark_where_that_is_wanted_and_white_on_paper(opened, file, media, lightness):
+    with opened(file.as_uri(), color_scheme="dark") as shown:
+        # A browser that prints says so beforehand
+        shown.page.emulate_media(media=media)
+        shown.page.evaluate(f"window.dispatchEvent(new Event('{'before' if media == 'print' else 'after'}print'))")
+        assert round(pixels(shown.page.locator("h1")).mean()) in lightness
+        assert [title for title, chart in shown.charts() if line_share(chart) < LINE] == []

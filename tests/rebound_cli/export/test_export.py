@@ -1,0 +1,332 @@
+"""A flight as MCAP and as ULog, read back by the formats' own readers; PX4's log with a run's events in it."""
+
+import json
+import math
+import os
+import struct
+import xml.etree.ElementTree
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from pyulog import ULog
+
+from companion.messages import GlobalPosition, ImuSample, LocalPosition
+from rebound_cli.export.foxglove import write_mcap
+from rebound_cli.export.ulog import Row, boot_us, with_rows
+from rebound_cli.logs.log import Heard
+from rebound_cli.logs.reader import read_log, read_telemetry
+from rebound_cli.main import main
+from rebound_cli.report.shown_flight import recorded_flight
+from sim_vehicle.scene import Scene
+from tests.docs.pages import ROOT
+from tests.rebound_cli.logs.ulog_file import every, message, sensor_combined, ulog
+
+SIDE = math.sqrt(0.5)
+
+
+@pytest.fixture(scope="module")
+def flight(wall_flight):
+    folder, _ = wall_flight
+    return recorded_flight(folder), read_telemetry(folder / "flight.tlog")
+
+
+@pytest.fixture(scope="module")
+def exported(wall_flight, tmp_path_factory):
+    """Both files, as the command writes them."""
+    out = tmp_path_factory.mktemp("exported")
+    for kind in ("mcap", "ulg"):
+        assert main(["logs", "export", str(wall_flight[0]), "--format", kind, "--out", str(out / f"wall.{kind}")]) == 0
+    return out
+
+
+def read_mcap(content):
+    """Each message by its topic; one of each kind is held against the schema that the file itself gives it."""
+    topics, seen = {}, set()
+    for schema, channel, read in make_reader(BytesIO(content), validate_crcs=True).iter_messages():
+        data = json.loads(read.data)
+        kind = (channel.topic, *(entity["id"] for entity in data.get("entities", ())))
+        if kind not in seen:
+            jsonschema.validate(data, json.loads(schema.data))
+            seen.add(kind)
+        topics.setdefault(channel.topic, []).append((schema.name, read.log_time, data))
+    return topics
+
+
+def mcap_of(flight, log):
+    content = BytesIO()
+    write_mcap(replace(flight, truth=None), log, content)
+    return read_mcap(content.getvalue())
+
+
+# --- MCAP -------------------------------------------------------------------------------------------------------
+
+
+def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(exported, flight):
+    shown, log = flight
+    topics = read_mcap((exported / "wall.mcap").read_bytes())
+    schemas = {topic: rows[0][0] for topic, rows in topics.items()}
+    assert schemas["/pose"] == schemas["/truth"] == "foxglove.PoseInFrame"
+    assert schemas["/scene"] == "foxglove.SceneUpdate" and schemas["/log"] == "foxglove.Log"
+    assert len(topics["/imu"]) == len(log.imu())
+    assert [data["text"] for _, _, data in topics["/event"]] == [event["text"] for event in shown.events]
+    assert [data["kind"] for _, _, data in topics["/hit"]] == ["wall"]
+    # At the companion's own times, in nanoseconds
+    assert [at_ns for _, at_ns, _ in topics["/imu"]] == [at_us * 1000 for at_us, _ in log.imu()]
+    levels = {data["message"][:9]: data["level"] for _, _, data in topics["/log"]}
+    assert levels["detection"] == 3 and levels["takeoff: "] == 2
+
+
+@pytest.mark.parametrize(
+    ("attitude_frd_to_ned", "flu_to_enu"),
+    [
+        # Nose north is a quarter of a turn from east; nose east none; a right wing down is a positive roll in both
+        ((1.0, 0.0, 0.0, 0.0), (SIDE, 0.0, 0.0, SIDE)),
+        ((SIDE, 0.0, 0.0, SIDE), (1.0, 0.0, 0.0, 0.0)),
+        ((0.5, 0.5, 0.5, 0.5), (SIDE, SIDE, 0.0, 0.0)),
+        # Nose north and up: about the left axis it is a negative turn
+        ((SIDE, 0.0, SIDE, 0.0), (0.5, 0.5, -0.5, 0.5)),
+    ],
+)
+def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ned, flu_to_enu):
+    shown, log = flight
+    moved = LocalPosition(1_000_000, (3.0, 2.0, -1.0), (0.0, 0.0, 0.0))
+    attitude = next(h for h in log.heard if type(h.sample).__name__ == "Attitude")
+    heard = (replace(attitude, sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
+    imu = Heard(*log.imu()[0])
+    topics = mcap_of(shown, replace(log, heard=(imu, *heard, Heard(log.heard[-1].at_us, moved))))
+    ((_, _, found),) = topics["/pose"]
+    assert found["pose"]["position"] == {"x": 2.0, "y": 3.0, "z": 1.0}
+    assert [found["pose"]["orientation"][axis] for axis in "wxyz"] == pytest.approx(flu_to_enu)
+
+
+def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
+    # Given a wall that faces south at 4 m north, a slanted pole, and a box that goes 2 m east between 5 and 15 s
+    shown, log = flight
+    box = {"centre_ned_m": [2, 0, -1], "size_m": [1, 2, 3], "name": "cart"}
+    motion = {"velocity_ned_m_s": [0, 0.2, 0], "from_s": 5, "until_s": 15}
+    scene = Scene.model_validate(
+        {
+            "walls": [{"point_ned_m": [4, 0, -2], "normal_ned": [-1, 0, 0], "width_m": 6, "height_m": 4}],
+            "poles": [{"point_ned_m": [0, 5, 0], "axis_ned": [0, 1, 0], "height_m": 2, "radius_m": 0.1}],
+            "boxes": [{**box, "motion": motion}],
+        }
+    )
+    topics = mcap_of(replace(shown, scene=scene), log)
+    drawn = {}
+    for _, at_ns, data in topics["/scene"]:
+        (entity,) = data["entities"]
+        drawn.setdefault(entity["id"], []).append((at_ns, entity))
+    names = [obstacle.name for _, obstacle in scene.obstacles()]
+    ((_, wall),), ((_, pole),), cart = (drawn[f"obstacle {name}"] for name in names)
+    # Then a wall of 6 by 4 m is a thin plate just north of its face
+    (cube,) = wall["cubes"]
+    assert cube["pose"]["position"]["y"] == pytest.approx(4.0 + 0.5 * cube["size"]["x"])
+    assert sorted(cube["size"].values())[1:] == [4.0, 6.0]
+    # and the bar that lies to the east has Foxglove's z axis along x
+    (bar,) = pole["cylinders"]
+    assert bar["pose"]["position"] == pytest.approx({"x": 6.0, "y": 0.0, "z": 0.0})
+    turned = bar["pose"]["orientation"]
+    assert 2 * (turned["x"] * turned["z"] + turned["w"] * turned["y"]) == pytest.approx(1.0)
+    # and the cart's way is that of the vehicle's clock
+    began_ns = (log.heard[0].at_us - boot_us(log, [log.heard[0].at_us])[0]) * 1000
+    east = {round((at_ns - began_ns) * 1e-9, 2): e["cubes"][0]["pose"]["position"]["x"] for at_ns, e in cart}
+    assert east[min(east)] == 0.0 and east[max(east)] == 2.0
+    assert min(abs(place - 1.0) for at_s, place in east.items() if abs(at_s - 10.0) < 0.05) < 0.01
+
+
+def test_a_position_on_earth_becomes_a_fix(flight):
+    shown, log = flight
+    here = Heard(log.heard[-1].at_us, GlobalPosition(47.397742, 8.545594, 488.0))
+    ((schema, _, fix),) = mcap_of(shown, replace(log, heard=(*log.heard, here)))["/location"]
+    assert schema == "foxglove.LocationFix"
+    assert (fix["latitude"], fix["longitude"], fix["altitude"]) == (47.397742, 8.545594, 488.0)
+
+
+# --- ULog -------------------------------------------------------------------------------------------------------
+
+
+def test_a_ulog_is_read_back_by_pyulog_and_searched_as_px4s_own(exported, flight, tmp_path, capsys):
+    shown, log = flight
+    written = ULog(str(exported / "wall.ulg"))
+    assert not written.file_corruption and written.initial_parameters == {"MAV_TYPE": 2}
+    said = [one.message for one in written.logged_messages]
+    assert all(f"[rebound] {event['text']}" in said for event in shown.events)
+    hit = written.get_dataset("rebound_hit").data
+    (finding,) = shown.hits
+    assert hit["timestamp"].tolist() == [finding.first.impact.sample_time_boot_us]
+    assert hit["is_collision"][0] == 1
+    assert hit["impact_velocity_m_s[0]"][0] == pytest.approx(finding.first.velocity_ned_m_s[0], abs=1e-4)
+    # Every IMU sample again, at its own stamp
+    again = [sample for _, sample in read_log(exported / "wall.ulg").imu()]
+    for ours, theirs in zip([sample for _, sample in log.imu()], again, strict=True):
+        assert theirs.time_boot_us == ours.time_boot_us
+        assert theirs.specific_force_frd_m_s2 == pytest.approx(ours.specific_force_frd_m_s2, rel=1e-6, abs=1e-6)
+    # and the same hit is found in it
+    assert main(["replay", str(exported / "wall.ulg"), "--expect", "1", "--out", str(tmp_path)]) == 0
+    assert "HIT: wall" in capsys.readouterr().out
+
+
+def test_places_are_not_left_out_of_a_file_full_of_them(wall_flight, tmp_path, capsys):
+    out = tmp_path / "wall.mcap"
+    words = ["logs", "export", str(wall_flight[0]), "--format", "mcap", "--no-position", "--out", str(out)]
+    assert main(words) == 1
+    assert "--no-position" in capsys.readouterr().err and not out.exists()
+
+
+# --- merged -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["battery_brownout", "corrupt_unregistered", "ground_strike", "mission_rtl"])
+@pytest.mark.skipif(
+    "REBOUND_DATA" not in os.environ, reason="REBOUND_DATA does not name the folder of real flight logs"
+)
+def test_nothing_of_a_real_log_is_changed_by_what_is_added(name):
+    content = (Path(os.environ["REBOUND_DATA"]) / "px4_logs" / f"{name}.ulg").read_bytes()
+    before = ULog(BytesIO(content))
+    middle_us = (before.start_timestamp + before.last_timestamp) // 2
+    added = [
+        Row(middle_us, None, (b"4", "[rebound] hit")),
+        Row(middle_us, ("rebound_hit", "bool is_collision"), [True]),
+    ]
+    after = ULog(BytesIO(with_rows(content, added)))
+    for data in before.data_list:
+        for field, values in data.data.items():
+            np.testing.assert_array_equal(after.get_dataset(data.name, data.multi_id).data[field], values)
+    assert len(after.logged_messages) == len(before.logged_messages) + 1
+    assert after.changed_parameters == before.changed_parameters
+    assert after.get_dataset("rebound_hit").data["timestamp"].tolist() == [middle_us]
+
+
+def px4_log(log, tail=b"", moved_us=0, turned=lambda rates: rates):
+    """What PX4 would have written of a flight: the same samples under the same stamps, in another program's bytes."""
+    fields, _ = sensor_combined([])
+    rows = [
+        (
+            sample.time_boot_us + moved_us,
+            turned(sample.angular_velocity_frd_rad_s),
+            *(4000, 0, sample.specific_force_frd_m_s2, 4000, 0),
+        )
+        for _, sample in log.imu()
+    ]
+    text = message("L", b"6" + struct.pack("<Q", rows[0][0]) + b"PX4's own")
+    return ulog({"sensor_combined": (fields, rows)}, started_us=rows[0][0]) + text + tail
+
+
+def merged(wall_flight, tmp_path, content):
+    path = tmp_path / "px4.ulg"
+    path.write_bytes(content)
+    code = main(["replay", str(wall_flight[0]), "--merge", str(path), "--out", str(tmp_path / "out")])
+    return code, tmp_path / "out" / "px4-merged.ulg"
+
+
+def test_a_runs_events_are_put_into_px4s_own_log_by_its_clock(wall_flight, flight, tmp_path, capsys):
+    shown, log = flight
+    code, path = merged(wall_flight, tmp_path, px4_log(log))
+    assert code == 0
+    assert "100.0 % of their angular rates, and fits best moved by +0.0 ms" in capsys.readouterr().out
+    found = ULog(str(path))
+    # PX4's own is untouched, and the hit stands at the sample that showed it
+    assert len(found.get_dataset("sensor_combined").data["timestamp"]) == len(log.imu())
+    assert "PX4's own" in [one.message for one in found.logged_messages]
+    said = {one.message: one.timestamp for one in found.logged_messages}
+    (hit,) = [event for event in shown.events if event["kind"] == "detection"]
+    assert said[f"[rebound] {hit['text']}"] == hit["data"]["sample_time_boot_us"]
+    assert found.get_dataset("rebound_hit").data["timestamp"][0] == hit["data"]["sample_time_boot_us"]
+    # A second run's go in beside the first one's
+    path.rename(tmp_path / "px4.ulg")
+    assert main(["replay", str(wall_flight[0]), "--merge", str(tmp_path / "px4.ulg"), "--out", str(path.parent)]) == 0
+    assert len(ULog(str(path)).get_dataset("rebound_hit", 1).data["timestamp"]) == 1
+
+
+def test_a_log_that_power_ended_takes_them_before_its_cut(wall_flight, flight, tmp_path):
+    # Given a log of the first half whose last message is cut off
+    _, log = flight
+    half = replace(log, heard=log.heard[: len(log.heard) // 3])
+    code, path = merged(wall_flight, tmp_path, px4_log(half, tail=message("D", bytes(40))[:20]))
+    assert code == 0
+    found = ULog(str(path))
+    assert len(found.get_dataset("sensor_combined").data["timestamp"]) == len(half.imu())
+    assert any("landed and disarmed" in one.message for one in found.logged_messages)
+
+
+def test_what_px4_appended_after_a_crash_is_found_again(wall_flight, flight, tmp_path):
+    # Given a log whose head says where, after a fault, PX4 has added to it
+    _, log = flight
+    content = bytearray(px4_log(log))
+    added = message("L", b"2" + struct.pack("<Q", 5) + b"hardfault")
+    head = 16 + 3
+    content[head + 8] = 1
+    struct.pack_into("<Q", content, head + 16, len(content))
+    code, path = merged(wall_flight, tmp_path, bytes(content) + added)
+    assert code == 0
+    (offset,) = struct.unpack_from("<Q", path.read_bytes(), head + 16)
+    assert path.read_bytes()[offset : offset + len(added)] == added
+    assert "hardfault" in [one.message for one in ULog(str(path)).logged_messages]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        # Another flight by the same clock, the same flight after another boot, another time, another program's file
+        ({"turned": lambda rates: (rates[1], rates[2], -rates[0])}, "of their angular rates"),
+        ({"moved_us": 300_000}, "moved by -300.0 ms"),
+        ({"moved_us": 3_600_000_000}, "by PX4's clock since boot"),
+    ],
+)
+def test_what_is_not_of_one_flight_is_refused(wall_flight, flight, tmp_path, capsys, change, words):
+    code, path = merged(wall_flight, tmp_path, px4_log(flight[1], **change))
+    assert code == 1 and not path.exists()
+    error = capsys.readouterr().err
+    assert "are not of one flight" in error and words in error
+
+
+def test_only_a_runs_folder_has_events_to_merge(exported, tmp_path, capsys):
+    log = str(exported / "wall.ulg")
+    assert main(["replay", log, "--merge", log, "--out", str(tmp_path)]) == 1
+    assert "--merge goes with a run's folder" in capsys.readouterr().err
+
+
+def test_an_event_stands_at_the_newest_sample_that_was_heard_by_then(flight):
+    # Given samples that came 3 ms after their stamps, a gap, and a time 5 ms after the newest
+    _, log = flight
+    times_us = list(every(4000, 1_000_000, 1_100_000))
+    force, still = (0.0, 0.0, -9.8), (0.0, 0.0, 0.0)
+    heard = tuple(Heard(time_us + 500_003_000, ImuSample(time_us, force, still)) for time_us in times_us)
+    assert boot_us(replace(log, heard=heard), [heard[-1].at_us + 5000]).tolist() == [times_us[-1] + 5000]
+
+
+# --- layouts ----------------------------------------------------------------------------------------------------
+
+
+def values_of(data):
+    if isinstance(data, dict):
+        yield from (one for key, value in data.items() for one in ([value] if key == "value" else values_of(value)))
+    elif isinstance(data, list):
+        yield from (one for value in data for one in values_of(value))
+
+
+def test_every_path_of_foxgloves_layout_is_in_the_file(exported):
+    layout = json.loads((ROOT / "examples" / "foxglove-layout.json").read_text())
+    topics = read_mcap((exported / "wall.mcap").read_bytes())
+    paths = list(values_of(layout["configById"]))
+    assert len(paths) > 10
+    for path in paths:
+        topic, _, field = path.partition(".")
+        name, _, index = field.partition("[")
+        value = topics[topic][0][2][name]
+        assert not index or isinstance(value[int(index.rstrip("]"))], float), path
+    assert set(layout["configById"]["3D!flight"]["topics"]) <= set(topics)
+
+
+def test_every_curve_of_plotjugglers_layout_is_in_the_file(exported):
+    root = xml.etree.ElementTree.parse(ROOT / "examples" / "plotjuggler-layout.xml")
+    curves = [curve.attrib["name"] for curve in root.iter("curve")]
+    assert len(curves) > 10
+    written = ULog(str(exported / "wall.ulg"))
+    fields = {f"{data.name}/{name.replace('[', '.0').rstrip(']')}" for data in written.data_list for name in data.data}
+    assert set(curves) <= fields
