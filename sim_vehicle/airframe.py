@@ -124,7 +124,7 @@ class Clipping(_Part):
     """How an estimate finds back after a hit of which an accelerometer's clipping hid a part (bench/notes/px4.md).
 
     The hidden part is missing in the velocity at once. `late_s` later the error of the place that grows from it begins
-    to correct both, as a second-order system.
+    to correct both. A part is taken for a tilt: the attitude is off by as much, and goes back slowly.
     """
 
     late_s: NotNegative
@@ -133,6 +133,8 @@ class Clipping(_Part):
     """Natural frequency of the correction."""
     damping: Positive
     """Its damping ratio."""
+    tilt_per_s: NotNegative = 0.0
+    """How fast the tilt goes back. 0: nothing is taken for a tilt."""
 
 
 class Estimate(_Part):

@@ -82,9 +82,9 @@ PUSHES_S = 0.2
 LEFT_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
 KNOWN_US = 80_000
-# How an estimate is put right after a clipped hit. By motion capture a real PX4 took 0.18 s, 4.7 rad/s and a damping of
-# 0.67, by GPS 0.15 s, 2.4 rad/s and 0.69 (bench/notes/px4.md); others are up to twice as late, and twice as fast.
-PUT_RIGHT_AFTER_S = (0.06, 0.12, 0.18, 0.24)
+# How an estimate is put right after a clipped hit. By motion capture a real PX4 took 0.16 s, 4.7 rad/s and a damping of
+# 0.67, by GPS 0.13 s, 2.4 rad/s and 0.69 (bench/notes/px4.md); others are up to twice as late, and twice as fast.
+PUT_RIGHT_AFTER_S = (0.04, 0.1, 0.16, 0.22)
 PUT_RIGHT_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
 PUT_RIGHT_DAMPING = (0.5, 0.67, 0.85)
 # A part of what is missing is taken for a tilt, and goes as slowly as that: 0.51 and 0.49 per second.

@@ -7,7 +7,7 @@ import numpy as np
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.physics.jit import njit
-from sim_vehicle.physics.layout import BODY_SIZE, Disturbance, PlantState
+from sim_vehicle.physics.layout import BODY_SIZE, GRAVITY_M_S2, Disturbance, PlantState
 from sim_vehicle.physics.record import Floats, Matrix3, Vector3, new_record
 from sim_vehicle.physics.rotation import matrix_from_quaternion, turn
 
@@ -33,13 +33,16 @@ class EstimateErrors:
     drive: Annotated[Floats, (9,)]  # standard deviation of what is added in one interval
     cursor: int  # row of the ring that is written next
     velocity_before: Vector3  # the estimate's, one interval ago
-    missed: Annotated[Floats, (6,)]  # position m, velocity m/s, NED: what the estimate is off by since a hit was hidden
+    missed: Annotated[Floats, (9,)]  # what position m, velocity m/s, NED, are off by since a hit was hidden; and the
+    # level acceleration m/s^2, NED, that is taken for one because the attitude is off
     since_missed_s: float  # since clipping began to hide something
     rotation: Matrix3  # working memory
+    tilt: Vector3  # the same
     step_s: float
     late_s: float
     frequency_rad_s: float  # 0: nothing is missed
     damping: float
+    tilt_per_s: float
 
 
 def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) -> tuple[EstimateErrors, Floats]:
@@ -55,7 +58,7 @@ def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) 
     keep = np.exp(-interval_s / correlation_s)
     slots = round(estimate.delay_s / interval_s) + 1 if estimate.kind == "markov" else 0
     found = estimate.clipping
-    clipping = found.model_dump(include={"late_s", "frequency_rad_s", "damping"}) if found else {}
+    clipping = found.model_dump(include={"late_s", "frequency_rad_s", "damping", "tilt_per_s"}) if found else {}
     errors = new_record(
         EstimateErrors,
         error=sigma * rng.standard_normal(9),
@@ -85,7 +88,15 @@ def update_estimate(
         state.estimate[i] = delayed[i] + errors.error[i] + errors.missed[i] + disturbance.estimate_jump[i]
     for i in range(3):
         state.frame_offset_ned_m[i] = errors.error[i] + errors.missed[i] + disturbance.estimate_jump[i]
-    turn(state.body, errors.error[6], errors.error[7], errors.error[8], state.estimate)
+    for i in range(3):
+        errors.tilt[i] = errors.error[6 + i]
+    if errors.missed[6] != 0.0 or errors.missed[7] != 0.0:
+        # A tilt by theta, NED, turns the thrust of a hover by theta x (0, 0, -g).
+        matrix_from_quaternion(state.body, errors.rotation)
+        north, east = errors.missed[7] / GRAVITY_M_S2, -errors.missed[6] / GRAVITY_M_S2
+        for i in range(3):
+            errors.tilt[i] += errors.rotation[0, i] * north + errors.rotation[1, i] * east
+    turn(state.body, errors.tilt[0], errors.tilt[1], errors.tilt[2], state.estimate)
 
 
 @njit
@@ -107,9 +118,11 @@ def note_what_is_clipped(state: PlantState, errors: EstimateErrors, row: Floats)
 def miss_what_was_clipped(errors: EstimateErrors, delayed: Floats) -> None:
     """What clipping hides of a hit is missing in the velocity, until other sensors have put velocity and place right.
 
-    An estimator of second order that is corrected by the error of its position, some time after the hit.
+    Some time after the hit the error of the position corrects position, velocity and, on the level, tilt, by constant
+    gains: a swing of the frequency and the damping given, and a slow rest, tilt_per_s.
     """
-    step_s, frequency, damping, missed = errors.step_s, errors.frequency_rad_s, errors.damping, errors.missed
+    step_s, frequency, missed = errors.step_s, errors.frequency_rad_s, errors.missed
+    swing, rest = 2.0 * errors.damping * frequency, errors.tilt_per_s
     errors.since_missed_s += step_s
     is_hidden = delayed[HIDDEN] != 0.0 or delayed[HIDDEN + 1] != 0.0 or delayed[HIDDEN + 2] != 0.0
     if is_hidden and errors.since_missed_s > CORRECTED_AFTER_S:
@@ -118,9 +131,10 @@ def miss_what_was_clipped(errors: EstimateErrors, delayed: Floats) -> None:
         missed[3 + i] -= delayed[HIDDEN + i]
         missed[i] += step_s * missed[3 + i]
         if errors.since_missed_s > errors.late_s:
-            off_m = missed[i]
-            missed[i] -= step_s * 2.0 * damping * frequency * off_m
-            missed[3 + i] -= step_s * frequency * frequency * off_m
+            off_m, slow = missed[i], rest if i < 2 else 0.0
+            missed[i] -= step_s * (swing + slow) * off_m
+            missed[3 + i] += step_s * (missed[6 + i] - (frequency * frequency + swing * slow) * off_m)
+            missed[6 + i] -= step_s * frequency * frequency * slow * off_m
 
 
 @njit

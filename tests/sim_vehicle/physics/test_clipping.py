@@ -7,8 +7,8 @@ from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.physics.throwing import quiet, throw
 
-# As the built-in airframes, whose 0.12 s begin when an estimate 0.02 s late has seen the hit.
-AS_PX4 = {"late_s": 0.14, "frequency_rad_s": 4.45, "damping": 0.59}
+# As the built-in airframes, whose 0.16 s begin when an estimate 0.02 s late has seen the hit.
+AS_PX4 = {"late_s": 0.18, "frequency_rad_s": 4.65, "damping": 0.67, "tilt_per_s": 0.5}
 
 
 def airframe(name: str, clipping: dict[str, float] | None = AS_PX4) -> Airframe:
@@ -40,17 +40,40 @@ def test_without_the_effect_the_estimate_knows_all() -> None:
     assert error_after(throw(airframe("rigid", None), 3.0).plant) == pytest.approx(np.zeros(6), abs=1e-12)
 
 
+# Of what was hidden, what a real PX4's velocity lacked so long after the hit: the mean of fourteen hits by motion capture.
+LACKED = [
+    (0.1, 1.0),
+    (0.3, 0.54),
+    (0.4, 0.22),
+    (0.5, -0.02),
+    (0.7, -0.2),
+    (1.0, -0.14),
+    (1.4, -0.1),
+    (2.0, -0.07),
+    (3.0, -0.05),
+]
+
+
 def test_the_estimate_finds_back_as_a_real_px4_s_did() -> None:
-    """Given a hit, then the velocity is wrong by as much for 0.14 s, by a third after 0.4 s, and right after 0.6 s."""
-    at_first, soon, later, right, in_the_end = (
-        error_after(throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=duration_s).plant)[3]
-        for duration_s in (0.06, 0.14, 0.41, 0.6, 3.0)
+    """Given a hit, then the velocity lacks what a real PX4's did."""
+    hidden, *found = (
+        error_after(throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=0.01 + duration_s).plant)[3]
+        for duration_s in (0.06, *(since_s for since_s, _ in LACKED))
     )
 
-    assert soon == pytest.approx(at_first, rel=0.01)
-    assert later == pytest.approx(at_first / 3, rel=0.1)
-    assert abs(right) < 0.03 * at_first
-    assert abs(in_the_end) < 0.02 * at_first
+    assert [each / hidden for each in found] == pytest.approx([share for _, share in LACKED], abs=0.12)
+
+
+def test_a_part_is_taken_for_a_tilt() -> None:
+    """Given a clipped hit to the north, then 0.7 s later the vehicle takes itself for leaning to the south, and it is not."""
+    plant = throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=0.7).plant
+    hidden_m_s = error_after(throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=0.07).plant)[3]
+    w, _, y, _ = plant.state.estimate[6:10]
+    true_w, _, true_y, _ = plant.state.body[6:10]
+    nose_up_rad = 2.0 * (np.arctan2(y, w) - np.arctan2(true_y, true_w))
+
+    # 15 degrees of 7.8 m/s; with constant gains half as much again.
+    assert 1.0 < nose_up_rad / (np.radians(15.0) * hidden_m_s / 7.8) < 1.5
 
 
 def test_the_place_errs_by_what_the_velocity_has_missed() -> None:
@@ -59,7 +82,7 @@ def test_the_place_errs_by_what_the_velocity_has_missed() -> None:
     back_m = error_after(throw(airframe("rigid"), 2.0, duration_s=2.5).plant)[0]
 
     assert 0.3 < inside_m < 1.0
-    assert abs(back_m) < 0.02
+    assert abs(back_m) < 0.05 * inside_m
 
 
 def test_a_late_estimate_misses_it_as_late_as_it_sees_the_hit() -> None:
