@@ -40,7 +40,7 @@ def test_without_the_effect_the_estimate_knows_all() -> None:
     assert error_after(throw(airframe("rigid", None), 3.0).plant) == pytest.approx(np.zeros(6), abs=1e-12)
 
 
-# Of what was hidden, what a real PX4's velocity lacked so long after the hit: the mean of fourteen hits by motion capture.
+# Of what was hidden, what a real PX4's velocity lacked so long after the hit: the mean of fourteen, by motion capture.
 LACKED = [
     (0.1, 1.0),
     (0.3, 0.54),
@@ -65,7 +65,7 @@ def test_the_estimate_finds_back_as_a_real_px4_s_did() -> None:
 
 
 def test_a_part_is_taken_for_a_tilt() -> None:
-    """Given a clipped hit to the north, then 0.7 s later the vehicle takes itself for leaning to the south, and it is not."""
+    """Given a clipped hit to the north, then 0.7 s later the vehicle takes itself for leaning back, and is not."""
     plant = throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=0.7).plant
     hidden_m_s = error_after(throw(airframe("rigid"), 2.0, gap_m=0.02, duration_s=0.07).plant)[3]
     w, _, y, _ = plant.state.estimate[6:10]
