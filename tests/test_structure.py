@@ -39,6 +39,7 @@ def name(path: Path) -> str:
 
 
 imported = functools.cache(lambda path: tuple(imported_names(path)))
+imports_of_all = functools.cache(lambda: module_imports(ROOT))
 
 
 def breaches(packages: tuple[str, ...], forbidden: set[str]) -> list[str]:
@@ -88,7 +89,7 @@ def test_only_the_shell_touches_the_world_outside(package: str) -> None:
 def test_no_module_needs_itself_by_way_of_others() -> None:
     # Not even late or for its types alone: two files that need each other are one concept, or hide a third.
     try:
-        graphlib.TopologicalSorter(module_imports(ROOT)).prepare()
+        graphlib.TopologicalSorter(imports_of_all()).prepare()
     except graphlib.CycleError as cycle:
         pytest.fail(" is imported by ".join(cycle.args[1]))
 
@@ -97,7 +98,7 @@ def test_no_module_needs_itself_by_way_of_others() -> None:
 def test_no_folder_needs_itself_by_way_of_others(package: str) -> None:
     # The way of the data is the way of the files. A file beside the folders counts as one of them.
     arrows: dict[str, set[str]] = {}
-    for module, names in module_imports(ROOT).items():
+    for module, names in imports_of_all().items():
         room, *inside = module.split(".")
         if room == package and inside:
             below = {name.split(".")[1] for name in names if name.startswith(f"{package}.")}
