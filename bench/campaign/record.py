@@ -17,7 +17,7 @@ class Record:
 
     def __init__(self, campaign: Campaign, folder: Path) -> None:
         """Open the campaign's file, or begin it. Raises RecordError where other lines are in it."""
-        self.path = folder / f"{campaign.name}-{campaign.key}.jsonl"
+        self.path = record_path(campaign, folder)
         folder.mkdir(parents=True, exist_ok=True)
         self.outcomes: dict[int, Outcome] = {}
         head = {"campaign": campaign.name, "version": campaign.version, "parameters": dict(campaign.parameters)}
@@ -25,18 +25,11 @@ class Record:
 
     def _open(self, head: dict[str, Any]) -> TextIO:
         _cut_torn_line(self.path)
-        lines = self.path.read_bytes().splitlines() if self.path.exists() else []
-        for number, line in enumerate(lines):
-            try:
-                entry = json.loads(line)
-                if number > 0:
-                    self.outcomes[entry["case"]] = Outcome(entry["case"], entry.get("result"), entry.get("failure"))
-            except (ValueError, KeyError, TypeError, AttributeError) as error:
-                raise RecordError(f"{self.path} is damaged in line {number + 1}; move it away.") from error
-            if number == 0 and entry != head:
-                raise RecordError(f"{self.path} holds another campaign's results; move it away.")
+        known, self.outcomes = outcomes_in(self.path) if self.path.exists() else (None, {})
+        if known not in (None, head):
+            raise RecordError(f"{self.path} holds another campaign's results; move it away.")
         file = self.path.open("a", encoding="utf-8")
-        if not lines:
+        if known is None:
             _write(file, head)
         return file
 
@@ -54,6 +47,28 @@ class Record:
 
     def close(self) -> None:
         self._file.close()
+
+
+def record_path(campaign: Campaign, folder: Path) -> Path:
+    return folder / f"{campaign.name}-{campaign.key}.jsonl"
+
+
+def outcomes_in(path: Path) -> tuple[dict[str, Any] | None, dict[int, Outcome]]:
+    """The head of a file of results, None in an empty one, and the outcomes by case number; without half a line at its
+    end, of a campaign that goes on or was killed. Raises RecordError, OSError.
+    """
+    content = path.read_bytes()
+    head, outcomes = None, {}
+    for number, line in enumerate(content[: content.rfind(b"\n") + 1].splitlines(), start=1):
+        try:
+            entry = dict(json.loads(line))
+            if number == 1:
+                head = entry
+            else:
+                outcomes[entry["case"]] = Outcome(entry["case"], entry.get("result"), entry.get("failure"))
+        except (ValueError, KeyError, TypeError) as error:
+            raise RecordError(f"{path} is damaged in line {number}; move it away.") from error
+    return head, outcomes
 
 
 def _write(file: TextIO, entry: dict[str, Any]) -> dict[str, Any]:

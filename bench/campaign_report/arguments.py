@@ -36,4 +36,16 @@ def add_campaign(commands: Commands) -> None:
         "(default: runs/<time>-random-SEED)",
     )
     campaign.set_defaults(run=runs("bench.campaign_report.command:run_campaign_command"))
-    add_recoveries(campaign.add_subparsers(metavar="PART", dest="part"))
+    parts = campaign.add_subparsers(metavar="PART", dest="part")
+    add_recoveries(parts)
+    page = parts.add_parser(
+        "page",
+        help="a campaign's results as one page to look at",
+        description="Small multiples, every failure with the command that flies it again, and two versions compared.",
+    )
+    page.add_argument(
+        "record", type=Path, nargs="?", metavar="RECORD", help="of random missions (default: the newest that there is)"
+    )
+    page.add_argument("--against", type=Path, metavar="RECORD", help="another version's, to be compared with")
+    page.add_argument("--out", type=Path, metavar="FILE", help="default: beside the record, as .html")
+    page.set_defaults(run=runs("bench.campaign_report.page:run_page"))

@@ -6,12 +6,14 @@ from pathlib import Path
 
 from bench.arguments import DRAWN_NAME, DRAWN_TITLE, NOTES
 from bench.campaign.plan import Campaign
-from bench.campaign.run import Results, Workers, failures_text, run_campaign
+from bench.campaign.record import record_path
+from bench.campaign.run import RECORDS_FOLDER, Results, Workers, failures_text, run_campaign
 from bench.campaign_report import tables
 from bench.campaign_report.flown import Missions
 from bench.campaign_report.law_bars import law_bars
-from bench.campaign_report.mission_bars import mission_bars
+from bench.campaign_report.mission_bars import DRAWN_WANTED, mission_bars
 from bench.campaign_report.only import run_only
+from bench.campaign_report.page import write_page
 from bench.campaign_report.picture import missions_figure
 from bench.campaign_report.reading import HOW_TO_READ
 from bench.detectors_report.bars import Bar, bars_text, summary_text
@@ -27,8 +29,6 @@ from companion.errors import ConfigurationError
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"
 PART, TITLE = "campaign", "Campaign"
-# What is wanted of vehicles drawn at random; the two named ones have other bars.
-DRAWN_WANTED = {"foldable": 0.995, "rigid": 0.99}
 
 
 def run_campaign_command(options: Namespace) -> int:
@@ -57,7 +57,8 @@ def run_campaign_command(options: Namespace) -> int:
     print(summary_text(bars))
     for text in failed:
         print(text)
-    print(f"Written to {out / DOCUMENT_NAME} in {time.monotonic() - started_s:.0f} s.")
+    shown = write_page(record_path(flown, RECORDS_FOLDER))
+    print(f"Written to {out / DOCUMENT_NAME} and {shown} in {time.monotonic() - started_s:.0f} s.")
     return 1 if failed else 0
 
 
@@ -73,7 +74,7 @@ def _run_drawn(options: Namespace, workers: Workers, out: Path) -> int:
     write_part(out / DRAWN_NAME, PART, "\n".join(parts), DRAWN_TITLE)
     print(summary_text(bars))
     failed = failures_text(flown, results)
-    print(f"{failed}Written to {out / DRAWN_NAME}.")
+    print(f"{failed}Written to {out / DRAWN_NAME} and {write_page(record_path(flown, RECORDS_FOLDER))}.")
     return 1 if failed else 0
 
 

@@ -11,7 +11,7 @@ from bench.campaign_report.flown import FlownCase, Missions, answered, level, sq
 from bench.campaign_report.mission_bars import OVERSHOOT_MOST_M
 from bench.detectors_report.numbers import per_cent, share
 from bench.paper.table import markdown
-from bench.random_missions.generator import AIRFRAMES, STREAMS_HZ
+from bench.random_missions.generator import AIRFRAMES, STREAMS_HZ, MissionCase
 
 SPEED_BINS_M_S = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.5)
 WIND_BINS_M_S = (0.0, 1.0, 2.0, 3.0, 4.0, 5.01)
@@ -107,14 +107,15 @@ def failures_text(missions: Missions) -> str:
             f"{one.result['stream_hz']} Hz",
             f"{one.result['wind_m_s']:.1f} m/s",
             "; ".join(f"{cause}: {details}" for cause, details in one.result["failures"]).replace("|", "/"),
-            f"`{command_again(one)}`",
+            f"`{command_again(one.case)}`",
         )
         for one in missions.failed()
     ]
     return markdown(("seed", "airframe", "room", "stream", "wind", "cause", "again"), rows, left=7) if rows else ""
 
 
-def command_again(flown: FlownCase) -> str:
-    airframe = "" if flown.case.airframe == AIRFRAMES[0] else f" --airframe {flown.case.airframe}"
-    drawn = " --vehicles drawn" if flown.case.is_drawn else ""
-    return f"python -m bench campaign --only {flown.case.seed}{airframe}{drawn}"
+def command_again(case: MissionCase) -> str:
+    """What flies a mission of the campaign again, into a run folder."""
+    airframe = "" if case.airframe == AIRFRAMES[0] else f" --airframe {case.airframe}"
+    drawn = " --vehicles drawn" if case.is_drawn else ""
+    return f"python -m bench campaign --only {case.seed}{airframe}{drawn}"

@@ -97,7 +97,8 @@ def _notes(way: Way) -> Iterator[str]:
         yield "no way round what is known" if way.leg.is_cut_off else "round what is known"
     if way.meets is not None:
         north, east, down = way.points_ned_m[way.meets.index]
-        yield f"meets '{way.meets.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
+        meets = "may meet" if way.meets.moves else "meets"
+        yield f"{meets} '{way.meets.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
     if modifiers := describe_modifiers(way.leg.step.item):
         yield modifiers
 

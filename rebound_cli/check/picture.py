@@ -1,34 +1,52 @@
 """A mission from above and from the side: the ways, the fence, and the simulated world's obstacles."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
 from companion.fence import Fence
+from companion.flight.plan import describe_after_recovery, describe_limit
+from companion.mission.items import program
 from companion.mission.model import Mission
 from rebound_cli.check.ways import Way
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
 from sim_vehicle.scene import Scene
+
+Floats = npt.NDArray[np.float64]
 
 _WAY = "tab:orange"
 _FENCE = "tab:green"
 _MEETING = "tab:red"
 # Numbers of items: not on the way itself.
 _BESIDE: Any = {"fontsize": 8, "xytext": (4, 4), "textcoords": "offset points"}
+# Names of obstacles: above their middles, and read over what is drawn there.
+_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6}
+_ON_IT: Any = {
+    "fontsize": 7,
+    "color": OBSTACLE,
+    "ha": "center",
+    "xytext": (0, 5),
+    "textcoords": "offset points",
+    "bbox": _BOX,
+}
 # A wait whose end nobody knows is drawn this long.
 _UNKNOWN_S = 5.0
 
 
 def draw_mission(path: Path, mission: Mission, scene: Scene, ways: Sequence[Way]) -> None:
-    figure = Figure(figsize=(13, 6.5), layout="constrained")
+    figure = Figure(figsize=(13, 7.2), layout="constrained")
     above, side = figure.subplots(1, 2)
     _draw_from_above(above, mission, scene, ways)
     _draw_heights(side, mission.fence, ways)
+    policies = "\n".join(_policies(mission, scene))
+    shown = above.get_legend_handles_labels()
+    figure.legend(*shown, loc="outside lower center", ncols=8, fontsize=8, title=policies, title_fontsize=9)
     known = ways[-1].ends_s
     lasts = "" if known is None else f", {known:.0f} s"
     figure.suptitle(f"Mission '{mission.name}': {sum(way.length_m for way in ways):.0f} m{lasts} if nothing is hit")
@@ -39,22 +57,57 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
     start = np.array(scene.start.position_ned_m)
     draw_obstacles(axis, scene, start, "obstacles (simulated)", 0.7)
     for _, obstacle in scene.obstacles():
-        north, east = footprint(obstacle).mean(axis=0) - start[:2]
-        axis.annotate(obstacle.name, (east, north), fontsize=7, color=OBSTACLE)
+        moved = (0.0, 0.0, 0.0) if obstacle.motion is None else obstacle.motion.offsets_ned_m[0]
+        north, east = footprint(obstacle).mean(axis=0) - start[:2] + moved[:2]
+        axis.annotate(obstacle.name, (east, north), **_ON_IT)
     draw_patches(axis, mission.obstacles.patches())
     _draw_fence(axis, mission.fence)
     for number, way in enumerate(ways):
         points = way.points_ned_m
         axis.plot(points[:, 1], points[:, 0], color=_WAY, linewidth=1.6, label="way" if number == 0 else None)
         if way.meets:
-            axis.plot(*points[way.meets.index, 1::-1], "x", color=_MEETING)
+            label = None if any(before.meets for before in ways[:number]) else "would be hit"
+            axis.plot(*points[way.meets.index, 1::-1], "x", color=_MEETING, label=label, linestyle="none")
+    for number, (start_ned_m, end_ned_m) in enumerate(after_hits(mission, ways)):
+        along = {"linestyle": ":", "color": _MEETING, "marker": "v", "markevery": [1], "markersize": 5}
+        label = "then flies or lands here" if number == 0 else None
+        axis.plot(*np.array([start_ned_m, end_ned_m])[:, 1::-1].T, label=label, **along)
     for (north, east), numbers in ends(ways).items():
         axis.annotate(", ".join(numbers), (east, north), **_BESIDE)
     axis.plot([0.0], [0.0], "^", color="black", label="arming position")
     axis.set(title="From above; numbers are items", xlabel="east [m]", ylabel="north [m]")
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(alpha=0.3)
-    axis.legend(loc="best", fontsize=8)
+
+
+def after_hits(mission: Mission, ways: Sequence[Way]) -> list[tuple[Floats, Floats]]:
+    """From where each way would be hit to where the mission goes on after the recovery, if it is the first hit."""
+    found = []
+    for number, way in enumerate(ways):
+        if way.meets is not None:
+            policy = way.leg.step.item.on_collision or mission.on_collision
+            then = policy.after_max_hits if policy.max_hits == 1 else policy.then
+            here = way.points_ned_m[way.meets.index]
+            following = [later.points_ned_m[-1] for later in ways[number + 1 :] if later.length_m]
+            goes_to = {
+                **dict.fromkeys(("hold", "continue"), (following or [here])[0]),
+                **dict.fromkeys(("retry", "detour"), way.points_ned_m[-1]),
+                "return": np.zeros(3),
+            }
+            found.append((here, goes_to.get(then, here)))
+    return found
+
+
+def _policies(mission: Mission, scene: Scene) -> Iterator[str]:
+    """What follows a hit, wherever it is; and by which clock obstacles move."""
+    general = mission.on_collision
+    yield f"On a hit: recover, then {describe_after_recovery(general)}; {describe_limit(general)}."
+    for step in program(mission.items):
+        policy = step.item.on_collision
+        if policy is not None:
+            yield f"In item {step.label}: then {describe_after_recovery(policy)}; {describe_limit(policy)}."
+    if any(obstacle.motion for _, obstacle in scene.obstacles()):
+        yield "Obstacles' times: s since the vehicle's boot, which is some seconds before arming."
 
 
 def ends(ways: Sequence[Way]) -> dict[tuple[float, float], list[str]]:
@@ -94,13 +147,12 @@ def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
         if way.meets:
             met_s, height_m = times[way.meets.index], heights[way.meets.index]
             axis.plot([met_s], [height_m], "x", color=_MEETING)
-            axis.annotate(f"  {way.meets.name}", (met_s, height_m), fontsize=7, color=_MEETING, rotation=60)
+            beside = {"xytext": (2, -4), "textcoords": "offset points", "va": "top", "rotation": -60}
+            axis.annotate(way.meets.name, (met_s, height_m), fontsize=7, color=_MEETING, **beside)
         begins_s += lasts_s
-    for number, height_m in enumerate((fence.max_height_m, fence.min_height_m)):
-        label = None if number else "fence"
-        axis.axhline(height_m, color=_FENCE, linestyle="--", linewidth=1.2, label=label)
+    for height_m in (fence.max_height_m, fence.min_height_m):
+        axis.axhline(height_m, color=_FENCE, linestyle="--", linewidth=1.2)
     axis.set(title="Height", xlabel="time after arming, when nothing is hit [s]")
     axis.set_ylabel("height above the arming position [m]")
     axis.set_ylim(bottom=min(0.0, math.floor(-max(float(way.points_ned_m[:, 2].max()) for way in ways))))
     axis.grid(alpha=0.3)
-    axis.legend(loc="best", fontsize=8)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,7 @@ from companion.mission.model import Leg, Mission, itinerary
 from rebound_cli.inputs import SimulatedWorld
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.scene import Scene
+from sim_vehicle.world import Obstacle, Vector3
 
 Floats = npt.NDArray[np.float64]
 
@@ -20,10 +22,11 @@ _MOST_POINTS = 2_000
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """The first obstacle in a way, and at which of its points."""
+    """The first obstacle in a way, and at which of its points. One that moves may be there, or not, when it comes."""
 
     name: str
     index: int
+    moves: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +63,35 @@ def planned_ways(mission: Mission, world: SimulatedWorld) -> tuple[Way, ...]:
 
 
 def _first_met(points_ned_m: Floats, scene: Scene, airframe: Airframe) -> Meeting | None:
-    """The first obstacle, where it stands at first, that a vehicle on these points touches."""
+    """The first obstacle, wherever it stands in its time, that a vehicle on these points touches."""
     # The arming position is that of the vehicle's centre as it stands.
     (north_m, east_m, _), standing_m = scene.start.position_ned_m, airframe.geometry.foot_depth_m
     for index, (north, east, down) in enumerate(points_ned_m.tolist()):
         place = (north + north_m, east + east_m, down - standing_m)
         for _, obstacle in scene.obstacles():
-            if obstacle.distance_m(place) < airframe.geometry.reach_m:
-                return Meeting(obstacle.name, index)
+            if _nearest_m(obstacle, place) < airframe.geometry.reach_m:
+                return Meeting(obstacle.name, index, obstacle.motion is not None)
     return None
+
+
+def _nearest_m(obstacle: Obstacle, place_ned_m: Vector3) -> float:
+    """How near an obstacle comes to a place."""
+    if obstacle.motion is None:
+        return obstacle.distance_m(place_ned_m)
+
+    def distance_m(offset_ned_m: Floats) -> float:
+        north, east, down = (np.array(place_ned_m) - offset_ned_m).tolist()
+        return obstacle.distance_m((north, east, down))
+
+    nearest_m = math.inf
+    for start, end in pairwise(map(np.array, obstacle.motion.offsets_ned_m)):
+        # On a straight way the distance from a convex solid has one least value: thirds close in on it.
+        low, high = 0.0, 1.0
+        while (high - low) * np.linalg.norm(end - start) > _STEP_M:
+            near, far = low + (high - low) / 3, high - (high - low) / 3
+            if distance_m(start + near * (end - start)) < distance_m(start + far * (end - start)):
+                high = far
+            else:
+                low = near
+        nearest_m = min(nearest_m, distance_m(start + 0.5 * (low + high) * (end - start)))
+    return nearest_m

@@ -4,10 +4,12 @@ Foxglove's scene has z up. Its topics are in two frames: `local` is ENU about th
 `vehicle` is FLU about its centre. Our own topics keep NED and FRD, as their fields' names say.
 """
 
+import heapq
 import json
 import math
 from collections.abc import Iterator, Sequence
 from importlib import resources
+from operator import itemgetter
 from typing import IO, Any, TypeAlias
 
 import numpy as np
@@ -18,7 +20,7 @@ from rebound_cli import __version__
 from rebound_cli.export.ulog import boot_us
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.report import finding_data
-from rebound_cli.report.content import surfaces
+from rebound_cli.report.content import finite, surfaces
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.run_folder import HIT_KINDS
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
@@ -54,14 +56,16 @@ def write_mcap(flight: ShownFlight, log: Log, file: IO[bytes]) -> None:
     writer = Writer(file)
     writer.start(library=f"px4-rebound {__version__}")
     channels: dict[str, int] = {}
-    for at_us, topic, data in sorted(_messages(flight, log), key=lambda message: message[0]):
+    # What is much comes as it is wanted: half an hour of it would not fit into a small computer's memory.
+    told = sorted(_told(flight, log), key=itemgetter(0))
+    for at_us, topic, data in heapq.merge(_heard(log), _truth(flight, log), told, key=itemgetter(0)):
         if topic not in channels:
             name = f"foxglove.{_FOXGLOVE[topic]}" if topic in _FOXGLOVE else f"rebound.{topic[1:]}"
             schema = json.dumps(foxglove.get(name) or {"title": name, **_kind(data)}).encode()
             schema_id = writer.register_schema(name, "jsonschema", schema)
             channels[topic] = writer.register_channel(topic, "json", schema_id)
         at_ns = round(at_us) * 1000
-        writer.add_message(channels[topic], at_ns, json.dumps(data, allow_nan=False).encode(), at_ns)
+        writer.add_message(channels[topic], at_ns, json.dumps(finite(data), allow_nan=False).encode(), at_ns)
     writer.finish()  # type: ignore[no-untyped-call]
 
 
@@ -81,10 +85,8 @@ def _kind(value: Any) -> Json:
     return {}
 
 
-def _messages(flight: ShownFlight, log: Log) -> Iterator[Message]:
-    yield from _scene(flight, log)
+def _heard(log: Log) -> Iterator[Message]:
     attitude = _LEVEL
-    at_us: float
     for heard in log.heard:
         at_us, sample = heard.at_us, heard.sample
         match sample:
@@ -101,12 +103,27 @@ def _messages(flight: ShownFlight, log: Log) -> Iterator[Message]:
                 yield at_us, "/imu", _fields(sample)
             case GlobalPosition():
                 yield at_us, "/location", _location(at_us, sample)
-    if flight.truth is not None:
-        series = flight.truth.series
-        times = flight.truth.at_us(series["time_boot_us"]).tolist()
-        rows = zip(times, series["position_ned_m"].tolist(), series["attitude_wxyz"].tolist(), strict=True)
-        for at_us, place, turned in rows:
-            yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": _pose(place, turned)}
+
+
+def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
+    """As often as the vehicle tells where it is."""
+    if flight.truth is None:
+        return
+    series = flight.truth.series
+    rows = np.searchsorted(series["time_boot_us"], boot_us(log, _positions_us(log)))
+    for row in np.unique(rows[rows < len(series["time_boot_us"])]).tolist():
+        at_us = float(flight.truth.at_us(float(series["time_boot_us"][row])))
+        pose = _pose(series["position_ned_m"][row].tolist(), series["attitude_wxyz"][row].tolist())
+        yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": pose}
+
+
+def _positions_us(log: Log) -> list[int]:
+    return [heard.at_us for heard in log.heard if isinstance(heard.sample, LocalPosition)]
+
+
+def _told(flight: ShownFlight, log: Log) -> Iterator[Message]:
+    """What the companion made of it."""
+    yield from _scene(flight, log)
     for at_us, place in zip(flight.log.setpoint_at_us.tolist(), flight.log.setpoint_ned_m.tolist(), strict=True):
         if math.isfinite(sum(place)):
             yield at_us, "/setpoint", {"position_ned_m": place}
@@ -127,7 +144,7 @@ def _scene(flight: ShownFlight, log: Log) -> Iterator[Message]:
     places = [_xyz(x, y, 0.0) for x in (aside_m, -aside_m) for y in (aside_m, -aside_m)]
     hoops = [_cylinder({"position": place, "orientation": _wxyz(*_LEVEL)}, size, _BLUE) for place in places]
     yield _entity(began_us, "vehicle", "vehicle", cylinders=hoops)
-    moving_us = [heard.at_us for heard in log.heard if isinstance(heard.sample, LocalPosition)]
+    moving_us = _positions_us(log)
     clock_s = (boot_us(log, moving_us) * 1e-6).tolist()
     for _, obstacle in () if flight.scene is None else flight.scene.obstacles():
         name, motion = f"obstacle {obstacle.name}", obstacle.motion

@@ -224,7 +224,7 @@ def _format(topic: tuple[str, str]) -> bytes:
 def _written(row: Row, numbers: Mapping[tuple[str, str], int]) -> bytes:
     if row.topic is None:
         level, text = row.values
-        return _message("L", level + struct.pack("<Q", row.boot_us) + text.encode())
+        return _message("L", level + struct.pack("<Q", row.boot_us) + text.encode("utf-8", "replace"))
     kinds = (field.split()[0].rstrip("]").partition("[") for field in row.topic[1].split(";"))
     letters = "".join((count or "1") + _LETTERS[kind] for kind, _, count in kinds)
     return _message("D", struct.pack("<HQ" + letters, numbers[row.topic], row.boot_us, *row.values))

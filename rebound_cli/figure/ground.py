@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,11 +35,23 @@ def footprint(obstacle: Obstacle) -> Floats:
 
 
 def draw_obstacles(axis: Any, scene: Scene, origin_ned_m: Floats, label: str, alpha: float) -> None:
-    """Where they stand at first, about the origin."""
+    """Where they stand at first, about the origin; and of those that move the way, with times of the boot clock."""
     for number, (_, obstacle) in enumerate(scene.obstacles()):
         corners = (footprint(obstacle) - origin_ned_m[:2])[:, ::-1]
         said = label if number == 0 else None
-        axis.add_patch(Polygon(corners, facecolor=OBSTACLE, edgecolor=OBSTACLE, alpha=alpha, label=said))
+        motion = obstacle.motion
+        moved = np.zeros((1, 2)) if motion is None else np.array(motion.offsets_ned_m)[:, 1::-1]
+        style: Any = {"facecolor": OBSTACLE, "edgecolor": OBSTACLE}
+        axis.add_patch(Polygon(corners + moved[0], alpha=alpha, label=said, **style))
+        if motion is None:
+            continue
+        axis.add_patch(Polygon(corners + moved[-1], alpha=0.4 * alpha, linestyle=":", **style))
+        places = corners.mean(axis=0) + moved
+        for start, end in pairwise(places):
+            axis.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": OBSTACLE, "linewidth": 1.2})
+        for time_s, place in zip(motion.times_s, places, strict=True):
+            beside = {"xytext": (5, -9), "textcoords": "offset points", "fontsize": 7, "color": OBSTACLE}
+            axis.annotate(f"{time_s:g} s", place, **beside)
 
 
 def draw_patches(axis: Any, patches: Sequence[Patch]) -> None:

@@ -8,13 +8,14 @@ import matplotlib.image
 import numpy as np
 import pytest
 import yaml
+from matplotlib.figure import Figure
 
 from companion.mission.items import ACTIONS
 from rebound_cli.check.command import mission_schema
-from rebound_cli.check.picture import ends
+from rebound_cli.check.picture import after_hits, ends
 from rebound_cli.check.ways import planned_ways
 from rebound_cli.documents import parse_document
-from rebound_cli.figure.ground import footprint
+from rebound_cli.figure.ground import draw_obstacles, footprint
 from rebound_cli.inputs import mission_from, world_from
 from sim_vehicle.scene import Scene
 from tests.rebound_cli.command import ROOT, WALL, run_here
@@ -68,6 +69,81 @@ sim:
     assert [way.meets.name if way.meets else None for way in ways] == [None, "far wall", "mast", "mast"]
     # a reach before the wall
     assert ways[1].points_ned_m[ways[1].meets.index][0] == pytest.approx(3.8, abs=0.15)
+
+
+def test_what_moves_is_in_the_way_wherever_it_comes_by():
+    # Given a cart that comes 10 m north, stops, and goes 6 m east; a way across its own, one behind it, one before it
+    ways = planned("""
+name: t
+items:
+  - takeoff: {height_m: 2}
+  - go_to: {position_ned_m: [0, 8, -2]}
+  - go_to: {position_ned_m: [-14, 8, -2]}
+  - go_to: {position_ned_m: [-14, 2, -2]}
+  - go_to: {position_ned_m: [0, 2, -2]}
+  - land:
+fence: {radius_m: 20}
+sim:
+  boxes:
+    - name: cart
+      centre_ned_m: [-10, 2, -2]
+      size_m: [1, 1, 1]
+      motion:
+        path:
+          - {at_s: 5, offset_ned_m: [0, 0, 0]}
+          - {at_s: 15, offset_ned_m: [10, 0, 0]}
+          - {at_s: 30, offset_ned_m: [10, 6, 0]}
+""")
+    met = [way.meets and way.meets.moves and way.points_ned_m[way.meets.index] for way in ways]
+    assert met[0] is None and met[3] is None
+    # its western side is met on the way east, the end of its way, and its southern side where it stands at first
+    assert met[1][1] == pytest.approx(1.5 - 0.2, abs=0.15) and met[2][0] == 0.0
+    assert met[4][0] == pytest.approx(-10.5 - 0.2, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("policy", "goes_on_at"),
+    [
+        # the next item's end, the same item's again, home, or no further: there it lands
+        ("{then: hold}", [0, 4, -2]),
+        ("{then: retry}", [6, 0, -2]),
+        ("{then: return}", [0, 0, 0]),
+        ("{then: land}", None),
+        ("{then: retry, max_hits: 1, after_max_hits: return}", [0, 0, 0]),
+    ],
+)
+def test_where_the_mission_goes_on_after_a_hit(policy, goes_on_at):
+    document = parse_document(
+        f"""
+name: t
+items:
+  - takeoff: {{height_m: 2}}
+  - go_to: {{position_ned_m: [6, 0, -2]}}
+    on_collision: {policy}
+  - hold: {{duration_s: 1}}
+  - go_to: {{position_ned_m: [0, 4, -2]}}
+  - land:
+sim:
+  walls: [{{point_ned_m: [4, 0, -2], normal_ned: [-1, 0, 0], width_m: 1, height_m: 2}}]
+""",
+        "t.yaml",
+    )
+    world = world_from(document)
+    mission = mission_from(document, world)
+    ((here, there), *_) = after_hits(mission, planned_ways(mission, world))
+    assert here[0] == pytest.approx(3.8, abs=0.15)
+    assert there.tolist() == pytest.approx(here.tolist() if goes_on_at is None else goes_on_at)
+
+
+def test_a_moving_obstacle_is_drawn_where_it_begins_and_ends_with_its_way_between():
+    box = {"centre_ned_m": [-5, 0, -2], "size_m": [0.6, 1, 1]}
+    motion = {"velocity_ned_m_s": [1.5, 0.5, 0], "from_s": 12, "until_s": 14}
+    axis = Figure().subplots()
+    draw_obstacles(axis, Scene.model_validate({"boxes": [{**box, "motion": motion}]}), np.zeros(3), "obstacles", 0.7)
+    middles = [patch.get_xy()[:-1].mean(axis=0).tolist() for patch in axis.patches]
+    # east first: 2 s later it is 3 m north and 1 m east
+    assert np.ptp(middles, axis=0).tolist() == pytest.approx([1.0, 3.0])
+    assert [text.get_text() for text in axis.texts] == ["", "12 s", "14 s"]
 
 
 def test_items_that_end_in_one_place_are_named_together_and_once():

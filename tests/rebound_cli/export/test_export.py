@@ -77,6 +77,12 @@ def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(export
     assert [data["kind"] for _, _, data in topics["/hit"]] == ["wall"]
     # At the companion's own times, in nanoseconds
     assert [at_ns for _, at_ns, _ in topics["/imu"]] == [at_us * 1000 for at_us, _ in log.imu()]
+    # and the truth as often as the vehicle says where it is, by the same clock
+    truth = {at_ns: data["pose"]["position"] for _, at_ns, data in topics["/truth"]}
+    for _, at_ns, data in topics["/pose"]:
+        if at_ns in truth:
+            assert math.dist(truth[at_ns].values(), data["pose"]["position"].values()) < 0.3
+    assert len(truth.keys() & {at_ns for _, at_ns, _ in topics["/pose"]}) > 0.9 * len(topics["/pose"])
     levels = {data["message"][:9]: data["level"] for _, _, data in topics["/log"]}
     assert levels["detection"] == 3 and levels["takeoff: "] == 2
 
