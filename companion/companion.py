@@ -20,7 +20,7 @@ from companion.report import Event, ExpectationReport, FlightReport, Status
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """`received_frames` holds the packets found in what was received, in order; bad bytes as they came.
+    """`received_frames` holds the packets found in what was received, in order; bad bytes as they came, as `Stray`.
 
     A packet that is not complete yet appears in the step that completes it.
     """

@@ -71,15 +71,16 @@ def measured(hits: int) -> Json:
     # Measured at the priority at which the product runs; a higher one than this process has takes root.
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, 0)
-    flights = [_recorded(number) for number in range(FLIGHTS)]
+    flights = [recorded(number) for number in range(FLIGHTS)]
     times = math.ceil(hits / FLIGHTS)
-    quiet = [taken for flight in flights for taken in _timed(flight, times)]
-    with _busy(BUSY_LOOPS):
-        busy = [taken for flight in flights for taken in _timed(flight, times)]
-    return {"hits": len(busy), "load": os.getloadavg()[0], "busy": _spread(busy), "quiet": _spread(quiet)}
+    quiet = [taken for flight in flights for taken in timed(flight, times)]
+    with busy(BUSY_LOOPS):
+        loaded = [taken for flight in flights for taken in timed(flight, times)]
+    return {"hits": len(loaded), "load": os.getloadavg()[0], "busy": spread(loaded), "quiet": spread(quiet)}
 
 
-def _recorded(number: int) -> Recorded:
+def recorded(number: int) -> Recorded:
+    """The flight of that number up to its hit, and what the vehicle says after it to whoever does nothing."""
     mission = mission_of(number)
     scene = Scene.model_validate(mission.sim or {})
     companion, vehicle = Companion(mission), SimulatedVehicle(load_built_in(scene.airframe), scene, scene.seed)
@@ -101,7 +102,7 @@ def _now_us(interval: int) -> int:
     return EPOCH_US + 4000 * (interval + 2)
 
 
-def _timed(flight: Recorded, times: int) -> Iterator[float | None]:
+def timed(flight: Recorded, times: int) -> Iterator[float | None]:
     """Seconds from the hit's datagram to the recovery setpoint; None where there was none in time."""
     companion = Companion(mission_of(flight.number))
     companion.confirm_plan()
@@ -117,7 +118,7 @@ def _timed(flight: Recorded, times: int) -> Iterator[float | None]:
                 with contextlib.suppress(BaseException):
                     _fly_on(companion, _now_us(start), ours.getsockname()[1], place)
                 os._exit(0)
-            yield _exchanged(flight, start, ours)
+            yield exchanged(flight, start, ours, _address_of_child(ours))
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
 
@@ -134,9 +135,8 @@ def _fly_on(companion: Companion, now_us: int, port: int, folder: Path) -> None:
             loop.exchange()
 
 
-def _exchanged(flight: Recorded, start: int, ours: socket.socket) -> float | None:
-    ours.settimeout(10.0)
-    theirs = _address_of_child(ours)
+def exchanged(flight: Recorded, start: int, ours: socket.socket, theirs: tuple[str, int]) -> float | None:
+    """Plays what the vehicle said from an interval on. Seconds from the hit's datagram until a setpoint that jumps."""
     began_s, hit_s, last = time.monotonic(), math.inf, None
     for interval in range(start, len(flight.said)):
         due_s = began_s + 0.004 * (interval - start)
@@ -162,6 +162,7 @@ def _exchanged(flight: Recorded, start: int, ours: socket.socket) -> float | Non
 
 def _address_of_child(ours: socket.socket) -> tuple[str, int]:
     """Where its first packet came from; what an earlier child sent last is passed over."""
+    ours.settimeout(10.0)
     data, sender = b"", ("", 0)
     while data != b"\0":
         data, sender = ours.recvfrom(65_536)
@@ -174,7 +175,8 @@ def _jumps(last: tuple[int, float, float], place: tuple[int, float, float]) -> b
 
 
 @contextlib.contextmanager
-def _busy(loops: int) -> Iterator[None]:
+def busy(loops: int) -> Iterator[None]:
+    """Processes of the same priority that do nothing but reckon."""
     children = []
     for _ in range(loops):
         child = os.fork()
@@ -190,7 +192,7 @@ def _busy(loops: int) -> Iterator[None]:
             os.waitpid(child, 0)
 
 
-def _spread(taken: Sequence[float | None]) -> Json:
+def spread(taken: Sequence[float | None]) -> Json:
     """Milliseconds; one that did not come in time is without bound, and counts. One before the hit is below none."""
     sizes = sorted(math.inf if seconds is None else 1e3 * seconds for seconds in taken)
     early = sum(size < 0.0 for size in sizes)

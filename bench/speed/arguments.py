@@ -22,4 +22,10 @@ def add_speed(commands: Commands) -> None:
     speed.add_argument(
         "--calls", action="store_true", help="count function calls alone, and make what the count is held to anew"
     )
+    speed.add_argument(
+        "--latency",
+        type=count,
+        metavar="HITS",
+        help="measure in real time, beside pymavlink and MAVSDK 4, how soon so many hits are answered; nothing else",
+    )
     speed.set_defaults(run=runs("bench.speed.command:run_speed"))

@@ -1,4 +1,4 @@
-"""`bench speed`: how many times real time, and the budget of an interval; or the count of calls alone."""
+"""`bench speed`: how many times real time, and the budget of an interval; or the calls, or the latency, alone."""
 
 import os
 from argparse import Namespace
@@ -12,10 +12,11 @@ from bench.reference.stamps import FLOWN, stamp_text
 from bench.speed.budget import Budget, measured_budget
 from bench.speed.calls import calls_an_interval, hold_to
 from bench.speed.flight import fly
+from bench.speed.latency import compared, table
 from bench.speed.parse import median_us, parse_us
 from bench.speed.parts import KERNEL, PARTS, PLANT
 
-PART = "speed"
+PART, LATENCY_PART = "speed", "latency"
 # The standard normal values that an interval draws: six for each of 32 raw samples, nine for the estimate.
 _DRAWS = 201
 _REPEATS = 5000
@@ -44,12 +45,23 @@ def run_speed(options: Namespace) -> int:
         hold_to(calls)
         print(f"{sum(calls.values()):.1f} calls an interval: {calls}")
         return 0
+    if options.latency:
+        return _run_latency(options)
     checked_text(options.out, PART)
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     fly()
     flights = [_flown() for _ in range(options.flights)]
     text = "\n".join([*_lines(flights), *_budget(measured_budget(options.flights), calls_an_interval()), ""])
     write_part(options.out, PART, text)
+    print(f"{text}\nWritten to {options.out}.")
+    return 0
+
+
+def _run_latency(options: Namespace) -> int:
+    checked_text(options.out, LATENCY_PART)
+    stamp = stamp_text(f"python -m bench speed --latency {options.latency}", (*FLOWN, "rebound_cli"))
+    text = "\n".join([f"{stamp}:", "", *table(compared(options.latency))])
+    write_part(options.out, LATENCY_PART, text)
     print(f"{text}\nWritten to {options.out}.")
     return 0
 

@@ -14,6 +14,7 @@ from companion.mavlink.packet import (
     HEADER_V2,
     MAGIC_V1,
     MAGIC_V2,
+    Stray,
     message_id_of,
     packet_length,
     payload_of,
@@ -55,7 +56,7 @@ class Decoder:
         self._vehicle = (system_id, component_id)
 
     def feed(self, received: bytes) -> list[Frame]:
-        """All packets complete by now, with their samples; bytes that are no packet come as they are, with None."""
+        """All packets complete by now, with their samples; bytes that are no packet come as `Stray`, with None."""
         data = self._pending + received if self._pending else received
         frames: list[Frame] = []
         start = bad_start = 0
@@ -68,12 +69,12 @@ class Decoder:
             if start + length > end:
                 break
             if bad_start < start:
-                frames.append((data[bad_start:start], None))
+                frames.append((Stray(data[bad_start:start]), None))
             packet = data[start : start + length]
             frames.append((packet, self._sample(packet)))
             start = bad_start = start + length
         if bad_start < start:
-            frames.append((data[bad_start:start], None))
+            frames.append((Stray(data[bad_start:start]), None))
         self._pending = data[start:]
         return frames
 

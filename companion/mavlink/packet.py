@@ -5,6 +5,10 @@ HEADER_V1, HEADER_V2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 FLAG_SIGNED = 0x01
 
 
+class Stray(bytes):
+    """Bytes in which no packet was found."""
+
+
 def packet_length(data: bytes, start: int = 0) -> int:
     """Length of the packet that may begin at ``start``: 0 when none can, 1 over the end when not yet known."""
     magic = data[start]

@@ -5,12 +5,11 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from companion.mavlink.decode import checksum_holds
-from companion.mavlink.packet import message_id_of, packet_length
+from companion.mavlink.packet import MAGIC_V2, Stray, packet_length
 
 _STAMP = struct.Struct(">Q")
 # It carries the secret key: MAVLink asks to leave it out of logs (mavlink.io, "Message Signing", "Logging").
-SETUP_SIGNING = 256
+SETUP_SIGNING = (256).to_bytes(3, "little")
 
 # A killed process must leave a log complete to its last second; half of that leaves room for a slow disk.
 FLUSH_INTERVAL_US = 500_000
@@ -93,13 +92,11 @@ def packets_in(content: bytes) -> Iterator[tuple[int, bytes, int]]:
 
 
 def may_be_logged(frame: bytes) -> bool:
-    """Whether bytes are a packet by their header and their checksum: what is not could hide others from a reader.
+    """Whether what was received is a packet: what is not could hide others from a reader.
 
     One that carries a key is in no log.
     """
-    if len(frame) == 0 or packet_length(frame) != len(frame) or not checksum_holds(frame, 0, len(frame)):
-        return False
-    return message_id_of(frame) != SETUP_SIGNING
+    return not isinstance(frame, Stray) and (frame[0] != MAGIC_V2 or frame[7:10] != SETUP_SIGNING)
 
 
 def _plausible(stamp_us: int, last_us: int | None) -> bool:

@@ -166,7 +166,7 @@ class Link:
             self._sign()
         for text in texts:
             self._texts.add(text, now_us)
-        if self._texts.waiting:
+        if self._texts.heard_us is not None:
             for message in self._texts.due(now_us):
                 self.send(message)
         for service in self._busy:

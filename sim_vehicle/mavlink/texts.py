@@ -26,28 +26,29 @@ class TextLink:
     """Texts waiting for a ground station."""
 
     def __init__(self) -> None:
-        self.waiting: deque[tuple[int, StatusText]] = deque(maxlen=QUEUE_LENGTH)
-        self._heard_us: int | None = None
+        self._waiting: deque[tuple[int, StatusText]] = deque(maxlen=QUEUE_LENGTH)
+        self.heard_us: int | None = None
+        """When a ground station was heard last."""
         self._sent_us = -TEXT_INTERVAL_US
         self._number = 0
 
     def heard(self, heartbeat: PeerHeartbeat, now_us: int) -> None:
         """A heartbeat came over this link."""
         if heartbeat.type == GROUND_STATION_TYPE:
-            self._heard_us = now_us
+            self.heard_us = now_us
 
     def add(self, text: StatusText, now_us: int) -> None:
         """Queue a text."""
-        self.waiting.append((now_us, text))
+        self._waiting.append((now_us, text))
 
     def due(self, now_us: int) -> Iterator[Message]:
         """The messages of the next text, if it is time for one and somebody listens."""
-        if self._heard_us is None:
+        if not self._waiting or self.heard_us is None:
             return
-        if now_us - self._heard_us > GROUND_STATION_TIMEOUT_US or now_us - self._sent_us < TEXT_INTERVAL_US:
+        if now_us - self.heard_us > GROUND_STATION_TIMEOUT_US or now_us - self._sent_us < TEXT_INTERVAL_US:
             return
-        while self.waiting:
-            written_us, text = self.waiting.popleft()
+        while self._waiting:
+            written_us, text = self._waiting.popleft()
             if now_us - written_us < STALE_US:
                 self._sent_us = now_us
                 yield from encode.status_texts(text, self._number)

@@ -16,7 +16,7 @@ from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
 from bench.faults.files import tried
 from bench.faults.flight import fly, fly_from_one_take_off
 from bench.faults.injectors import Rewritten, Simulated, setting
-from bench.faults.latency import _spread
+from bench.faults.latency import spread as spread_of
 from bench.faults.packets import ARM, IMU, SET_MODE, made
 from bench.faults.pilot import Taken
 from bench.faults.table import Row, text_of
@@ -203,7 +203,7 @@ def test_the_table_counts_what_was_not_as_expected() -> None:
 
 
 def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None:
-    spread = _spread([0.004, 0.006, None])
+    spread = spread_of([0.004, 0.006, None])
     assert (spread["found"], spread["p50"], spread["most"]) == (2, 6.0, math.inf)
     text = text_of([], {"hits": 3, "load": 1.0, "busy": spread, "quiet": spread}, "Made")
     assert "| p50 6.0 ms, p99 more than 500 ms, p99.9 more than 500 ms, most more than 500 ms | 2 of 3 |" in text
@@ -213,7 +213,7 @@ def test_a_hit_that_is_not_answered_in_time_counts_among_the_latencies() -> None
 def test_a_run_that_was_broken_off_goes_on_where_it_was(monkeypatch, tmp_path, capsys) -> None:
     # Given one row, of which one seed has been tried before
     monkeypatch.chdir(tmp_path)
-    missing, wanted, spread = command._missing, [], _spread([0.004])
+    missing, wanted, spread = command._missing, [], spread_of([0.004])
     monkeypatch.setattr(latency, "measured", lambda hits: {"hits": hits, "load": 1.0, "busy": spread, "quiet": spread})
 
     def of_one_row(record: Record, number: int) -> list[str]:

@@ -2,8 +2,10 @@
 
 import pytest
 
+from bench.faults.latency import recorded
 from bench.speed.calls import calls_an_interval, held_to
 from bench.speed.flight import fly
+from bench.speed.latency import of_peer
 from bench.speed.parts import PARTS
 
 # A change that costs more is looked at: it is made cheaper, or the count is renewed by `python -m bench speed --calls`.
@@ -27,3 +29,12 @@ def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, program):
 
 def test_the_count_is_the_same_in_every_flight(calls):
     assert calls_an_interval() == calls
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("name", ["pymavlink", "mavsdk"])
+def test_a_program_that_only_answers_is_timed_at_each_hit(name):
+    # Given a flight that is played to it until the hit, again and again
+    taken = list(of_peer(name)(recorded(0), 3))
+    # Then each answer comes after the hit, and long before PX4 would miss a setpoint (COM_OF_LOSS_T, 1 s)
+    assert all(seconds is not None and 0.0 < seconds < 0.5 for seconds in taken)

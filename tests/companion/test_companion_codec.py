@@ -1,6 +1,8 @@
 """MAVLink bytes to samples and commands to bytes, against pymavlink's own packing and parsing."""
 
 import copy
+import functools
+import inspect
 import math
 import struct
 
@@ -9,6 +11,8 @@ from pymavlink.dialects.v20 import development as mav
 
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
+from companion.mavlink.packet import payload_of
+from companion.mavlink.readers import LONE_GUARD_READERS, Reader
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -312,6 +316,57 @@ def test_setpoint_masks_are_px4s(velocity, acceleration, yaw, mask):
     assert math.isnan(m.yaw_rate)
     assert (m.vx, m.vy, m.vz) == velocity if velocity else math.isnan(m.vx)
     assert m.yaw == yaw if yaw is not None else math.isnan(m.yaw)
+
+
+@pytest.mark.parametrize("sequence", [0, 255])
+@pytest.mark.parametrize(
+    "setpoint",
+    [
+        PositionSetpoint(2_000_000, (1.0, 2.0, -3.0), 1.0, (0.5, 0.0, -0.5), (0.0, 2.0, 0.0)),
+        PositionSetpoint(0, (0.0, 0.0, 0.0), None, None, None),
+        PositionSetpoint(5_000_000_000_000, (-1e4, 1e-9, 0.1), -3.0, (0.0, 0.0, 0.0), None),
+    ],
+)
+def test_a_setpoint_is_packed_field_by_field_and_byte_by_byte_as_pymavlink_packs_it(setpoint, sequence):
+    encoder, link = Encoder(), mav.MAVLink(None, 7, 191)
+    encoder.speak_to(7, 1)
+    encoder._mavlink.seq = link.seq = sequence
+    ((name, fields),) = encoder.fields(setpoint)
+    theirs = mav.MAVLink_set_position_target_local_ned_message(
+        **{key: math.nan if value is None else value for key, value in fields.items()}
+    )
+    (packet,) = encoder.packets(setpoint)
+    assert packet == theirs.pack(link)
+    assert mav.MAVLink(None).decode(bytearray(packet)).get_type() == name
+    assert encoder._mavlink.seq == (sequence + 1) % 256
+
+
+@pytest.mark.parametrize("kept", [0, 1, 3, 100])
+@pytest.mark.parametrize("reader", LONE_GUARD_READERS.values(), ids=lambda reader: reader.name)
+def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
+    """Zeros at the end of a payload, which are not sent, included."""
+    # Given a message whose fields are zero but for the first on the wire
+    kind, values, number = mav.mavlink_map[mav.__dict__[f"MAVLINK_MSG_ID_{reader.name}"]], {}, 1
+    for name, length in zip(kind.ordered_fieldnames, kind.lengths, strict=True):
+        field = kind.fieldtypes[kind.fieldnames.index(name)]
+        given = [(number + i if "int" in field else 0.5 * (number + i)) * (number <= kept) for i in range(length)]
+        values[name] = b"NAME" if field == "char" else given[0] if length == 1 else given
+        number += length
+    packet = packed(kind(**values))
+    # When it is read
+    seen = []
+    make = functools.wraps(reader._make)(lambda *fields: seen.append(fields))
+    Reader(kind, make).from_payload(payload_of(packet), (1, 1))
+    # Then the fields are those that pymavlink's own parser finds
+    heard, (fields,) = mav.MAVLink(None).decode(bytearray(packet)), seen
+    names = list(inspect.signature(reader._make).parameters)
+    for name, value in zip(names, fields, strict=True):
+        if name == "source":
+            assert value == (1, 1)
+        elif isinstance(value, bytes):
+            assert value.rstrip(b"\0").decode() == getattr(heard, name)
+        else:
+            assert value == (tuple(found) if isinstance(found := getattr(heard, name), list) else found), name
 
 
 def test_a_setpoint_that_leans_only_asks_for_the_acceleration_alone():
