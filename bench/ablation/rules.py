@@ -86,6 +86,12 @@ RULES = (
         _REFLEX + "reckoning:Bank.off",
         _says((REST, REST)),
     ),
+    Rule(
+        "velocity by places",
+        "no velocity that the places deny",
+        _REFLEX + "reckoning:_beside",
+        _says(REST),
+    ),
     Rule("spinning", "gentle steering while it spins", _FLIGHT + "recovering:Recover._is_spinning", _says(False)),
     Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
     Rule(

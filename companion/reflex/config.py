@@ -97,6 +97,9 @@ DRIFT_M2_S3 = 0.03
 PLACE_SPREAD_M = 0.1
 # Right is what is known to be wrong by no more than four times a good velocity's noise.
 RIGHT_M_S = 0.15
+# A velocity that is told is held against the places that are told over this time: their noise of 0.02 m makes 0.04 m/s
+# of it. What is more than twice RIGHT_M_S is a place that jumped.
+COMPARED_S, MOST_OFF_M_S = 0.5, 0.3
 # Spreads of the velocity after a hit about the one expected: of the speed into the obstacle (frames give back 0.2 to
 # 0.9 of it, and the normal is good to 20 degrees), of the speed by friction, and upwards (0.6 m/s at 5 m/s).
 REBOUND_SPREAD, FRICTION_SPREAD, THROWN_SHARE, LEAST_SPREAD_M_S = 0.26, 0.1, 0.12, 0.1

@@ -26,6 +26,7 @@ from companion.motion.delay import DELAY_S
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.reflex.config import (
+    COMPARED_S,
     CORRECTED_S,
     DRIFT_M2_S3,
     FRICTION_SPREAD,
@@ -35,6 +36,7 @@ from companion.reflex.config import (
     MISFIT,
     MISFIT_S,
     MOST_LEANT,
+    MOST_OFF_M_S,
     PLACE_SPREAD_M,
     PUSHES_S,
     PUT_RIGHT_AFTER_S,
@@ -185,14 +187,17 @@ class Reckoning:
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # the slow external force, wind and drag: what it takes of the lean
     push_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
-    off_m: Vector3 = REST  # what is missing still in the told place, once that is foreseen
-    off_m_s: Vector3 = REST  # the same of the velocity
+    off_m: Vector3 = REST  # what the told place is off by, once the estimate is right: what is missing in it still
+    off_m_s: Vector3 = REST  # the same of the velocity, and by what it is not that of the places besides
     _bank: Bank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
     _at_boot_us: int = 0  # of the bank
     _moved_m_s: Vector3 = REST  # the sum up to there
     _time_boot_us: int = 0
+    _missing_m_s: Vector3 = REST  # in the told velocity still
+    _beside_m_s: Vector3 = REST  # what the rest of it is not that of the places by
+    _told: LocalPosition | None = None  # the newest since the estimate is right, without what is missing
     _heard_boot_us: int = 0  # the newest told, by the bank
     _told_boot_us: int = 0  # and since the estimate is right
     _pushed_boot_us: int = 0
@@ -223,7 +228,8 @@ class Reckoning:
                 plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
             )
         self._heard_boot_us = self._told_boot_us = 0
-        self.is_right, self.off_m, self.off_m_s = False, REST, REST
+        self._told, self.is_right = None, False
+        self.off_m = self.off_m_s = self._missing_m_s = self._beside_m_s = REST
 
     def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
         """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
@@ -263,7 +269,7 @@ class Reckoning:
             return
         was_right, is_in_push = self.is_right, sample.time_boot_us <= self._pushed_boot_us
         if self.is_whole:
-            self.is_right, self.off_m, self.off_m_s = True, REST, REST
+            self.is_right, self.off_m, self._missing_m_s = True, REST, REST
         elif was_right or not is_in_push:
             self._reckon(sample, at_us)
         if was_right or self.is_right:
@@ -289,7 +295,7 @@ class Reckoning:
         found, spread_m_s, left_m_s = bank.found(since_s)
         self.is_right = self.is_right or left_m_s <= RIGHT_M_S
         if self.is_right:
-            self.off_m, self.off_m_s = bank.off(since_s)
+            self.off_m, self._missing_m_s = bank.off(since_s)
             return
         velocity = plus(found.velocity_ned_m_s, behind_s, self._acceleration)
         place = plus(found.position_ned_m, behind_s, velocity)
@@ -301,20 +307,41 @@ class Reckoning:
         elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - self._told_boot_us))
         share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
         was, self._told_boot_us = self.motion, sample.time_boot_us
+        self._compare(sample)
         told = self.put_right(sample)
         place = plus(was.position_ned_m, share, plus(told.position_ned_m, -1.0, was.position_ned_m))
         velocity = plus(was.velocity_ned_m_s, share, plus(told.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = Moving(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = REST
 
+    def _compare(self, sample: LocalPosition) -> None:
+        """The told velocity, less what is missing in it, with the told places: its errors last longer than theirs."""
+        self.off_m_s = self._missing_m_s
+        before, self._told = self._told, self.put_right(sample)
+        if before is not None:
+            elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
+            if 0.0 < elapsed_s < COMPARED_S:
+                self._beside_m_s = _beside(self._beside_m_s, before, self._told, elapsed_s)
+        self.off_m_s = plus(self._missing_m_s, 1.0, self._beside_m_s)
+
     def put_right(self, sample: LocalPosition) -> LocalPosition:
-        """What is told, with what is missing in it still."""
+        """What is told, without what it is off by."""
         place, velocity = sample.position_ned_m, sample.velocity_ned_m_s
         return replace(
             sample,
             position_ned_m=plus(place, -1.0, self.off_m),
             velocity_ned_m_s=plus(velocity, -1.0, self.off_m_s),
         )
+
+
+def _beside(was_m_s: Vector3, before: LocalPosition, told: LocalPosition, elapsed_s: float) -> Vector3:
+    """By what the velocities from one told place to the next have led beside it, smoothed."""
+    half_s = 0.5 * elapsed_s
+    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, told.velocity_ned_m_s)
+    further_m = plus(led, -1.0, told.position_ned_m)
+    found = plus(was_m_s, 1.0 / (COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
+    size = math.hypot(*found)
+    return found if size <= MOST_OFF_M_S else plus(REST, MOST_OFF_M_S / size, found)
 
 
 def lean_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:

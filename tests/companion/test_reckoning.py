@@ -14,7 +14,7 @@ from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from companion.motion.strapdown import Strapdown
-from companion.reflex.config import RIGHT_M_S, TILT_PER_S
+from companion.reflex.config import MOST_OFF_M_S, RIGHT_M_S, TILT_PER_S
 from companion.reflex.laws import Contact
 from companion.reflex.planner import Moving
 from companion.reflex.reckoning import Reckoning, half_way, lean_ahead
@@ -281,6 +281,29 @@ def test_a_vehicle_whose_estimate_is_off_for_seconds_comes_to_rest_where_it_is_t
     assert off_m_s < -0.25 and asked_m_s == pytest.approx(off_m_s, abs=0.1)
     assert record.is_over and lacks_m_s < -0.1
     assert record.settled_after_s() < 3.5
+
+
+def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
+    # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
+    flight, record, recover = recovering()
+    record.reckoning.tell(True, HIT_US)
+    for at_us in range(100_000, 5_000_000, 20_000):
+        recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
+        if record.is_over:
+            break
+    # Then the recovery is over although 0.15 m/s is told, and PX4 is asked for as much at rest
+    assert record.setpoint_ned_m[0] == pytest.approx(2.38, abs=0.05)
+    assert record.reckoning.off_m_s[0] == pytest.approx(0.15, abs=0.05)
+    assert recover.target(at_us + 3_000_000).velocity_ned_m_s[0] == record.reckoning.off_m_s[0]
+    assert record.is_over and record.settled_after_s() < 3.5
+
+
+def test_a_place_that_jumps_makes_no_large_error_of_a_velocity():
+    found = reckoned()
+    found.tell(True, HIT_US)
+    for since_us in range(60_000, 400_000, 20_000):
+        found.hear(said(0.0, since_us, (3.0 if since_us < 200_000 else 8.0, 0.0, -2.0)))
+    assert math.hypot(*found.off_m_s) <= MOST_OFF_M_S + 1e-9
 
 
 def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
