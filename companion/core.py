@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 from companion.detection.interface import Situation
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
+from companion.flight.damage import note_motors
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.hearing import hear, landed, note_height, too_low
@@ -125,6 +126,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             follow_contact(flight, self.watch)
+            note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
         return moved

@@ -160,6 +160,13 @@ class Sticks(Sample):
 
 
 @dataclass(frozen=True, slots=True)
+class MotorOutputs(Sample):
+    """SERVO_OUTPUT_RAW of the main outputs: the first four, microseconds of PWM or a driver's own units."""
+
+    outputs: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Vibration(Sample):
     """VIBRATION as PX4 fills it: the mean change from sample to sample, and clipped samples since boot.
 

@@ -19,6 +19,7 @@ MEANINGS = {
     "connected": "A PX4 multicopter was heard.",
     "contact": "A landing or a hand. It is no collision and is not answered.",
     "crossed": "Another program's setpoints reached the vehicle while the guard held it.",
+    "damage": "A motor works harder than before the hit: its propeller, or it, may be hurt.",
     "detection": "A collision, on the first message that shows it.",
     "detector": "The detector is armed, with its threshold.",
     "detour": "The item is flown round known obstacles.",

@@ -19,6 +19,7 @@ from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetp
 from companion.mission.course import Pace
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
+from companion.motion.motors import MotorWatch
 from companion.reflex.planner import Moving
 from companion.report import Event, JsonValue, Outcome
 
@@ -168,6 +169,7 @@ class FlightContext:
     patches: tuple[Patch, ...] = ()  # what is known of the surroundings, mission coordinates
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
+    motors: MotorWatch = field(default_factory=MotorWatch)
     leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     pressing: Pressing = field(default_factory=Pressing)

@@ -10,7 +10,7 @@ from companion.memory.stored import ObstaclesConfig
 from companion.memory.stored import describe as describe_patch
 from companion.mission import items
 from companion.mission.model import Mission
-from companion.mission.policy import AbortWhen, OnCollision
+from companion.mission.policy import AbortWhen, OnCollision, OnDamage
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05
@@ -126,6 +126,7 @@ def mission_lines(mission: Mission) -> list[str]:
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
         f"On a hit   detector {mission.companion.detector}, recovery law {law}; "
         f"then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
+        *_damage_lines(mission.on_damage),
         *_obstacle_lines(mission.obstacles),
         f"Abort      {describe_abort(mission.abort_when)}",
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
@@ -146,6 +147,11 @@ def _fastest_m_s(mission: Mission) -> float:
             case items.GoToItem() | items.PathItem() | items.OrbitItem() | items.ReturnItem() | items.SetSpeedItem():
                 speeds.append(step.action.speed_m_s or mission.companion.flight.cruise_speed_m_s)
     return max(speeds, default=mission.companion.flight.takeoff_speed_m_s)
+
+
+def _damage_lines(on_damage: OnDamage) -> list[str]:
+    after = {"land": "land", "return": "return and land"}
+    return [f"On damage  a motor that works harder than before a hit: {after[on_damage]}"] if on_damage in after else []
 
 
 def _obstacle_lines(obstacles: ObstaclesConfig) -> list[str]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from companion.flight import expecting
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
+from companion.flight.damage import way_out
 from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
@@ -121,6 +122,8 @@ class FlyItems(_OnAWay):
         return self._heading.turn(motion[0], motion[1], now_us)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+        if (hurt := way_out(flight)) is not None:
+            return hurt
         while True:
             if isinstance(self._action, items.ReturnItem):
                 flight.returning_as = self._action
@@ -299,7 +302,7 @@ class FlyHome(_OnAWay):
         flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        if self._is_cut_off:
+        if self._is_cut_off or (flight.motors.damage is not None and flight.mission.on_damage == "land"):
             return Move(Trigger.LAND_DUE)
         overdue_s = self._elapsed_s - self._way.duration_s
         if overdue_s < 0.0:

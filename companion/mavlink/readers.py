@@ -160,6 +160,10 @@ def _vibration(
     return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))
 
 
+def _motor_outputs(port: int, servo1_raw: int, servo2_raw: int, servo3_raw: int, servo4_raw: int) -> Sample | None:
+    return messages.MotorOutputs((servo1_raw, servo2_raw, servo3_raw, servo4_raw)) if port == 0 else None
+
+
 def _battery(battery_remaining: int) -> Sample | None:
     # -1: the autopilot does not know.
     return messages.Battery(battery_remaining) if 0 <= battery_remaining <= 100 else None
@@ -244,6 +248,7 @@ READERS = _readers(
         dialect.MAVLink_heartbeat_message: _heartbeat,
         dialect.MAVLink_attitude_target_message: _attitude_target,
         dialect.MAVLink_vibration_message: _vibration,
+        dialect.MAVLink_servo_output_raw_message: _motor_outputs,
         dialect.MAVLink_sys_status_message: _battery,
         dialect.MAVLink_extended_sys_state_message: _extended_state,
         dialect.MAVLink_current_mode_message: _current_mode,

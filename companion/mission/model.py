@@ -19,7 +19,7 @@ from companion.mission import items
 from companion.mission.config import CompanionConfig
 from companion.mission.course import Pace, Planned, climb, home_around, way_around
 from companion.mission.items import MissionItem
-from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, Resume
+from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, OnDamage, Resume
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.laws import RECOVERY_LAWS, check_known_law
@@ -50,6 +50,8 @@ class Mission(Written):
     recovery: KnownRecovery = RecoveryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
+    on_damage: OnDamage = "tell"
+    """After a hit that has hurt a propeller or a motor; told in any case. From the recovery's end on."""
     on_interrupt: Handover = "hold"
     """What the vehicle is told to do when the flight ends early."""
     companion: CompanionConfig = CompanionConfig()

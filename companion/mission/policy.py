@@ -7,6 +7,7 @@ from pydantic import Field
 from companion.written import NotNegative, PositionNed, Positive, Written
 
 Handover: TypeAlias = Literal["hold", "land"]
+OnDamage: TypeAlias = Literal["tell", "land", "return"]
 OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
 
 

@@ -1,0 +1,39 @@
+"""What is known of a motor that a hit has hurt, and what the mission wants then."""
+
+from collections.abc import Sequence
+
+from companion.flight.context import FlightContext, Move
+from companion.flight.states import Trigger
+from companion.messages import LandedState, MotorOutputs, Sample
+from companion.motion.motors import MotorWatch
+
+
+def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> None:
+    """What the motors are asked for, before the first hit and after each recovery."""
+    vehicle = flight.vehicle
+    if not vehicle.armed:
+        if flight.motors.is_begun:
+            flight.motors = MotorWatch(len(flight.collisions))
+        return
+    if vehicle.identity is None or vehicle.identity.vehicle_type != "quadrotor":
+        return
+    hits = len(flight.collisions) - flight.motors.earlier_hits
+    flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
+    # One that does not come to rest may hang on what it hit, or lie on the ground: that asks more of a motor, too.
+    rests = hits == 0 or flight.collisions[-1].settled_at_boot_us is not None
+    was_hit = hits > 0 if flies and rests else None
+    for sample in samples:
+        if isinstance(sample, MotorOutputs):
+            damage = flight.motors.take(sample.outputs, was_hit, now_us)
+            if damage is not None:
+                data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
+                wanted = flight.mission.on_damage
+                flight.tell(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
+
+
+def way_out(flight: FlightContext) -> Move | None:
+    """What the mission wants of a vehicle that is hurt."""
+    damage, wanted = flight.motors.damage, flight.mission.on_damage
+    if damage is None or wanted == "tell":
+        return None
+    return Move(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)

@@ -1,0 +1,129 @@
+"""After a hit: does one motor have to work harder than before? Which, by how much, and how surely.
+
+What a hurt propeller or a worn motor no longer lifts, PX4's rate control asks of that motor in addition, and of no
+other: in steady flight lift and drag torque of all four have to be what they were. A shifted load, or something that
+leans on the vehicle, asks more of two, or of one as much as it spares the opposite one.
+
+Nothing is known of the vehicle beforehand. Each half second of the flight before the hit says how its four outputs
+differ, trim, wind and manoeuvres included. A motor is hurt if after the recovery it works harder, beside the others,
+than in any of these. Of moments that come in random order the probability is 1 / C(n + m, m) that m last ones exceed
+all n first ones; four motors have four chances.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from statistics import fmean, median
+from typing import TypeAlias
+
+# Five of PX4's SERVO_OUTPUT_RAW at the 10 Hz of its onboard set; in so long a turn is begun and ended.
+WINDOW_US = 500_000
+# What a hit has done shows in the first minute.
+MOST_WINDOWS = 60
+# The usual level of significance.
+LEAST_CONFIDENCE = 0.99
+# A rotor that has lost a twentieth of its blades lifts 0.95^3 of what it did (lift goes with r^2 dr), which takes a
+# command of 1.08 where lift goes with its square. Told is what is nearer to that than to a whole one.
+LEAST_HARDER = (0.95**-1.5 - 1.0) / 2.0
+# A weight that shifts towards one motor asks of the opposite one as much less: the other three then differ by half of
+# what the first has more. Of a motor alone they do not. Half way between.
+MOST_UNLIKE = 0.25
+# The least that PX4 lets a PWM output be (PWM_MAIN_MINn). Outputs of DShot and CAN begin at zero, those of PWM at 1 ms.
+LEAST_PWM, PWM_ZERO = 800.0, 1000.0
+
+Outputs: TypeAlias = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """`motor` counts from 1, as PX4's outputs. `harder`: beside the other three, in shares of their mean."""
+
+    motor: int
+    harder: float
+    confidence: float
+    is_at_limit: bool
+
+    @property
+    def text(self) -> str:
+        limit = ", all it has" if self.is_at_limit else ""
+        return f"motor {self.motor} works {self.harder:.0%} harder than before{limit} ({self.confidence:.1%} sure)"
+
+
+@dataclass(slots=True)
+class MotorWatch:
+    """Of one flight of a quadrotor whose motors are outputs 1 to 4."""
+
+    earlier_hits: int = 0  # of flights before this one
+    damage: Damage | None = None
+    _before: list[Outputs] = field(default_factory=list)  # a window's means
+    _after: list[Outputs] = field(default_factory=list)
+    _samples_after: list[Outputs] = field(default_factory=list)
+    _window: list[Outputs] = field(default_factory=list)
+    _window_began_us: int = 0
+    _least: float = math.inf
+    _most: float = -math.inf
+    _was_hit: bool | None = None
+
+    @property
+    def is_begun(self) -> bool:
+        return self._most > -math.inf
+
+    def take(self, outputs: Outputs, was_hit: bool | None, now_us: int) -> Damage | None:
+        """Of a vehicle that is armed. `was_hit`: None where its flight says nothing, as in a recovery."""
+        self._least, self._most = min(self._least, *outputs), max(self._most, *outputs)
+        if was_hit is not self._was_hit:
+            self._was_hit, self._window = was_hit, []
+            self._after, self._samples_after = [], []
+        if was_hit is None or self.damage is not None or len(self._after) >= MOST_WINDOWS:
+            return None
+        if not self._window:
+            self._window_began_us = now_us
+        self._window.append(outputs)
+        if was_hit:
+            self._samples_after.append(outputs)
+        if now_us - self._window_began_us < WINDOW_US:
+            return None
+        (self._after if was_hit else self._before).append(_over(self._window, fmean))
+        self._window = []
+        self.damage = self._judged() if was_hit else None
+        return self.damage
+
+    def _judged(self) -> Damage | None:
+        count = len(self._after)
+        confidence = 1.0 - 4.0 / math.comb(len(self._before) + count, count)
+        if confidence < LEAST_CONFIDENCE:
+            return None
+        zero = PWM_ZERO if self._least >= LEAST_PWM else 0.0
+        before, after = (_shares(windows, zero) for windows in (self._before, self._after))
+        changes = [now - was for now, was in zip(_over(after, median), _over(before, median), strict=True)]
+        motor = max(range(4), key=changes.__getitem__)
+        others = [change for number, change in enumerate(changes) if number != motor]
+        harder = changes[motor] - fmean(others)
+        if harder < LEAST_HARDER or min(_beside(after, motor)) <= max(_beside(before, motor)):
+            return None
+        # One that gives all that it has says the same most of the time, and how much more is wanted is not seen.
+        shown = [outputs[motor] for outputs in self._samples_after]
+        is_at_limit = median(shown) == self._most
+        unlike = max(abs(change - fmean(others)) for change in others)
+        is_alone = is_at_limit or unlike < MOST_UNLIKE * harder
+        return Damage(motor + 1, harder, confidence, is_at_limit) if is_alone else None
+
+
+def _over(windows: Sequence[Outputs], of: Callable[[Sequence[float]], float]) -> Outputs:
+    """Of each motor."""
+    first, second, third, fourth = (of(column) for column in zip(*windows, strict=True))
+    return first, second, third, fourth
+
+
+def _shares(windows: Sequence[Outputs], zero: float) -> list[Outputs]:
+    """Of the four's mean. One microsecond is what PWM can tell apart: of less nothing is a share."""
+    shares: list[Outputs] = []
+    for first, second, third, fourth in windows:
+        mean = max(fmean((first, second, third, fourth)) - zero, 1.0)
+        shares.append(((first - zero) / mean, (second - zero) / mean, (third - zero) / mean, (fourth - zero) / mean))
+    return shares
+
+
+def _beside(windows: Sequence[Outputs], motor: int) -> list[float]:
+    """By how much a motor works harder than the other three."""
+    return [(4.0 * shares[motor] - sum(shares)) / 3.0 for shares in windows]
