@@ -5,8 +5,9 @@ a payload, and `encode.Encoder` makes the packet; whatever arrives is read here.
 """
 
 import struct
+from collections.abc import Callable
 from functools import cache
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Any, TypeAlias
 
 from fastcrc.crc16 import mcrf4xx
@@ -40,6 +41,18 @@ ATTITUDE_TARGET = Layout(dialect.MAVLink_attitude_target_message)
 LOCAL_POSITION_NED = Layout(dialect.MAVLink_local_position_ned_message)
 GLOBAL_POSITION_INT = Layout(dialect.MAVLink_global_position_int_message)
 ODOMETRY = Layout(dialect.MAVLink_odometry_message)
+
+
+@cache
+def flattened(kind: Any) -> tuple[Layout, Callable[[Any], tuple[Any, ...]]] | None:
+    """How a message of pymavlink's becomes its payload; None for one with texts or arrays, and one of a single field.
+
+    And for one that packs itself, in another way than the dialect's.
+    """
+    names, is_theirs = kind.ordered_fieldnames, dialect.mavlink_map.get(kind.id) is kind
+    if not is_theirs or len(names) == 1 or "char" in kind.fieldtypes or any(kind.array_lengths):
+        return None
+    return Layout(kind), attrgetter(*names)
 
 
 def read(packet: bytes) -> Any:

@@ -439,7 +439,7 @@ def test_a_situation_that_stays_is_judged_once_and_no_decision_differs_for_it():
                     {"tipped_over": chance.random() < 0.1},
                 ]
             )
-            now = now._replace(**{"mode_requested": False, **changes})
+            now = FailsafeSituation(**{**now._asdict(), "mode_requested": False, **changes})
         if chance.random() < 0.01:
             parameters.set("COM_FAIL_ACT_T", chance.choice((0.0, 0.5, 1.0)))
         anew._settled = None
