@@ -406,11 +406,6 @@ TIME_US = 1 << 53
 QUATERNION_ERROR = 1.0e-3
 
 
-def within(most: float, *values: float) -> bool:
-    """Whether the vector is no longer than `most`. One with NaN or an infinity is not."""
-    return math.hypot(*values) <= most
-
-
 def is_rotation(w: float, x: float, y: float, z: float) -> bool:
     """Whether a quaternion has length 1."""
     return abs(w * w + x * x + y * y + z * z - 1.0) <= QUATERNION_ERROR

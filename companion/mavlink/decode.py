@@ -15,10 +15,8 @@ from companion.mavlink.packet import (
     MAGIC_V1,
     MAGIC_V2,
     Stray,
-    message_id_of,
+    opened,
     packet_length,
-    payload_of,
-    source_of,
 )
 from companion.mavlink.readers import READERS, Reader
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
@@ -79,14 +77,13 @@ class Decoder:
         return frames
 
     def _sample(self, packet: bytes) -> Sample | None:
-        message_id = message_id_of(packet)
+        message_id, source, payload = opened(packet)
         reader = self._readers.get(message_id)
         if reader is None:
             return None
-        source = source_of(packet)
         if source != self._vehicle and (self._vehicle is not None or message_id != dialect.MAVLINK_MSG_ID_HEARTBEAT):
             return None
-        sample = reader.from_payload(payload_of(packet), source)
+        sample = reader.from_payload(payload, source)
         if isinstance(sample, ImuSample):
             self._boot_us = sample.time_boot_us
         elif self._boot_us > WRAP_US // 2 and isinstance(sample, LocalPosition | Attitude | AttitudeTarget):

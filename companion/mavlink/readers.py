@@ -1,6 +1,7 @@
 """MAVLink messages to typed samples: one function a message, whose parameters are the fields that it reads.
 
-The layout is pymavlink's own; its message objects, which take most of the time, are left out.
+The layout is pymavlink's own; its message objects, which take most of the time, are left out. A vector with NaN or
+infinity in it has a length that is within no limit.
 """
 
 import math
@@ -8,6 +9,7 @@ import re
 import struct
 from collections.abc import Callable, Mapping
 from inspect import signature
+from math import hypot
 from operator import itemgetter
 from typing import Any
 
@@ -15,7 +17,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion import messages
 from companion.mavlink.encode import COMPONENT_ID
-from companion.messages import Refused, Sample, is_rotation, within
+from companion.messages import Refused, Sample, is_rotation
 
 # HIGHRES_UPDATED_FLAGS: the accelerometer's three axes.
 ACCELEROMETER_UPDATED = 0x7
@@ -71,11 +73,12 @@ def _imu(
     if fields_updated & ACCELEROMETER_UPDATED != ACCELEROMETER_UPDATED:
         return None
     force, rates = (xacc, yacc, zacc), (xgyro, ygyro, zgyro)
-    if within(messages.ZERO_G_OFFSET_M_S2, *force):
+    force_m_s2 = hypot(xacc, yacc, zacc)
+    if force_m_s2 <= messages.ZERO_G_OFFSET_M_S2:
         return Refused("HIGHRES_IMU", "the accelerometer reads zero on all axes")
     if not (
-        within(messages.SPECIFIC_FORCE_M_S2, *force)
-        and within(messages.ANGULAR_VELOCITY_RAD_S, *rates)
+        force_m_s2 <= messages.SPECIFIC_FORCE_M_S2
+        and hypot(xgyro, ygyro, zgyro) <= messages.ANGULAR_VELOCITY_RAD_S
         and time_usec < messages.TIME_US
     ):
         text = f"specific force {_text(*force)} m/s^2, rates {_text(*rates)} rad/s at {time_usec} us"
@@ -84,7 +87,7 @@ def _imu(
 
 
 def _local_position(time_boot_ms: int, x: float, y: float, z: float, vx: float, vy: float, vz: float) -> Sample:
-    if not (within(messages.POSITION_M, x, y, z) and within(messages.VELOCITY_M_S, vx, vy, vz)):
+    if not (hypot(x, y, z) <= messages.POSITION_M and hypot(vx, vy, vz) <= messages.VELOCITY_M_S):
         return _moves_too_far("LOCAL_POSITION_NED", x, y, z, vx, vy, vz)
     return messages.LocalPosition(time_boot_ms * 1000, (x, y, z), (vx, vy, vz))
 
@@ -93,7 +96,7 @@ def _attitude(
     time_boot_ms: int, q1: float, q2: float, q3: float, q4: float, rollspeed: float, pitchspeed: float, yawspeed: float
 ) -> Sample:
     turn, rates = (q1, q2, q3, q4), (rollspeed, pitchspeed, yawspeed)
-    if not (is_rotation(*turn) and within(messages.ANGULAR_VELOCITY_RAD_S, *rates)):
+    if not (is_rotation(*turn) and hypot(*rates) <= messages.ANGULAR_VELOCITY_RAD_S):
         return Refused("ATTITUDE_QUATERNION", f"quaternion {_text(*turn)}, rates {_text(*rates)} rad/s")
     return messages.Attitude(time_boot_ms * 1000, turn, rates)
 
@@ -113,11 +116,8 @@ def _odometry(
     # PX4 sends NED velocity under child frame LOCAL_NED; any other frame would have to be turned first.
     if frame_id != dialect.MAV_FRAME_LOCAL_NED or child_frame_id != dialect.MAV_FRAME_LOCAL_NED:
         return None
-    if not (
-        within(messages.POSITION_M, x, y, z)
-        and within(messages.VELOCITY_M_S, vx, vy, vz)
-        and time_usec < messages.TIME_US
-    ):
+    is_near = hypot(x, y, z) <= messages.POSITION_M and hypot(vx, vy, vz) <= messages.VELOCITY_M_S
+    if not is_near or time_usec >= messages.TIME_US:
         return _moves_too_far("ODOMETRY", x, y, z, vx, vy, vz)
     return messages.Odometry(time_usec, (x, y, z), (vx, vy, vz), reset_counter)
 
@@ -151,10 +151,8 @@ def _vibration(
     time_usec: int, vibration_y: float, vibration_z: float, clipping_0: int, clipping_1: int, clipping_2: int
 ) -> Sample:
     # How much a sample may differ from the one before: no more than the ranges.
-    turns, shakes = (
-        within(2.0 * messages.ANGULAR_VELOCITY_RAD_S, vibration_y),
-        within(2.0 * messages.SPECIFIC_FORCE_M_S2, vibration_z),
-    )
+    turns = hypot(vibration_y) <= 2.0 * messages.ANGULAR_VELOCITY_RAD_S
+    shakes = hypot(vibration_z) <= 2.0 * messages.SPECIFIC_FORCE_M_S2
     if not (turns and shakes) or time_usec >= messages.TIME_US:
         return Refused("VIBRATION", f"{vibration_y:g} rad/s, {vibration_z:g} m/s^2")
     return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))
@@ -218,12 +216,12 @@ def _autopilot_version(flight_sw_version: int) -> Sample:
 
 
 def _position_target(type_mask: int, x: float, y: float, z: float) -> Sample:
-    known = not type_mask & POSITION_IGNORED and within(messages.POSITION_M, x, y, z)
+    known = not type_mask & POSITION_IGNORED and hypot(x, y, z) <= messages.POSITION_M
     return messages.PositionTarget((x, y, z) if known else None)
 
 
 def _global_position(lat: int, lon: int, alt: int) -> Sample:
-    if not (within(90e7, lat) and within(180e7, lon)):
+    if not (abs(lat) <= 90e7 and abs(lon) <= 180e7):
         return Refused("GLOBAL_POSITION_INT", f"latitude {lat}, longitude {lon} (1e-7 deg)")
     return messages.GlobalPosition(lat * 1e-7, lon * 1e-7, alt * 1e-3)
 

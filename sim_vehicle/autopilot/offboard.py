@@ -167,11 +167,10 @@ def _controlled(target: PositionTarget) -> tuple[Axis3, Axis3, Axis3]:
 
 def _is_complete(position: Axis3, velocity: Axis3, acceleration: Axis3) -> bool:
     """Every axis needs a demand, and north and east only come together."""
-    if any((vector[0] is None) != (vector[1] is None) for vector in (position, velocity, acceleration)):
-        return False
-    return all(
-        position[axis] is not None or velocity[axis] is not None or acceleration[axis] is not None for axis in range(3)
-    )
+    for vector in (position, velocity, acceleration):
+        if (vector[0] is None) != (vector[1] is None):
+            return False
+    return FREE not in zip(position, velocity, acceleration, strict=True)
 
 
 def _turned_by_yaw(vector: Axis3, attitude_wxyz: Quaternion) -> Axis3:

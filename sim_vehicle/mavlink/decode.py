@@ -14,14 +14,13 @@ from sim_vehicle.autopilot.messages import (
     Identity,
     PeerHeartbeat,
     PingRequest,
-    PositionTarget,
     SetMode,
     SigningSetup,
     TimeSyncRequest,
 )
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.services import file_service, mission_service, parameter_service, setpoint_service
 from sim_vehicle.mavlink.signing import SETUP_SIGNING_ID, Signing
-from sim_vehicle.setpoint import Axis3
 
 _MARKER = re.compile(rb"[\xfd\xfe]")
 _MARKER_V2 = 0xFD
@@ -33,8 +32,6 @@ _DO_SET_MODE = 176
 # Its target is a system, too, under another name.
 _MANUAL_CONTROL_ID = 69
 _GREATEST_INT32 = 2**31 - 1
-_FORCE_BIT = 0x200
-_YAW_IGNORED, _YAW_RATE_IGNORED = 0x400, 0x800
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +51,6 @@ class Decoder:
         self._signing = signing or Signing()
         self.signing_is_optional = False
         """MAV_SIGN_CFG = 0: unsigned packets are read although there is a key."""
-        self._parser = dialect.MAVLink(None)
         self._rest = b""
         self.sources: set[tuple[int, int]] = set()
         """System and component of everybody who was heard here."""
@@ -96,12 +92,8 @@ class Decoder:
     def _decode(self, packet: bytes) -> dialect.MAVLink_message | None:
         if packet[0] == _MARKER_V2 and packet[2] & ~_SIGNED_FLAG:
             return None
-        try:
-            message = self._parser.decode(bytearray(packet))
-        except dialect.MAVError:
-            return None
-        # Without its definition, a packet's checksum cannot be judged.
-        if isinstance(message, dialect.MAVLink_unknown):
+        message = framing.read(packet)
+        if message is None:
             return None
         is_signed = packet[0] == _MARKER_V2 and bool(packet[2] & _SIGNED_FLAG)
         source = message.get_srcSystem(), message.get_srcComponent()
@@ -204,29 +196,6 @@ def _command(
     )
 
 
-def _position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
-    mask = packet.type_mask
-    return PositionTarget(
-        target_system=packet.target_system,
-        target_component=packet.target_component,
-        frame=packet.coordinate_frame,
-        position_m=_axes(mask, packet.x, packet.y, packet.z),
-        velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
-        acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
-        yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
-        yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
-        is_force=bool(mask & _FORCE_BIT),
-    )
-
-
-def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
-    return _value(mask & 1, x), _value(mask & 2, y), _value(mask & 4, z)
-
-
-def _value(ignored: int, value: float) -> float | None:
-    return None if ignored or not math.isfinite(value) else value
-
-
 Reader: TypeAlias = Callable[[dialect.MAVLink_message], object | None]
 """A packet's value; None where it says nothing to this vehicle."""
 
@@ -238,7 +207,6 @@ READERS: dict[int, Reader] = {
     SETUP_SIGNING_ID: _setup_signing,
     75: _command_int,
     76: _command_long,
-    84: _position_target,
     111: _timesync,
     **parameter_service.READERS,
     **file_service.READERS,

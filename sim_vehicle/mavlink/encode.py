@@ -15,7 +15,7 @@ from sim_vehicle.autopilot.messages import CommandAck, Identity, PingRequest, St
 from sim_vehicle.autopilot.mode_numbers import NUMBERS, base_mode
 from sim_vehicle.estimator.estimate import Estimate, roll_pitch_of, yaw_of
 from sim_vehicle.mavlink import framing
-from sim_vehicle.mavlink.framing import HEADER, MAGIC, Packed
+from sim_vehicle.mavlink.framing import HEADER, MAGIC, Packed, flattened
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Axis3, TrajectorySetpoint
 
@@ -41,7 +41,11 @@ class Encoder:
     def packet(self, message: Message) -> bytes | None:
         """The message as a packet; None for one whose number MAVLink 1 has no room for."""
         link = self._link
-        if type(message) is tuple:
+        kind: Any = type(message)
+        if kind is not tuple and (flat := flattened(kind)) is not None:
+            layout, fields_of = flat
+            kind, message = tuple, (layout, layout.pack(*fields_of(message)))
+        if kind is tuple:
             if self.speaks_mavlink_1 or link.signing.sign_outgoing:
                 return self._whole(message)
             layout, payload = message

@@ -231,7 +231,7 @@ class Commander:
         return FailsafeSituation(
             armed=armed,
             intended=self.modes.intended,
-            armed_for_us=self._now_us - self.arming.armed_at_us if armed else 0,
+            armed_for_us=self._now_us - self.arming.armed_at_us if armed and self._tipping.tipped_over else 0,
             mode_requested=self.modes.requested,
             sticks_moved=self.failsafe.acts and self.sticks.moving and self._sticks_override,
             sticks_lost=self.sticks.sticks is None,

@@ -90,6 +90,8 @@ class Failsafe:
         self._parameter_changes = -1
         self._delay_us = 0
         self._announce = False
+        self._settled: tuple[FailsafeSituation, int, Decision] | None = None
+        """Situation, changes of parameters, and what they came to, while nothing acts and no delay runs."""
 
     @property
     def acts(self) -> bool:
@@ -97,7 +99,11 @@ class Failsafe:
         return self.action > Action.WARN
 
     def update(self, now_us: int, now: FailsafeSituation, parameters: Parameters) -> Decision:
-        """Judge the situation."""
+        """Judge the situation. One that stays as it is, and calls for nothing, is judged once."""
+        settled = self._settled
+        if settled is not None and settled[0] == now and settled[1] == parameters.changes:
+            self._last_us = now_us
+            return settled[2]
         elapsed_us = 0 if self._last_us is None else now_us - self._last_us
         self._last_us = now_us
         if now.armed is not self._armed:
@@ -118,7 +124,10 @@ class Failsafe:
         self._run_start_delay(elapsed_us, delayed is not Action.NONE, configured_us)
         says = self._announcement(decision.action, delayed)
         self.action, self.took_over, self._intended = decision.action, took_over, decision.intended
-        return Decision(decision.action, decision.intended, says)
+        decision = Decision(decision.action, decision.intended, says)
+        waits = self._active or took_over or self._delay_us > 0 or self._start_delay_us != configured_us
+        self._settled = None if waits or says else (now, parameters.changes, decision)
+        return decision
 
     def _run_start_delay(self, elapsed_us: int, runs: bool, configured_us: int) -> None:
         start_us = self._start_delay_us

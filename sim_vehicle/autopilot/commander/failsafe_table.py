@@ -78,6 +78,7 @@ class FailsafeSituation(NamedTuple):
     armed: bool
     intended: Mode
     armed_for_us: int = 0
+    """Counts only where the vehicle has tipped over; 0 elsewhere."""
     mode_requested: bool = False
     """A mode was accepted since the last cycle, be it the same."""
     sticks_moved: bool = False

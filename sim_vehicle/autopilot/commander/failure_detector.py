@@ -9,7 +9,7 @@ from sim_vehicle.estimator.estimate import Quaternion, roll_pitch_of
 from sim_vehicle.parameters.store import Parameters
 
 # The greatest tilt and how long it has to last; a tilt of 0 or less switches the axis off.
-_ROLL, _PITCH = ("FD_FAIL_R", "FD_FAIL_R_TTRI"), ("FD_FAIL_P", "FD_FAIL_P_TTRI")
+_NAMES = (("FD_FAIL_R", "FD_FAIL_R_TTRI"), ("FD_FAIL_P", "FD_FAIL_P_TTRI"))
 
 
 class TippingDetector:
@@ -23,13 +23,12 @@ class TippingDetector:
     def update(self, now_us: int, attitude_wxyz: Quaternion) -> None:
         """Judge the attitude; call it at every cycle of the failsafes."""
         tipped = False
-        for axis, (angle_rad, names) in enumerate(zip(roll_pitch_of(attitude_wxyz), (_ROLL, _PITCH), strict=True)):
-            most_deg, lasting_s = (self._parameters[name] for name in names)
-            if not 0.0 < most_deg < abs(math.degrees(angle_rad)):
+        for axis, (angle_rad, (most, lasting)) in enumerate(zip(roll_pitch_of(attitude_wxyz), _NAMES, strict=True)):
+            if not 0.0 < self._parameters[most] < abs(math.degrees(angle_rad)):
                 self._since_us[axis] = None
                 continue
             since_us = self._since_us[axis]
             if since_us is None:
                 since_us = self._since_us[axis] = now_us
-            tipped = tipped or now_us - since_us > 1e6 * lasting_s
+            tipped = tipped or now_us - since_us > 1e6 * self._parameters[lasting]
         self.tipped_over = tipped

@@ -1,8 +1,8 @@
 """What steers the flight on a link: setpoints, sticks, targets to follow."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import isfinite
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -26,12 +26,27 @@ _UNKNOWN_SOURCE = 0
 """The link puts its own number in."""
 
 
+def _position_target(packet: dialect.MAVLink_set_position_target_local_ned_message) -> PositionTarget:
+    mask = packet.type_mask
+    return PositionTarget(
+        target_system=packet.target_system,
+        target_component=packet.target_component,
+        frame=packet.coordinate_frame,
+        position_m=_axes(mask, packet.x, packet.y, packet.z),
+        velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
+        acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
+        yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
+        yaw_rate_rad_s=_value(mask & _YAW_RATE_IGNORED, packet.yaw_rate),
+        is_force=bool(mask & _FORCE_BIT),
+    )
+
+
 def _global_target(packet: dialect.MAVLink_set_position_target_global_int_message) -> GlobalTarget:
     mask = packet.type_mask
     place = (packet.lat_int / 1e7, packet.lon_int / 1e7, packet.alt)
     return GlobalTarget(
         frame=packet.coordinate_frame,
-        place=None if mask & 0x7 or not math.isfinite(packet.alt) else place,
+        place=None if mask & 0x7 or not isfinite(packet.alt) else place,
         velocity_m_s=_axes(mask >> 3, packet.vx, packet.vy, packet.vz),
         acceleration_m_s2=_axes(mask >> 6, packet.afx, packet.afy, packet.afz),
         yaw_rad=_value(mask & _YAW_IGNORED, packet.yaw),
@@ -68,24 +83,29 @@ def _radio_channels(packet: dialect.MAVLink_rc_channels_override_message) -> Rad
 
 
 def _follow_target(packet: dialect.MAVLink_follow_target_message) -> FollowTarget | None:
-    v_north, v_east, v_down = (value if math.isfinite(value) else 0.0 for value in packet.vel)
-    if not math.isfinite(packet.alt):
+    v_north, v_east, v_down = (value if isfinite(value) else 0.0 for value in packet.vel)
+    if not isfinite(packet.alt):
         return None
     return FollowTarget(packet.lat * 1e-7, packet.lon * 1e-7, packet.alt, (v_north, v_east, v_down))
 
 
 def _axes(mask: int, x: float, y: float, z: float) -> Axis3:
-    return _value(mask & 1, x), _value(mask & 2, y), _value(mask & 4, z)
+    return (
+        None if mask & 1 or not isfinite(x) else x,
+        None if mask & 2 or not isfinite(y) else y,
+        None if mask & 4 or not isfinite(z) else z,
+    )
 
 
 def _value(ignored: int, value: float) -> float | None:
-    return None if ignored or not math.isfinite(value) else value
+    return None if ignored or not isfinite(value) else value
 
 
 READERS: dict[int, Callable[[dialect.MAVLink_message], object | None]] = {
     69: _manual_control,
     70: _radio_channels,
     82: _attitude_target,
+    84: _position_target,
     86: _global_target,
     144: _follow_target,
 }

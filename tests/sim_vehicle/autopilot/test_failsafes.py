@@ -1,5 +1,7 @@
 """Every failsafe with every value of its parameter: what flies, when, how the pilot ends it, how it ends by itself."""
 
+import random
+
 import pytest
 
 from sim_vehicle.autopilot.commander.battery import Warning as BatteryWarning
@@ -412,3 +414,36 @@ def test_a_second_failsafe_soon_after_holds_shorter_unless_a_parameter_was_set(c
     if changes_a_parameter:
         parameters.set("RTL_RETURN_ALT", 33.0)
     assert act(True, 6.0).count(Action.HOLD) == pytest.approx(10 * hold_s, abs=1)
+
+
+def test_a_situation_that_stays_is_judged_once_and_no_decision_differs_for_it():
+    """Random situations that come and stay, beside failsafes that judge every one of them anew."""
+    chance, rows_judged = random.Random(1), 0
+    parameters = Parameters({"COM_FAIL_ACT_T": 0.5, "NAV_DLL_ACT": 2, "NAV_RCL_ACT": 2, "COM_RC_IN_MODE": 1})
+    ours, anew, now = (
+        Failsafe(),
+        Failsafe(),
+        situation(sticks_lost=False, ground_station_lost=False, offboard_lost=False),
+    )
+    for cycle in range(5000):
+        if chance.random() < 0.05:
+            changes = chance.choice(
+                [
+                    {"sticks_lost": chance.random() < 0.3},
+                    {"ground_station_lost": chance.random() < 0.3},
+                    {"armed": chance.random() < 0.8},
+                    {"intended": chance.choice((Mode.LOITER, Mode.OFFBOARD, Mode.POSCTL)), "mode_requested": True},
+                    {"offboard_lost": chance.random() < 0.3},
+                    {"battery": chance.choice((BatteryWarning.NONE, BatteryWarning.LOW))},
+                    {"sticks_moved": chance.random() < 0.3},
+                    {"tipped_over": chance.random() < 0.1},
+                ]
+            )
+            now = FailsafeSituation(**{**now._asdict(), "mode_requested": False, **changes})
+        if chance.random() < 0.01:
+            parameters.set("COM_FAIL_ACT_T", chance.choice((0.0, 0.5, 1.0)))
+        anew._settled = None
+        assert ours.update(20_000 * cycle, now, parameters) == anew.update(20_000 * cycle, now, parameters)
+        assert (ours.action, ours.took_over, ours.acts) == (anew.action, anew.took_over, anew.acts)
+        rows_judged += ours._settled is None
+    assert 500 < rows_judged < 4500

@@ -7,8 +7,10 @@ import pytest
 from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.autopilot.messages import Command, Identity, PeerHeartbeat, PositionTarget, TimeSyncRequest
-from sim_vehicle.mavlink.decode import Decoder
+from sim_vehicle.mavlink import framing
+from sim_vehicle.mavlink.decode import READERS, Decoder
 from sim_vehicle.setpoint import FREE
+from tests.sim_vehicle import packets
 
 NAN = math.nan
 
@@ -80,6 +82,37 @@ def test_each_message_whole_and_byte_by_byte(message, expected, v1):
     assert Decoder(Identity()).push(raw) == wanted
     decoder = Decoder(Identity())
     assert [got for byte in raw for got in decoder.push(bytes([byte]))] == wanted
+
+
+@pytest.mark.parametrize("number", sorted(READERS), ids=lambda number: dialect.mavlink_map[number].msgname)
+def test_a_packet_is_read_field_by_field_as_pymavlink_reads_it(number):
+    """Of any content, whole, with zeros at its end that are left out, with more than the dialect knows, signed."""
+    kind, chance, link = dialect.mavlink_map[number], random.Random(number), dialect.MAVLink(None, 7, 191)
+    for signs in (False, True):
+        link.signing.secret_key, link.signing.sign_outgoing = b"k" * 32, signs
+        for payload in [packets.random_payload(kind, chance) for _ in range(20)] + [bytes(kind.unpacker.size)]:
+            for content in (payload, payload[:2] + bytes(len(payload) - 2), (payload + b"\x01\x02")[:255]):
+                raw = packets.packet(kind, content, link, v1=number < 256 and chance.random() < 0.3)
+                ours, theirs = framing.read(raw), dialect.MAVLink(None).decode(bytearray(raw))
+                assert repr([plain(ours, name) for name in kind.fieldnames]) == repr(
+                    [plain(theirs, name) for name in kind.fieldnames]
+                )
+                sender = (theirs.get_srcSystem(), theirs.get_srcComponent(), theirs.get_msgId())
+                assert (ours.get_srcSystem(), ours.get_srcComponent(), ours.get_msgId()) == sender
+                assert bytes(ours.get_msgbuf()) == bytes(theirs.get_msgbuf())
+
+
+def plain(message, name):
+    value = getattr(message, name)
+    return tuple(value) if isinstance(value, list) else value
+
+
+def test_a_packet_of_a_wrong_checksum_or_an_unknown_message_is_not_read():
+    raw = packet(dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+    assert framing.read(raw) is not None
+    for place in range(1, len(raw)):
+        assert framing.read(raw[:place] + bytes((raw[place] ^ 1,)) + raw[place + 1 :]) is None or place in (1, 2, 3)
+    assert framing.read(raw[:7] + b"\xff\xff\xf0" + raw[10:]) is None
 
 
 @pytest.mark.parametrize(
