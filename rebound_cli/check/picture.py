@@ -16,7 +16,6 @@ from companion.mission.items import program
 from companion.mission.model import Mission
 from rebound_cli.check.ways import Way
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
-from rebound_cli.figure.legend import legend_below
 from sim_vehicle.scene import Scene
 
 Floats = npt.NDArray[np.float64]
@@ -79,7 +78,6 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
     axis.set(title="From above; numbers are items", xlabel="east [m]", ylabel="north [m]")
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(alpha=0.3)
-<<<<<<< HEAD
 
 
 def after_hits(mission: Mission, ways: Sequence[Way]) -> list[tuple[Floats, Floats]]:
@@ -110,9 +108,6 @@ def _policies(mission: Mission, scene: Scene) -> Iterator[str]:
             yield f"In item {step.label}: then {describe_after_recovery(policy)}; {describe_limit(policy)}."
     if any(obstacle.motion for _, obstacle in scene.obstacles()):
         yield "Obstacles' times: s since the vehicle's boot, which is some seconds before arming."
-=======
-    legend_below(axis)
->>>>>>> 1bba579 (The manual's pictures come from one command and none is blank: an animation of a hit, the report's screens, legends beside the data)
 
 
 def ends(ways: Sequence[Way]) -> dict[tuple[float, float], list[str]]:
@@ -161,7 +156,3 @@ def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
     axis.set_ylabel("height above the arming position [m]")
     axis.set_ylim(bottom=min(0.0, math.floor(-max(float(way.points_ned_m[:, 2].max()) for way in ways))))
     axis.grid(alpha=0.3)
-<<<<<<< HEAD
-=======
-    legend_below(axis)
->>>>>>> 1bba579 (The manual's pictures come from one command and none is blank: an animation of a hit, the report's screens, legends beside the data)

@@ -3,6 +3,7 @@
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from tests.rebound_cli.command import WALL, run_here
 
@@ -17,13 +18,17 @@ def drawn(monkeypatch):
 
 def assert_legible(figure):
     FigureCanvasAgg(figure).draw()
-    for axis in figure.axes:
-        legend = axis.get_legend()
-        assert not legend.get_window_extent().overlaps(axis.bbox), axis.get_title()
-        for text in (axis.title, axis.xaxis.label, axis.yaxis.label, *legend.get_texts()):
-            # A pixel less: letters are rounded outward
-            box = text.get_window_extent().padded(-1.0)
-            assert not text.get_text() or figure.bbox.count_contains(box.corners()) == 4, text
+    # Of each part, or one of the whole
+    legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
+    assert legends
+    words = [text for axis in figure.axes for text in (axis.title, axis.xaxis.label, axis.yaxis.label)]
+    for legend in legends:
+        words += legend.get_texts()
+        for axis in figure.axes:
+            assert not legend.get_window_extent().overlaps(axis.bbox), axis.get_title()
+    for text in filter(Text.get_text, words):
+        # A pixel less: letters are rounded outward
+        assert figure.bbox.count_contains(text.get_window_extent().padded(-1.0).corners()) == 4, text
 
 
 def test_a_mission_before_it_is_flown(drawn, tmp_path):
