@@ -1,31 +1,29 @@
 """A telemetry log as arrays: what was measured and what was asked for."""
 
 import struct
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from companion.mavlink.decode import Decoder
-from companion.mavlink.packet import message_id_of, payload_of, source_of
+from companion import messages
+from companion.mavlink.columns import columns_of
+from companion.mavlink.decode import SAME_BOOT_US, WRAP_US
+from companion.mavlink.packet import message_id_of, payload_of
+from companion.mavlink.readers import ACCELEROMETER_UPDATED
 from companion.messages import Attitude, ImuSample, LocalPosition, MessageId
-from companion.motion.strapdown import Strapdown
 from companion.shell.tlog import read_tlog
 from rebound_cli.logs.log import Demand, Told
 
 Floats = npt.NDArray[np.float64]
 
-# Only these are decoded; a log holds many more.
-_DECODED = (MessageId.HIGHRES_IMU, MessageId.LOCAL_POSITION_NED, MessageId.ATTITUDE_QUATERNION)
 _SET_POSITION_TARGET_LOCAL_NED = 84
 _STATUSTEXT = 253
 
-# SET_POSITION_TARGET_LOCAL_NED's payload: time_boot_ms, then x, y, z in metres; MAVLink 2 leaves out
-# the zeros at the end of a payload, which is 53 bytes long in full.
-_SETPOINT_POSITION = struct.Struct("<4x3f")
-_SETPOINT_LENGTH = 53
 # STATUSTEXT: severity, 50 bytes of text; a longer text goes on in packets of the same id that is not 0.
 _TEXT = struct.Struct("<B50sHB")
 
@@ -38,12 +36,12 @@ class FlightLog:
     imu_time_boot_us: Floats
     specific_force_frd_m_s2: Floats
     angular_velocity_frd_rad_s: Floats
-    accelerated_ned_m_s: Floats  # what the accelerometer has summed up to by each of its samples; from any velocity
     position_at_us: Floats
     position_time_boot_us: Floats
     position_ned_m: Floats
     velocity_ned_m_s: Floats
     attitude_at_us: Floats
+    attitude_time_boot_us: Floats
     attitude_wxyz: Floats
     setpoint_at_us: Floats
     setpoint_ned_m: Floats  # NaN where a setpoint asked for no place
@@ -56,72 +54,91 @@ def read_flight_log(path: Path) -> FlightLog:
 
 
 def flight_log_of_packets(packets: Iterable[tuple[int, bytes]]) -> FlightLog:
-    """The same of packets with their stamps."""
-    decoder, rows = Decoder(), _Rows()
-    for at_us, packet in packets:
-        message_id = message_id_of(packet)
-        if message_id == _SET_POSITION_TARGET_LOCAL_NED:
-            payload = payload_of(packet).ljust(_SETPOINT_LENGTH, b"\0")
-            rows.setpoints.append((at_us, *_SETPOINT_POSITION.unpack_from(payload)))
-        elif message_id == _STATUSTEXT:
-            rows.take_text(at_us, payload_of(packet))
-        elif message_id in _DECODED:
-            decoder.listen_to(*source_of(packet))
-            for _, sample in decoder.feed(packet):
-                if sample is not None:
-                    rows.take(at_us, sample)
-    return rows.log()
+    """The same of packets with their stamps; without what no vehicle can truly say (see messages)."""
+    sorted_by_id: dict[int, list[tuple[int, bytes]]] = defaultdict(list)
+    for stamped in packets:
+        sorted_by_id[message_id_of(stamped[1])].append(stamped)
+
+    def table(message_id: int, names: str) -> tuple[Floats, Floats, npt.NDArray[Any]]:
+        """Stamps, the fields of these names in columns, and all fields."""
+        stamped = sorted_by_id[message_id]
+        rows = columns_of(message_id, (packet for _, packet in stamped))
+        at_us = np.array([stamp_us for stamp_us, _ in stamped], np.float64)
+        # A damaged payload may hold a NaN of any kind.
+        with np.errstate(invalid="ignore"):
+            return at_us, np.column_stack([rows[name] for name in names.split()]).astype(np.float64), rows
+
+    imu_at_us, imu, rows = table(MessageId.HIGHRES_IMU, "time_usec xacc yacc zacc xgyro ygyro zgyro")
+    force = np.linalg.norm(imu[:, 1:4], axis=1)
+    good = (force > messages.ZERO_G_OFFSET_M_S2) & (force <= messages.SPECIFIC_FORCE_M_S2)
+    good &= _within(messages.ANGULAR_VELOCITY_RAD_S, imu[:, 4:7]) & (imu[:, 0] < messages.TIME_US)
+    good &= rows["fields_updated"] & ACCELEROMETER_UPDATED == ACCELEROMETER_UPDATED
+    imu_at_us, imu = imu_at_us[good], imu[good]
+
+    moved_at_us, moved, _ = table(MessageId.LOCAL_POSITION_NED, "time_boot_ms x y z vx vy vz")
+    good = _within(messages.POSITION_M, moved[:, 1:4]) & _within(messages.VELOCITY_M_S, moved[:, 4:7])
+    moved_at_us, moved = moved_at_us[good], moved[good]
+
+    names = "time_boot_ms q1 q2 q3 q4 rollspeed pitchspeed yawspeed"
+    turned_at_us, turned, _ = table(MessageId.ATTITUDE_QUATERNION, names)
+    good = np.abs((turned[:, 1:5] ** 2).sum(axis=1) - 1.0) <= messages.QUATERNION_ERROR
+    good &= _within(messages.ANGULAR_VELOCITY_RAD_S, turned[:, 5:8])
+    turned_at_us, turned = turned_at_us[good], turned[good]
+
+    asked_at_us, asked, _ = table(_SET_POSITION_TARGET_LOCAL_NED, "x y z")
+    clock = (imu_at_us, imu[:, 0])
+    return FlightLog(
+        *(imu_at_us, imu[:, 0], imu[:, 1:4], imu[:, 4:7]),
+        *(moved_at_us, _unwrapped(moved_at_us, 1e3 * moved[:, 0], *clock), moved[:, 1:4], moved[:, 4:7]),
+        *(turned_at_us, _unwrapped(turned_at_us, 1e3 * turned[:, 0], *clock), turned[:, 1:5], asked_at_us, asked),
+        tuple(_texts(sorted_by_id[_STATUSTEXT])),
+    )
+
+
+def _within(most: float, vectors: Floats) -> npt.NDArray[np.bool_]:
+    within: npt.NDArray[np.bool_] = np.linalg.norm(vectors, axis=1) <= most
+    return within
+
+
+def _unwrapped(at_us: Floats, boot_us: Floats, imu_at_us: Floats, imu_boot_us: Floats) -> Floats:
+    """Stamps of 32 bits of milliseconds, after 49.7 days, by those of 64 bits that came last before them."""
+    if not len(imu_boot_us):
+        return boot_us
+    newest_us = imu_boot_us[np.maximum(np.searchsorted(imu_at_us, at_us, "right") - 1, 0)]
+    later_us = boot_us + np.round((newest_us - boot_us) / WRAP_US) * WRAP_US
+    # Far from the newest one it has not wrapped: the vehicle has rebooted.
+    return np.where(np.abs(later_us - newest_us) < SAME_BOOT_US, later_us, boot_us)
+
+
+def _texts(stamped: Iterable[tuple[int, bytes]]) -> list[tuple[int, str]]:
+    """Whole ones: parts with one number belong together."""
+    texts: list[tuple[int, int, bytes]] = []
+    for at_us, packet in stamped:
+        _, text, number, part = _TEXT.unpack_from(payload_of(packet).ljust(_TEXT.size, b"\0"))
+        text = text.rstrip(b"\0")
+        if number and part and texts and texts[-1][1] == number:
+            text = texts[-1][2] + text
+            at_us = texts.pop()[0]
+        texts.append((at_us, number, text))
+    return [(at_us, text.decode("utf-8", "replace")) for at_us, _, text in texts]
 
 
 def flight_log_of(samples: Iterable[tuple[int, Told]]) -> FlightLog:
     """The same of samples that were decoded already; setpoints as the vehicle tells them."""
-    rows = _Rows()
+    imu, moved, turned, asked = list[Any](), list[Any](), list[Any](), list[Any]()
     for at_us, sample in samples:
-        rows.take(at_us, sample)
-    return rows.log()
-
-
-class _Rows:
-    """Grow as the log is read."""
-
-    def __init__(self) -> None:
-        self._strapdown = Strapdown()
-        self._imu: list[tuple[float, ...]] = []
-        self._positions: list[tuple[float, ...]] = []
-        self._attitudes: list[tuple[float, ...]] = []
-        self.setpoints: list[tuple[float, ...]] = []
-        self._texts: list[tuple[int, int, bytes]] = []
-
-    def take(self, at_us: int, sample: Told) -> None:
-        if isinstance(sample, ImuSample):
-            force, rates = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-            self._strapdown.imu(sample.time_boot_us, force, rates)
-            self._imu.append((at_us, sample.time_boot_us, *force, *rates, *self._strapdown.sum_ned_m_s))
-        elif isinstance(sample, Attitude):
-            self._strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
-            self._attitudes.append((at_us, *sample.attitude_wxyz))
-        elif isinstance(sample, LocalPosition):
-            moved = (*sample.position_ned_m, *sample.velocity_ned_m_s)
-            self._positions.append((at_us, sample.time_boot_us, *moved))
-        elif isinstance(sample, Demand):
-            self.setpoints.append((at_us, *(sample.position_ned_m or (np.nan, np.nan, np.nan))))
-
-    def take_text(self, at_us: int, payload: bytes) -> None:
-        _, text, number, part = _TEXT.unpack_from(payload.ljust(_TEXT.size, b"\0"))
-        before = self._texts[-1] if self._texts else None
-        if number and part and before is not None and before[1] == number:
-            self._texts[-1] = (before[0], number, before[2] + text.rstrip(b"\0"))
-        else:
-            self._texts.append((at_us, number, text.rstrip(b"\0")))
-
-    def log(self) -> FlightLog:
-        imu, moved, attitudes, asked = (
-            np.array(rows, np.float64).reshape(-1, width)
-            for rows, width in ((self._imu, 11), (self._positions, 8), (self._attitudes, 5), (self.setpoints, 4))
-        )
-        return FlightLog(
-            *(imu[:, 0], imu[:, 1], imu[:, 2:5], imu[:, 5:8], imu[:, 8:11]),
-            *(moved[:, 0], moved[:, 1], moved[:, 2:5], moved[:, 5:8]),
-            *(attitudes[:, 0], attitudes[:, 1:5], asked[:, 0], asked[:, 1:4]),
-            tuple((at_us, text.decode("utf-8", "replace")) for at_us, _, text in self._texts),
-        )
+        match sample:
+            case ImuSample(boot_us, force, rates):
+                imu.append((at_us, boot_us, *force, *rates))
+            case LocalPosition(boot_us, position, velocity):
+                moved.append((at_us, boot_us, *position, *velocity))
+            case Attitude(boot_us, turn):
+                turned.append((at_us, boot_us, *turn))
+            case Demand():
+                asked.append((at_us, *(sample.position_ned_m or (np.nan, np.nan, np.nan))))
+    widths = ((imu, 8), (moved, 8), (turned, 6), (asked, 4))
+    i, m, t, a = (np.array(rows, np.float64).reshape(-1, width) for rows, width in widths)
+    return FlightLog(
+        *(i[:, 0], i[:, 1], i[:, 2:5], i[:, 5:8], m[:, 0], m[:, 1], m[:, 2:5], m[:, 5:8]),
+        *(t[:, 0], t[:, 1], t[:, 2:6], a[:, 0], a[:, 1:4], ()),
+    )

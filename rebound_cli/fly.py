@@ -21,6 +21,8 @@ from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.offering import offer_report
 from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
+from rebound_cli.replay.recording import Followed
+from rebound_cli.report.listening import Listener
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.status import StatusServer, served
@@ -42,6 +44,7 @@ class Flight:
     recorder: FlightRecorder
     console: Console
     interrupts: Interrupts
+    followed: Followed | None = None  # in lockstep, where nobody waits for it
 
 
 def run_fly(options: Namespace) -> int:
@@ -81,7 +84,8 @@ def run_fly(options: Namespace) -> int:
         make_room = None if is_simulated else room_for(folder, options.out, mission.companion.disk)
         recorder = FlightRecorder(folder, None if options.lockstep else Background("log"), make_room)
         with Interrupts() as interrupts:
-            flight = Flight(mission, world, folder, recorder, console, interrupts)
+            followed = Followed(Listener()) if options.lockstep else None
+            flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
             try:
                 flown = _fly(flight, connection, options)
             finally:
@@ -171,7 +175,7 @@ def _fly_lockstep(flight: Flight) -> Flown:
 
     assert flight.world is not None, "a lockstep flight has a simulated world"
     flown, truth = fly_mission_lockstep(
-        flight.mission, flight.world, flight.recorder, flight.interrupts, flight.console
+        flight.mission, flight.world, flight.recorder, flight.interrupts, flight.console, flight.followed
     )
     save_truth(flight.folder / run_folder.TRUTH_NAME, truth, EPOCH_US)
     return flown
@@ -216,7 +220,7 @@ def _draw(flight: Flight, flown: Flown, world: inputs.SimulatedWorld) -> None:
             from rebound_cli.figure.flight import draw_flight
 
             draw_flight(*drawn)
-            write_report(flight.folder)
+            write_report(flight.folder, followed=flight.followed)
             return
     except KeyboardInterrupt:
         pass

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from companion.companion import Companion
 from companion.mission.model import Mission, longest_s
@@ -10,6 +11,7 @@ from rebound_cli.console import Console
 from rebound_cli.inputs import SimulatedWorld
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.realtime import look_for_file
+from rebound_cli.replay.recording import Followed
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.summary import Flown
 from rebound_cli.truth_match import FlightTruth
@@ -42,8 +44,9 @@ def fly_mission_lockstep(
     recorder: FlightRecorder,
     interrupts: Interrupts,
     console: Console | None = None,
+    followed: Followed | None = None,
 ) -> tuple[Flown, TruthRecorder]:
-    """Fly a whole mission; it fails when it takes much longer than it should."""
+    """Fly a whole mission; it fails when it takes much longer than it should. `followed` notes what is detected."""
     companion = Companion(mission)
     vehicle = SimulatedVehicle(world.airframe, world.scene, world.seed)
     limit_s = virtual_time_limit_s(mission)
@@ -54,7 +57,7 @@ def fly_mission_lockstep(
             console.live(companion.status, flight_time_s)
 
     started_s, truth = time.monotonic(), vehicle.truth
-    is_finished = run_lockstep(companion, vehicle, recorder, interrupts, limit_s, look)
+    is_finished = run_lockstep(companion, vehicle, recorder, interrupts, limit_s, look, followed)
     wall_clock_s, report = time.monotonic() - started_s, companion.report()
     if not is_finished:
         reason = f"the flight was not over after {limit_s:.0f} s of virtual time"
@@ -69,6 +72,7 @@ def run_lockstep(
     interrupts: Interrupts,
     limit_s: float,
     look: Callable[[float], None],
+    followed: Followed | None = None,
 ) -> bool:
     """Exchange bytes until the companion has finished, its packets one interval later; `look` is told the virtual time
     in seconds now and then. False when virtual time ran out first.
@@ -76,10 +80,11 @@ def run_lockstep(
     is_confirmed = is_stopped = False
     limit_us = vehicle.time_boot_us + round(limit_s * 1e6)
     pending, count = b"", 0
+    step = companion.step if followed is None else partial(followed.step, companion)
     while not companion.finished:
         frames = vehicle.step(pending)
         now_us = EPOCH_US + vehicle.time_boot_us
-        result = companion.step(b"".join(frames), now_us)
+        result = step(b"".join(frames), now_us)
         pending = b"".join(result.sent_frames)
         recorder.record(now_us, result)
         if result.events:

@@ -1,10 +1,12 @@
 """A hit in a flight's log: the wall's push from HIGHRES_IMU, the speeds from LOCAL_POSITION_NED."""
 
+from collections import deque
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from companion.motion.strapdown import Strapdown
 from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Push, guards_at
 
@@ -106,12 +108,27 @@ def _carried_back(log: FlightLog, release: int) -> Floats | None:
     later = _between(log, log.imu_at_us[release], *_RIGHT_AGAIN_S)
     if not later.any():
         return None
-    summed = log.accelerated_ned_m_s[:, :2]
+    summed = _summed_up(log)
     gained = [np.interp(log.position_at_us[later], log.imu_at_us, summed[:, axis]) for axis in range(2)]
     back: Floats = (log.velocity_ned_m_s[later, :2] - np.column_stack(gained)).mean(axis=0)
     # The first sample after the contact: the sum takes half of each sample's mean to be still to come.
     carried: Floats = back + summed[min(release + 1, len(summed) - 1)]
     return carried
+
+
+def _summed_up(log: FlightLog) -> Floats:
+    """What the accelerometer has summed up to by each of its samples, north and east, from any velocity."""
+    strapdown, sums = Strapdown(), []
+    told = zip(*(column.tolist() for column in (log.attitude_at_us, log.attitude_time_boot_us)), strict=True)
+    attitudes = deque(zip(told, map(tuple, log.attitude_wxyz.tolist()), strict=True))
+    vectors = (map(tuple, rows.tolist()) for rows in (log.specific_force_frd_m_s2, log.angular_velocity_frd_rad_s))
+    for at_us, boot_us, force, rates in zip(log.imu_at_us, log.imu_time_boot_us, *vectors, strict=True):
+        while attitudes and attitudes[0][0][0] <= at_us:
+            (_, turned_boot_us), turn = attitudes.popleft()
+            strapdown.attitude(turned_boot_us, turn)
+        strapdown.imu(boot_us, force, rates)
+        sums.append(strapdown.sum_ned_m_s[:2])
+    return np.array(sums)
 
 
 def _push(log: FlightLog, touch: int, direction: Floats, speed_m_s: float) -> tuple[Push | None, float | None]:

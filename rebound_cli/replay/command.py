@@ -54,7 +54,7 @@ def _replay(options: Namespace, console: Console) -> tuple[Replay, Callable[[], 
         other = [f"{name} {then[name]}, now {now.get(name)}" for name in then if now.get(name) != then[name]]
         if other:
             console.print(f"flown with other versions, so bits may differ: {'; '.join(other)}")
-        replay = replay_flight(read_telemetry(folder / TLOG_NAME), recording, listener.listen)
+        replay = replay_flight(read_telemetry(folder / TLOG_NAME), recording, listener)
         assert replay.reproduction is not None, "a flight of our own is decided again"
         return replay, partial(decided_again, folder, recording, replay.reproduction, listener)
     settings = options.companion

@@ -5,14 +5,14 @@ whole companion once more.
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
-from companion.companion import Companion
+from companion.companion import Companion, StepResult
 from companion.detection.interface import Situation
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
@@ -27,6 +27,7 @@ from rebound_cli.documents import validated
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.replay.watching import Findings
+from rebound_cli.report.listening import Listener
 
 
 @dataclass(slots=True)
@@ -64,9 +65,7 @@ def read_recording(folder: Path) -> Recording:
     if not inputs_file.exists():
         text = f"no {inputs_file.name} in it, so the flight was recorded by a version that no replay repeats to the bit"
         raise LogError(f"{folder}: {text}; replay {tlog} instead.")
-    file = settings_file(folder)
-    document, is_guard = load_flown(file), file.name == run_folder.GUARD_NAME
-    settings = validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
+    settings = read_settings(folder)
     steps = _steps(tlog)
     if not steps:
         raise LogError(f"{tlog}: no packet in it: nothing was ever heard in this flight.")
@@ -95,6 +94,13 @@ def read_recording(folder: Path) -> Recording:
     except (ValueError, TypeError) as error:
         raise LogError(f"{folder / run_folder.VERSIONS_NAME}: damaged: {error}.") from error
     return Recording(settings, [steps[time_us] for time_us in sorted(steps)], lines, is_cut, versions)
+
+
+def read_settings(folder: Path) -> Mission | GuardConfig:
+    """Raises DocumentError."""
+    file = settings_file(folder)
+    document, is_guard = load_flown(file), file.name == run_folder.GUARD_NAME
+    return validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
 
 
 def settings_file(folder: Path) -> Path:
@@ -127,17 +133,44 @@ class Reproduction:
     first_difference: str | None
 
 
-def reproduce(recording: Recording, listen: Callable[[Watch], None] | None = None) -> Reproduction:
-    """Fly the recording to its end, whatever differs. `listen` is told of each watch before its first IMU sample."""
+class Followed:
+    """What a companion's watch finds, noted step by step: in lockstep, and when a flight is flown again."""
+
+    def __init__(self, listener: Listener | None = None) -> None:
+        self.listener, self.findings = listener, Findings()
+        self.started_at_us = self.ended_at_us = 0
+        self._watch: Watch | None = None
+
+    def step(self, stepped: Companion | Guard, received: bytes, now_us: int) -> StepResult:
+        """The companion's own."""
+        # What the flight knew when the packets came; they may move it on.
+        known = Situation(off_reason="connect") if stepped.core is None else stepped.core.situation()
+        result = stepped.step(received, now_us)
+        assert stepped.core is not None, "the first step begins it"
+        watch = stepped.core.watch
+        if watch is not self._watch and self.listener is not None:
+            self.listener.listen(watch)
+        self._watch = watch
+        for event in result.events:
+            self.findings.tell(event.time_us, event.text)
+        # A step in which nothing came or went is in no recording.
+        if received or result.sent_frames:
+            self.findings.note(watch, known, now_us)
+            self.started_at_us, self.ended_at_us = self.started_at_us or now_us, now_us
+        return result
+
+    def close(self) -> None:
+        self.findings.close(self.ended_at_us)
+
+
+def reproduce(recording: Recording, listener: Listener | None = None) -> Reproduction:
+    """Fly the recording to its end, whatever differs."""
     settings = recording.settings
     stepped = Guard(settings) if isinstance(settings, GuardConfig) else Companion(settings)
-    findings, expected, differences = Findings(), list(recording.event_lines), []
+    followed, expected, differences = Followed(listener), list(recording.event_lines), []
     told: list[str] = []
-    watch: Watch | None = None
     for step in recording.steps:
-        # What the flight knew when the packets came; they may move it on.
-        known = _known(stepped)
-        result = stepped.step(b"".join(step.received), step.time_us)
+        result = followed.step(stepped, b"".join(step.received), step.time_us)
         for event in result.events:
             then = expected[len(told)] if len(told) < len(expected) else None
             told.append(run_folder.event_line(event))
@@ -145,22 +178,16 @@ def reproduce(recording: Recording, listen: Callable[[Watch], None] | None = Non
                 differences.append(f"this event is new: {told[-1].strip()}")
             elif told[-1] != then:
                 differences.append(f"event {len(told)} was {then.strip()} and is {told[-1].strip()}")
-            findings.tell(event.time_us, event.text)
         if list(step.sent) != list(result.sent_frames):
             were, are = len(step.sent), len(result.sent_frames)
             what = "another packet was sent" if were == are else f"{were} packets were sent then and {are} now"
             differences.append(f"at {step.time_us} us {what}")
-        assert stepped.core is not None, "the first step begins it"
-        if stepped.core.watch is not watch and listen is not None:
-            listen(stepped.core.watch)
-        watch = stepped.core.watch
-        findings.note(stepped.core.watch, known, step.time_us)
         for record in step.told:
             _tell(stepped, record)
     differences += [f"this event did not come again: {line.strip()}" for line in expected[len(told) :]]
-    findings.close(recording.steps[-1].time_us)
+    followed.close()
     return Reproduction(
-        findings=findings,
+        findings=followed.findings,
         steps=len(recording.steps),
         packets_received=sum(len(step.received) for step in recording.steps),
         packets_sent=sum(len(step.sent) for step in recording.steps),
@@ -186,7 +213,3 @@ def _tell(stepped: Companion | Guard, record: Mapping[str, Any]) -> None:
             except (TypeError, KeyError) as error:
                 raise LogError(f"{run_folder.INPUTS_NAME}: a status of the computer is damaged.") from error
             stepped.tell_computer(status)
-
-
-def _known(stepped: Companion | Guard) -> Situation:
-    return Situation(off_reason="connect") if stepped.core is None else stepped.core.situation()

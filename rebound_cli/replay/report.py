@@ -14,6 +14,7 @@ from rebound_cli.logs.log import WANTED, Log, LogError
 from rebound_cli.logs.shaking import Shaking, clipped, shaking
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
 from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
+from rebound_cli.report.listening import Listener
 
 SCHEMA = 1
 
@@ -56,10 +57,10 @@ def replay_log(
     return Replay(log, config.detector, recorded_hz, shaking(log), findings, _losses(log, config), None)
 
 
-def replay_flight(log: Log, recording: Recording, listen: Callable[[Watch], None] | None = None) -> Replay:
+def replay_flight(log: Log, recording: Recording, listener: Listener | None = None) -> Replay:
     """Our own flight decided again, from the first byte to the last."""
     config = recording.settings.companion
-    reproduction = reproduce(recording, listen)
+    reproduction = reproduce(recording, listener)
     # The flight's own zero, so that times are those of its timeline.
     log = replace(log, started_at_us=recording.steps[0].time_us)
     shown = shaking(log)

@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,20 @@ from companion.guard.config import GuardConfig
 from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
+from companion.mission.model import Mission
 from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.flight_log import FlightLog, flight_log_of, read_flight_log
-from rebound_cli.inputs import load_flown, mission_from
-from rebound_cli.replay.recording import Recording, Reproduction, read_recording, reproduce, settings_file
+from rebound_cli.inputs import load_flown
+from rebound_cli.replay.recording import (
+    Followed,
+    Recording,
+    Reproduction,
+    read_recording,
+    read_settings,
+    reproduce,
+    settings_file,
+)
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
 from rebound_cli.report.listening import Listener
@@ -44,7 +53,7 @@ class ShownFlight:
     truth: FlightTruth | None = None
     patches: Sequence[Patch] = ()
     versions: Mapping[str, str] | None = None
-    reproduction: Reproduction | None = None
+    difference: str | None = None  # from what was recorded, where it was decided again and not to the same
 
     @property
     def origin_ned_m(self) -> tuple[float, float, float]:
@@ -78,46 +87,55 @@ class ShownFlight:
 def recorded_flight(folder: Path) -> ShownFlight:
     """Of a run's folder: what was recorded, decided again for all that the detector thought. Raises ReboundError."""
     recording, listener = read_recording(folder), Listener()
-    return decided_again(folder, recording, reproduce(recording, listener.listen), listener)
+    return decided_again(folder, recording, reproduce(recording, listener), listener)
 
 
 def decided_again(folder: Path, recording: Recording, again: Reproduction, listener: Listener) -> ShownFlight:
     """The same where that was done already, with the listener. Raises ReboundError."""
-    summary = _summary(folder)
-    lines = "".join(recording.event_lines)
-    events = list(run_folder.read_records(folder / run_folder.EVENTS_NAME, lines))
-    return ShownFlight(
-        name=str((summary or {}).get("mission", folder.resolve().name)),
+    return replace(
+        _in_folder(folder, recording.settings, again.findings, listener, "".join(recording.event_lines)),
         started_at_us=recording.steps[0].time_us,
         log=read_flight_log(folder / run_folder.TLOG_NAME),
-        config=recording.settings.companion,
-        findings=again.findings,
-        listener=listener,
-        events=events,
-        summary=summary,
-        scene=_scene(folder),
-        truth=_truth(folder / run_folder.TRUTH_NAME),
-        patches=_patches(folder / run_folder.OBSTACLES_NAME),
         versions=recording.versions,
-        reproduction=again,
+        difference=again.first_difference,
+    )
+
+
+def followed_flight(folder: Path, followed: Followed) -> ShownFlight:
+    """The same of one that was followed while it was flown: nothing is decided again. Raises ReboundError."""
+    assert followed.listener is not None, "nobody else asks for a page"
+    followed.close()
+    events = run_folder.read_text(folder / run_folder.EVENTS_NAME)
+    return replace(
+        _in_folder(folder, read_settings(folder), followed.findings, followed.listener, events),
+        started_at_us=followed.started_at_us,
+        log=read_flight_log(folder / run_folder.TLOG_NAME),
+        versions=run_folder.versions(),
     )
 
 
 def unseen_flight(folder: Path) -> ShownFlight:
     """One that is still flown: what is known of it beforehand. Raises ReboundError."""
-    file = settings_file(folder)
-    document = load_flown(file)
-    is_guard = file.name == run_folder.GUARD_NAME
-    settings = validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
+    return _in_folder(folder, read_settings(folder), Findings(), Listener(), "")
+
+
+def _in_folder(
+    folder: Path, settings: Mission | GuardConfig, findings: Findings, listener: Listener, event_lines: str
+) -> ShownFlight:
+    """All but the log."""
+    summary = _summary(folder)
     return ShownFlight(
-        name=folder.resolve().name,
+        name=str((summary or {}).get("mission", folder.resolve().name)),
         started_at_us=0,
         log=flight_log_of(()),
         config=settings.companion,
-        findings=Findings(),
-        listener=Listener(),
-        events=(),
+        findings=findings,
+        listener=listener,
+        events=list(run_folder.read_records(folder / run_folder.EVENTS_NAME, event_lines)),
+        summary=summary,
         scene=_scene(folder),
+        truth=_truth(folder / run_folder.TRUTH_NAME),
+        patches=_patches(folder / run_folder.OBSTACLES_NAME),
     )
 
 

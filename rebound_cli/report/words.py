@@ -43,7 +43,8 @@ def _end(flight: ShownFlight) -> str:
     if summary is None:
         share = flight.findings.watched_share
         seen = "no flight was heard" if share is None else f"{100.0 * share:.0f} % of the flight was watched"
-        return "the recording was cut off" if flight.reproduction is not None else seen
+        # Only a run's own folder has versions.
+        return "the recording was cut off" if flight.versions is not None else seen
     outcome, reason = str(summary.get("outcome", "")), str(summary.get("reason") or "")
     return f"{outcome}: {reason}" if reason and reason != outcome else outcome
 
@@ -67,7 +68,8 @@ def link_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
     share = findings.watched_share
     if share is not None:
         rows.append(("Watched", f"{100.0 * share:.1f} % of the time in the air"))
-    return rows + _summary_rows(flight.summary or {}) + _again_rows(flight)
+    rows += _summary_rows(flight.summary or {})
+    return rows if flight.difference is None else [*rows, ("Decided again", f"not the same: {flight.difference}")]
 
 
 def _imu_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
@@ -107,11 +109,3 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     if "reconnects" in summary:
         rows.append(("Reconnects", str(summary["reconnects"])))
     return rows
-
-
-def _again_rows(flight: ShownFlight) -> list[tuple[str, str]]:
-    again = flight.reproduction
-    if again is None:
-        return []
-    same = again.first_difference is None
-    return [("Decided again", "the same to the bit" if same else f"not the same: {again.first_difference}")]

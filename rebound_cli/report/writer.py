@@ -5,14 +5,22 @@ import sys
 from pathlib import Path
 
 from companion.shell.files import write_whole
+from rebound_cli.replay.recording import Followed
 from rebound_cli.report.page import page
-from rebound_cli.report.shown_flight import ShownFlight, recorded_flight
+from rebound_cli.report.shown_flight import ShownFlight, followed_flight, recorded_flight
 from rebound_cli.run_folder import REPORT_NAME
 
 
-def write_report(folder: Path, out: Path | None = None, no_position: bool = False) -> Path:
+def write_report(
+    folder: Path, out: Path | None = None, no_position: bool = False, followed: Followed | None = None
+) -> Path:
     """Of a run's folder, into it where no other file is named. Raises ReboundError, OSError."""
-    return write_page(recorded_flight(folder), out or folder / REPORT_NAME, no_position)
+    # Where nothing was heard, that is what reading it says.
+    if followed is not None and followed.started_at_us:
+        flight = followed_flight(folder, followed)
+    else:
+        flight = recorded_flight(folder)
+    return write_page(flight, out or folder / REPORT_NAME, no_position)
 
 
 def write_page(flight: ShownFlight, path: Path, no_position: bool = False) -> Path:

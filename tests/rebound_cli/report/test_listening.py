@@ -17,7 +17,7 @@ from tests.rebound_cli.replay.flying import HIT_US, flight
 
 def test_a_flight_that_is_listened_to_comes_again_to_the_bit(wall_folder):
     listener = Listener()
-    assert reproduce(read_recording(wall_folder), listener.listen).first_difference is None
+    assert reproduce(read_recording(wall_folder), listener).first_difference is None
     assert len(listener.tested) > 6000
 
 
