@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 WHEEL := $(abspath .venv-wheel)
 READY := $(VENV)/.ready
 
-.PHONY: fly test rest browser sandbox clients check lint types results paper schema docs diagrams site stamps release wheel requirements audit aarch64 clean
+.PHONY: fly test rest browser sandbox clients check lint types results paper schema docs diagrams pictures site stamps release wheel requirements audit aarch64 clean
 
 fly: $(READY)
 	$(BIN)/rebound fly missions/wall.yaml
@@ -110,6 +110,10 @@ schema: $(READY)
 # The pages that are written from the code; `diagrams` is their name of before.
 docs diagrams: $(READY)
 	$(BIN)/python -m bench docs
+
+# The pictures of the manual, from one flight; needs Chromium.
+pictures: $(READY)
+	$(BIN)/python -m bench pictures
 
 # The manual as a site in build/site; fails on a link that leads nowhere.
 site: $(READY)

@@ -11,6 +11,7 @@ from bench.detectors_report.arguments import add_detectors
 from bench.faults.arguments import add_faults
 from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
+from bench.pictures.arguments import add_pictures
 from bench.reference.arguments import add_docs, add_stamps
 from bench.speed.arguments import add_speed
 from rebound_cli.main import run
@@ -34,6 +35,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_kills(commands)
     add_faults(commands)
     add_speed(commands)
+    add_pictures(commands)
     add_docs(commands)
     add_stamps(commands)
     return parser

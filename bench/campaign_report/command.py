@@ -51,7 +51,7 @@ def run_campaign_command(options: Namespace) -> int:
     failed = [text for campaign, results in worked_out if (text := failures_text(campaign, results))]
     missions = Missions(flown.cases, missions_results.results)
     bars = mission_bars(missions) + law_bars(hits.cases, hits_results.results)
-    _write(out, missions, _text(options, missions, bars, worked_out))
+    _write(out, options.first_seed, _text(options, missions, bars, worked_out))
     if (out / RECOVERY_NAME).exists():
         write_table(out / RECOVERY_NAME, hits, hits_results, options.hits)
     print(summary_text(bars))
@@ -124,8 +124,8 @@ def _lead(options: Namespace, worked_out: list[tuple[Campaign, Results]]) -> str
     )
 
 
-def _write(folder: Path, missions: Missions, text: str) -> None:
+def _write(folder: Path, first_seed: int, text: str) -> None:
     """The picture beside the document; what stands between its marks made anew, the rest left as it is."""
     (folder / PICTURE.parent).mkdir(parents=True, exist_ok=True)
-    missions_figure(missions).savefig(folder / PICTURE)
+    missions_figure(first_seed).savefig(folder / PICTURE)
     write_part(folder / DOCUMENT_NAME, PART, text, TITLE)

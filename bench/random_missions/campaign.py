@@ -1,17 +1,12 @@
 """The campaign of random missions: each flown by both airframes."""
 
-import numpy as np
-
 from bench.campaign.plan import Campaign, Json
 from bench.random_missions.contacts import contacts_of
-from bench.random_missions.flight import JudgedFlight, fly
+from bench.random_missions.flight import fly
 from bench.random_missions.generator import AIRFRAMES, MissionCase, random_mission
 from bench.random_missions.judge import failures
 from bench.random_missions.recovered import recoveries
 
-# The paths of the first missions are kept for the picture, a point a quarter of a second.
-PICTURED = 6
-_EVERY_S = 0.25
 # The first hit of every fifth mission shows what the feed-forward of the height is worth.
 COMPARED_EVERY = 5
 
@@ -34,7 +29,7 @@ def work_out_mission(case: MissionCase) -> Json:
     drawn = random_mission(case)
     flight = fly(case, drawn)
     contacts = contacts_of(flight)
-    found: Json = {
+    return {
         "room": drawn.room,
         "stream_hz": drawn.stream_hz,
         "wind_m_s": drawn.wind_m_s,
@@ -47,10 +42,3 @@ def work_out_mission(case: MissionCase) -> Json:
         "unreachable": sum(event.kind == "unreachable" for event in flight.events),
         "hits": recoveries(flight, contacts),
     }
-    return found | ({"path_ned_m": _path(flight)} if case.seed <= PICTURED else {})
-
-
-def _path(flight: JudgedFlight) -> list[list[float]]:
-    series = flight.truth.series
-    step = max(1, round(_EVERY_S / (1e-6 * float(np.diff(series["time_boot_us"][:2])[0]))))
-    return [[round(float(x), 3) for x in place] for place in series["position_ned_m"][::step]]

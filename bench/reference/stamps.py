@@ -27,7 +27,7 @@ _STAMP = re.compile(
 )
 FLOWN = ("companion", "sim_vehicle")
 # Files that a result depends on beside the code.
-_DATA = (".yaml", ".csv")
+_DATA = (".yaml", ".csv", ".js", ".css", ".html")
 _DIGITS = 16
 _FIGURE = re.compile(r"!\[[^]]*\]\(|<!-- generated: ")
 
@@ -92,6 +92,16 @@ def complaints(name: str, text: str) -> Iterator[str]:
     for section in re.split(r"^#+ ", text, flags=re.MULTILINE):
         if _FIGURE.search(section) and not stamps_in(section):
             yield f"{name}: the section {section.partition(chr(10))[0]!r} has a figure or table without a stamp"
+
+
+def stamped_anew(text: str, command: str) -> str:
+    """With what this command has just measured or drawn again."""
+
+    def anew(old: re.Match[str]) -> str:
+        (stamp,) = stamps_in(old[0])
+        return stamp_text(command, stamp.paths) if stamp.command == command else old[0]
+
+    return _STAMP.sub(anew, text)
 
 
 def pages() -> Iterator[Path]:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from companion.mission.model import Mission
 from companion.report import CollisionReport, FlightReport
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches
+from rebound_cli.figure.legend import legend_below
 from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.run_folder import FIGURE_NAME, TLOG_NAME
 from rebound_cli.truth_match import FlightTruth, match_contacts
@@ -46,7 +47,7 @@ def draw_flight(
     log = read_flight_log(folder / TLOG_NAME)
     picture = _Picture(log, mission, scene, report, truth)
     count = len(report.collisions)
-    figure = Figure(figsize=(18 if count else 13, 8.5), layout="constrained")  # without pyplot: no global state
+    figure = Figure(figsize=(18 if count else 13, 9.5), layout="constrained")  # without pyplot: no global state
     if count:
         picture.draw_hit(figure.subplots(2, 3))
     else:
@@ -188,7 +189,7 @@ class _Picture:
             self._draw_threshold(axis)
             axis.set_ylim(bottom=0.0)
         _mark_zoom(axis, hit)
-        _finish(axis, title, _DETECTION, "specific force [m/s²]", "upper right")
+        _finish(axis, title, _DETECTION, "specific force [m/s²]")
 
     def _draw_fold(self, axis: Any, hit: _Hit, truth: FlightTruth) -> None:
         since_s = self._since_start_s(truth.at_us(truth.series["time_boot_us"])) - hit.detected_s
@@ -198,7 +199,7 @@ class _Picture:
             axis.plot(1e3 * since_s[near], fold_mm[:, arm], style, label=f"{name} arm", linewidth=1.8)
         _mark_zoom(axis, hit)
         axis.set_ylim(0.0, max(5.0, 1.1 * float(fold_mm.max(initial=0.0))))
-        _finish(axis, "How far each arm folded (simulator's truth)", _DETECTION, "fold [mm]", "upper right")
+        _finish(axis, "How far each arm folded (simulator's truth)", _DETECTION, "fold [mm]")
 
     def _draw_map(self, axis: Any) -> None:
         """From above, about the take-off point; an obstacle that moves stands where it stood at first."""
@@ -270,11 +271,11 @@ class _Picture:
             axis.set_xlim(left, right)
 
 
-def _finish(axis: Any, title: str, across: str, up: str, legend_place: str = "best") -> None:
-    """Title, axes with their units, grid and legend."""
+def _finish(axis: Any, title: str, across: str, up: str) -> None:
+    """Title, axes with their units, grid, and a legend below the data."""
     axis.set(title=title, xlabel=across, ylabel=up)
     axis.grid(alpha=0.3)
-    axis.legend(loc=legend_place, fontsize=8, framealpha=0.9)
+    legend_below(axis)
 
 
 def _mark_moments(axis: Any, hit: _Hit) -> None:

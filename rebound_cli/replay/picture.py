@@ -23,7 +23,7 @@ _DETECTED = "tab:red"
 
 def draw_impact(replay: Replay, finding: Finding, path: Path) -> None:
     """Write the picture to `path`."""
-    figure = Figure(figsize=(10, 9), layout="constrained")  # without pyplot: no window, no global state
+    figure = Figure(figsize=(12, 9), layout="constrained")  # without pyplot: no window, no global state
     axes = figure.subplots(3, 1, sharex=True)
     near = [h for h in replay.log.heard if -_BEFORE_S <= (h.at_us - finding.at_us) * 1e-6 <= _AFTER_S]
     imu = [(h.at_us, h.sample) for h in near if isinstance(h.sample, ImuSample)]
@@ -53,7 +53,7 @@ def draw_impact(replay: Replay, finding: Finding, path: Path) -> None:
     for axis in axes:
         axis.axvline(0.0, color=_DETECTED, linewidth=1.2, label="detected")
         axis.grid(alpha=0.3)
-        axis.legend(loc="upper right", fontsize=8, ncols=2)
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     what = "hit" if finding.is_collision else "contact, no collision"
     title = f"{replay.log.path.name}: {what} at {replay.log.seconds(finding.at_us):.3f} s by '{replay.detector}'"
     figure.suptitle(f"{title}, {finding.final.kind.value}, confidence {finding.final.confidence:.2f}", fontsize=12)

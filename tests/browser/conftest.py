@@ -1,34 +1,28 @@
 """One recorded flight and one browser for all tests here."""
 
-import shutil
 from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import sync_playwright
 
+from bench.pictures.screens import ARGUMENTS, NoBrowserError, browser_path
 from rebound_cli.report.shown_flight import recorded_flight
 from rebound_cli.report.writer import write_page
 from tests.browser.opened_page import OpenedPage
 from tests.rebound_cli.command import WALL, run_here
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-# Three dimensions without a graphics card, and a browser that asks its maker for nothing. As root there is no sandbox.
-ARGUMENTS = (
-    *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-quic"),
-)
-
 
 def pytest_sessionstart():
-    if not any(map(shutil.which, NAMES)):
-        pytest.exit("No browser is installed: apt-get install chromium (on Ubuntu: chromium-browser).", returncode=1)
+    try:
+        browser_path()
+    except NoBrowserError as error:
+        pytest.exit(str(error), returncode=1)
 
 
 @pytest.fixture(scope="session")
 def browser():
-    executable = next(filter(None, map(shutil.which, NAMES)))
     with sync_playwright() as playwright:
-        yield playwright.chromium.launch(executable_path=executable, args=ARGUMENTS)
+        yield playwright.chromium.launch(executable_path=browser_path(), args=ARGUMENTS)
 
 
 @pytest.fixture(scope="session")

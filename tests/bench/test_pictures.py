@@ -1,0 +1,78 @@
+"""The pictures that are kept: none blank, each word inside, and the hit's animation shows what happens."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from bench.main import main
+from bench.pictures import command
+from bench.pictures.animation import SLOW_S, SLOWNESS, Frame, frame_times_s
+from bench.reference.stamps import ROOT, stamp_text, stamped_anew, stamps_in
+from rebound_cli.report.shown_flight import recorded_flight
+from tests.rebound_cli.command import WALL, run_here
+
+KEPT = sorted(path for folder in ("docs/images", "bench/notes/images") for path in (ROOT / folder).rglob("*.*"))
+
+
+def least_ink(path):
+    """How much of it differs from its ground: of an animation of its first or its last frame."""
+    with Image.open(path) as image:
+        shares = []
+        for number in {0, getattr(image, "n_frames", 1) - 1}:
+            image.seek(number)
+            grey = np.asarray(image.convert("L")).astype(int)
+            shares.append((np.abs(grey - np.median(grey)) > 24).mean())
+        return min(shares)
+
+
+@pytest.mark.parametrize("path", KEPT, ids=lambda path: path.name)
+def test_no_picture_is_blank(path):
+    # A title alone is a thousandth
+    assert least_ink(path) > 0.02
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("flights") / "wall"
+    run_here("fly", WALL, "--lockstep", "--json", "--out", folder)
+    return recorded_flight(folder)
+
+
+def test_the_animation_is_ten_times_slower_round_the_touch():
+    paces = [(since, until - since) for since, until in pairwise(frame_times_s())]
+    slow = [pace for since, pace in paces if SLOW_S[0] <= since < SLOW_S[1]]
+    fast = [pace for since, pace in paces if not SLOW_S[0] <= since < SLOW_S[1]]
+    assert len(slow) > 30 and len(fast) > 30
+    assert min(fast) == pytest.approx(SLOWNESS * max(slow))
+
+
+def red_share(frame):
+    red, green, blue = np.moveaxis(np.asarray(frame).astype(int), -1, 0)
+    return ((red - green > 80) & (red - blue > 80)).mean()
+
+
+def test_arms_turn_red_as_they_fold_and_the_moment_of_detection_stays(flight):
+    hit = flight.truth.hits[0]
+    before, folded, after = (red_share(Frame(flight, hit, at_s).drawn()) for at_s in (-0.1, 0.025, 1.5))
+    assert before == 0.0 and folded > 3.0 * after > 0.0
+
+
+def test_a_command_makes_all_pictures_and_stamps_their_pages(tmp_path, monkeypatch):
+    # Given pages with an old stamp of it, and one of another command
+    old, other = stamp_text(command.COMMAND, ["bench/pictures"]).replace("+", "+0"), stamp_text("make bumps", ["docs"])
+    (tmp_path / "README.md").write_text(f"![hit](docs/images/hit.webp)\n{old}; {other}.\n")
+    monkeypatch.setattr(command, "write_animation", lambda flight, path: path.write_text(flight.name))
+    monkeypatch.setattr(command, "write_screens", lambda page, folder: (folder / "report.png").write_bytes(b"x"))
+    monkeypatch.setattr(command, "browser_path", lambda: "")
+    assert main(["pictures", "--out", str(tmp_path)]) == 0
+    images = tmp_path / command.FOLDER
+    assert (images / "hit.webp").read_text() == "wall" and (images / "wall.png").stat().st_size > 10_000
+    found = stamps_in((tmp_path / "README.md").read_text())
+    assert [(stamp.command, stamp.is_old) for stamp in found] == [(command.COMMAND, False), ("make bumps", False)]
+
+
+def test_a_stamp_of_another_command_stays_as_it_is():
+    text = "Measured by `make bumps` on version 0.1.0+0 of `docs`."
+    assert stamped_anew(text, command.COMMAND) == text
