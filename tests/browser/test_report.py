@@ -96,11 +96,13 @@ def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, flight,
     file = tmp_path / "hostile.html"
     events = [*flight.events, {"time_us": flight.started_at_us, "kind": HOSTILE, "text": HOSTILE, "data": {}}]
     file.write_text(page(replace(flight, name=HOSTILE, log=log, events=events)))
-    with opened(file.as_uri()) as shown:
+    with opened(file.as_uri(), width=390) as shown:
         assert shown.text("#name") == HOSTILE
         cells = shown.page.locator("#events td").all_inner_texts()
         assert cells.count(HOSTILE) == 3 and cells.count("STATUSTEXT") > 0
         assert shown.page.locator("img").count() == 0
+        # A long name finds room on a phone, too
+        assert shown.overlaps() == []
         assert shown.asked == [file.as_uri()] and shown.complaints == []
 
 
