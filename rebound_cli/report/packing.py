@@ -13,7 +13,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 
 # The most negative number stands for "none".
-_NONE = {"i2": -(1 << 15), "i4": -(1 << 31)}
+NONE = {"i2": -(1 << 15), "i4": -(1 << 31)}
 
 
 def packed(values: Floats, resolution: float) -> dict[str, Any]:
@@ -24,22 +24,14 @@ def packed(values: Floats, resolution: float) -> dict[str, Any]:
     kind = "i2" if high - low < 65_000 else "i4"
     # What four bytes cannot hold is none: of times in steps of 10 us what is six hours from the middle.
     steps = np.round(values / resolution) - middle
-    held = np.isfinite(steps) & (np.abs(steps) < -_NONE[kind])
-    whole = np.where(held, np.where(held, steps, 0.0), _NONE[kind]).astype(f"<{kind}")
+    held = np.isfinite(steps) & (np.abs(steps) < -NONE[kind])
+    whole = np.where(held, np.where(held, steps, 0.0), NONE[kind]).astype(f"<{kind}")
     return {
         "kind": kind,
         "offset": middle,
         "resolution": resolution,
         "data": base64.b64encode(whole.tobytes()).decode(),
     }
-
-
-def unpacked(column: dict[str, Any]) -> Floats:
-    """The numbers again, to half the resolution; NaN for none."""
-    kind = column["kind"]
-    whole = np.frombuffer(base64.b64decode(column["data"]), f"<{kind}").astype(np.float64)
-    values: Floats = np.where(whole == _NONE[kind], np.nan, (whole + column["offset"]) * column["resolution"])
-    return values
 
 
 def kept_rows(seconds: Floats, loudness: Floats, near_s: Floats, around_s: float, most: int) -> npt.NDArray[np.int64]:

@@ -55,7 +55,7 @@ function addDownload(list, name, about, text) {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   });
-  entry.append(button, element("span", ` ${about}`));
+  entry.append(button, element("span", about));
   list.append(entry);
 }
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from rebound_cli.report.content import content
+from rebound_cli.report import content as report_content
 from rebound_cli.report.page import page
+from rebound_cli.report.writer import write_page
 from tests.browser.opened_page import drawn_share, line_share, pixels
 from tests.rebound_cli.report.test_page import HOSTILE
 
@@ -42,7 +43,7 @@ def test_nothing_on_it_is_empty_covers_another_or_leaves_the_window(shown):
 
 
 def test_every_moment_is_reached_by_keys_alone(shown, flight):
-    moments_s = [moment["t"] for moment in content(flight)["moments"]]
+    moments_s = [moment["t"] for moment in report_content.content(flight)["moments"]]
     assert len(moments_s) > 1
     shown.press("Home")
     assert shown.time_s == 0.0
@@ -96,12 +97,21 @@ def test_what_was_heard_is_text_and_never_an_element_or_a_script(opened, flight,
     file = tmp_path / "hostile.html"
     events = [*flight.events, {"time_us": flight.started_at_us, "kind": HOSTILE, "text": HOSTILE, "data": {}}]
     file.write_text(page(replace(flight, name=HOSTILE, log=log, events=events)))
-    with opened(file.as_uri()) as shown:
+    with opened(file.as_uri(), width=390) as shown:
         assert shown.text("#name") == HOSTILE
         cells = shown.page.locator("#events td").all_inner_texts()
         assert cells.count(HOSTILE) == 3 and cells.count("STATUSTEXT") > 0
         assert shown.page.locator("img").count() == 0
         assert shown.asked == [file.as_uri()] and shown.complaints == []
+
+
+def test_a_long_flight_with_its_longer_texts_has_room_on_a_phone(opened, flight, tmp_path, monkeypatch):
+    # Given as many rows as are shown of half an hour
+    monkeypatch.setattr(report_content, "_ROWS", 1000)
+    file = write_page(flight, tmp_path / "long.html")
+    with opened(file.as_uri(), width=390) as shown:
+        assert "rows: all round the hits, the loudest elsewhere" in shown.text("#downloads")
+        assert shown.overlaps() == [] and shown.complaints == []
 
 
 def test_downloads_hold_all_rows_with_their_units(shown, flight):

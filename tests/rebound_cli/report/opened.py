@@ -1,11 +1,19 @@
 """A page as a program reads it: its elements, its scripts, its data."""
 
+import base64
 import json
 from html.parser import HTMLParser
 
 import numpy as np
 
-from rebound_cli.report.packing import unpacked
+from rebound_cli.report.packing import NONE
+
+
+def unpacked(column):
+    """The numbers of a column again, to half the resolution; NaN for none."""
+    kind = column["kind"]
+    whole = np.frombuffer(base64.b64decode(column["data"]), f"<{kind}").astype(np.float64)
+    return np.where(whole == NONE[kind], np.nan, (whole + column["offset"]) * column["resolution"])
 
 
 class Opened(HTMLParser):

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rebound_cli.report.packing import kept_rows, packed, unpacked
+from rebound_cli.report.packing import kept_rows, packed
+from tests.rebound_cli.report.opened import unpacked
 
 
 @given(st.lists(st.floats(-300.0, 300.0), min_size=1, max_size=50))
