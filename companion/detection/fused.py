@@ -104,7 +104,8 @@ class FusedDetector:
         f_x, f_y, f_z = f
         off = situation.why_off
         x, y = f_x - s.floor.x, f_y - s.floor.y
-        side = math.sqrt(x * x + y * y)
+        # A push that ends leaves nothing, however long it has lasted and been learnt.
+        side = math.sqrt(min(x * x + y * y, f_x * f_x + f_y * f_y))
         room = vertical_threshold_m_s2(s, config)
         most = s.thrust.most_m_s2(now_us)
         is_within = side < s.threshold_m_s2 and -most - room < f_z < room
