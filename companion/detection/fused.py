@@ -3,8 +3,8 @@
 By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs of a
 contact, each against what this vehicle shows in its own flight:
 
-* sideways: a departure of f_x, f_y from their running mean, with room for the drag that changes as the
-  vehicle turns;
+* sideways: a departure of f_x, f_y from their running mean, and from nothing, with room for the drag that changes
+  as the vehicle turns;
 * vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
   fall, a dropped payload and every manoeuvre stay inside;
 * aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
@@ -47,8 +47,8 @@ SHAKING = 2.0
 # been, is another hit: a vehicle that scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
 WORSE = 1.5
-# After a hit an estimator puts right what it missed of it, for as long as `estimate.trust` may wait for that; also
-# where the hit seemed to have been measured whole, which a slow stream's samples, a quarter of the time, cannot know.
+# After a hit an estimator puts right what it missed of it; by then what is left of the swing is no step. Also where the
+# hit seemed to have been measured whole, which a slow stream's samples, a quarter of the time, cannot know.
 # Those steps reach 0.25 m/s (random missions at 50 Hz); a second hit of 0.5 m/s makes twice that.
 SWING_US, SWINGING = 1_500_000, 3.0
 

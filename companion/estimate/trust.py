@@ -1,8 +1,8 @@
 """May the vehicle's velocity be believed? After a hit that its accelerometer did not show whole, not at once.
 
-What clipping hides of a hit is missing in PX4's velocity; its estimator finds back within a second, in a swing that
-looks like another hit (measured on a real PX4: off by up to 3.6 m/s, unchanged for a tenth of a second, a seventh too
-far on the other side after 0.9 s). While velocity and accelerometer contradict each other it is correcting itself.
+What clipping hides of a hit is missing in PX4's velocity. Its estimator finds back in a swing that looks like another
+hit. Measured on a real PX4: off by up to 7.8 m/s, unchanged for a tenth of a second, a fifth too far on the other side
+after 0.7 s, and a tilt for seconds. While velocity and accelerometer contradict each other it is correcting itself.
 
 This judges for the detector, which must not take that swing for a second hit and loses little by waiting. A recovery
 has its own estimate, `reflex.reckoning`: it needs a velocity sooner, and knows the normal and the rebound to expect.

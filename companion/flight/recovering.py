@@ -75,10 +75,8 @@ class Recover:
             (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
             motion, c = Moving((n, e, goal[2]), (u, v, 0.0)), self._height_m_s2(1.0)
         # PX4 takes place, velocity and tilt for what it tells: as much is asked for beside the plan's.
-        place, velocity = (
-            plus(motion.position_ned_m, 1.0, reckoning.off_m),
-            plus(motion.velocity_ned_m_s, 1.0, reckoning.off_m_s),
-        )
+        place = plus(motion.position_ned_m, 1.0, reckoning.off_m)
+        velocity = plus(motion.velocity_ned_m_s, 1.0, reckoning.off_m_s)
         return Target(place, self._yaw_rad, velocity, plus((DAMPED * a, DAMPED * b, c), -1.0, record.level_leans_m_s2))
 
     def _leaning(self, elapsed_s: float) -> Target:

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from companion.mavlink.decode import checksum_holds
-from companion.mavlink.packet import packet_length, sequence_of, source_of
+from companion.mavlink.packet import Stray, sequence_of, source_of
 
 # A sequence number has one byte; one that is behind by less than half of its range was overtaken on the way.
 _NUMBERS = 256
@@ -25,7 +24,7 @@ class Delivery:
 
     def take(self, frame: bytes, vehicle: tuple[int, int]) -> None:
         """A packet, or bytes that are none."""
-        if packet_length(frame) != len(frame) or not checksum_holds(frame, 0, len(frame)):
+        if isinstance(frame, Stray):
             self.unreadable_bytes += len(frame)
         elif source_of(frame) == vehicle:
             missing = 0 if self._sequence is None else (sequence_of(frame) - self._sequence - 1) % _NUMBERS

@@ -151,8 +151,8 @@ def _vibration(
     time_usec: int, vibration_y: float, vibration_z: float, clipping_0: int, clipping_1: int, clipping_2: int
 ) -> Sample:
     # How much a sample may differ from the one before: no more than the ranges.
-    turns = hypot(vibration_y) <= 2.0 * messages.ANGULAR_VELOCITY_RAD_S
-    shakes = hypot(vibration_z) <= 2.0 * messages.SPECIFIC_FORCE_M_S2
+    turns = abs(vibration_y) <= 2.0 * messages.ANGULAR_VELOCITY_RAD_S
+    shakes = abs(vibration_z) <= 2.0 * messages.SPECIFIC_FORCE_M_S2
     if not (turns and shakes) or time_usec >= messages.TIME_US:
         return Refused("VIBRATION", f"{vibration_y:g} rad/s, {vibration_z:g} m/s^2")
     return messages.Vibration(time_usec, vibration_y, vibration_z, (clipping_0, clipping_1, clipping_2))

@@ -14,8 +14,8 @@ ATTITUDE_KEPT_S = 0.1
 LONGEST_GAP_US = 100_000
 # A velocity that is held against the sum lags by no more than this (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
-# Cosine of 15 degrees: the tilt that a filter makes of 9 m/s missed, by what a real PX4 made of 2.4 m/s
-# (bench/notes/px4.md). Gyroscopes that show more are wrong themselves.
+# Cosine of 15 degrees: about the tilt that a real PX4 made of 7.8 m/s missed (bench/notes/px4.md). Gyroscopes that show
+# more are wrong themselves.
 MOST_WRONG = 0.966
 # Motors turn the vehicle with no more than this.
 MOTORS_RAD_S2 = 100.0

@@ -90,7 +90,7 @@ PUT_RIGHT_DAMPING = (0.5, 0.67, 0.85)
 # A part of what is missing is taken for a tilt, and goes as slowly as that: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
 # Of what was hidden, the share by which velocity and, in seconds, place of those hits differ from that, RMS over 3 s.
-MISFIT, MISFIT_S = 0.03, 0.02
+MODEL_ERROR, MODEL_ERROR_S = 0.03, 0.02
 # What the accelerometer's sum drifts by: a tilt that is off by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
 # Of where the hit was.

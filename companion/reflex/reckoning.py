@@ -33,8 +33,8 @@ from companion.reflex.config import (
     HIDDEN_SHARE,
     LEAD_S,
     LEAST_SPREAD_M_S,
-    MISFIT,
-    MISFIT_S,
+    MODEL_ERROR,
+    MODEL_ERROR_S,
     MOST_LEANT,
     MOST_OFF_M_S,
     PLACE_SPREAD_M,
@@ -109,8 +109,8 @@ class Bank:
         """
         g, way_s, _ = missing(since_s)
         hidden2 = np.array(self.missing_m_s) ** 2
-        self._take(0, way_s, place_m, colour * (spread_m**2 + min(MISFIT * since_s, MISFIT_S) ** 2 * hidden2))
-        self._take(1, g, velocity_m_s, colour * (spread_m_s**2 + MISFIT**2 * hidden2))
+        self._take(0, way_s, place_m, colour * (spread_m**2 + min(MODEL_ERROR * since_s, MODEL_ERROR_S) ** 2 * hidden2))
+        self._take(1, g, velocity_m_s, colour * (spread_m_s**2 + MODEL_ERROR**2 * hidden2))
 
     def _take(self, which: int, of_e: Floats, told: Vector3, variance: Floats) -> None:
         """One measurement on each axis: the place (0) or the velocity (1) with so much of e in it."""
@@ -188,7 +188,6 @@ class Reckoning:
     push_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
     off_m: Vector3 = REST  # what the told place is off by, once the estimate is right: what is missing in it still
-    off_m_s: Vector3 = REST  # the same of the velocity, and by what it is not that of the places besides
     _bank: Bank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
@@ -229,7 +228,7 @@ class Reckoning:
             )
         self._heard_boot_us = self._told_boot_us = 0
         self._told, self.is_right = None, False
-        self.off_m = self.off_m_s = self._missing_m_s = self._beside_m_s = REST
+        self.off_m = self._missing_m_s = self._beside_m_s = REST
 
     def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
         """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
@@ -267,12 +266,11 @@ class Reckoning:
         at_us = sample.time_boot_us - round(1e6 * DELAY_S)
         if at_us <= self.hit_boot_us:
             return
-        was_right, is_in_push = self.is_right, sample.time_boot_us <= self._pushed_boot_us
         if self.is_whole:
             self.is_right, self.off_m, self._missing_m_s = True, REST, REST
-        elif was_right or not is_in_push:
+        elif self.is_right or sample.time_boot_us > self._pushed_boot_us:
             self._reckon(sample, at_us)
-        if was_right or self.is_right:
+        if self.is_right:
             self._correct(sample)
 
     def _reckon(self, sample: LocalPosition, at_us: int) -> None:
@@ -316,22 +314,25 @@ class Reckoning:
 
     def _compare(self, sample: LocalPosition) -> None:
         """The told velocity, less what is missing in it, with the told places: its errors last longer than theirs."""
-        self.off_m_s = self._missing_m_s
-        before, self._told = self._told, self.put_right(sample)
+        before, self._told = self._told, _less(sample, self.off_m, self._missing_m_s)
         if before is not None:
             elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
             if 0.0 < elapsed_s < COMPARED_S:
                 self._beside_m_s = _beside(self._beside_m_s, before, self._told, elapsed_s)
-        self.off_m_s = plus(self._missing_m_s, 1.0, self._beside_m_s)
+
+    @property
+    def off_m_s(self) -> Vector3:
+        """The same of the velocity, and by what it is not that of the places besides."""
+        return plus(self._missing_m_s, 1.0, self._beside_m_s)
 
     def put_right(self, sample: LocalPosition) -> LocalPosition:
         """What is told, without what it is off by."""
-        place, velocity = sample.position_ned_m, sample.velocity_ned_m_s
-        return replace(
-            sample,
-            position_ned_m=plus(place, -1.0, self.off_m),
-            velocity_ned_m_s=plus(velocity, -1.0, self.off_m_s),
-        )
+        return _less(sample, self.off_m, self.off_m_s)
+
+
+def _less(sample: LocalPosition, off_m: Vector3, off_m_s: Vector3) -> LocalPosition:
+    place, velocity = plus(sample.position_ned_m, -1.0, off_m), plus(sample.velocity_ned_m_s, -1.0, off_m_s)
+    return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
 
 
 def _beside(was_m_s: Vector3, before: LocalPosition, told: LocalPosition, elapsed_s: float) -> Vector3:

@@ -18,6 +18,7 @@ from companion.reflex.laws import Contact
 from companion.reflex.reckoning import Reckoning
 
 HIT_US, SINCE_US = 1_000_000, 100_000
+OFF_M, OFF_M_S, LEVEL_LEANS_M_S2 = (0.3, -0.2, 0.1), (-0.1, 0.05, 0.0), (0.5, 0.4, 0.0)
 MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
@@ -27,6 +28,7 @@ def asked(
     down_m_s: float = 0.0,
     attitude: Attitude | None = None,
     is_whole: bool = False,
+    told_off: bool = False,
 ) -> Target:
     """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much."""
     mission = Mission.model_validate(MISSION)
@@ -44,6 +46,9 @@ def asked(
     sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
     recover.step(flight, Inputs(positions=[sample]), SINCE_US)
+    if told_off:
+        reckoning.off_m, reckoning._missing_m_s = OFF_M, OFF_M_S
+        flight.collisions[0].level_leans_m_s2 = LEVEL_LEANS_M_S2
     target = recover.target(SINCE_US)
     assert target is not None
     return target
@@ -88,3 +93,17 @@ def test_the_spin_that_counts_is_that_about_the_vertical(attitude, rates, spins)
     # Given a hit that the vehicle's estimate knows whole: without a spin places are asked for
     target = asked(-10.0, attitude=Attitude(HIT_US, attitude, rates), is_whole=True)
     assert target.leans_only is spins
+
+
+def less(a, b):
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+def test_as_much_is_asked_for_beside_the_plan_as_the_told_estimate_is_off_by():
+    # Given the same plan, for a vehicle that tells its place and its tilt as they are, and for one that does not
+    right, off = asked(-10.0, is_whole=True), asked(-10.0, is_whole=True, told_off=True)
+    assert right.acceleration_ned_m_s2 is not None and off.acceleration_ned_m_s2 is not None
+    # Then place and velocity are off by as much, and the lean takes back what one gives that takes itself for level
+    assert less(off.position_ned_m, right.position_ned_m) == pytest.approx(OFF_M)
+    assert less(off.velocity_ned_m_s, right.velocity_ned_m_s) == pytest.approx(OFF_M_S)
+    assert less(right.acceleration_ned_m_s2, off.acceleration_ned_m_s2) == pytest.approx(LEVEL_LEANS_M_S2)
