@@ -323,6 +323,10 @@ def _delivery(survey: Survey) -> Iterator[Finding]:
         remedy = "a wire loses nothing: ground beside it, short, the same baud rate at both ends"
         found = f"{lost} of {sent} packets lost ({100.0 * lost / sent:.1f} %), {bad} unreadable bytes"
         yield _judged("packets", found, (lost > 0 or bad > 0, DOUBTFUL, remedy))
+    if delivery.signed and not survey.parameters:
+        # With a key, packets come here without their signatures.
+        found = "the vehicle signs its packets and answers nothing that has no signature"
+        yield Finding("signing", BAD, found, "--signing-key FILE, with the key that the vehicle has")
     jitter_us, timer_ms = delivery.jitter_us, None if line is None else line.latency_timer_ms
     if jitter_us is not None:
         held = "an FTDI converter's latency timer" + (

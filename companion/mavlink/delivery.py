@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from companion.mavlink.packet import Stray, sequence_of, source_of
+from companion.mavlink.packet import Stray, has_signature, sequence_of, source_of
 
 # A sequence number has one byte; one that is behind by less than half of its range was overtaken on the way.
 _NUMBERS = 256
@@ -19,6 +19,7 @@ class Delivery:
     received: int = 0
     lost: int = 0
     unreadable_bytes: int = 0
+    signed: int = 0
     _sequence: int | None = None
     _delays_us: list[tuple[int, int]] = field(default_factory=list)
 
@@ -32,6 +33,7 @@ class Delivery:
                 self._sequence = sequence_of(frame)
                 self.lost += missing
             self.received += 1
+            self.signed += has_signature(frame)
 
     def arrived(self, stamp_us: int, now_us: int) -> None:
         """A sample of the vehicle's own time."""

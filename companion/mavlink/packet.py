@@ -44,6 +44,10 @@ def sequence_of(packet: bytes) -> int:
     return packet[4] if packet[0] == MAGIC_V2 else packet[2]
 
 
+def has_signature(packet: bytes) -> bool:
+    return packet[0] == MAGIC_V2 and packet[2] & FLAG_SIGNED != 0
+
+
 def message_id_of(packet: bytes) -> int:
     return packet[7] | packet[8] << 8 | packet[9] << 16 if packet[0] == MAGIC_V2 else packet[5]
 

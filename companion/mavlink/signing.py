@@ -17,6 +17,7 @@ from companion.mavlink.packet import (
     HEADER_V2,
     MAGIC_V2,
     SIGNATURE,
+    has_signature,
     message_id_of,
     packet_length,
     source_of,
@@ -117,11 +118,10 @@ class Signing:
         return message_id_of(packet) in dialect.mavlink_map or self._is_signed(packet)
 
     def _is_signed(self, packet: bytes) -> bool:
-        has_signature = packet[0] == MAGIC_V2 and packet[2] & FLAG_SIGNED
-        return bool(has_signature) and hmac.compare_digest(self._hash(packet[:-_HASH]), packet[-_HASH:])
+        return has_signature(packet) and hmac.compare_digest(self._hash(packet[:-_HASH]), packet[-_HASH:])
 
     def _refusal(self, packet: bytes) -> str | None:
-        if packet[0] != MAGIC_V2 or not packet[2] & FLAG_SIGNED:
+        if not has_signature(packet):
             return UNSIGNED
         # Signature first: the stamp of a forged packet means nothing.
         if not self._is_signed(packet):

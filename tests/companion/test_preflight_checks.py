@@ -145,6 +145,15 @@ def test_clocks_that_drift_apart_are_no_uneven_arrival():
     assert delivery.jitter_us == pytest.approx(0.0, abs=10.0)
 
 
+@pytest.mark.parametrize(("is_signed", "answers", "verdict"), [(1, 0, Verdict.BAD), (1, 1, None), (0, 0, None)])
+def test_a_vehicle_that_signs_and_does_not_answer_wants_a_key(is_signed, answers, verdict):
+    # Given a heartbeat of MAVLink 2, with a signature or without
+    frame = bytes((0xFD, 0, is_signed, 0, 7, 1, 1, 0, 0, 0)) + bytes(15)
+    survey = surveyed(HEALTHY if answers else {})
+    survey.delivery.take(frame, (1, 1))
+    assert verdicts(survey).get("signing") is verdict
+
+
 def test_samples_that_are_held_back_are_told_with_the_timer_that_holds_them():
     # Given FTDI's 16 ms, in which four samples gather
     assert verdicts(surveyed())["arrival"] is Verdict.GOOD
