@@ -105,8 +105,9 @@ class Recover:
         return self._contact.normal_ned[2] == 0.0
 
     def _height_m_s2(self, loops: float) -> float:
-        spread_m_s, down_m = self._record.reckoning.spread_m_s[2], self._record.setpoint_ned_m[2]
-        return height_held(self._state(), spread_m_s, down_m, loops, self._config.vertical_acceleration_m_s2)
+        record, most_m_s2 = self._record, self._config.vertical_acceleration_m_s2
+        spread_m_s, told_m_s = record.reckoning.spread_m_s[2], record.estimated_down_m_s
+        return height_held(self._state(), spread_m_s, told_m_s, record.setpoint_ned_m[2], loops, most_m_s2)
 
     def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
         spread = self._record.reckoning.spread_m_s

@@ -180,12 +180,14 @@ def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> V
     return (share * a, share * b, c)
 
 
-def height_held(state: Moving, spread_m_s: float, down_m: float, loops: float, most_m_s2: float) -> float:
+def height_held(
+    state: Moving, spread_m_s: float, told_m_s: float, down_m: float, loops: float, most_m_s2: float
+) -> float:
     """What brings the vehicle back to a height, down positive: so many times what PX4's own loops ask for.
 
-    Of a speed up or down no more counts than what is beyond its spread.
+    The speed down that the vehicle tells counts as far as the motion reckoned, within its spread, does not deny it.
     """
-    wanted_m_s, speed_m_s = HEIGHT_PER_S * (down_m - state.position_ned_m[2]), state.velocity_ned_m_s[2]
-    speed_m_s = math.copysign(max(0.0, abs(speed_m_s) - spread_m_s), speed_m_s)
-    asked = loops * CLIMB_GAIN_PER_S * (wanted_m_s - speed_m_s)
+    reckoned_m_s = state.velocity_ned_m_s[2]
+    speed_m_s = min(max(told_m_s, reckoned_m_s - spread_m_s), reckoned_m_s + spread_m_s)
+    asked = loops * CLIMB_GAIN_PER_S * (HEIGHT_PER_S * (down_m - state.position_ned_m[2]) - speed_m_s)
     return min(max(asked, -most_m_s2), most_m_s2)

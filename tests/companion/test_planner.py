@@ -247,7 +247,7 @@ def test_a_climb_ends_sooner_than_by_the_vehicles_own_loop(speed_m_s):
     for most_m_s2 in (3.0, 0.0):
         w, way, done, furthest = speed_m_s, 0.0, 0.0, 0.0
         for _ in range(500):
-            asked = height_held(Moving((0.0, 0.0, way), (0.0, 0.0, w)), 0.0, 0.0, 1.0, most_m_s2)
+            asked = height_held(Moving((0.0, 0.0, way), (0.0, 0.0, w)), 0.0, w, 0.0, 1.0, most_m_s2)
             assert abs(asked) <= most_m_s2
             done += 0.002 / 0.03 * (asked - 4.0 * (w + way) - done)
             w += 0.002 * done
@@ -258,10 +258,14 @@ def test_a_climb_ends_sooner_than_by_the_vehicles_own_loop(speed_m_s):
     assert ways[0] < 0.7 * ways[1], "less than without; 0: none"
 
 
-def test_a_climb_that_may_be_none_is_not_braked():
+@pytest.mark.parametrize(
+    ("spread_m_s", "told_m_s", "counts_m_s"),
+    [(0.0, 0.0, -0.3), (0.1, 0.0, -0.2), (0.4, 0.0, 0.0), (0.4, -0.3, -0.3), (0.4, 0.05, 0.05), (0.1, -1.0, -0.4)],
+)
+def test_a_told_climb_counts_as_far_as_the_reckoned_one_allows(spread_m_s, told_m_s, counts_m_s):
     climbing = Moving((0.0, 0.0, 0.0), (0.0, 0.0, -0.3))
-    assert height_held(climbing, 0.4, 0.0, 1.0, 3.0) == 0.0
-    assert height_held(climbing, 0.1, 0.0, 1.0, 3.0) == pytest.approx(0.8)
+    asked_m_s2 = height_held(climbing, spread_m_s, told_m_s, 0.0, 1.0, 3.0)
+    assert asked_m_s2 == pytest.approx(-4.0 * counts_m_s)
 
 
 # --- laws
