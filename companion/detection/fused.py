@@ -25,7 +25,7 @@ from companion.detection.floor import SETTLED_US
 from companion.detection.force_signs import CLEAR, pushes_on, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
-from companion.detection.hidden_signs import Hidden, dipped, spun, velocity_jump
+from companion.detection.hidden_signs import Hidden, spun, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
 from companion.messages import (
@@ -113,7 +113,7 @@ class FusedDetector:
             # Nearly every sample ends here.
             s.soft.since_boot_us = None
             self._learn(s, f, before_us)
-            hidden = spun(s, config) or dipped(s, f_z, room)
+            hidden = spun(s, config)
             return None if hidden is None else self._fire_hidden(s, now_us, situation, hidden)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off

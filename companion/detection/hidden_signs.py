@@ -6,15 +6,11 @@ The state is only read; what is known of an impact found so is the gap it fell i
 import math
 from typing import NamedTuple
 
-from companion.detection.force_signs import CLEAR
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.messages import Vector3
 from companion.motion.rotation import ned_to_body
 from companion.motion.strapdown import ZERO
-
-# Three samples of 50 Hz with jitter: in more time thrust goes and comes back by itself.
-DIP_US = 50_000
 
 # Steps of velocities at 10 Hz are too few to know their spread well; a filter's corrections are more of them.
 SLOW_NOISE = 1.2
@@ -38,17 +34,6 @@ def spun(s: FusedState, config: FusedConfig) -> Hidden | None:
     if a.spun_rad_s < config.spin_rad_s + config.spin_rad_s2 * over_s:
         return None
     return _from_ahead(s, over_s)
-
-
-def dipped(s: FusedState, f_z: float, room_m_s2: float) -> Hidden | None:
-    """Thrust that was gone, or pushed back, in the sample before and is there again: a ceiling touched. Thrust cannot
-    go and come back from one sample to the next. `room_m_s2` is what f_z may depart by (see `force_signs`)."""
-    soft = s.soft
-    f_x, f_y, at_z = soft.last
-    dip_m_s2 = at_z - max(soft.before[2], f_z)
-    if dip_m_s2 < CLEAR * room_m_s2 or s.last_sample_boot_us - soft.before_us > DIP_US:
-        return None
-    return Hidden(soft.before_us, (f_x - s.floor.x, f_y - s.floor.y, dip_m_s2), 1.0, None)
 
 
 def _from_ahead(s: FusedState, over_s: float) -> Hidden:

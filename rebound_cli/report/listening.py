@@ -10,7 +10,6 @@ from typing import Any, cast
 
 from companion.detection.force_signs import side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
-from companion.detection.hidden_signs import spun
 from companion.detection.interface import Detector, DetectorState, Evidence, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
 from companion.reflex.watch import Watch
@@ -89,9 +88,7 @@ class _ListenedTo:
             return "force", math.nan
         if not isinstance(sample, ImuSample):
             return "velocity", math.nan
-        if isinstance(state, FusedState) and spun(state, self._config) is not None:
-            return "turn", state.aftermath.spun_rad_s
-        return "dip", math.nan
+        return "turn", state.aftermath.spun_rad_s if isinstance(state, FusedState) else math.nan
 
 
 def _tested(state: DetectorState, sample: ImuSample, config: Any) -> Tested:

@@ -29,7 +29,6 @@ _BESIDE_US = 500_000
 
 _SIGNS = {
     "turn": "It turned from one sample to the next as no motor turns a vehicle",
-    "dip": "The thrust was gone in one sample and back in the next, as when a ceiling is touched",
     "velocity": "Its velocity jumped by what the accelerometer did not show: the contact fell between the samples",
 }
 

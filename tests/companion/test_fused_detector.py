@@ -364,14 +364,6 @@ def buzzing(rates_rad_s):
     return lambda t: tuple(rate + 0.01 * (-1) ** (t // 4_000) for rate in rates_rad_s(t))
 
 
-@pytest.mark.parametrize(("lost_for_us", "hits"), [(5_000, 1), (500_000, 0)], ids=["ceiling", "motor"])
-def test_thrust_that_is_gone_for_one_sample_was_a_ceiling(lost_for_us, hits):
-    """Nine tenths of it: no push down by itself, because propellers that stop do the same, and stay so."""
-    dip = pulse((0.0, 0.0, 8.8), start_us=3_004_000, length_us=lost_for_us)
-    impacts = Flight(dip, imu_every_us=8_000, velocity=(0.0, 0.0, -0.7)).fly(3_030_000)
-    assert [(i.sample_time_boot_us, i.kind) for i in impacts] == hits * [(3_016_000, ImpactKind.CEILING)]
-
-
 # --- phases -------------------------------------------------------------------------------------------------
 
 
