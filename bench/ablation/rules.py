@@ -39,7 +39,6 @@ _DETECTION, _ESTIMATE, _REFLEX, _FLIGHT = (
 )
 
 RULES = (
-    Rule("spun", "rates that no motor makes are a hit", _DETECTION + "hidden_signs:spun", _says(None)),
     Rule(
         "velocity jump",
         "a velocity that the accelerometer does not explain is a hit",

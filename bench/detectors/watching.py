@@ -34,8 +34,6 @@ SWEPT_FIELDS = {
         "velocity_step_m_s",
         "velocity_step_turned_m_s",
         "rate_step_rad_s",
-        "spin_rad_s",
-        "spin_rad_s2",
     ),
 }
 

@@ -45,11 +45,6 @@ class Aftermath:
     averaging_us: int
     strapdown: Strapdown = field(default_factory=Strapdown)
     previous_imu_us: int = 0
-    earlier_imu_us: int = 0
-    earlier_rates_rad_s: Vector3 = ZERO
-    """Of the sample before the previous one."""
-    spun_rad_s: float = 0.0
-    """By how much the rates stepped at the previous sample, if the newest one keeps it: the lesser of the two steps."""
     newest_rate_step_rad_s: float = 0.0
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
@@ -80,17 +75,14 @@ class Aftermath:
             unseen_us = time_us - before_us - self.averaging_us
             unseen = unseen_us / (time_us - before_us) if unseen_us > 0 else 0.0
             self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
-            before = self.newest_rate_step_rad_s
             step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
-            self.spun_rad_s = min(before, math.dist(w, self.earlier_rates_rad_s)) if before > 0.0 else 0.0
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         else:
-            self.newest_rate_step_rad_s = self.spun_rad_s = 0.0
+            self.newest_rate_step_rad_s = 0.0
             self.forget()
-        self.earlier_imu_us, self.previous_imu_us = self.previous_imu_us, before_us
-        self.earlier_rates_rad_s = (p_0, q_0, r_0)
+        self.previous_imu_us = before_us
 
     def forget(self) -> None:
         """The sum has a hole, a contact in it, or the estimator was reset: what was before is no measure."""
@@ -165,11 +157,6 @@ class Aftermath:
     def rate_step_near(self, velocity_us: int) -> float:
         """The largest step of the rates from sample to sample that a jump at ``velocity_us`` may belong to."""
         return self.rate_step_rad_s if velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US else 0.0
-
-    @property
-    def rate_step_s(self) -> float:
-        """How long the largest step of the rates had: from one sample to the next."""
-        return 1e-6 * (self.rate_step_until_us - self.rate_step_from_us)
 
     def contact_gap_us(self, velocity_us: int, least_rad_s: float) -> int:
         """Latest time at which the vehicle was certainly free before the step seen at ``velocity_us``."""

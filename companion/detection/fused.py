@@ -10,9 +10,8 @@ contact, each against what this vehicle shows in its own flight:
 * aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
   the rates jumped, too.
 
-A vehicle that turns from one sample to the next as no motor turns it was hit between them, whatever its accelerometer
-shows. What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment
-before it is called a hit or a hand (see `soft`).
+What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment before it
+is called a hit or a hand (see `soft`).
 """
 
 import math
@@ -25,7 +24,7 @@ from companion.detection.floor import SETTLED_US
 from companion.detection.force_signs import CLEAR, pushes_on, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
-from companion.detection.hidden_signs import Hidden, spun, velocity_jump
+from companion.detection.hidden_signs import Hidden, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
 from companion.messages import (
@@ -113,8 +112,7 @@ class FusedDetector:
             # Nearly every sample ends here.
             s.soft.since_boot_us = None
             self._learn(s, f, before_us)
-            hidden = spun(s, config)
-            return None if hidden is None else self._fire_hidden(s, now_us, situation, hidden)
+            return None
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
             self._learn(s, f, before_us)

@@ -6,7 +6,9 @@ from companion.written import NotNegative, Positive, Written
 class FusedConfig(Written):
     """Settings of the detector `fused`."""
 
-    retired = frozenset({"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push"})
+    retired = frozenset(
+        {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
+    )
 
     side_threshold_m_s2: Positive = 1.75
     """Least lateral external force that is a hit. A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its
@@ -36,12 +38,6 @@ class FusedConfig(Written):
     """Room in a velocity jump for a vehicle that turns. Thrust that turns at 1 rad/s changes the acceleration by 0.6
     m/s^2 in 60 ms; the estimate's 20 ms of delay make 0.012 m/s of that. Turning about the thrust itself changes
     nothing."""
-    spin_rad_s: Positive = 2.0
-    """Least rate jump that is a hit by itself: from one sample to the next, and kept by the one after. Motors at full
-    moment make 200 rad/s^2; twice that, so that a nimbler vehicle's flips are none. A rigid vehicle that meets a
-    leaning wall at 2 m/s steps by 15 rad/s and more."""
-    spin_rad_s2: Positive = 400.0
-    """Added to it for each second between the samples."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5

@@ -1,4 +1,4 @@
-"""What a contact that fell between the samples leaves: a velocity that jumped, rates that no motor made.
+"""What a contact that fell between the samples leaves: a velocity that jumped.
 
 The state is only read; what is known of an impact found so is the gap it fell into and the mean push over that gap.
 """
@@ -10,7 +10,6 @@ from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.messages import Vector3
 from companion.motion.rotation import ned_to_body
-from companion.motion.strapdown import ZERO
 
 # Steps of velocities at 10 Hz are too few to know their spread well; a filter's corrections are more of them.
 SLOW_NOISE = 1.2
@@ -22,26 +21,7 @@ class Hidden(NamedTuple):
     free_until_boot_us: int
     specific_force_frd_m_s2: Vector3
     confidence: float
-    velocity_before_ned_m_s: Vector3 | None
-
-
-def spun(s: FusedState, config: FusedConfig) -> Hidden | None:
-    """Turned as no motor turns a vehicle, and nothing else to see: hit before the sample that showed it first."""
-    a = s.aftermath
-    if a.spun_rad_s < config.spin_rad_s:
-        return None
-    over_s = 1e-6 * (a.previous_imu_us - a.earlier_imu_us)
-    if a.spun_rad_s < config.spin_rad_s + config.spin_rad_s2 * over_s:
-        return None
-    return _from_ahead(s, over_s)
-
-
-def _from_ahead(s: FusedState, over_s: float) -> Hidden:
-    a = s.aftermath
-    # Which way it was pushed does not show: as an obstacle does that is in the vehicle's way.
-    v = s.velocity_ned_m_s or ZERO
-    force = ned_to_body(a.strapdown.attitude_wxyz, (-v[0] / over_s, -v[1] / over_s, -v[2] / over_s))
-    return Hidden(a.earlier_imu_us, force, 1.0, None)
+    velocity_before_ned_m_s: Vector3
 
 
 def velocity_jump(
@@ -71,15 +51,11 @@ def velocity_jump(
 
 def _step_asked_for_m_s(s: FusedState, config: FusedConfig, time_us: int, spread_m_s: float, caution: float) -> float:
     aftermath = s.aftermath
-    turned_rad_s = aftermath.rate_step_near(time_us)
-    turned = turned_rad_s >= config.rate_step_rad_s
+    turned = aftermath.rate_step_near(time_us) >= config.rate_step_rad_s
     least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
     p, q, _ = aftermath.strapdown.rates_frd_rad_s
     shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
     noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
-    if turned and turned_rad_s >= config.spin_rad_s + config.spin_rad_s2 * aftermath.rate_step_s:
-        # No motor did that, and the thrust has not turned for long: two signs, half as clear.
-        noise_m_s, room = 0.5 * noise_m_s, 0.0
     room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
     if aftermath.is_slow:
         least, noise_m_s = config.velocity_step_slow_m_s, SLOW_NOISE * noise_m_s

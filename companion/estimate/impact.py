@@ -30,8 +30,6 @@ CLIPPING_TOLD_US = 2_100_000
 LATE_SAMPLES = 3
 # Sums kept to look back: a contact that went unnoticed was up to 0.34 s ago, at 400 Hz.
 SUMS_KEPT = 160
-# One sample's rates, the ones before them and two after.
-RATES_KEPT = 4
 # Of these one is from before a contact, at up to 250 Hz.
 ATTITUDES_KEPT = 16
 # What the detector leaves open or takes for soft is not classified anew.
@@ -48,8 +46,6 @@ class ImpactEstimate:
     IMU sample. `is_lower_bound`: the sensor clipped, or part of the contact was not seen, and both may be larger.
     `may_be_clipped`: the sensor's range may not have been enough, and then the vehicle's own estimate lacks what it did
     not show. `is_final`: the contact is over. `earlier` is the IMU sample before the first one that shows it.
-    `by_velocity`: a velocity showed it, not the IMU. `spike_rad_s`: by how much the rates of one sample differ from
-    those before and after it; None where they stayed.
     """
 
     impact: Impact
@@ -67,8 +63,6 @@ class ImpactEstimate:
     confidence: float
     is_final: bool
     earlier: ImuSample | None = None
-    by_velocity: bool = False
-    spike_rad_s: float | None = None
 
 
 @dataclass(slots=True)
@@ -81,7 +75,6 @@ class ImpactEstimator:
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
     fixes: deque[VelocityFix] = field(default_factory=deque)
-    rates: deque[Vector3] = field(default_factory=lambda: deque(maxlen=RATES_KEPT))
     trust: Trust = field(default_factory=Trust)
     odometry_boot_us: int | None = None
     reset_counter: int = 0
@@ -112,7 +105,6 @@ class ImpactEstimator:
             self.trust.age(now_us)
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
             self.earlier_imu, self.imu = self.imu, sample
-            self.rates.append(sample.angular_velocity_frd_rad_s)
         elif isinstance(sample, LocalPosition):
             self.history.add(sample)
             told_us = self.odometry_boot_us
@@ -181,7 +173,7 @@ class ImpactEstimator:
         v, u = velocity_ned_m_s, sum_ned_m_s
         self.trust.hear(time_us, (v[0] - u[0], v[1] - u[1], v[2] - u[2]), self.strapdown.level_leans_m_s2)
 
-    def begin(self, impact: Impact, situation: Situation, by_velocity: bool = False) -> ImpactEstimate:
+    def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
         """A new impact: what was known just before it, and what its first sample, or velocity, shows."""
         sample_us = impact.sample_time_boot_us
         free_until_us = self._free_until(impact.contact_free_until_boot_us)
@@ -209,17 +201,8 @@ class ImpactEstimator:
             confidence=impact.confidence,
             is_final=False,
             earlier=self.earlier_imu,
-            by_velocity=by_velocity,
-            spike_rad_s=self._spike_rad_s(),
         )
         return estimate
-
-    def _spike_rad_s(self) -> float | None:
-        if len(self.rates) < RATES_KEPT:
-            return None
-        before, at, after, newest = self.rates
-        size = math.dist(at, before)
-        return size if max(math.dist(after, before), math.dist(newest, before)) < 0.5 * size else None
 
     def _begin_push(self, impact: Impact) -> Push | None:
         """The contact's course, its first sample taken; None for one that was reported late, its course unseen."""

@@ -3,8 +3,7 @@
 One row is an accelerometer's sample. A second one is another sample of the contact's force; or rates of turn that no
 motor makes so fast; or the vehicle's own velocity, which a true push of the length of that sample's mean must have
 changed. A broken or forged packet does none of this: rates and velocity go on as all other samples say. Nor do the
-velocities after a forged one stay where it was, and rates that come and go within one sample take two pushes, both off
-the obstacle, of which a velocity tells.
+velocities after a forged one stay where it was.
 """
 
 import math
@@ -14,7 +13,6 @@ from statistics import fmean, median
 
 from companion.detection.interface import Evidence
 from companion.estimate.approach import HIT_LEAVES_M_S, VelocityFix
-from companion.estimate.config import GuardsConfig
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import MotionHistory
@@ -86,12 +84,12 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Leap:
-    """What one velocity says alone, or one sample's rates that were gone in the next: the velocity has changed."""
+    """What one velocity says alone: it has changed."""
 
     time_boot_us: int
     free_until_boot_us: int
     change_m_s: float
-    away: Vector3 | None  # its direction, local NED; None where that is not known
+    away: Vector3  # its direction, local NED
 
     def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
         """Whether no velocity since shows so much as half of the change."""
@@ -116,35 +114,27 @@ class Leap:
 
     def _came_m_s(self, places: Sequence[LocalPosition]) -> float | None:
         """How fast the places went along the change."""
-        if self.away is None or not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
+        if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
             return None
         over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
         ends = zip(self.away, places[-1].position_ned_m, places[0].position_ned_m, strict=True)
         return sum(a * (p - q) for a, p, q in ends) / over_s
 
     def _departs_m_s(self, came: Sequence[float], was: Sequence[float]) -> float:
-        if self.away is None:
-            return math.dist(came, was)
         return sum(a * (c - w) for a, c, w in zip(self.away, came, was, strict=True))
 
 
-def claim_of(
-    estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float, guards: GuardsConfig
-) -> Claim | Leap | None:
+def claim_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Claim | Leap | None:
     """None where more than one sample or message has spoken already."""
     impact = estimate.impact
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
     if impact.evidence is Evidence.AFTERMATH:
         size_m_s2 = math.hypot(*force_ned_m_s2)
-        if estimate.by_velocity and size_m_s2 > 0.0:
-            n, e, d = force_ned_m_s2
-            away = (n / size_m_s2, e / size_m_s2, d / size_m_s2)
-            return Leap(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
-        if not estimate.by_velocity and estimate.spike_rad_s is not None:
-            # A push that turns by so much has the longest lever at a guard's rim; there and back take two of them.
-            per_rad_m = min(guards.gyration_frd_m) ** 2 / (guards.centre_m + guards.radius_m)
-            return Leap(hit_us, free_us, 2.0 * per_rad_m * estimate.spike_rad_s, None)
-        return None
+        if size_m_s2 == 0.0:
+            return None
+        n, e, d = force_ned_m_s2
+        away = (n / size_m_s2, e / size_m_s2, d / size_m_s2)
+        return Leap(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
     if estimate.is_final or estimate.earlier is None:
         return None
     return Claim(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)

@@ -332,8 +332,7 @@ def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | Leap | No
     if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
         return None
     force_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
-    config = flight.mission.companion.estimate
-    return claim_of(estimate, force_ned, config.imu_averaging_interval_s, config.guards)
+    return claim_of(estimate, force_ned, flight.mission.companion.estimate.imu_averaging_interval_s)
 
 
 def _law(flight: FlightContext) -> Law:

@@ -180,7 +180,7 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
             cut_short = watch.estimator.close()
             if cut_short is not None:
                 finished.append(cut_short)
-            impacts.append(watch.estimator.begin(impact, situation, type(sample) is not ImuSample))
+            impacts.append(watch.estimator.begin(impact, situation))
         elif type(sample) is ImuSample:
             final = watch.estimator.follow(watch.state)
             if final is not None:

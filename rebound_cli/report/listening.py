@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from companion.detection.force_signs import side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
-from companion.detection.interface import Detector, DetectorState, Evidence, Impact, Phase, Situation
+from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
 from companion.reflex.watch import Watch
 
@@ -37,11 +37,9 @@ class Tested:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What the detector went by when it fired: `sign` in words, and whether a hand was thinkable."""
+    """What the detector went by when it fired: the sample, if it was one, and whether a hand was thinkable."""
 
     tested: Tested | None
-    sign: str
-    spun_rad_s: float
     may_be_hand: bool
 
 
@@ -79,16 +77,8 @@ class _ListenedTo:
             may_be_hand = isinstance(state, FusedState) and state.soft.may_be_hand(sample.time_boot_us)
         state, impact = self._detector.step(state, sample, situation)
         if impact is not None:
-            sign, spun_rad_s = self._sign(state, sample, impact)
-            self._listener.shown[impact.sample_time_boot_us] = Shown(tested, sign, spun_rad_s, may_be_hand)
+            self._listener.shown[impact.sample_time_boot_us] = Shown(tested, may_be_hand)
         return state, impact
-
-    def _sign(self, state: DetectorState, sample: Sample, impact: Impact) -> tuple[str, float]:
-        if impact.evidence is Evidence.FORCE:
-            return "force", math.nan
-        if not isinstance(sample, ImuSample):
-            return "velocity", math.nan
-        return "turn", state.aftermath.spun_rad_s if isinstance(state, FusedState) else math.nan
 
 
 def _tested(state: DetectorState, sample: ImuSample, config: Any) -> Tested:

@@ -27,11 +27,6 @@ MOST_MOMENTS = 40
 # What a contact shakes belongs to it: an estimate swings for so long after one (`velocity_rest_s` and a recovery).
 _BESIDE_US = 500_000
 
-_SIGNS = {
-    "turn": "It turned from one sample to the next as no motor turns a vehicle",
-    "velocity": "Its velocity jumped by what the accelerometer did not show: the contact fell between the samples",
-}
-
 
 @dataclass(frozen=True, slots=True)
 class Moment:
@@ -146,8 +141,7 @@ def _signs(shown: Shown, evidence: Evidence) -> Iterator[str]:
         yield _side_text(tested)
         yield _thrust_text(tested)
     if evidence is Evidence.AFTERMATH:
-        size = "" if math.isnan(shown.spun_rad_s) else f", by {shown.spun_rad_s:.1f} rad/s"
-        yield f"{_SIGNS[shown.sign]}{size}: speaks for a contact."
+        yield "Its velocity jumped by what the accelerometer did not show: the contact fell between the samples."
 
 
 def _side_text(tested: Tested) -> str:

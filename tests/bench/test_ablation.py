@@ -65,15 +65,15 @@ def test_every_rule_is_a_function_of_the_companion(rule):
 
 
 def test_the_table_counts_what_is_lost_without_a_rule():
-    campaign = ablation_campaign(1, 7, ("spun", "hand"))
+    campaign = ablation_campaign(1, 7, ("trust", "hand"))
     well = {"failures": [], "hits": [RECOVERED]}
     flights = {
-        0: {"with": well, "without": {"spun": {"failures": ["fell"], "hits": [RECOVERED | {"rest_s": None}]}}},
-        1: {"with": well, "without": {"spun": {"failures": [], "hits": [RECOVERED | {"past_m": 0.06}]}}},
+        0: {"with": well, "without": {"trust": {"failures": ["fell"], "hits": [RECOVERED | {"rest_s": None}]}}},
+        1: {"with": well, "without": {"trust": {"failures": [], "hits": [RECOVERED | {"past_m": 0.06}]}}},
     }
     lines = table(campaign, Results(flights, {})).splitlines()
-    spun = next(line for line in lines if line.startswith("| spun"))
-    assert [cell.strip() for cell in spun.split("|")][3:6] == ["2", "+1", "+2"]
+    trust = next(line for line in lines if line.startswith("| trust"))
+    assert [cell.strip() for cell in trust.split("|")][3:6] == ["2", "+1", "+2"]
     hand = next(line for line in lines if line.startswith("| hand"))
     assert [cell.strip() for cell in hand.split("|")][3:] == ["0", "+0", "+0", *["–"] * 5, ""]
 
@@ -81,20 +81,20 @@ def test_the_table_counts_what_is_lost_without_a_rule():
 @pytest.mark.slow
 def test_a_drawn_hit_is_heard_with_and_without_each_rule():
     # Given a hit, and the rule by which alone the detector hears velocities
-    heard = detections_campaign(1, 71_003, ("velocity jump", "hand"), None).cases
+    heard = detections_campaign(1, 71_003, ("trust", "hand"), None).cases
     assert {one.kind for one in heard} == {"plain", "hand", "flight"}
     said = work_out(heard[0])
     assert set(said["with"]) == {"50", "100", "246"}
     assert all(set(entry) == {"found", "ms", "false"} for entry in said["with"].values())
-    assert set(said["without"]) <= {"velocity jump", "hand"}
+    assert set(said["without"]) <= {"trust", "hand"}
 
 
 def test_the_detectors_table_counts_hits_alarms_and_what_came_sooner():
-    campaign = detections_campaign(1, 7, ("spun", "hand"), None)
+    campaign = detections_campaign(1, 7, ("trust", "hand"), None)
     found, late, missed = ({"found": f, "ms": ms, "false": 0} for f, ms in ((True, 4.0), (True, 40.0), (False, None)))
     cases = {
-        0: {"kind": "plain", "with": {"50": found, "246": found}, "without": {"spun": {"50": missed, "246": late}}},
+        0: {"kind": "plain", "with": {"50": found, "246": found}, "without": {"trust": {"50": missed, "246": late}}},
         1: {"kind": "hand", "with": {"50": {"false": 0}}, "without": {"hand": {"50": {"false": 1}}}},
     }
     lines = detections_table(campaign, Results(cases, {})).splitlines()
-    assert "| spun | 1 | +1 | +0 | 1 |" in lines and "| hand | 1 | +0 | -1 | 0 |" in lines
+    assert "| trust | 1 | +1 | +0 | 1 |" in lines and "| hand | 1 | +0 | -1 | 0 |" in lines

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from companion.detection.aftermath import Aftermath
 from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
@@ -142,18 +141,6 @@ def test_of_a_stiff_hit_between_the_samples_what_clipping_leaves_in_the_velocity
     jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
     impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump).fly(until_us=3_200_000)
     assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
-
-
-@pytest.mark.parametrize(("turn_rad_s", "step_m_s", "hits"), [(11.0, 0.1, 1), (11.0, 0.0, 1), (3.0, 0.1, 0)])
-def test_a_turn_that_no_motor_makes_needs_little_of_a_step(turn_rad_s, step_m_s, hits):
-    """A beam met in the climb at 50 Hz: within 20 ms the nimblest motors turn the vehicle by 10 rad/s at most."""
-
-    def rates(t):
-        return (turn_rad_s * 0.7, turn_rad_s * 0.7, 0.0) if t > 3_002_000 else (0.0, 0.0, 0.0)
-
-    jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
-    flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump, rates=rates)
-    assert [i.evidence for i in flight.fly(until_us=3_045_000)] == [Evidence.AFTERMATH] * hits
 
 
 @pytest.mark.parametrize(("step_m_s", "hits"), [(1.5, 1), (0.6, 0)])
@@ -339,29 +326,6 @@ def test_what_a_hand_holds_can_still_be_struck():
 
     told = Flight(held_and_struck, velocity=(0.0, 0.0, 0.0)).fly(3_400_000)
     assert [impact.is_collision for impact in told] == [False, True]
-
-
-@pytest.mark.parametrize("imu_every_us", [4_000, 20_000])
-@pytest.mark.parametrize(("rates_rad_s", "hits"), [((15.0, -8.0, 0.0), 1), ((3.0, 1.0, 0.0), 0)])
-def test_turning_as_no_motor_turns_it_a_vehicle_was_hit_between_the_samples(rates_rad_s, hits, imu_every_us):
-    """When its rates have stepped, stay so, and neither force nor velocity shows anything."""
-    spun = Flight(rates=lambda t: rates_rad_s if t > HIT_US else (0.0, 0.0, 0.0), imu_every_us=imu_every_us)
-    impacts = spun.fly(3_000_000 + 4 * imu_every_us)
-    assert [impact.evidence for impact in impacts] == hits * [Evidence.AFTERMATH]
-    assert all(impact.contact_free_until_boot_us <= HIT_US for impact in impacts)
-
-
-def test_a_gyroscope_that_shakes_to_and_fro_has_not_spun():
-    aftermath, spun = Aftermath(WINDOW_US), []
-    for count in range(20):
-        aftermath.imu(4_000 * count, (0.0, 0.0, -GRAVITY), (6.0 * (-1) ** count, 0.0, 0.0))
-        spun.append(aftermath.spun_rad_s)
-    assert max(spun) == 0.0
-
-
-def buzzing(rates_rad_s):
-    """A gyroscope never reads the same twice."""
-    return lambda t: tuple(rate + 0.01 * (-1) ** (t // 4_000) for rate in rates_rad_s(t))
 
 
 # --- phases -------------------------------------------------------------------------------------------------

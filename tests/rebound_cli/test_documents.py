@@ -62,10 +62,10 @@ def test_an_unknown_key_suggests_the_close_one_and_lists_all():
 
 
 def test_a_key_of_an_earlier_version_is_taken_with_a_warning():
-    earlier = "companion: {fused: {kick_rad_s: 0.4, spin_rad_s: 3.0}}\nsim:"
+    earlier = "companion: {fused: {kick_rad_s: 0.4, rate_step_rad_s: 3.0}}\nsim:"
     with pytest.warns(UserWarning, match="kick_rad_s has no effect any more"):
         mission = mission_from(document("sim:", earlier))
-    assert mission.companion.fused.spin_rad_s == 3.0
+    assert mission.companion.fused.rate_step_rad_s == 3.0
 
 
 def test_a_missing_key_is_named_at_the_part_that_lacks_it():
