@@ -19,8 +19,6 @@ COMPARED = 3
 # Velocities further apart leave more to a sum of samples that sees a quarter of the time, and to a filter's own
 # corrections: at 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# 10 Hz with the jitter of a log; further apart they are no measure.
-LONGEST_SLOW_STEP_US = 130_000
 # A spread of fewer steps than this is a guess: two thirds of a second at 30 Hz.
 TRUSTED = 20
 # Steps that the spread remembers, and that a rising one does: 3 s and a third of a second at 30 Hz.
@@ -60,10 +58,6 @@ class Aftermath:
     newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
     """Of the newest step: velocity less sum with its delay in it, and the change of the acceleration."""
     unlearnt: tuple[Vector3, Vector3, Vector3] | None = None
-    slow_boot_us: int = 0
-    """Of the last velocity that came longer than `LONGEST_STEP_US` after the one before."""
-    is_slow: bool = False
-    """Whether one of the velocities that the newest was compared with did."""
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
         """Take one sample, body FRD."""
@@ -97,19 +91,14 @@ class Aftermath:
             # To the last digit: nothing is estimated now, and what comes after is a new beginning.
             residuals.clear()
             return None
-        if residuals:
-            elapsed_us = time_us - residuals[-1][0]
-            if not 0 < elapsed_us < LONGEST_SLOW_STEP_US:
-                residuals.clear()
-            elif elapsed_us > LONGEST_STEP_US:
-                self.slow_boot_us = time_us
+        if residuals and not 0 < time_us - residuals[-1][0] <= LONGEST_STEP_US:
+            residuals.clear()
         u = self.strapdown.sum_at(time_us)
         if u is None:
             return None
         residual, acceleration = _less(velocity_ned_m_s, u), self._accelerated(time_us, u)
         found = None
         if len(residuals) == COMPARED:
-            self.is_slow = residuals[0][0] < self.slow_boot_us
             _, before, led, _ = zip(*residuals, strict=True)
             step, change = _less(residual, _mean(before)), _less(acceleration, _mean(led))
             late_s = self.delay.delay_s(self.variance_m2_s2)

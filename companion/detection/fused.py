@@ -10,8 +10,8 @@ contact, each against what this vehicle shows in its own flight:
 * aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
   the rates jumped, too.
 
-What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment before it
-is called a hit or a hand (see `soft`).
+What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment before
+it is called a hit or a hand (see `soft`).
 """
 
 import math

@@ -11,9 +11,6 @@ from companion.detection.fused_state import FusedState
 from companion.messages import Vector3
 from companion.motion.rotation import ned_to_body
 
-# Steps of velocities at 10 Hz are too few to know their spread well; a filter's corrections are more of them.
-SLOW_NOISE = 1.2
-
 
 class Hidden(NamedTuple):
     """A contact that no sample showed: free until then, and the mean push since (body FRD)."""
@@ -57,6 +54,4 @@ def _step_asked_for_m_s(s: FusedState, config: FusedConfig, time_us: int, spread
     shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
     noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
     room += aftermath.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
-    if aftermath.is_slow:
-        least, noise_m_s = config.velocity_step_slow_m_s, SLOW_NOISE * noise_m_s
     return caution * max(least, noise_m_s) + room
