@@ -62,7 +62,6 @@ RULES = (
     Rule("leaning after a touch", "the same, at once after a touch", _FLIGHT + "leaning:Leaning._pressed", _says(None)),
     Rule("pressing", "thrust that lifts nothing is a hit", _FLIGHT + "pressing:Pressing.step", _says(None)),
     Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
-    Rule("unnoticed contact", "t_c before an unnoticed contact", _ESTIMATE + "approach:free_until", _argument(1)),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule("attitude by rates", "no clipped attitude", _ESTIMATE + "trust:Trust.is_attitude_right", _says(True)),
     Rule("trust", "no velocity jump while an estimate swings", _ESTIMATE + "trust:Trust.is_trusted", _says(True)),

@@ -9,7 +9,6 @@ follows c, its slope and the estimate's delay, state [c (3), slope (3), delay]:
 Only velocities from before the contact are used: after a stiff one PX4's estimate cannot be trusted.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,7 +18,6 @@ from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import DELAY_S, DELAY_SPREAD_S
 from companion.motion.kalman import Floats, KalmanFilter
-from companion.motion.strapdown import LONGEST_DELAY_US
 
 # Errors of a velocity estimate last for tenths of a second, and the accelerometer's bias is learnt in seconds: the
 # longer, the better, until the vehicle has turned its bias to another heading.
@@ -38,24 +36,6 @@ SUM_DENSITY_M2_S3 = 0.25**2 * 0.05
 # change little from one to the next), 1.0 for one with three times its noise. Beyond this, attitude or accelerometer
 # do not belong to the velocities.
 SURPRISE = 1.5
-# A hit that nothing showed is in the velocities before it is found: by what the vehicle's own sensor saw of it at once,
-# by what clipping hid from that a tenth of a second later (see `trust`). Of 300 simulated hits of a rigid vehicle at 50
-# and 100 Hz, the latest was found after 0.26 s.
-UNNOTICED_US = 300_000
-# Against the mean of the half second before.
-BEFORE_US = 500_000
-# Three times a good velocity's noise.
-DEPARTED_M_S = 0.1
-# Noise alone departs by that now and then, and would move the place of a hit by a third of a metre: no hit that matters
-# leaves less than this.
-HIT_LEAVES_M_S = 0.15
-# What accelerometer and velocities disagree by without a hit (GPS, a bias, an attitude that is off) is looked for over
-# so long before; a hit leaves clearly more than that.
-USUAL_US, CLEARLY = 3_000_000, 1.5
-# An estimate that is put right after what clipping hid: the error grows from velocity to velocity, and has begun to so
-# long after the hit. What the vehicle's own sensor saw is there at once.
-GROWS = 1.5
-PUT_RIGHT_US = 120_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +46,12 @@ class VelocityFix:
     velocity_ned_m_s: Vector3
     sum_ned_m_s: Vector3
     acceleration_ned_m_s2: Vector3
+
+
+def less_sum(fix: VelocityFix) -> Vector3:
+    """What the velocity says beyond the accelerometer: constant while the two agree."""
+    v, u = fix.velocity_ned_m_s, fix.sum_ned_m_s
+    return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
 
 
 def velocity_at(
@@ -95,48 +81,6 @@ def velocity_at(
     return (n, e, d), float(np.sqrt(max(kalman.P[0, 0], kalman.P[1, 1], kalman.P[2, 2])))
 
 
-def free_until(fixes: Sequence[VelocityFix], contact_boot_us: int) -> int:
-    """The latest time before the contact at which no velocity yet shows an earlier one that went unnoticed.
-
-    ``fixes`` may be newer than the contact. The time is that of the last velocity that still was where the
-    accelerometer leads from those of half a second before, earlier where what follows is an estimate that is being put
-    right; the contact's own where nothing contradicts it, or no more than has done so for seconds.
-    """
-    start_us = contact_boot_us - UNNOTICED_US
-    usual_m_s = _usually_departed(fixes, start_us)
-    free_us, departed = start_us, list[tuple[int, float]]()
-    for time_us, off_m_s in reversed(_departures(fixes, start_us)):
-        if off_m_s < max(DEPARTED_M_S, usual_m_s):
-            free_us = time_us
-            break
-        departed.append((time_us, off_m_s))
-    if max((off_m_s for _, off_m_s in departed), default=0.0) < max(HIT_LEAVES_M_S, CLEARLY * usual_m_s):
-        return contact_boot_us
-    if len(departed) > 1 and departed[-2][1] > GROWS * departed[-1][1]:
-        free_us = max(start_us, departed[-1][0] - PUT_RIGHT_US)
-    elif departed[-1][0] >= contact_boot_us:
-        return contact_boot_us
-    return min(contact_boot_us, free_us - LONGEST_DELAY_US)
-
-
-def _departures(fixes: Sequence[VelocityFix], start_us: int, end_us: int | None = None) -> list[tuple[int, float]]:
-    """How far the velocities after a time are from where the accelerometer leads from those before it: (time, m/s)."""
-    before = [_less_sum(fix) for fix in fixes if start_us - BEFORE_US < fix.time_boot_us <= start_us]
-    if not before:
-        return []
-    mean = [sum(axis) / len(before) for axis in zip(*before, strict=True)]
-    after = [fix for fix in fixes if fix.time_boot_us > start_us and (end_us is None or fix.time_boot_us <= end_us)]
-    return [(fix.time_boot_us, math.dist(_less_sum(fix), mean)) for fix in after]
-
-
-def _usually_departed(fixes: Sequence[VelocityFix], end_us: int) -> float:
-    """The most that as long a look would have shown in the seconds before, m/s: noise, a bias, an estimate that is
-    corrected."""
-    ends = range(end_us, end_us - USUAL_US, -UNNOTICED_US)
-    seen = [_departures(fixes, until_us - UNNOTICED_US, until_us) for until_us in ends]
-    return max((off_m_s for departures in seen for _, off_m_s in departures), default=0.0)
-
-
 def position_at(samples: Sequence[LocalPosition], contact_boot_us: int, velocity_ned_m_s: Vector3) -> Vector3:
     """x(t_c), local NED, m: the mean of the last positions before the contact, each carried on to it at v_c."""
     recent = [s for s in samples if contact_boot_us - s.time_boot_us <= POSITIONS_US] or samples[-1:]
@@ -157,13 +101,8 @@ def _thinned(fixes: Sequence[VelocityFix]) -> list[VelocityFix]:
     return kept[::-1]
 
 
-def _less_sum(fix: VelocityFix) -> Vector3:
-    v, u = fix.velocity_ned_m_s, fix.sum_ned_m_s
-    return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
-
-
 def _offset(fix: VelocityFix) -> Floats:
-    return np.array(_less_sum(fix))
+    return np.array(less_sum(fix))
 
 
 def _filter(first: VelocityFix, noise: Floats) -> KalmanFilter:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.estimate.approach import BATCH_US, VelocityFix, free_until, position_at, velocity_at
+from companion.estimate.approach import BATCH_US, VelocityFix, position_at, velocity_at
 from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
 from companion.estimate.collision import ContactMotion, motion_before_contact
 from companion.estimate.config import EstimateConfig
@@ -28,8 +28,8 @@ REST_US = 150_000
 CLIPPING_TOLD_US = 2_100_000
 # A detector that waited for no more than this many samples still knows what the contact did to the present one.
 LATE_SAMPLES = 3
-# Sums kept to look back: a contact that went unnoticed was up to 0.34 s ago, at 400 Hz.
-SUMS_KEPT = 160
+# Sums kept to look back: the rates' step that a velocity showed was up to 0.12 s ago, at 400 Hz.
+SUMS_KEPT = 64
 # Of these one is from before a contact, at up to 250 Hz.
 ATTITUDES_KEPT = 16
 # What the detector leaves open or takes for soft is not classified anew.
@@ -176,7 +176,7 @@ class ImpactEstimator:
     def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
         """A new impact: what was known just before it, and what its first sample, or velocity, shows."""
         sample_us = impact.sample_time_boot_us
-        free_until_us = self._free_until(impact.contact_free_until_boot_us)
+        free_until_us = impact.contact_free_until_boot_us
         motion, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
@@ -301,18 +301,11 @@ class ImpactEstimator:
             motion = ContactMotion(latest.time_boot_us, latest.position_ned_m, latest.velocity_ned_m_s)
         return motion, self.config.velocity_noise_m_s
 
-    def _free_until(self, contact_us: int) -> int:
-        """Earlier than the contact that was seen where the velocities show that it was not the first."""
-        return free_until(self._fixes_since_rest(), contact_us) if self.config.inertial else contact_us
-
-    def _fixes_since_rest(self) -> list[VelocityFix]:
-        since_us = 0 if self.contact_ended_boot_us is None else self.contact_ended_boot_us + REST_US
-        return [fix for fix in self.fixes if since_us < fix.time_boot_us]
-
     def _velocity(self, contact_us: int) -> tuple[Vector3, float] | None:
         """v_c by velocities and accelerometer; None where too little was heard for it."""
         end_us = contact_us - STAMP_RESOLUTION_US
-        fixes = [fix for fix in self._fixes_since_rest() if fix.time_boot_us <= end_us]
+        since_us = 0 if self.contact_ended_boot_us is None else self.contact_ended_boot_us + REST_US
+        fixes = [fix for fix in self.fixes if since_us < fix.time_boot_us <= end_us]
         before = [entry for entry in self.sums if entry[0] <= contact_us]
         if not fixes or not before:
             return None

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from statistics import fmean, median
 
 from companion.detection.interface import Evidence
-from companion.estimate.approach import HIT_LEAVES_M_S, VelocityFix
+from companion.estimate.approach import VelocityFix, less_sum
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import MotionHistory
@@ -26,6 +26,8 @@ DECIDED_US = 150_000
 LATE_US = 40_000
 # What the velocity was is taken from as long before; the estimate's own slow errors are the smaller the shorter it is.
 BEFORE_US = DECIDED_US
+# No hit that matters leaves less than this: twice what noise alone departs by now and then.
+HIT_LEAVES_M_S = 0.15
 # Three standard deviations: what the velocity cannot tell from its own noise does not speak against a hit.
 SURE = 3.0
 
@@ -78,7 +80,7 @@ class Claim:
         before: Sequence[VelocityFix], after: Sequence[VelocityFix], in_sum_m_s: float, away: Sequence[float]
     ) -> float:
         """By how much the velocities show a push from whatever side: an axis that is stuck shows no force along it."""
-        was, came = ([fmean(axis) for axis in zip(*map(_less_sum, fixes), strict=True)] for fixes in (before, after))
+        was, came = ([fmean(axis) for axis in zip(*map(less_sum, fixes), strict=True)] for fixes in (before, after))
         return math.hypot(*(c - w + in_sum_m_s * a for c, w, a in zip(came, was, away, strict=True)))
 
 
@@ -94,8 +96,8 @@ class Leap:
     def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
         """Whether no velocity since shows so much as half of the change."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
-        before = [_less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
-        after = [_less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
+        before = [less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
+        after = [less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
         if len(before) < 2 or len(after) < 2:
             return False
         # One of them may be what was forged.
@@ -142,8 +144,4 @@ def claim_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: flo
 
 def _ahead(fix: VelocityFix, away: Sequence[float]) -> float:
     """The velocity less the accelerometer's sum, along a direction."""
-    return sum(a * less for a, less in zip(away, _less_sum(fix), strict=True))
-
-
-def _less_sum(fix: VelocityFix) -> tuple[float, ...]:
-    return tuple(v - s for v, s in zip(fix.velocity_ned_m_s, fix.sum_ned_m_s, strict=True))
+    return sum(a * less for a, less in zip(away, less_sum(fix), strict=True))

@@ -9,7 +9,7 @@ import pytest
 
 from companion.detection.interface import ImpactKind, Situation
 from companion.estimate import guards, normal
-from companion.estimate.approach import VelocityFix, free_until, velocity_at
+from companion.estimate.approach import VelocityFix, velocity_at
 from companion.estimate.config import EstimateConfig, GuardsConfig
 from companion.estimate.facing import whole_normal
 from companion.estimate.normal import normal_of
@@ -310,64 +310,3 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_cou
     assert final.impulse_m_s == pytest.approx(1.5, abs=0.05)
     assert (final.is_lower_bound, watch.estimate.is_lower_bound) == (False, True)
     assert not final.may_be_clipped
-
-
-def velocities(off_m_s, until_us=1_200_000, every_us=32_000):
-    """North at 2 m/s and no acceleration; the estimate is off by what `off_m_s` of the time says."""
-    return [
-        VelocityFix(t, (2.0 + off_m_s(t), 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        for t in range(every_us, until_us + 1, every_us)
-    ]
-
-
-def test_a_contact_that_velocities_do_not_contradict_is_the_first():
-    fixes = velocities(lambda t: 0.03 * math.sin(t))
-    assert free_until(fixes, 1_190_000) == 1_190_000
-    assert free_until([], 1_190_000) == 1_190_000
-
-
-def test_a_bounce_after_a_hit_that_fell_between_the_samples_is_not_where_it_was_free():
-    """Given a hit at 1.0 s of which the vehicle's own sensor saw 0.2 m/s, when a bounce at 1.18 s is the first that is
-    heard, then it was free until the last velocity before 1.0 s, less the estimate's delay."""
-    fixes = velocities(lambda t: -0.2 if t > 1_000_000 else 0.0)
-    assert free_until(fixes, 1_180_000) == 992_000 - 40_000
-
-
-def test_velocities_that_always_wander_so_far_tell_of_no_hit():
-    """Given GPS that leads the velocity 0.3 m/s to and fro, what it does before a contact was no other contact; after
-    a steady flight as much is one."""
-
-    def wandering(t):
-        return 0.3 * math.sin(2.0 * math.pi * 1e-6 * t / 1.3)
-
-    assert free_until(velocities(wandering, 4_000_000), 4_000_000) == 4_000_000
-    assert free_until(velocities(lambda t: 0.3 if t > 3_850_000 else 0.0, 4_000_000), 4_000_000) < 3_850_000
-
-
-def test_an_estimate_that_is_put_right_tells_of_a_hit_a_tenth_of_a_second_before():
-    """Given a hit at 1.0 s that clipping hid whole, when its velocity drifts off from 1.12 s on, it was free before."""
-    fixes = velocities(lambda t: -8e-6 * max(0, t - 1_120_000))
-    free_us = free_until(fixes, 1_130_000)
-    assert 900_000 <= free_us < 1_010_000
-
-
-def test_v_c_of_a_hit_that_is_found_late_is_that_before_it():
-    """Given a hit at 3.0 s between the samples, when the estimate is put right 0.12 s later, v_c is the cruise's."""
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
-    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
-    impacts = []
-    for t in range(20_000, 3_400_000, 20_000):
-        late_s = max(0.0, 1e-6 * t - 3.12)
-        speed = 1.5 - (0.12 if t > 3_000_000 else 0.0) - min(2.2, 14.0 * late_s)
-        samples: list[Sample] = [ImuSample(t, (0.0, 0.0, -9.80665), (0.0, 0.0, 0.0))]
-        # A hair's breadth of noise: velocities that stand still to the last digit are no estimate.
-        speed += 1e-3 * (t // 20_000 % 2)
-        samples.append(Odometry(t, (0.0, 0.0, -3.0), (speed, 0.0, 0.0), 0))
-        samples.append(LocalPosition(t, (1.5 * t * 1e-6, 0.0, -3.0), (speed, 0.0, 0.0)))
-        samples.append(Attitude(t, LEVEL))
-        impacts += advance(watch, samples, situation, t).impacts
-    assert impacts[0].impact.sample_time_boot_us > 3_120_000
-    assert impacts[0].velocity_ned_m_s[0] == pytest.approx(1.5, abs=0.05)
-    assert 2_900_000 < impacts[0].time_boot_us - impacts[0].time_error_us < 3_020_000
-    # of a hit whose push nobody saw the estimate may lack a part
-    assert impacts[0].is_lower_bound and watch.estimator.estimate.may_be_clipped
