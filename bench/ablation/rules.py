@@ -59,7 +59,6 @@ RULES = (
         _says(True),
     ),
     Rule("leaning", "a lean that moves nothing is a hit", _FLIGHT + "leaning:Leaning.step", _says(None)),
-    Rule("leaning after a touch", "the same, at once after a touch", _FLIGHT + "leaning:Leaning._pressed", _says(None)),
     Rule("pressing", "thrust that lifts nothing is a hit", _FLIGHT + "pressing:Pressing.step", _says(None)),
     Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),

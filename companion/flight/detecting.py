@@ -104,4 +104,3 @@ def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) 
     kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
     text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
     flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
-    flight.leaning.touch(estimate.impact.sample_time_boot_us)

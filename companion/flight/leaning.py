@@ -37,9 +37,6 @@ HELD_M_S2 = 1.5
 LET_GO_M_S2 = 0.5
 # Who comes nearer as fast as this is not kept from it.
 NEARING_M_S = 0.1
-# Who leans on what was softly felt slides along it, a pole or an edge, with changing velocity, and may come nearer. So
-# for so long after a touch the external force before it is the measure, wherever the vehicle is to be.
-TOUCHED_US = 5_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,28 +82,13 @@ class Leaning:
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     lean_m_s2: Flat = (0.0, 0.0)
     missing_m_s2: Flat = (0.0, 0.0)
-    calm_m_s2: Flat = (0.0, 0.0)
-    touched_us: int | None = None
-    untouched_m_s2: Flat = (0.0, 0.0)
-    pressed_us: int | None = None
 
     def forget(self) -> None:
-        self.calm_m_s2 = self._calm()
-        self.stretch, self.time_us, self.touched_us = None, 0, None
-
-    def _calm(self) -> Flat:
-        """The external force, by the means of now or, where those are too young, of before."""
-        return self.wind_m_s2 if self.time_us and self.is_settled else self.calm_m_s2
+        self.stretch, self.time_us = None, 0
 
     @property
     def is_settled(self) -> bool:
         return self.time_us - self.began_us >= SETTLED_US
-
-    def touch(self, boot_us: int) -> None:
-        """Something was felt that was no hit."""
-        if self.touched_us is None or boot_us - self.touched_us > TOUCHED_US:
-            self.untouched_m_s2 = self._calm()
-        self.touched_us = boot_us
 
     @property
     def wind_m_s2(self) -> Flat:
@@ -124,9 +106,6 @@ class Leaning:
         self.felt = 0
         if not self.is_settled:
             return None
-        pressed = self._pressed(sample.time_boot_us)
-        if pressed is not None:
-            return pressed
         north, east = goal_ned_m[0] - sample.position_ned_m[0], goal_ned_m[1] - sample.position_ned_m[1]
         error_m = math.hypot(north, east)
         stretch, (u, v, _) = self.stretch, self.velocity_m_s
@@ -145,25 +124,10 @@ class Leaning:
         is_kept_off = is_pushed_back and u * n + v * e < NEARING_M_S
         if towards_m_s2 < HELD_M_S2 or not is_kept_off or sample.time_boot_us - stretch.since_us < LEAST_US:
             return None
-        size, since_us, self.touched_us = math.hypot(*grown), stretch.since_us, None
+        size, since_us = math.hypot(*grown), stretch.since_us
         # What it was in free air stays known.
         self.stretch = replace(stretch, since_us=sample.time_boot_us, velocity_m_s=self.velocity_m_s, error_m=0.0)
         return Held((-grown[0] / size, -grown[1] / size, 0.0), towards_m_s2, since_us)
-
-    def _pressed(self, now_us: int) -> Held | None:
-        """On what was touched, for as long as a lean takes to move anything."""
-        n, e = (m - u for m, u in zip(self.missing_m_s2, self.untouched_m_s2, strict=True))
-        size = math.hypot(n, e)
-        if self.touched_us is None or now_us - self.touched_us > TOUCHED_US or size < HELD_M_S2:
-            self.pressed_us = None
-            return None
-        if self.pressed_us is None:
-            self.pressed_us = now_us
-        if now_us - self.pressed_us < LEAST_US:
-            return None
-        since_us, self.touched_us = self.pressed_us, None
-        self.stretch = _Stretch(now_us, self.velocity_m_s, self.untouched_m_s2, 0.0)
-        return Held((-n / size, -e / size, 0.0), size, since_us)
 
     def _smooth(self, sample: LocalPosition, lean_m_s2: Flat) -> float:
         """Means, and the lean's acceleration less the velocity's, which is the change of its mean; the time since."""

@@ -5,7 +5,6 @@ import math
 
 import pytest
 
-from bench.random_missions.campaign import MissionCase, work_out_mission
 from companion.flight.leaning import HELD_M_S2, Leaning, lean_of
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
@@ -106,38 +105,6 @@ def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new
     assert len(found) == 1
 
 
-def slid_along(touched, push_m_s2=0.5):
-    """A vehicle that slides round a pole with a lean that grows by 1 m/s^2 each second; its velocity wavers."""
-    leaning = Leaning()
-    for step in range(250):
-        t = step * EVERY_S
-        lean = push_m_s2 + max(0.0, min(t - 1.5, push_m_s2 * 4.0))
-        slides_m_s, slid_m = 0.3 * math.sin(2.0 * t), 0.15 * (1.0 - math.cos(2.0 * t))
-        leaning.feel((0.0, 0.0, -math.hypot(9.80665, lean)))
-        if touched and step == 70:
-            leaning.touch(1_000_000 + round(t * 1e6))
-        sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, slid_m, -1.5), (0.0, slides_m_s, 0.0))
-        held = leaning.step(sample, leaning_north(lean), (0.05, 0.0, -1.5))
-        if held is not None:
-            return t, held
-    return None
-
-
-def test_who_leans_on_what_was_softly_touched_is_told_however_it_slides():
-    # Given a push felt at 1.4 s, too soft for a hit, and a vehicle near its goal whose velocity changes all the while
-    at_s, held = slid_along(touched=True)
-    # Then what the lean does in vain since the touch counts, before it is pinned
-    assert at_s == pytest.approx(1.5 + HELD_M_S2 + 0.3 + 0.2, abs=0.2)
-    assert held.normal_ned[0] < -0.97
-    # and without the touch none of it would be seen
-    assert slid_along(touched=False) is None
-
-
-def test_a_gust_after_a_soft_touch_is_no_wall():
-    """Of 5 m/s: 1.1 m/s^2."""
-    assert slid_along(touched=True, push_m_s2=0.27) is None
-
-
 def flown(folder, items, **sim):
     """In lockstep: the flight, and what its timeline says of things in the way."""
     data = {
@@ -225,11 +192,3 @@ def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(
     assert most_tilt_deg(flight) < 25.0
     assert all(collision.normal_ned[0] < -0.5 for collision in flight.report.collisions)
     assert all(collision.settled_after_s is not None for collision in flight.report.collisions[-1:])
-
-
-@pytest.mark.slow
-def test_a_crawl_onto_a_pole_that_was_felt_softly_ends_off_it():
-    """On the way out of a recovery a pole is brushed and slid round, with a lean of 84 degrees and a fall of 2 m."""
-    ended = work_out_mission(MissionCase(seed=15489, airframe="foldable", feed_forward=True))
-    assert ended["failures"] == []
-    assert max(hit["lost_m"] for hit in ended["hits"] if hit["lost_m"] is not None) < 0.1
