@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass, field
 
-from companion.estimate.clipping import Clipping, may_have_clipped
 from companion.estimate.suppositions import LOOKED_AT_US, Touch
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned, turned
@@ -13,10 +12,16 @@ CONTIGUOUS = 1.5
 # What comes after this long without a push is another part of the vehicle, turned round by the first: the guard on the
 # other side, the hub. Its direction is no longer that of the hit.
 QUIET_US = 20_000
+# Raw samples are clipped at the range before they are averaged: a pulse of a third of the window that reaches the
+# range shows a third of it in the mean.
+CLIPPED_SHARE = 1.0 / 3.0
 # A force that is over within this many samples was shorter than they can tell: its raw peak may well have been clipped.
+# What rings after it, below a third of the most, or pushes another way tells nothing of that.
 SHORT = 2
+LASTING_SHARE = 1.0 / 3.0
 # What is sent in one loop of the link comes in any order, with time stamps some milliseconds apart.
 LATE_US = 3_000
+NONE: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -40,27 +45,24 @@ class Push:
     told_boot_us: int = 0
     """Of the latest sample or attitude."""
     first_boot_us: int = 0
-    rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
-    first_rates_frd_rad_s: Vector3 = (0.0, 0.0, 0.0)
-    impulse_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
-    unconfirmed_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
+    rates_frd_rad_s: Vector3 = NONE
+    first_rates_frd_rad_s: Vector3 = NONE
+    impulse_ned_m_s: Vector3 = NONE
+    unconfirmed_ned_m_s: Vector3 = NONE
     shown: list[ImuSample] = field(default_factory=list)
     """Those of the first hundredths of a second, until one may have clipped; all of them where the first one may."""
-    last_ned_m_s2: Vector3 = (0.0, 0.0, 0.0)
+    last_ned_m_s2: Vector3 = NONE
     peak_m_s2: float = 0.0
-    samples: int = 0
+    loud_frd_m_s2: list[Vector3] = field(default_factory=list)
+    """The contact's force in its loud samples."""
     loud_boot_us: int = 0
     closed: bool = False
     clipped: bool = False
+    clipped_late: bool = False
+    """Of the whole contact, also of what comes after the push."""
     clipped_at_once: bool = False
     gap: bool = False
-    first_size_m_s2: float = 0.0
     begun_boot_us: int | None = None
-    clipping: Clipping = field(init=False)
-    """Of the whole contact, also of what comes after the push."""
-
-    def __post_init__(self) -> None:
-        self.clipping = Clipping(self.averaging_us, self.range_m_s2)
 
     def add(self, sample: ImuSample, loud: bool) -> None:
         """Take one sample of the contact; what comes after the last loud one does not belong to it."""
@@ -71,7 +73,8 @@ class Push:
         elapsed_us = now_us - (self.started_boot_us if first else self.heard_boot_us)
         contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
         self.heard_boot_us = self.told_boot_us = now_us
-        self.clipping.add(f, frd, contiguous)
+        clips = max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
+        self.clipped_late = self.clipped_late or clips
         if not first and now_us - self.loud_boot_us > max(QUIET_US, 2 * self.averaging_us):
             self.closed = True
         if self.closed:
@@ -94,12 +97,12 @@ class Push:
         self.rates_frd_rad_s = w
         if first:
             self.first_boot_us = now_us
-        self.clipped = self.clipped or may_have_clipped(f, self.range_m_s2)
+        self.clipped = self.clipped or clips
         self.clipped_at_once = self.clipped_at_once or (first and self.clipped)
         if (not self.clipped or self.clipped_at_once) and now_us - self.first_boot_us <= LOOKED_AT_US:
             self.shown.append(sample)
         if loud:
-            self._confirm(now_us, math.sqrt(frd[0] ** 2 + frd[1] ** 2 + frd[2] ** 2), contiguous)
+            self._confirm(now_us, frd, contiguous)
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
 
     def hear(self, attitude: Attitude) -> None:
@@ -119,20 +122,19 @@ class Push:
         earlier = [] if self.earlier is None else [self.earlier]
         return Touch(self.free_frd_m_s2, earlier + self.shown, self.attitudes, self.clipped_at_once)
 
-    def _confirm(self, now_us: int, size_m_s2: float, contiguous: bool) -> None:
+    def _confirm(self, now_us: int, force_frd_m_s2: Vector3, contiguous: bool) -> None:
         """The sample and all since the last loud one belong to the contact."""
+        size_m_s2 = math.hypot(*force_frd_m_s2)
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
         self.unconfirmed_ned_m_s = (0.0, 0.0, 0.0)
-        self.samples += 1
+        self.loud_frd_m_s2.append(force_frd_m_s2)
         self.loud_boot_us = now_us
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
         self.gap = self.gap or not contiguous
-        if self.samples == 1:
-            self.first_size_m_s2 = size_m_s2
-        elif self.samples == 2 and contiguous and size_m_s2 > 0.0:
+        if len(self.loud_frd_m_s2) == 2 and contiguous and size_m_s2 > 0.0:
             # The first window held the force for the share that its mean has of the second's.
-            share = min(1.0, self.first_size_m_s2 / size_m_s2)
+            share = min(1.0, math.hypot(*self.loud_frd_m_s2[0]) / size_m_s2)
             self.begun_boot_us = self.time_boot_us - round(share * self.averaging_us)
 
     @property
@@ -146,12 +148,15 @@ class Push:
     @property
     def is_whole(self) -> bool:
         """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
-        return not self.clipping.may_hide and self.samples > SHORT
+        x, y, z = max(self.loud_frd_m_s2, key=lambda force: math.hypot(*force), default=NONE)
+        least = LASTING_SHARE * (x * x + y * y + z * z)
+        lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.loud_frd_m_s2)
+        return not self.clipped_late and lasting > SHORT
 
     @property
     def is_blurred(self) -> bool:
         """Whether the push's direction is that of a few clipped axes."""
-        return self.clipped and self.samples <= SHORT
+        return self.clipped and len(self.loud_frd_m_s2) <= SHORT
 
     def turn_rad_s(self) -> float:
         """How much the contact has changed the rates by since its first sample."""

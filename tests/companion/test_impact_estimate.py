@@ -278,8 +278,9 @@ def test_a_vehicle_that_turns_in_the_contact_is_followed():
         ([(-20.0, True)] * 2, 4_000),
         ([(-20.0, True)] * 5, 20_000),
         ([(-3.0, True), (-30.0, True), (-4.0, True), (-3.0, True)], 4_000),
+        ([(-19.0, True), (23.6, True), (-13.1, True), (-4.7, True)], 4_000),
     ],
-    ids=["may have clipped", "too short to tell", "gaps", "over in one window"],
+    ids=["may have clipped", "too short to tell", "gaps", "over in one window", "guards that clatter"],
 )
 def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
     assert pushed(pushes, every_us).is_lower_bound
