@@ -31,7 +31,7 @@ class EstimateConfig(Written):
     """Numbers of the estimate of a collision."""
 
     inertial: bool = True
-    """v_c with the accelerometer's help (see estimate.approach); off: from positions and velocities alone."""
+    """v_c with the accelerometer's help (see estimate.approach); off: from velocities alone."""
 
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
     """IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this."""

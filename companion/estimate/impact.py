@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.estimate.approach import BATCH_US, VelocityFix, position_at, velocity_at
-from companion.estimate.collision import BATCH_US as MOTION_BATCH_US
-from companion.estimate.collision import ContactMotion, motion_before_contact
+from companion.estimate.approach import ALONE_US, BATCH_US, VelocityFix, position_at, velocity_alone, velocity_at
 from companion.estimate.config import EstimateConfig
 from companion.estimate.facing import normal_by, whole_normal
 from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
@@ -18,7 +16,7 @@ from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US, MotionHistory
 from companion.motion.rotation import body_to_ned, turned
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import ZERO, Strapdown
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
@@ -177,7 +175,7 @@ class ImpactEstimator:
         """A new impact: what was known just before it, and what its first sample, or velocity, shows."""
         sample_us = impact.sample_time_boot_us
         free_until_us = impact.contact_free_until_boot_us
-        motion, error_m_s = self._motion(free_until_us)
+        place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
@@ -189,10 +187,10 @@ class ImpactEstimator:
             impact=impact,
             time_boot_us=(free_until_us + sample_us) // 2,
             time_error_us=(sample_us - free_until_us) // 2,
-            position_ned_m=motion.position_ned_m,
-            velocity_ned_m_s=motion.velocity_ned_m_s,
+            position_ned_m=place,
+            velocity_ned_m_s=velocity,
             velocity_error_m_s=error_m_s,
-            normal_ned=normal_by(self.push, unit(force_ned), motion.velocity_ned_m_s),
+            normal_ned=normal_by(self.push, unit(force_ned), velocity),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
@@ -283,23 +281,21 @@ class ImpactEstimator:
             kind=kind,
         )
 
-    def _motion(self, contact_us: int) -> tuple[ContactMotion, float]:
-        """From what was heard before this contact and after the one before it, and v_c's standard deviation."""
-        last_us = self.contact_ended_boot_us
-        start_us = contact_us - MOTION_BATCH_US
-        if last_us is not None:
-            start_us = max(start_us, last_us + STAMP_RESOLUTION_US)
+    def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
+        """x(t_c) and v_c from what was heard before this contact and after the one before it; v_c's standard deviation
+        on an axis."""
+        start_us, config = contact_us - ALONE_US, self.config
+        if self.contact_ended_boot_us is not None:
+            start_us = max(start_us, self.contact_ended_boot_us + STAMP_RESOLUTION_US)
         samples = self.history.between(start_us, contact_us - STAMP_RESOLUTION_US)
-        found = self._velocity(contact_us) if self.config.inertial else None
+        found = self._velocity(contact_us) if config.inertial else None
+        found = found or velocity_alone(samples, contact_us, config)
         if found is not None and samples:
-            return ContactMotion(contact_us, position_at(samples, contact_us, found[0]), found[0]), found[1]
-        motion = motion_before_contact(samples, contact_us, self.config)
-        if motion is None:
-            latest = self.history.latest()
-            if latest is None:
-                return ContactMotion(contact_us, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), math.inf
-            motion = ContactMotion(latest.time_boot_us, latest.position_ned_m, latest.velocity_ned_m_s)
-        return motion, self.config.velocity_noise_m_s
+            return position_at(samples, contact_us, found[0]), *found
+        latest = self.history.latest()
+        if latest is None:
+            return ZERO, ZERO, math.inf
+        return latest.position_ned_m, latest.velocity_ned_m_s, config.velocity_noise_m_s
 
     def _velocity(self, contact_us: int) -> tuple[Vector3, float] | None:
         """v_c by velocities and accelerometer; None where too little was heard for it."""

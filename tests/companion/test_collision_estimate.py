@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from companion.estimate.collision import motion_before_contact
+from companion.estimate.approach import position_at, velocity_alone
 from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition
 from companion.motion.history import MotionHistory
@@ -30,43 +30,39 @@ def approach(speed_m_s=2.0, acceleration_m_s2=0.0, noise_m_s=0.0, seed=1, every_
 
 @pytest.mark.parametrize("acceleration", [0.0, 2.0, -0.52])
 def test_a_clean_approach_is_extrapolated_to_the_contact(acceleration):
-    motion = motion_before_contact(approach(2.0, acceleration), CONTACT_US, CONFIG)
-    assert motion is not None
-    assert motion.velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.005)
-    assert motion.position_ned_m == pytest.approx((4.0, 1.0, -1.5), abs=0.002)
+    samples = approach(2.0, acceleration)
+    velocity, _ = velocity_alone(samples, CONTACT_US, CONFIG)
+    assert velocity == pytest.approx((2.0, 0.0, 0.0), abs=0.005)
+    assert position_at(samples, CONTACT_US, velocity) == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
 
 
 def test_samples_after_the_contact_change_nothing():
     before = approach(noise_m_s=0.03)
     after = [LocalPosition(CONTACT_US + k * 20_000, (9.0, 9.0, 9.0), (-50.0, 7.0, 3.0)) for k in range(5)]
-    assert motion_before_contact(before + after, CONTACT_US, CONFIG) == motion_before_contact(
-        before, CONTACT_US, CONFIG
-    )
+    assert velocity_alone(before + after, CONTACT_US, CONFIG) == velocity_alone(before, CONTACT_US, CONFIG)
 
 
 def test_a_stamp_cut_to_the_millisecond_that_may_be_after_the_contact_is_not_used():
     before = approach()
     doubtful = LocalPosition(CONTACT_US - 500, (4.0, 1.0, -1.5), (-1.0, 0.0, 0.0))
-    assert motion_before_contact([*before, doubtful], CONTACT_US, CONFIG) == motion_before_contact(
-        before, CONTACT_US, CONFIG
-    )
+    assert velocity_alone([*before, doubtful], CONTACT_US, CONFIG) == velocity_alone(before, CONTACT_US, CONFIG)
 
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 2.0])
 def test_with_a_good_estimates_noise_v_c_is_within_five_percent(speed_m_s):
     errors = []
     for seed in range(60):
-        motion = motion_before_contact(approach(speed_m_s, noise_m_s=0.03, seed=seed), CONTACT_US, CONFIG)
-        errors.append(math.hypot(*motion.velocity_ned_m_s) - speed_m_s)
+        velocity, _ = velocity_alone(approach(speed_m_s, noise_m_s=0.03, seed=seed), CONTACT_US, CONFIG)
+        errors.append(math.hypot(*velocity) - speed_m_s)
     rms = math.sqrt(sum(e * e for e in errors) / len(errors))
     assert rms < 0.05 * speed_m_s / 2, "half the allowance: the other half is the delay of the estimate"
 
 
 def test_without_history_there_is_no_estimate_and_one_sample_is_taken_as_it_is():
-    assert motion_before_contact([], CONTACT_US, CONFIG) is None
+    assert velocity_alone([], CONTACT_US, CONFIG) is None
     one = approach()[-1:]
-    motion = motion_before_contact(one, CONTACT_US, CONFIG)
-    assert motion.velocity_ned_m_s == pytest.approx(one[0].velocity_ned_m_s)
+    velocity, _ = velocity_alone(one, CONTACT_US, CONFIG)
+    assert velocity == pytest.approx(one[0].velocity_ned_m_s)
 
 
 def test_history_keeps_two_seconds_drops_late_packets_and_starts_anew_after_a_reboot():
