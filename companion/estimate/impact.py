@@ -129,7 +129,6 @@ class ImpactEstimator:
     def forget(self) -> None:
         """Velocity or sum have jumped: what the one said beside the other is no measure any more."""
         self.fixes.clear()
-        self.trust.errors.clear()
 
     def _seek(self, push: Push) -> None:
         """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
@@ -168,8 +167,7 @@ class ImpactEstimator:
         fixes.append(VelocityFix(time_us, velocity_ned_m_s, sum_ned_m_s, self.strapdown.acceleration_ned_m_s2))
         while fixes[0].time_boot_us < time_us - BATCH_US:
             fixes.popleft()
-        v, u = velocity_ned_m_s, sum_ned_m_s
-        self.trust.hear(time_us, (v[0] - u[0], v[1] - u[1], v[2] - u[2]), self.strapdown.level_leans_m_s2)
+        self.trust.hear(fixes, self.strapdown.level_leans_m_s2)
 
     def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
         """A new impact: what was known just before it, and what its first sample, or velocity, shows."""

@@ -9,9 +9,10 @@ has its own estimate, `reflex.reckoning`: it needs a velocity sooner, and knows 
 """
 
 import math
-from collections import deque
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+from companion.estimate.approach import VelocityFix, less_sum
 from companion.messages import Vector3
 
 # The estimator has not yet begun to correct itself for 0.14 s, and swings through the truth at about 0.5 s.
@@ -36,7 +37,6 @@ class Trust:
     """Since the latest hit; None when that was measured whole."""
     earlier_boot_us: int | None = None
     """Since one before it, which was still in doubt when the latest came."""
-    errors: deque[tuple[int, Vector3]] = field(default_factory=deque)
 
     @property
     def is_trusted(self) -> bool:
@@ -54,7 +54,6 @@ class Trust:
     def doubt(self, time_us: int) -> None:
         """A new hit, which may have been more than was seen."""
         self.earlier_boot_us, self.doubted_boot_us = self._since_us, time_us
-        self.errors.clear()
 
     def judge(self, is_whole: bool, time_us: int) -> None:
         """Whether the latest hit has been measured whole, as far as it is known now; what an earlier one hid stays."""
@@ -62,12 +61,10 @@ class Trust:
             self.doubted_boot_us = None
         elif self.doubted_boot_us is None:
             self.doubted_boot_us = time_us
-            self.errors.clear()
 
     def restore(self) -> None:
         """The estimate agrees again."""
         self.doubted_boot_us = self.earlier_boot_us = None
-        self.errors.clear()
 
     def age(self, now_us: int) -> None:
         """Doubt ends, whatever the velocities say or if none comes."""
@@ -75,22 +72,14 @@ class Trust:
         if since_us is not None and now_us - since_us > MOST_US:
             self.restore()
 
-    def hear(self, time_us: int, velocity_less_sum_m_s: Vector3, level_leans_m_s2: Vector3) -> None:
-        """Take one velocity less the accelerometer's sum: constant while the two agree. And the acceleration of a
-        vehicle that is level by its attitude, as its gyroscopes show it."""
-        doubted_us, errors = self._since_us, self.errors
-        if doubted_us is None:
+    def hear(self, fixes: Sequence[VelocityFix], level_leans_m_s2: Vector3) -> None:
+        """Take the newest of the velocities: less the accelerometer's sum they stand still while the two agree. And the
+        acceleration of a vehicle that is level by its attitude, as its gyroscopes show it."""
+        doubted_us, now_us = self._since_us, fixes[-1].time_boot_us
+        if doubted_us is None or now_us - doubted_us <= LEAST_US or math.hypot(*level_leans_m_s2) >= AGREE_M_S2:
             return
-        errors.append((time_us, velocity_less_sum_m_s))
-        while time_us - errors[0][0] > AGREE_US:
-            errors.popleft()
-        is_level = math.hypot(*level_leans_m_s2) < AGREE_M_S2
-        if is_level and time_us - doubted_us > LEAST_US and self._agree():
+        recent = [fix for fix in fixes if now_us - fix.time_boot_us <= AGREE_US]
+        axes = zip(*map(less_sum, recent), strict=True)
+        is_long = now_us - recent[0].time_boot_us >= AGREE_US // 2
+        if is_long and all(max(axis) - min(axis) < AGREE_M_S for axis in axes):
             self.restore()
-
-    def _agree(self) -> bool:
-        first_us, last_us = self.errors[0][0], self.errors[-1][0]
-        if last_us - first_us < AGREE_US // 2:
-            return False
-        axes = list(zip(*(error for _, error in self.errors), strict=True))
-        return all(max(axis) - min(axis) < AGREE_M_S for axis in axes)

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from companion.detection.interface import Situation
+from companion.estimate.approach import VelocityFix
 from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
@@ -148,10 +149,11 @@ def test_a_tilt_that_the_gyroscopes_deny_keeps_the_doubt(leans_m_s2, believed_s)
     # Given a hit that may have been more, and velocities that agree with the accelerometer turned by the gyroscopes
     trust = Trust()
     trust.doubt(0)
-    believed_us = None
+    fixes, believed_us = [], None
     for time_us in range(20_000, 6_000_000, 20_000):
         trust.age(time_us)
-        trust.hear(time_us, (0.5, 0.0, 0.0), (leans_m_s2, 0.0, 0.0))
+        fixes.append(VelocityFix(time_us, (0.5, 0.0, 0.0), STILL, STILL))
+        trust.hear(fixes, (leans_m_s2, 0.0, 0.0))
         if trust.is_trusted and believed_us is None:
             believed_us = time_us
     # Then the vehicle is believed once its attitude agrees, too, or after so long in any case
