@@ -42,7 +42,7 @@ RULES = (
     Rule(
         "velocity jump",
         "a velocity that the accelerometer does not explain is a hit",
-        _DETECTION + "hidden_signs:velocity_jump",
+        _DETECTION + "velocity_jump:VelocityJump.step_m_s",
         _says(None),
     ),
     Rule("hand", "a soft force on a hovering vehicle waits", _DETECTION + "soft:SoftTouch.may_be_hand", _says(False)),

@@ -7,8 +7,8 @@ contact, each against what this vehicle shows in its own flight:
   as the vehicle turns;
 * vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
   fall, a dropped payload and every manoeuvre stay inside;
-* aftermath: a velocity that jumps by what the accelerometer did not show (see `aftermath`), with less asked for when
-  the rates jumped, too.
+* a velocity that jumps by what the accelerometer did not show (see `velocity_jump`), with less asked for when the rates
+  jumped, too.
 
 What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment before
 it is called a hit or a hand (see `soft`).
@@ -18,27 +18,17 @@ import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from companion.detection.aftermath import Aftermath
 from companion.detection.classify import kind_of
 from companion.detection.floor import SETTLED_US
 from companion.detection.force_signs import CLEAR, pushes_on, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
-from companion.detection.hidden_signs import Hidden, velocity_jump
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.sight import BLIND_M_S2
-from companion.messages import (
-    Attitude,
-    AttitudeTarget,
-    ImuSample,
-    LocalPosition,
-    MessageId,
-    Odometry,
-    Sample,
-    Vector3,
-)
-from companion.motion.history import ODOMETRY_KEPT_US
-from companion.motion.rotation import body_to_ned
+from companion.detection.velocity_jump import VelocityJump
+from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
+from companion.motion.rotation import body_to_ned, ned_to_body
+from companion.motion.strapdown import LEVEL
 
 # A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
 SHAKING = 2.0
@@ -71,26 +61,17 @@ class FusedDetector:
         self._soft_us = round(config.soft_wait_s * 1e6)
 
     def initial(self) -> FusedState:
-        return FusedState(
-            threshold_m_s2=self._config.side_threshold_m_s2, aftermath=Aftermath(averaging_us=self._averaging_us)
-        )
+        return FusedState(threshold_m_s2=self._config.side_threshold_m_s2, jump=VelocityJump(self._averaging_us))
 
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
         if type(sample) is ImuSample:
             impact = self._imu(state, sample, situation)
             state.soft.imu(state.last_sample_boot_us, sample.specific_force_frd_m_s2)
             return state, impact
-        match sample:
-            case Odometry():
-                return state, self._odometry(state, sample, situation)
-            case LocalPosition():
-                return state, self._local_position(state, sample, situation)
-            case Attitude():
-                state.aftermath.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
-            case AttitudeTarget():
-                state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
-            case _:
-                pass
+        if isinstance(sample, LocalPosition | Odometry):
+            return state, self._velocity(state, sample, situation)
+        if isinstance(sample, AttitudeTarget):
+            state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
         return state, None
 
     # --- force ------------------------------------------------------------------------------------------------
@@ -98,8 +79,9 @@ class FusedDetector:
     def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
         config, now_us = self._config, sample.time_boot_us
         f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-        s.aftermath.imu(now_us, f, w)
-        before_us, s.last_sample_boot_us = s.last_sample_boot_us, now_us
+        before_us = s.previous_sample_boot_us = s.last_sample_boot_us
+        s.last_sample_boot_us = now_us
+        s.jump.imu(before_us, now_us, w)
         f_x, f_y, f_z = f
         off = situation.why_off
         x, y = f_x - s.floor.x, f_y - s.floor.y
@@ -156,13 +138,13 @@ class FusedDetector:
         self, s: FusedState, sample: ImuSample, situation: Situation, force: Vector3, size: float, ratio: float
     ) -> Impact | None:
         now_us, soft = s.last_sample_boot_us, s.soft
-        f, turn = sample.specific_force_frd_m_s2, s.aftermath.newest_rate_step_rad_s
+        f, turn = sample.specific_force_frd_m_s2, s.jump.newest_rate_step_rad_s
         jumps = soft.turns(now_us, turn) or soft.jumps(now_us, f, s.threshold_m_s2)
         if s.phase is Phase.CONTACT:
             s.last_loud_boot_us = now_us
             is_another = jumps if soft.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
             if is_another and size > WORSE * s.peak_specific_force_m_s2:
-                return self._fire(s, now_us, situation, force, s.aftermath.previous_imu_us, Evidence.FORCE, 1.0)
+                return self._fire(s, now_us, situation, force, s.previous_sample_boot_us, Evidence.FORCE, 1.0)
             s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             if now_us - s.contact_began_boot_us > self._longest_us:
                 self._learn(s, f, now_us - 1)
@@ -175,7 +157,7 @@ class FusedDetector:
             s.phase, s.last_loud_boot_us = Phase.ARMED if waited else Phase.QUIET, max(now_us, s.last_loud_boot_us)
             self._learn(s, f, now_us - 1)
             return None
-        free_until_us = min(now_us - self._averaging_us, s.aftermath.previous_imu_us)
+        free_until_us = min(now_us - self._averaging_us, s.previous_sample_boot_us)
         if soft.since_boot_us is not None:
             free_until_us = soft.free_until_us
         kind = None
@@ -200,15 +182,13 @@ class FusedDetector:
         evidence: Evidence,
         confidence: float,
         kind: ImpactKind | None = None,
-        velocity_before_ned_m_s: Vector3 | None = None,
     ) -> Impact:
         if kind is None:
-            n, e, d = body_to_ned(s.aftermath.strapdown.attitude_wxyz, force)
+            attitude = LEVEL if situation.inertial is None else situation.inertial.strapdown.attitude_wxyz
+            n, e, d = body_to_ned(attitude, force)
             over_s = max(now_us - free_until_us, 1) * 1e-6
-            velocity = velocity_before_ned_m_s or s.velocity_ned_m_s
-            kind = kind_of(
-                (n * over_s, e * over_s, d * over_s), velocity, s.aftermath.rate_step_near(now_us), situation
-            )
+            impulse = (n * over_s, e * over_s, d * over_s)
+            kind = kind_of(impulse, s.velocity_ned_m_s, s.jump.rate_step_near(now_us), situation)
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
@@ -217,48 +197,45 @@ class FusedDetector:
             s.hit_boot_us = now_us
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
 
-    def _fire_hidden(self, s: FusedState, now_us: int, situation: Situation, hidden: Hidden) -> Impact:
-        s.aftermath.forget()
-        force, free_until_us = hidden.specific_force_frd_m_s2, hidden.free_until_boot_us
-        before, confidence = hidden.velocity_before_ned_m_s, hidden.confidence
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence, None, before)
+    # --- velocity ---------------------------------------------------------------------------------------------
 
-    # --- aftermath --------------------------------------------------------------------------------------------
-
-    def _odometry(self, s: FusedState, sample: Odometry, situation: Situation) -> Impact | None:
-        if s.odometry_boot_us is None or sample.reset_counter != s.reset_counter:
-            s.aftermath.forget()
-        s.odometry_boot_us, s.reset_counter = sample.time_boot_us, sample.reset_counter
-        return self._velocity(s, sample.time_boot_us, sample.velocity_ned_m_s, situation, 1.0)
-
-    def _local_position(self, s: FusedState, sample: LocalPosition, situation: Situation) -> Impact | None:
-        told = s.odometry_boot_us
-        if told is not None and sample.time_boot_us - told < ODOMETRY_KEPT_US:
-            self._moves(s, sample.time_boot_us, sample.velocity_ned_m_s)
+    def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
+        time_us, jump, config, inertial = sample.time_boot_us, s.jump, self._config, situation.inertial
+        s.velocity_ned_m_s = v = sample.velocity_ned_m_s
+        s.soft.velocity(time_us, v)
+        if inertial is None or not inertial.has_new_fix:
             return None
-        return self._velocity(s, sample.time_boot_us, sample.velocity_ned_m_s, situation, 2.0)
-
-    def _moves(self, s: FusedState, time_us: int, velocity_ned_m_s: Vector3) -> None:
-        s.velocity_ned_m_s = velocity_ned_m_s
-        s.soft.velocity(time_us, velocity_ned_m_s)
-
-    def _velocity(
-        self, s: FusedState, time_us: int, velocity_ned_m_s: Vector3, situation: Situation, caution: float
-    ) -> Impact | None:
-        self._moves(s, time_us, velocity_ned_m_s)
-        aftermath, config = s.aftermath, self._config
-        step = aftermath.step_m_s(time_us, velocity_ned_m_s)
+        step = jump.step_m_s(inertial.fixes)
         rests = time_us - s.last_loud_boot_us < self._rest_us or not situation.estimate_trusted
         if s.phase is Phase.CONTACT or rests:
-            aftermath.forget()
+            jump.since_us = time_us
             return None
         if step is None:
             return None
-        spread_m_s = aftermath.spread_m_s
-        aftermath.learn(step)
-        if s.phase is not Phase.ARMED:
+        spread_m_s = jump.spread_m_s
+        jump.learn(step)
+        size, least = math.hypot(*step), self._least_jump_m_s(s, time_us, spread_m_s, type(sample) is Odometry)
+        if s.phase is not Phase.ARMED or size < least:
             return None
+        jump.since_us = time_us
+        now_us, free_until_us = max(time_us, s.last_sample_boot_us), jump.free_until_us(time_us, config.rate_step_rad_s)
+        over_s = max(now_us - free_until_us, 1) * 1e-6
+        push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
+        force = ned_to_body(inertial.strapdown.attitude_wxyz, push)
+        s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
+        confidence = min(1.0, 0.5 * size / least)
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence)
+
+    def _least_jump_m_s(self, s: FusedState, time_us: int, spread_m_s: float, counts_resets: bool) -> float:
+        """What a jump must reach; more where the velocity may jump by itself."""
+        config, jump = self._config, s.jump
+        caution = 1.0 if counts_resets else 2.0
         if s.hit_boot_us is not None and time_us - s.hit_boot_us < SWING_US:
             caution *= SWINGING
-        hidden = velocity_jump(s, config, time_us, velocity_ned_m_s, step, spread_m_s, caution)
-        return None if hidden is None else self._fire_hidden(s, max(time_us, s.last_sample_boot_us), situation, hidden)
+        turned = jump.rate_step_near(time_us) >= config.rate_step_rad_s
+        least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
+        p, q, _ = jump.rates_frd_rad_s
+        shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
+        room = config.velocity_per_rate_m * (abs(p) + abs(q))
+        room += jump.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
+        return caution * max(least, config.noise_factor * spread_m_s) + room

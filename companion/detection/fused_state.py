@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass, field
 
-from companion.detection.aftermath import Aftermath
 from companion.detection.floor import Floor
 from companion.detection.interface import DetectorState
 from companion.detection.soft import SoftTouch
 from companion.detection.thrust import ThrustGain
+from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Vector3
 
 
@@ -16,10 +16,9 @@ class FusedState(DetectorState):
 
     floor: Floor = field(default_factory=Floor)
     thrust: ThrustGain = field(default_factory=ThrustGain)
-    aftermath: Aftermath = field(default_factory=lambda: Aftermath(0))
+    jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
-    odometry_boot_us: int | None = None
-    reset_counter: int = 0
+    previous_sample_boot_us: int = 0
     contact_began_boot_us: int = 0
     hit_boot_us: int | None = None
     """Of the latest impact that was no hand's."""

@@ -6,6 +6,7 @@ from enum import Enum
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from companion.messages import LandedState, MessageId, Sample, Vector3
+from companion.motion.inertial import Inertial
 
 
 class Phase(Enum):
@@ -50,8 +51,9 @@ class Situation(NamedTuple):
 
     `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
     one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
-    to, so that touching it is no surprise. `estimate_trusted`: False while the vehicle's velocity cannot be believed,
-    because its accelerometer did not show the whole of a hit; the watch fills it in.
+    to, so that touching it is no surprise. The watch fills in the last two. `estimate_trusted`: False while the
+    vehicle's velocity cannot be believed, because its accelerometer did not show the whole of a hit. `inertial` has
+    heard the sample already.
     """
 
     off_reason: str | None = None
@@ -61,6 +63,7 @@ class Situation(NamedTuple):
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
     estimate_trusted: bool = True
+    inertial: Inertial | None = None
 
     @property
     def why_off(self) -> str | None:

@@ -12,7 +12,6 @@ accelerometer, as the paper does it, u is zero, c the velocity itself and its sl
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,12 +20,10 @@ from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import DELAY_S, DELAY_SPREAD_S
 from companion.motion.history import STAMP_RESOLUTION_US
+from companion.motion.inertial import VelocityFix, less_sum
 from companion.motion.kalman import Floats, KalmanFilter
 from companion.motion.strapdown import ZERO
 
-# Errors of a velocity estimate last for tenths of a second, and the accelerometer's bias is learnt in seconds: the
-# longer, the better, until the vehicle has turned its bias to another heading.
-BATCH_US = 5_000_000
 # Five positions at 50 Hz; at 2 m/s^2 the vehicle is 1 cm off a straight line in that time.
 POSITIONS_US = 100_000
 # The sum's own noise: 0.25 m/s^2 in samples of 5 ms, each of which stands for 50 ms at the slowest useful rate.
@@ -53,22 +50,6 @@ BIAS = Slope(0.08, 0.05, 100_000, 1.5)
 LIMITS_M_S2, ALONE_US = 3.0, 500_000
 
 
-@dataclass(frozen=True, slots=True)
-class VelocityFix:
-    """One velocity of the estimate with the accelerometer's sum and mean at its stamp; local NED."""
-
-    time_boot_us: int
-    velocity_ned_m_s: Vector3
-    sum_ned_m_s: Vector3
-    acceleration_ned_m_s2: Vector3
-
-
-def less_sum(fix: VelocityFix) -> Vector3:
-    """What the velocity says beyond the accelerometer: constant while the two agree."""
-    v, u = fix.velocity_ned_m_s, fix.sum_ned_m_s
-    return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
-
-
 def velocity_alone(
     samples: Sequence[LocalPosition], contact_boot_us: int, config: EstimateConfig
 ) -> tuple[Vector3, float] | None:
@@ -91,7 +72,7 @@ def velocity_at(
     ``fixes`` are in the order of time and from before the contact, without a jump of the estimate between them. None
     when there are none, or when accelerometer and velocities contradict each other.
     """
-    batch = _thinned([fix for fix in fixes if contact_boot_us - BATCH_US <= fix.time_boot_us], slope.spacing_us)
+    batch = _thinned(fixes, slope.spacing_us)
     if not batch:
         return None
     # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.

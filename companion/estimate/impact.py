@@ -7,16 +7,17 @@ from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.estimate.approach import ALONE_US, BATCH_US, VelocityFix, position_at, velocity_alone, velocity_at
+from companion.estimate.approach import ALONE_US, position_at, velocity_alone, velocity_at
 from companion.estimate.config import EstimateConfig
 from companion.estimate.facing import normal_by, whole_normal
 from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
 from companion.estimate.push import Push, unit
 from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
-from companion.motion.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US, MotionHistory
+from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
+from companion.motion.inertial import Inertial
 from companion.motion.rotation import body_to_ned, turned
-from companion.motion.strapdown import ZERO, Strapdown
+from companion.motion.strapdown import ZERO
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
@@ -69,13 +70,10 @@ class ImpactEstimator:
 
     config: EstimateConfig
     history: MotionHistory = field(default_factory=MotionHistory)
-    strapdown: Strapdown = field(default_factory=Strapdown)
+    inertial: Inertial = field(default_factory=Inertial)
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
-    fixes: deque[VelocityFix] = field(default_factory=deque)
     trust: Trust = field(default_factory=Trust)
-    odometry_boot_us: int | None = None
-    reset_counter: int = 0
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -95,29 +93,22 @@ class ImpactEstimator:
     def hear(self, sample: Sample) -> None:
         """Take one sample of any kind."""
         if isinstance(sample, ImuSample):
-            now_us = sample.time_boot_us
-            strapdown = self.strapdown
-            if not strapdown.imu(now_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s):
-                self.forget()
+            now_us, strapdown = sample.time_boot_us, self.inertial.strapdown
+            if not self.inertial.imu(sample):
                 self.sums.clear()
             self.trust.age(now_us)
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
             self.earlier_imu, self.imu = self.imu, sample
-        elif isinstance(sample, LocalPosition):
-            self.history.add(sample)
-            told_us = self.odometry_boot_us
-            if told_us is None or sample.time_boot_us - told_us > ODOMETRY_KEPT_US:
-                self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
-        elif isinstance(sample, Odometry):
-            if self.odometry_boot_us is None or sample.reset_counter != self.reset_counter:
-                self.forget()
-            self.odometry_boot_us, self.reset_counter = sample.time_boot_us, sample.reset_counter
-            self._fix(sample.time_boot_us, sample.velocity_ned_m_s)
+        elif isinstance(sample, LocalPosition | Odometry):
+            if isinstance(sample, LocalPosition):
+                self.history.add(sample)
+            self.inertial.velocity(sample)
+            if self.inertial.has_new_fix:
+                self.trust.hear(self.inertial.fixes, self.inertial.strapdown.level_leans_m_s2)
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
-            is_right = self.trust.is_attitude_right(sample.time_boot_us)
-            self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, is_right)
+            self.inertial.attitude(sample, self.trust.is_attitude_right(sample.time_boot_us))
             self.attitudes.append(sample)
             if self.push is not None:
                 self.push.hear(sample)
@@ -125,10 +116,6 @@ class ImpactEstimator:
             return
         if self.push is not None:
             self._seek(self.push)
-
-    def forget(self) -> None:
-        """Velocity or sum have jumped: what the one said beside the other is no measure any more."""
-        self.fixes.clear()
 
     def _seek(self, push: Push) -> None:
         """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
@@ -159,22 +146,12 @@ class ImpactEstimator:
         if sample.time_boot_us - ended_us < CLIPPING_TOLD_US:
             self.estimate = replace(estimate, is_lower_bound=True)
 
-    def _fix(self, time_us: int, velocity_ned_m_s: Vector3) -> None:
-        sum_ned_m_s = self.strapdown.sum_at(time_us)
-        if sum_ned_m_s is None:
-            return
-        fixes = self.fixes
-        fixes.append(VelocityFix(time_us, velocity_ned_m_s, sum_ned_m_s, self.strapdown.acceleration_ned_m_s2))
-        while fixes[0].time_boot_us < time_us - BATCH_US:
-            fixes.popleft()
-        self.trust.hear(fixes, self.strapdown.level_leans_m_s2)
-
     def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
         """A new impact: what was known just before it, and what its first sample, or velocity, shows."""
         sample_us = impact.sample_time_boot_us
         free_until_us = impact.contact_free_until_boot_us
         place, velocity, error_m_s = self._motion(free_until_us)
-        force_ned = body_to_ned(self.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
+        force_ned = body_to_ned(self.inertial.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
         self.push = self._begin_push(impact) if impact.evidence is Evidence.FORCE else None
@@ -210,10 +187,10 @@ class ImpactEstimator:
         if sample.time_boot_us - impact.contact_free_until_boot_us > LATE_SAMPLES * between_us + averaging_us:
             return None
         f, force, w = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-        behind_s = (sample.time_boot_us - self.strapdown.attitude_boot_us) * 1e-6
+        behind_s = (sample.time_boot_us - self.inertial.strapdown.attitude_boot_us) * 1e-6
         push = Push(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
-            attitude_wxyz=turned(self.strapdown.attitude_wxyz, w, behind_s if abs(behind_s) < 0.1 else 0.0),
+            attitude_wxyz=turned(self.inertial.strapdown.attitude_wxyz, w, behind_s if abs(behind_s) < 0.1 else 0.0),
             averaging_us=averaging_us,
             range_m_s2=self.config.accelerometer_range_m_s2,
             started_boot_us=impact.contact_free_until_boot_us,
@@ -299,7 +276,7 @@ class ImpactEstimator:
         """v_c by velocities and accelerometer; None where too little was heard for it."""
         end_us = contact_us - STAMP_RESOLUTION_US
         since_us = 0 if self.contact_ended_boot_us is None else self.contact_ended_boot_us + REST_US
-        fixes = [fix for fix in self.fixes if since_us < fix.time_boot_us <= end_us]
+        fixes = [fix for fix in self.inertial.fixes if since_us < fix.time_boot_us <= end_us]
         before = [entry for entry in self.sums if entry[0] <= contact_us]
         if not fixes or not before:
             return None

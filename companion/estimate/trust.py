@@ -12,8 +12,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from companion.estimate.approach import VelocityFix, less_sum
 from companion.messages import Vector3
+from companion.motion.inertial import VelocityFix, less_sum
 
 # The estimator has not yet begun to correct itself for 0.14 s, and swings through the truth at about 0.5 s.
 CORRECTED_US = 140_000

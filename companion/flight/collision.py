@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 
 from companion.detection.interface import DetectorState
-from companion.estimate.approach import VelocityFix
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.flight.confirming import DECIDED_US, Claim, Leap
 from companion.messages import LocalPosition, Vector3
 from companion.motion.history import MotionHistory
+from companion.motion.inertial import VelocityFix
 from companion.motion.strapdown import Strapdown
 from companion.reflex.halfspace import away_from
 from companion.reflex.laws import Contact

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from statistics import fmean, median
 
 from companion.detection.interface import Evidence
-from companion.estimate.approach import VelocityFix, less_sum
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import MotionHistory
+from companion.motion.inertial import VelocityFix, less_sum
 from companion.motion.strapdown import MOTORS_RAD_S2
 
 # A push that moved the vehicle by as much is a hit: twice what an estimate has been seen to show of one that it missed.

@@ -94,9 +94,9 @@ def _tell_held(flight: FlightContext, held: Held, sample: LocalPosition, now_us:
 def follow_contact(flight: FlightContext, watching: Watch) -> None:
     """Let the latest collision's record see the contact's course."""
     if flight.collisions:
-        record, estimator = flight.collisions[-1], watching.estimator
-        record.follow_contact(watching.state, watching.estimate, estimator.fixes)
-        record.follow_motion(estimator.strapdown)
+        record, inertial = flight.collisions[-1], watching.estimator.inertial
+        record.follow_contact(watching.state, watching.estimate, inertial.fixes)
+        record.follow_motion(inertial.strapdown)
 
 
 def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -146,6 +146,7 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
     imu_samples = 0
+    situation = situation._replace(inertial=watch.estimator.inertial)
     for sample in samples:
         if type(sample) is ImuSample:
             if watch.sameness.imu(sample):
@@ -170,12 +171,11 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
         watch.estimator.hear(sample)
         is_attitude_old = watch.is_attitude_old
         if is_attitude_old:
-            watch.estimator.forget()
-        if watch.estimator.trust.is_trusted and not is_attitude_old:
-            watch.state, impact = watch.detector.step(watch.state, sample, situation)
-        else:
-            doubtful = situation._replace(estimate_trusted=False)
-            watch.state, impact = watch.detector.step(watch.state, sample, doubtful)
+            watch.estimator.inertial.fixes.clear()
+        known = situation
+        if not watch.estimator.trust.is_trusted or is_attitude_old:
+            known = situation._replace(estimate_trusted=False)
+        watch.state, impact = watch.detector.step(watch.state, sample, known)
         if impact is not None:
             cut_short = watch.estimator.close()
             if cut_short is not None:

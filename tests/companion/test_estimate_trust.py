@@ -5,10 +5,10 @@ import math
 import pytest
 
 from companion.detection.interface import Situation
-from companion.estimate.approach import VelocityFix
 from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
+from companion.motion.inertial import VelocityFix
 from companion.reflex.watch import advance, start_watch
 
 STILL = (0.0, 0.0, 0.0)
@@ -138,10 +138,10 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
             samples.append(Attitude(t_us, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), rates))
         advance(watch, samples, situation, t_us)
         if t_us < 2_140_000:
-            assert watch.estimator.strapdown.level_leans_m_s2 == STILL
+            assert watch.estimator.inertial.strapdown.level_leans_m_s2 == STILL
     # Then it is the filter's in the one case and the vehicle's in the other
     assert not watch.estimate_trusted
-    assert watch.estimator.strapdown.level_leans_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
+    assert watch.estimator.inertial.strapdown.level_leans_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
 
 
 @pytest.mark.parametrize(("leans_m_s2", "believed_s"), [(0.1, 0.7), (0.4, 4.6)])

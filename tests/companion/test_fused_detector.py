@@ -10,6 +10,7 @@ from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
+from companion.motion.inertial import Inertial
 
 TICK_US = 1_000
 WINDOW_US = 4_000
@@ -72,11 +73,19 @@ class Flight:
 
     def fly(self, until_us=4_000_000, **config):
         detector = FusedDetector(FusedConfig(**config), WINDOW_US)
-        self.state, impacts = detector.initial(), []
+        self.state, impacts, inertial = detector.initial(), [], Inertial()
         for t, sample in self.samples(until_us):
             if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
                 continue
-            self.state, impact = detector.step(self.state, sample, self.situation(t))
+            match sample:
+                case ImuSample():
+                    inertial.imu(sample)
+                case Attitude():
+                    inertial.attitude(sample)
+                case LocalPosition() | Odometry():
+                    inertial.velocity(sample)
+            known = self.situation(t)._replace(inertial=inertial)
+            self.state, impact = detector.step(self.state, sample, known)
             if impact is not None:
                 impacts.append(impact)
         return impacts
@@ -106,7 +115,7 @@ def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push,
     assert [(i.sample_time_boot_us, i.kind) for i in impacts] == [(3_004_000, kind)]
 
 
-# --- aftermath ----------------------------------------------------------------------------------------------
+# --- velocity jump ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("imu_every_us", [10_000, 20_000])

@@ -9,7 +9,7 @@ import pytest
 
 from companion.detection.interface import ImpactKind, Situation
 from companion.estimate import guards, normal
-from companion.estimate.approach import VelocityFix, velocity_at
+from companion.estimate.approach import velocity_at
 from companion.estimate.config import EstimateConfig, GuardsConfig
 from companion.estimate.facing import whole_normal
 from companion.estimate.normal import normal_of
@@ -17,6 +17,7 @@ from companion.estimate.push import Push
 from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample, Vibration
 from companion.mission.config import CompanionConfig
+from companion.motion.inertial import VelocityFix
 from companion.reflex.watch import advance, start_watch
 
 CONFIG = EstimateConfig()

@@ -7,7 +7,6 @@ from pymavlink.dialects.v20 import development as mav
 
 from bench.faults.packets import made
 from companion.detection.sight import Turning
-from companion.estimate.approach import VelocityFix
 from companion.flight.confirming import Claim, Leap
 from companion.messages import (
     Attitude,
@@ -19,6 +18,7 @@ from companion.messages import (
     Refused,
 )
 from companion.motion.history import MotionHistory
+from companion.motion.inertial import VelocityFix
 from companion.motion.resets import Resets
 from companion.motion.strapdown import Strapdown
 from tests.companion.fake_vehicle import LOITER, flight

@@ -1,18 +1,20 @@
-"""What a contact leaves behind: a step in the velocity that the accelerometer did not show.
+"""A step in the vehicle's velocity that the accelerometer did not show.
 
-Between two velocities the vehicle's own estimate must change as the accelerometer says (see `motion.strapdown`). A
-contact that fell between the samples the wire carries, or into a lost one, makes the estimate jump and not the sum.
-The body's rates jump with it, for a push beside the centre turns; on their own they prove nothing, because a motor
+Between two velocities the vehicle's own estimate must change as the accelerometer says (see `motion.inertial`). A
+contact that fell between the samples the wire carries, or into a lost one, makes the estimate jump and not the sum. The
+body's rates jump with it, for a push beside the centre turns; on their own they prove nothing, because a motor
 that fails turns the vehicle too.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from companion.messages import Vector3
 from companion.motion.delay import Delay
-from companion.motion.strapdown import LONGEST_DELAY_US, ZERO, Strapdown
+from companion.motion.inertial import VelocityFix, less_sum
+from companion.motion.strapdown import LONGEST_DELAY_US, LONGEST_GAP_US, ZERO
 
 # The velocities before the newest that it is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
@@ -37,19 +39,19 @@ RATE_STEP_KEPT_US = 120_000
 
 
 @dataclass(slots=True)
-class Aftermath:
+class VelocityJump:
     """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
     averaging_us: int
-    strapdown: Strapdown = field(default_factory=Strapdown)
-    previous_imu_us: int = 0
+    rates_frd_rad_s: Vector3 = ZERO
     newest_rate_step_rad_s: float = 0.0
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
-    velocity_ned_m_s: Vector3 | None = None
-    residuals: list[tuple[int, Vector3, Vector3, Vector3]] = field(default_factory=list)
-    """Time, velocity less sum, mean acceleration since the one before, sum."""
+    since_us: int = 0
+    """Velocities before this are no measure."""
+    before_us: int = 0
+    """Of the velocity before the newest."""
     delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
     known: int = 0
@@ -59,63 +61,41 @@ class Aftermath:
     """Of the newest step: velocity less sum with its delay in it, and the change of the acceleration."""
     unlearnt: tuple[Vector3, Vector3, Vector3] | None = None
 
-    def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
-        """Take one sample, body FRD."""
-        strapdown = self.strapdown
-        before_us = strapdown.time_boot_us
-        p_0, q_0, r_0 = strapdown.rates_frd_rad_s
-        if strapdown.imu(time_us, f, w):
-            p, q, r = w[0] - p_0, w[1] - q_0, w[2] - r_0
-            unseen_us = time_us - before_us - self.averaging_us
-            unseen = unseen_us / (time_us - before_us) if unseen_us > 0 else 0.0
+    def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3) -> None:
+        """Take one sample; the one before it was at `before_us`."""
+        elapsed_us, self.newest_rate_step_rad_s = time_us - before_us, 0.0
+        if 0 < elapsed_us < LONGEST_GAP_US:
+            unseen = max(0.0, 1.0 - self.averaging_us / elapsed_us)
             self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
-            step = self.newest_rate_step_rad_s = math.sqrt(p * p + q * q + r * r)
+            step = self.newest_rate_step_rad_s = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
-        else:
-            self.newest_rate_step_rad_s = 0.0
-            self.forget()
-        self.previous_imu_us = before_us
+        self.rates_frd_rad_s = rates_frd_rad_s
 
-    def forget(self) -> None:
-        """The sum has a hole, a contact in it, or the estimator was reset: what was before is no measure."""
-        self.residuals.clear()
-
-    def step_m_s(self, time_us: int, velocity_ned_m_s: Vector3) -> Vector3 | None:
-        """Take one velocity: how far it is from what the recent ones and the accelerometer lead to, or None."""
-        residuals = self.residuals
-        stands_still = velocity_ned_m_s == self.velocity_ned_m_s
-        self.velocity_ned_m_s = velocity_ned_m_s
-        if stands_still:
+    def step_m_s(self, fixes: Sequence[VelocityFix]) -> Vector3 | None:
+        """How far the newest velocity is from what the recent ones and the accelerometer lead to, or None."""
+        if len(fixes) < COMPARED + 2:
+            return None
+        recent = [fixes[place] for place in range(-COMPARED - 2, 0)]
+        times = [fix.time_boot_us for fix in recent]
+        self.before_us = times[-2]
+        if recent[-1].velocity_ned_m_s == recent[-2].velocity_ned_m_s:
             # To the last digit: nothing is estimated now, and what comes after is a new beginning.
-            residuals.clear()
+            self.since_us = times[-1]
+        apart_us = [b - a for a, b in pairwise(times)]
+        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_STEP_US:
             return None
-        if residuals and not 0 < time_us - residuals[-1][0] <= LONGEST_STEP_US:
-            residuals.clear()
-        u = self.strapdown.sum_at(time_us)
-        if u is None:
-            return None
-        residual, acceleration = _less(velocity_ned_m_s, u), self._accelerated(time_us, u)
-        found = None
-        if len(residuals) == COMPARED:
-            _, before, led, _ = zip(*residuals, strict=True)
-            step, change = _less(residual, _mean(before)), _less(acceleration, _mean(led))
-            late_s = self.delay.delay_s(self.variance_m2_s2)
-            found = (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
-            self.newest = (step, change)
-            del residuals[0]
-        residuals.append((time_us, residual, acceleration, u))
-        return found
-
-    def _accelerated(self, time_us: int, sum_ned_m_s: Vector3) -> Vector3:
-        """In the mean since the velocity before; what shakes is gone from it."""
-        if not self.residuals:
-            return self.strapdown.acceleration_ned_m_s2
-        before_us, _, _, before = self.residuals[-1]
-        per_s = 1e6 / (time_us - before_us)
-        n, e, d = _less(sum_ned_m_s, before)
-        return (per_s * n, per_s * e, per_s * d)
+        *before, residual = (less_sum(fix) for fix in recent[1:])
+        # In the mean since the velocity before: what shakes is gone from it.
+        *led, acceleration = (
+            _over(_less(b.sum_ned_m_s, a.sum_ned_m_s), 1e-6 * us)
+            for (a, b), us in zip(pairwise(recent), apart_us, strict=True)
+        )
+        step, change = _less(residual, _mean(before)), _less(acceleration, _mean(led))
+        self.newest = (step, change)
+        late_s = self.delay.delay_s(self.variance_m2_s2)
+        return (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
 
     def learn(self, step: Vector3) -> None:
         """Take in the step before this one; the newest must not hide its own successor.
@@ -147,16 +127,19 @@ class Aftermath:
         """The largest step of the rates from sample to sample that a jump at ``velocity_us`` may belong to."""
         return self.rate_step_rad_s if velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US else 0.0
 
-    def contact_gap_us(self, velocity_us: int, least_rad_s: float) -> int:
+    def free_until_us(self, velocity_us: int, least_rad_s: float) -> int:
         """Latest time at which the vehicle was certainly free before the step seen at ``velocity_us``."""
         if self.rate_step_near(velocity_us) >= least_rad_s:
             return self.rate_step_from_us
-        before = self.residuals[-2][0] if len(self.residuals) > 1 else velocity_us
-        return before - LONGEST_DELAY_US
+        return self.before_us - LONGEST_DELAY_US
 
 
 def _less(a: Vector3, b: Vector3) -> Vector3:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _over(a: Vector3, seconds: float) -> Vector3:
+    return (a[0] / seconds, a[1] / seconds, a[2] / seconds)
 
 
 def _mean(vectors: Sequence[Vector3]) -> Vector3:
