@@ -11,7 +11,9 @@ accelerometer, as the paper does it, u is zero, c the velocity itself and its sl
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -48,6 +50,80 @@ BIAS = Slope(0.08, 0.05, 100_000, 1.5)
 # Of the acceleration nothing is known at first but the vehicle's limits, about 0.3 g; that of half a second ago says
 # nothing about now, and 25 velocities are enough.
 LIMITS_M_S2, ALONE_US = 3.0, 500_000
+# A hit that velocities show is told up to 0.3 s later: of four spacings before one is from before it.
+LOOKED_BACK = 5
+# The NIS is the mean of so many velocities, 5 s.
+JUDGED_BY = 50
+
+
+class _Known(NamedTuple):
+    """What was known of c at a time; so many velocities have been taken, of a mean NIS."""
+
+    time_boot_us: int
+    kalman: KalmanFilter
+    taken: int = 0
+    nis: float = 0.0
+
+
+@dataclass(slots=True)
+class Approach:
+    """Velocities in the order of time, without a jump of the estimate or the sum between them."""
+
+    config: EstimateConfig
+    slope: Slope = BIAS
+    _known: deque[_Known] = field(default_factory=lambda: deque(maxlen=LOOKED_BACK))
+
+    def take(self, fix: VelocityFix) -> None:
+        """Take a velocity, unless it is too near to the one before it."""
+        if not self._known:
+            self._known.append(_Known(fix.time_boot_us, self._filter(fix)))
+            return
+        before = self._known[-1]
+        elapsed_us = fix.time_boot_us - before.time_boot_us
+        if elapsed_us < self.slope.spacing_us:
+            return
+        kalman = self._ahead(before.kalman, elapsed_us)
+        measures = np.eye(3, 7)
+        measures[:, 6] = np.negative(fix.acceleration_ned_m_s2)
+        nis, taken = kalman.update(np.array(less_sum(fix)), measures, self._noise), before.taken + 1
+        mean = before.nis + (nis - before.nis) / min(taken, JUDGED_BY)
+        self._known.append(_Known(fix.time_boot_us, kalman, taken, mean))
+
+    def velocity_at(self, contact_boot_us: int, sum_ned_m_s: Vector3) -> tuple[Vector3, float] | None:
+        """v_c at a contact where the sum is ``sum_ned_m_s``, and its standard deviation on an axis, m/s.
+
+        None where nothing is known from before, or when accelerometer and velocities contradict each other.
+        """
+        end_us = contact_boot_us - STAMP_RESOLUTION_US
+        before = next((known for known in reversed(self._known) if known.time_boot_us <= end_us), None)
+        if before is None or before.nis > 3.0 * self.slope.most_nis:
+            return None
+        kalman = self._ahead(before.kalman, contact_boot_us - before.time_boot_us)
+        n, e, d = (float(kalman.x[axis]) + sum_ned_m_s[axis] for axis in range(3))
+        return (n, e, d), math.sqrt(max(kalman.P[axis, axis] for axis in range(3)))
+
+    @property
+    def _noise(self) -> Floats:
+        """An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not
+        get."""
+        spacing_us, lasts_us = self.slope.spacing_us, 2e6 * self.config.velocity_correlation_s
+        colour = max(1.0, lasts_us / spacing_us) if spacing_us else 1.0
+        return np.eye(3) * (self.config.velocity_noise_m_s**2 * colour)
+
+    def _filter(self, first: VelocityFix) -> KalmanFilter:
+        offset = np.array(less_sum(first)) + DELAY_S * np.array(first.acceleration_ned_m_s2)
+        unknown = np.diag([0.0] * 3 + [self.slope.spread_m_s2**2] * 3 + [DELAY_SPREAD_S**2])
+        return KalmanFilter(np.concatenate([offset, np.zeros(3), [DELAY_S]]), np.pad(self._noise, (0, 4)) + unknown)
+
+    def _ahead(self, kalman: KalmanFilter, elapsed_us: int) -> KalmanFilter:
+        """Another filter, later."""
+        dt_s = 1e-6 * elapsed_us
+        transition = np.eye(7)
+        transition[0, 3] = transition[1, 4] = transition[2, 5] = dt_s
+        walk = self.slope.walk**2 * dt_s
+        later = KalmanFilter(kalman.x, kalman.P)
+        later.predict(F=transition, Q=np.diag([SUM_DENSITY_M2_S3 * dt_s] * 3 + [walk] * 3 + [0.0]))
+        return later
 
 
 def velocity_alone(
@@ -55,40 +131,11 @@ def velocity_alone(
 ) -> tuple[Vector3, float] | None:
     """The same without the accelerometer; samples that may have been taken after the contact are ignored."""
     start_us, end_us = contact_boot_us - ALONE_US, contact_boot_us - STAMP_RESOLUTION_US
-    times = [(s.time_boot_us, s.velocity_ned_m_s) for s in samples if start_us <= s.time_boot_us <= end_us]
-    acceleration = Slope(LIMITS_M_S2, math.sqrt(config.jerk_density_m2_s5), 0, math.inf)
-    return velocity_at([VelocityFix(t, v, ZERO, ZERO) for t, v in times], contact_boot_us, ZERO, config, acceleration)
-
-
-def velocity_at(
-    fixes: Sequence[VelocityFix],
-    contact_boot_us: int,
-    sum_ned_m_s: Vector3,
-    config: EstimateConfig,
-    slope: Slope = BIAS,
-) -> tuple[Vector3, float] | None:
-    """v_c at a contact where the sum is ``sum_ned_m_s``, and its standard deviation on an axis, m/s.
-
-    ``fixes`` are in the order of time and from before the contact, without a jump of the estimate between them. None
-    when there are none, or when accelerometer and velocities contradict each other.
-    """
-    batch = _thinned(fixes, slope.spacing_us)
-    if not batch:
-        return None
-    # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
-    colour = max(1.0, 2e6 * config.velocity_correlation_s / slope.spacing_us) if slope.spacing_us else 1.0
-    noise = np.eye(3) * (config.velocity_noise_m_s**2 * colour)
-    kalman = _filter(batch[0], noise, slope)
-    time_us, surprise = batch[0].time_boot_us, 0.0
-    for fix in batch[1:]:
-        _predict(kalman, (fix.time_boot_us - time_us) * 1e-6, slope)
-        surprise += _update(kalman, fix, noise)
-        time_us = fix.time_boot_us
-    if surprise > slope.most_nis * 3 * max(len(batch) - 1, 1):
-        return None
-    _predict(kalman, (contact_boot_us - time_us) * 1e-6, slope)
-    n, e, d = (float(kalman.x[axis]) + sum_ned_m_s[axis] for axis in range(3))
-    return (n, e, d), float(np.sqrt(max(kalman.P[0, 0], kalman.P[1, 1], kalman.P[2, 2])))
+    approach = Approach(config, Slope(LIMITS_M_S2, math.sqrt(config.jerk_density_m2_s5), 0, math.inf))
+    for sample in samples:
+        if start_us <= sample.time_boot_us <= end_us:
+            approach.take(VelocityFix(sample.time_boot_us, sample.velocity_ned_m_s, ZERO, ZERO))
+    return approach.velocity_at(contact_boot_us, ZERO)
 
 
 def position_at(samples: Sequence[LocalPosition], contact_boot_us: int, velocity_ned_m_s: Vector3) -> Vector3:
@@ -100,36 +147,3 @@ def position_at(samples: Sequence[LocalPosition], contact_boot_us: int, velocity
         for axis in range(3)
     )
     return (n, e, d)
-
-
-def _thinned(fixes: Sequence[VelocityFix], spacing_us: int) -> list[VelocityFix]:
-    """The newest, and before it what is far enough apart; oldest first."""
-    kept: list[VelocityFix] = []
-    for fix in reversed(fixes):
-        if not kept or kept[-1].time_boot_us - fix.time_boot_us >= spacing_us:
-            kept.append(fix)
-    return kept[::-1]
-
-
-def _offset(fix: VelocityFix) -> Floats:
-    return np.array(less_sum(fix))
-
-
-def _filter(first: VelocityFix, noise: Floats, slope: Slope) -> KalmanFilter:
-    a = np.array(first.acceleration_ned_m_s2)
-    x = np.concatenate([_offset(first) + DELAY_S * a, np.zeros(3), [DELAY_S]])
-    unknown = np.diag([0.0] * 3 + [slope.spread_m_s2**2] * 3 + [DELAY_SPREAD_S**2])
-    return KalmanFilter(x, np.pad(noise, (0, 4)) + unknown)
-
-
-def _predict(kalman: KalmanFilter, dt_s: float, slope: Slope) -> None:
-    transition = np.eye(7)
-    transition[0, 3] = transition[1, 4] = transition[2, 5] = dt_s
-    walk = slope.walk**2 * dt_s
-    kalman.predict(F=transition, Q=np.diag([SUM_DENSITY_M2_S3 * dt_s] * 3 + [walk] * 3 + [0.0]))
-
-
-def _update(kalman: KalmanFilter, fix: VelocityFix, noise: Floats) -> float:
-    measures = np.eye(3, 7)
-    measures[:, 6] = np.negative(fix.acceleration_ned_m_s2)
-    return kalman.update(_offset(fix), measures, noise)

@@ -2,12 +2,12 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.estimate.approach import ALONE_US, position_at, velocity_alone, velocity_at
+from companion.estimate.approach import ALONE_US, Approach, position_at, velocity_alone
 from companion.estimate.config import EstimateConfig
 from companion.estimate.facing import normal_by, whole_normal
 from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
@@ -15,7 +15,7 @@ from companion.estimate.push import Push, unit
 from companion.estimate.trust import Trust
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
-from companion.motion.inertial import Inertial
+from companion.motion.inertial import Inertial, VelocityFix
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import ZERO
 
@@ -74,6 +74,7 @@ class ImpactEstimator:
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
     trust: Trust = field(default_factory=Trust)
+    approach: Approach = field(init=False)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -84,6 +85,9 @@ class ImpactEstimator:
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
     clipping_counts: tuple[int, int, int] | None = None
+
+    def __post_init__(self) -> None:
+        self.approach = Approach(self.config)
 
     @property
     def fits_normal(self) -> bool:
@@ -105,6 +109,7 @@ class ImpactEstimator:
             self.inertial.velocity(sample)
             if self.inertial.has_new_fix:
                 self.trust.hear(self.inertial.fixes, self.inertial.strapdown.level_leans_m_s2)
+                self._approach(self.inertial.fixes)
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
@@ -116,6 +121,18 @@ class ImpactEstimator:
             return
         if self.push is not None:
             self._seek(self.push)
+
+    def _approach(self, fixes: Sequence[VelocityFix]) -> None:
+        """The newest velocity, unless the latest contact's swing may be in it. After a jump the first begins anew."""
+        if len(fixes) == 1:
+            self.approach = Approach(self.config)
+        if self.contact_ended_boot_us is None or fixes[-1].time_boot_us > self.contact_ended_boot_us + REST_US:
+            self.approach.take(fixes[-1])
+
+    def _touched(self, boot_us: int) -> None:
+        """The contact lasts: v_c of a next one is found from what follows."""
+        if boot_us != self.contact_ended_boot_us:
+            self.contact_ended_boot_us, self.approach = boot_us, Approach(self.config)
 
     def _seek(self, push: Push) -> None:
         """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
@@ -156,7 +173,7 @@ class ImpactEstimator:
         self.situation = situation
         self.push = self._begin_push(impact) if impact.evidence is Evidence.FORCE else None
         self.search, self.is_over = None, False
-        self.contact_ended_boot_us = sample_us
+        self._touched(sample_us)
         self.trust.doubt(sample_us)
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
@@ -207,7 +224,7 @@ class ImpactEstimator:
         if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
         if not self.is_over:
-            self.contact_ended_boot_us = state.last_loud_boot_us
+            self._touched(state.last_loud_boot_us)
             self.is_over = state.phase is not Phase.CONTACT
             if push is not None and sample.time_boot_us > push.time_boot_us:
                 loud = state.last_loud_boot_us == sample.time_boot_us
@@ -274,13 +291,10 @@ class ImpactEstimator:
 
     def _velocity(self, contact_us: int) -> tuple[Vector3, float] | None:
         """v_c by velocities and accelerometer; None where too little was heard for it."""
-        end_us = contact_us - STAMP_RESOLUTION_US
-        since_us = 0 if self.contact_ended_boot_us is None else self.contact_ended_boot_us + REST_US
-        fixes = [fix for fix in self.inertial.fixes if since_us < fix.time_boot_us <= end_us]
-        before = [entry for entry in self.sums if entry[0] <= contact_us]
-        if not fixes or not before:
+        before = next((entry for entry in reversed(self.sums) if entry[0] <= contact_us), None)
+        if before is None:
             return None
-        time_us, u, a = before[-1]
+        time_us, u, a = before
         ahead_s = (contact_us - time_us) * 1e-6
         at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
-        return velocity_at(fixes, contact_us, at_contact, self.config)
+        return self.approach.velocity_at(contact_us, at_contact)

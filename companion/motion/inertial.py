@@ -10,8 +10,8 @@ from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Vec
 from companion.motion.history import ODOMETRY_KEPT_US
 from companion.motion.strapdown import Strapdown
 
-# An accelerometer's bias is learnt in seconds: the longer, the better, until the vehicle has turned it elsewhere.
-KEPT_US = 5_000_000
+# What shows a hit, or denies it, lies within three tenths of a second of it.
+KEPT_US = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)

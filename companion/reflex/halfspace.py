@@ -22,8 +22,9 @@ def away_from(normal_ned: Vector3) -> Vector3:
 
 def split(vector: Vector3, normal: Vector3) -> tuple[float, Vector3]:
     """The part of a vector along a unit normal, and the rest."""
-    along = sum(v * n for v, n in zip(vector, normal, strict=True))
-    return along, (vector[0] - along * normal[0], vector[1] - along * normal[1], vector[2] - along * normal[2])
+    (u, v, w), (a, b, c) = vector, normal
+    along = u * a + v * b + w * c
+    return along, (u - along * a, v - along * b, w - along * c)
 
 
 def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:
@@ -47,7 +48,8 @@ class Surface:
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """How far a place is from touching."""
-        return sum(n * (p - s) for n, p, s in zip(self.normal_ned, place_ned_m, self.point_ned_m, strict=True))
+        (a, b, c), (x, y, z), (u, v, w) = self.normal_ned, place_ned_m, self.point_ned_m
+        return a * (x - u) + b * (y - v) + c * (z - w)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import pytest
 
 from companion.detection.interface import ImpactKind, Situation
 from companion.estimate import guards, normal
-from companion.estimate.approach import velocity_at
+from companion.estimate.approach import Approach
 from companion.estimate.config import EstimateConfig, GuardsConfig
 from companion.estimate.facing import whole_normal
 from companion.estimate.normal import normal_of
@@ -38,24 +38,28 @@ def fixes(seed, seconds=5.0, acceleration=2.0, delay_s=0.02, bias=0.05, noise=0.
         yield VelocityFix(t_us, (velocity, 0.0, 0.0), (measured * t, 0.0, 0.0), (measured, 0.0, 0.0))
 
 
+def velocity_at(heard):
+    approach = Approach(CONFIG)
+    for fix in heard:
+        approach.take(fix)
+    return approach.velocity_at(CONTACT_US, (0.0, 0.0, 0.0))
+
+
 def test_v_c_is_right_to_a_few_centimetres_whatever_the_delay_the_bias_and_the_errors_that_last():
-    errors = [
-        velocity_at(list(fixes(seed, delay_s=0.02 * (seed % 2))), CONTACT_US, (0.0, 0.0, 0.0), CONFIG)[0][0] - 2.0
-        for seed in range(60)
-    ]
+    errors = [velocity_at(fixes(seed, delay_s=0.02 * (seed % 2)))[0][0] - 2.0 for seed in range(60)]
     assert math.sqrt(sum(e * e for e in errors) / len(errors)) < 0.03
 
 
 def test_what_the_filter_says_of_its_own_error_is_true():
-    pairs = [velocity_at(list(fixes(seed)), CONTACT_US, (0.0, 0.0, 0.0), CONFIG) for seed in range(60)]
+    pairs = [velocity_at(fixes(seed)) for seed in range(60)]
     rms = math.sqrt(sum((v[0] - 2.0) ** 2 for v, _ in pairs) / len(pairs))
     assert 0.4 < rms / pairs[0][1] < 1.5
 
 
 def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
     wrong = [VelocityFix(f.time_boot_us, f.velocity_ned_m_s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) for f in fixes(1)]
-    assert velocity_at(wrong, CONTACT_US, (0.0, 0.0, 0.0), CONFIG) is None
-    assert velocity_at([], CONTACT_US, (0.0, 0.0, 0.0), CONFIG) is None
+    assert velocity_at(wrong) is None
+    assert velocity_at([]) is None
 
 
 GUARDS = GuardsConfig(travel_m=0.03)
