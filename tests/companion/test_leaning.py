@@ -139,7 +139,7 @@ def test_a_wall_met_at_a_crawl_is_backed_away_from(tmp_path):
     flight, told = flown(tmp_path, [go], walls=screen(0.5))
     # Then it leans on it for no longer than it takes to be sure, backs away, and the policy follows
     assert len(told) == 1 and len(flight.report.collisions) == 1
-    assert most_tilt_deg(flight) < 25.0
+    assert most_tilt_deg(flight) < 35.0
     collision = flight.report.collisions[0]
     assert collision.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.2)
     assert collision.recovery_setpoint_ned_m[0] < collision.position_ned_m[0] - 0.25
@@ -152,7 +152,7 @@ def test_a_door_that_comes_slowly_pushes_the_hovering_vehicle_out_of_its_way(tmp
     door = screen(0.6, velocity_ned_m_s=[-0.06, 0, 0], from_s=9.0, until_s=20.0)
     flight, told = flown(tmp_path, [{"hold": {"duration_s": 14}}], walls=door)
     assert told and flight.report.outcome == "completed"
-    assert most_tilt_deg(flight) < 25.0
+    assert most_tilt_deg(flight) < 35.0
     assert all(collision.settled_after_s is not None for collision in flight.report.collisions)
 
 
@@ -189,6 +189,6 @@ def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(
     assert len(flight.truth.hits) > 1, "it touches the vehicle again"
     # Then the vehicle gives way, never leans on it, and takes the end of the long push for no hit from the other side
     assert flight.report.outcome == "completed"
-    assert most_tilt_deg(flight) < 25.0
+    assert most_tilt_deg(flight) < 35.0
     assert all(collision.normal_ned[0] < -0.5 for collision in flight.report.collisions)
     assert all(collision.settled_after_s is not None for collision in flight.report.collisions[-1:])
