@@ -52,7 +52,7 @@ class Recover:
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         self._spin_rad_s = 0.0
         self._is_known = not self._law.follows  # the motion after the hit
-        self._has_left, self._may_fall, self._comes_m_s = False, False, 0.0
+        self._has_left, self._may_fall, self._hangs, self._comes_m_s = False, False, False, 0.0
         self._agreed: Vector3 | None = None  # the normal by the velocities before and after
         self._planned_for: object = None  # what was known of the contact
         self._plan: Plan | None = None  # while the vehicle follows one; else it is asked for accelerations alone
@@ -90,7 +90,9 @@ class Recover:
         north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
         a, b, c = safe_to_hold(asked, self._leant.velocity_ned_m_s)
         a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
-        falls = self._is_level and self._may_fall and self._presses(HANGS_M_S2)
+        # Once it hangs, until it does not lean on it any more.
+        self._hangs = self._presses(LEANS_M_S2 if self._hangs else HANGS_M_S2)
+        falls = self._is_level and self._may_fall and self._hangs
         is_free = falls or (self._is_level and not self._is_known)
         if is_free:
             c = FALLS_M_S2 if falls else self._height_m_s2(2.0)

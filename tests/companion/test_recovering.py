@@ -10,7 +10,7 @@ from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.recovering import Recover
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import Attitude, LocalPosition
+from companion.messages import Attitude, LocalPosition, Vector3
 from companion.mission.model import Mission
 from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.config import FALLS_M_S2
@@ -22,6 +22,10 @@ OFF_M, OFF_M_S, LEVEL_LEANS_M_S2 = (0.3, -0.2, 0.1), (-0.1, 0.05, 0.0), (0.5, 0.
 MISSION = {"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]}
 
 
+def leans_m_s2(lean_deg: float) -> Vector3:
+    return (GRAVITY_M_S2 * math.tan(math.radians(lean_deg)), 0.0, 0.0)
+
+
 def asked(
     lean_deg: float,
     height_m: float = 2.0,
@@ -29,8 +33,10 @@ def asked(
     attitude: Attitude | None = None,
     is_whole: bool = False,
     told_off: bool = False,
+    leant_deg: float | None = None,
 ) -> Target:
-    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much."""
+    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much; before, by another
+    angle."""
     mission = Mission.model_validate(MISSION)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
@@ -42,13 +48,17 @@ def asked(
     )
     recover, flight.vehicle.attitude = Recover(flight, 0), attitude
     reckoning.tell(is_whole, HIT_US)
-    reckoning.lean_m_s2 = (GRAVITY_M_S2 * math.tan(math.radians(lean_deg)), 0.0, 0.0)
+    reckoning.lean_m_s2 = leans_m_s2(lean_deg)
     sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
     recover.step(flight, Inputs(positions=[sample]), SINCE_US)
     if told_off:
         reckoning.off_m, reckoning._missing_m_s = OFF_M, OFF_M_S
         flight.collisions[0].level_leans_m_s2 = LEVEL_LEANS_M_S2
+    if leant_deg is not None:
+        now, reckoning.lean_m_s2 = reckoning.lean_m_s2, leans_m_s2(leant_deg)
+        recover.target(SINCE_US)
+        reckoning.lean_m_s2 = now
     target = recover.target(SINCE_US)
     assert target is not None
     return target
@@ -73,6 +83,15 @@ def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, fa
     target = asked(30.0, height_m, down_m_s)
     assert target.acceleration_ned_m_s2 is not None
     assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is falls
+
+
+@pytest.mark.parametrize(
+    ("leant_deg", "lean_deg", "hangs"), [(30.0, 15.0, True), (30.0, 5.0, False), (15.0, 19.0, False)]
+)
+def test_a_vehicle_that_hangs_lets_go_until_it_does_not_lean_on_it_any_more(leant_deg, lean_deg, hangs):
+    target = asked(lean_deg, leant_deg=leant_deg)
+    assert target.acceleration_ned_m_s2 is not None
+    assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is hangs
 
 
 LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
