@@ -236,6 +236,9 @@ class FusedDetector:
         least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
         p, q, _ = jump.rates_frd_rad_s
         shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
-        room = config.velocity_per_rate_m * (abs(p) + abs(q))
+        noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
+        if jump.no_motor_turns(time_us, config.rate_step_rad_s):
+            # Two signs, half as clear, and the thrust has not turned for long.
+            noise_m_s, room = 0.5 * noise_m_s, 0.0
         room += jump.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
-        return caution * max(least, config.noise_factor * spread_m_s) + room
+        return caution * max(least, noise_m_s) + room

@@ -14,7 +14,7 @@ from itertools import pairwise
 from companion.messages import Vector3
 from companion.motion.delay import Delay
 from companion.motion.inertial import VelocityFix, less_sum
-from companion.motion.strapdown import LONGEST_DELAY_US, LONGEST_GAP_US, ZERO
+from companion.motion.strapdown import LONGEST_DELAY_US, LONGEST_GAP_US, MOTORS_RAD_S2, ZERO
 
 # The velocities before the newest that it is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
@@ -34,6 +34,9 @@ UNSEEN_SHARE = 0.1
 SHAKEN_S, STAMP_S = 0.15, 0.008
 # An output predictor's lag.
 LAG_S = 0.02
+# Four times what motors do, so that a nimbler vehicle's flips are none. A rigid vehicle that meets a leaning wall at
+# 2 m/s steps by 15 rad/s and more.
+NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
 # A step of the rates marks the gap that the contact fell into for this long: the velocity's interval and its delay.
 RATE_STEP_KEPT_US = 120_000
 
@@ -126,6 +129,11 @@ class VelocityJump:
     def rate_step_near(self, velocity_us: int) -> float:
         """The largest step of the rates from sample to sample that a jump at ``velocity_us`` may belong to."""
         return self.rate_step_rad_s if velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US else 0.0
+
+    def no_motor_turns(self, velocity_us: int, least_rad_s: float) -> bool:
+        """Whether that step is, beyond so much, more than motors make from one sample to the next."""
+        over_s = 1e-6 * (self.rate_step_until_us - self.rate_step_from_us)
+        return self.rate_step_near(velocity_us) >= least_rad_s + NO_MOTORS_RAD_S2 * over_s
 
     def free_until_us(self, velocity_us: int, least_rad_s: float) -> int:
         """Latest time at which the vehicle was certainly free before the step seen at ``velocity_us``."""

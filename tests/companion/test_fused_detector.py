@@ -151,6 +151,18 @@ def test_of_a_stiff_hit_between_the_samples_what_clipping_leaves_in_the_velocity
     assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
 
 
+@pytest.mark.parametrize(("turn_rad_s", "hits"), [(11.0, 1), (3.0, 0)])
+def test_a_turn_that_no_motor_makes_needs_little_of_a_step(turn_rad_s, hits):
+    """A beam met in the climb at 50 Hz: within 20 ms the nimblest motors turn the vehicle by 10 rad/s at most."""
+
+    def rates(t):
+        return (turn_rad_s * 0.7, turn_rad_s * 0.7, 0.0) if t > 3_002_000 else (0.0, 0.0, 0.0)
+
+    jump = (3_002_000, (0.0, 0.0, 0.1), 0)
+    flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump, rates=rates)
+    assert [i.evidence for i in flight.fly(until_us=3_045_000)] == [Evidence.AFTERMATH] * hits
+
+
 @pytest.mark.parametrize(("counted", "heard_odometry", "hits"), [(1, True, 0), (0, True, 1), (1, False, 1)])
 def test_a_jump_that_the_estimator_counts_as_its_own_is_no_hit(counted, heard_odometry, hits):
     """Without ODOMETRY nothing tells the two apart: that is what is lost."""
