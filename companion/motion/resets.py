@@ -36,7 +36,7 @@ class Resets:
     _first: Odometry | None = None
     """The first message with another counter than the latest's."""
     _place: LocalPosition | None = None
-    """The latest one believed; None after a reset."""
+    """The latest one accepted; None after a reset."""
 
     def follow(self, samples: Sequence[Sample], most_m: float) -> Sequence[Sample]:
         """What was heard, in this frame. A jump of more than `most_m` does not shift it."""

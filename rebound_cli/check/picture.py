@@ -136,7 +136,7 @@ def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
     begins_s = 0.0
     for way in ways:
         lasts_s = _UNKNOWN_S if way.leg.lasts_s is None else way.leg.lasts_s
-        moving_s = 0.0 if way.leg.way is None else way.leg.way.duration_s
+        moving_s = 0.0 if way.leg.trajectory is None else way.leg.trajectory.duration_s
         times = begins_s + way.fractions * moving_s
         heights = -way.points_ned_m[:, 2]
         axis.plot(times, heights, color=_WAY, linewidth=1.6)

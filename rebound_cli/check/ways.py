@@ -41,7 +41,7 @@ class Way:
 
     @property
     def length_m(self) -> float:
-        return 0.0 if self.leg.way is None else self.leg.way.distance_m
+        return 0.0 if self.leg.trajectory is None else self.leg.trajectory.distance_m
 
     @property
     def ends_s(self) -> float | None:
@@ -53,10 +53,10 @@ def planned_ways(mission: Mission, world: SimulatedWorld) -> tuple[Way, ...]:
     begins_s: float | None = 0.0
     ways: list[Way] = []
     for leg in itinerary(mission):
-        way, fractions, points = leg.way, np.zeros(1), np.array([leg.start_ned_m])
-        if way is not None and way.duration_s > 0.0:
-            fractions = np.linspace(0.0, 1.0, min(_MOST_POINTS, max(2, math.ceil(way.distance_m / _STEP_M))) + 1)
-            points = np.array([way.at(fraction * way.duration_s)[0] for fraction in fractions])
+        flown, fractions, points = leg.trajectory, np.zeros(1), np.array([leg.start_ned_m])
+        if flown is not None and flown.duration_s > 0.0:
+            fractions = np.linspace(0.0, 1.0, min(_MOST_POINTS, max(2, math.ceil(flown.distance_m / _STEP_M))) + 1)
+            points = np.array([flown.at(fraction * flown.duration_s)[0] for fraction in fractions])
         ways.append(Way(leg, begins_s, points, fractions, _first_met(points, world.scene, world.airframe)))
         begins_s = ways[-1].ends_s
     return tuple(ways)

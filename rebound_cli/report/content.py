@@ -260,7 +260,7 @@ def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
         corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline(patch)[:-1]]
     else:
         (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
-        (left_m, right_m), (low_m, high_m) = patch.believed_along_m(), patch.believed_heights_m()
+        (left_m, right_m), (low_m, high_m) = patch.assumed_along_m(), patch.assumed_heights_m()
         around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
         corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
     return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]

@@ -75,8 +75,8 @@ def _axis_acceleration(axis: int, state: PlantState, asked: SetpointRows, gains:
 def _thrust(acceleration: Floats, tilt_max_rad: float, most_m_s2: float) -> None:
     """Turn what is asked into thrust over mass, of ``most_m_s2`` at most, NED; as `PositionControl.cpp` of PX4.
 
-    It leans as if it hovered (MPC_ACC_DECOUPLE) and thrusts so as to hold the height once it leans so, not as it leans
-    now: tipped onto a wall it presses with all of its weight. Where there is too little thrust, height comes first.
+    It tilts as if it hovered (MPC_ACC_DECOUPLE). Its thrust holds the height at the commanded tilt, not at the present
+    one: tipped onto a wall it presses with all of its weight. Where there is too little thrust, height comes first.
     """
     horizontal = math.hypot(acceleration[0], acceleration[1])
     leant = min(horizontal / GRAVITY_M_S2, math.tan(tilt_max_rad))

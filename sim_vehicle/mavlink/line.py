@@ -114,7 +114,7 @@ class Outbox:
             self._packets.append(packet)
 
     def has_room(self, count: int) -> bool:
-        """Whether so many bytes more would not be lost."""
+        """Whether the line's buffer has room for these bytes."""
         return self._buffer.has_room(count)
 
     def take(self) -> tuple[bytes, ...]:

@@ -207,8 +207,8 @@ def settle_contacts(
             if behind[point, face] != IN_FRONT:
                 continue
             state.depth_m[point] = max(state.depth_m[point], depth)
-            # A guard that rolls over a pole or an edge goes on pressing its arm as it began: else the same depth would
-            # cost more and more force, and the roll would make energy.
+            # A guard that rolls over a pole or an edge keeps pressing the same arm. Otherwise the same depth would cost
+            # more and more force, and the roll would make energy.
             if faces[face, FACE_RADIUS] > 0.0 and depth > 0.0:
                 share = state.share[point] = scratch.share[point] if scratch.share[point] > 0.0 else share
             if point >= GUARDS:

@@ -59,8 +59,8 @@ def add_raw_sample(
 def shake(state: PlantState, raw_s: float, constants: Constants, disturbance: Disturbance, shaken: Floats) -> None:
     """Turn the rotors on and write the vibration that they make on the raw axes into ``shaken`` (6,), m/s2 and rad/s.
 
-    An unbalanced rotor pulls outward as it turns, with the square of its speed, as thrust goes: once a turn across the
-    rotors' axes, and twice a turn (two blades that do not track) along them.
+    An unbalanced rotor's force grows with the square of its speed, as thrust does. It acts once a turn across the
+    rotors' axes, and twice a turn along them (two blades that do not track).
     """
     shaken[:] = 0.0
     hover_n = constants.mass_kg * GRAVITY_M_S2 / 4

@@ -223,9 +223,8 @@ def _ratio_for(restitution: float) -> float:
     return (low + high) / 2
 
 
-# A disc lying flat against a face (a ceiling) cannot fold its arm towards it; below this share of the
-# normal in the disc's plane the push is taken as straight through the frame. A frame without arms that fold is as
-# stiff one way as another.
+# A disc flat against a face (a ceiling) cannot fold its arm towards it. Below this share of the normal in the disc's
+# plane the force goes straight through the frame. A frame without arms that fold is as stiff one way as another.
 LEAST_IN_PLANE = 0.2
 
 

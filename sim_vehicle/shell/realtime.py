@@ -1,4 +1,4 @@
-"""The simulated vehicle in real time, or so many times faster, on any number of ports."""
+"""The simulated vehicle in real time, or faster by a factor, on any number of ports."""
 
 import time
 from collections.abc import Callable, Sequence
