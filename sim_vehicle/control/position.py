@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
@@ -40,7 +41,7 @@ def position_control(state: PlantState, mass_kg: float, motor_max_n: float, aske
         state.yaw_setpoint_rad = asked.yaw[0]
     else:
         state.yaw_setpoint_rad += asked.yaw[2] * step_s
-    _thrust(acceleration, gains.tilt_max_rad, 4 * motor_max_n / mass_kg)
+    _thrust(acceleration, gains.tilt_max_rad, ARMS * motor_max_n / mass_kg)
     state.collective_n = mass_kg * math.sqrt(acceleration @ acceleration)
     _attitude(state, acceleration)
 

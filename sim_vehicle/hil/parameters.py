@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from sim_vehicle.airframe import Airframe
+from sim_vehicle.airframe import ARMS, Airframe
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS
 
 # PX4 scales a quadrotor's roll and pitch columns so that a torque setpoint of 1 moves every motor by
@@ -55,7 +55,7 @@ def px4_parameters(airframe: Airframe, position: Position = "mocap") -> tuple[Pa
 def _allocation(airframe: Airframe) -> Iterable[Parameter]:
     radius_m, moment_m = airframe.geometry.motor_radius_m, airframe.motors.moment_per_thrust_m
     yield Parameter("CA_AIRFRAME", 0, "multirotor")
-    yield Parameter("CA_ROTOR_COUNT", 4, "quad-x, in PX4's order")
+    yield Parameter("CA_ROTOR_COUNT", ARMS, "quad-x, in PX4's order")
     for rotor, (direction, sign) in enumerate(zip(ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, strict=True)):
         yield Parameter(f"CA_ROTOR{rotor}_PX", float(radius_m * direction[0]), "motor, metres ahead of the centre")
         yield Parameter(f"CA_ROTOR{rotor}_PY", float(radius_m * direction[1]), "metres to the right")
@@ -68,7 +68,7 @@ def _allocation(airframe: Airframe) -> Iterable[Parameter]:
 def _gains(airframe: Airframe) -> Iterable[Parameter]:
     """Attitude as a cascade: w^2 and 2 z w of the airframe's loop are P_angle * P_rate and P_rate."""
     control, motors = airframe.control, airframe.motors
-    all_n = 4 * motors.max_thrust_n
+    all_n = ARMS * motors.max_thrust_n
     arm_m = airframe.geometry.motor_radius_m / math.sqrt(2)
     jx, jy, jz = airframe.inertia_kg_m2
     rate_per_s = 2 * control.attitude_damping * control.attitude_frequency_rad_s

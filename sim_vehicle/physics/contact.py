@@ -132,7 +132,7 @@ def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxe
     the stop): eq. 2 ends there. A free arm has its end's mass to move as well (implicit Euler: its fastest time,
     3 ms, is far above any step). The hysteresis holds it where eq. 2 would take it back to zero.
     """
-    for arm in range(4):
+    for arm in range(GUARDS):
         fold = state.fold_m[arm]
         if fold == 0.0 and state.fold_rate_m_s[arm] == 0.0:
             relaxed_m[arm] = 0.0
