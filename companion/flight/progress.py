@@ -95,7 +95,7 @@ class FlyItems(_OnTrajectory):
         flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
         if isinstance(self._action, items.ExpectItem):
             expecting.begin(flight, step.label, self._action, now_us)
-        elif isinstance(self._action, items.GoToItem | items.VelocityItem | items.PathItem | items.OrbitItem):
+        elif isinstance(self._action, items.Motion):
             self._plan(self._action, start, now_us)
 
     def _plan(self, action: items.Motion, start_m: Vector3, now_us: int) -> None:
