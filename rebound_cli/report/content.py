@@ -17,7 +17,7 @@ from rebound_cli.report.packing import kept_rows, packed
 from rebound_cli.report.shown_flight import ShownFlight, patch_of
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
-from sim_vehicle.world import Box, Motion, Obstacle, Pole
+from sim_vehicle.world import Motion, Obstacle, Pole
 
 Floats = npt.NDArray[np.float64]
 
@@ -224,7 +224,7 @@ def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
     if isinstance(obstacle, Pole):
         shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
         return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
-    box = obstacle if isinstance(obstacle, Box) else obstacle.box()
+    box = obstacle.box()
     shape = {"centre": box.centre_ned_m, "axes": box.axes_ned, "sizes": box.sizes_m}
     return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
 
