@@ -173,7 +173,7 @@ class FlightContext:
     horizontal_force: HorizontalForceMonitor = field(default_factory=HorizontalForceMonitor)
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
     vertical_force: VerticalForceMonitor = field(default_factory=VerticalForceMonitor)
-    blind_since_us: int | None = None  # the detector, while it is on
+    no_data_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None
     reason: str = ""

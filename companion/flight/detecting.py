@@ -18,8 +18,8 @@ def collisions(
 ) -> list[ImpactEstimate]:
     """The impacts of this step that are collisions."""
     seen = watch.advance(watching, samples, situation, now_us)
-    if (watching.blind_reason is None) is not (flight.blind_since_us is None):
-        flight.blind_since_us = None if watching.blind_reason is None else now_us
+    if (watching.blind_reason is None) is not (flight.no_data_since_us is None):
+        flight.no_data_since_us = None if watching.blind_reason is None else now_us
     for notice in seen.notices:
         flight.tell(now_us, notice.kind, notice.text, **notice.data)
     for estimate in seen.impacts:

@@ -21,7 +21,7 @@ from companion.px4_mode import OFFBOARD, mode_name
 _KINDS = {
     Trigger.CONTROL_LOST: "let_go",
     Trigger.NOT_CONFIRMED: "refused",
-    Trigger.BLIND: "link",
+    Trigger.POSITION_SILENT: "link",
     Trigger.CROSSED: "crossed",
     Trigger.WORTH_GUARDING: "watching",
     Trigger.NOT_TO_GUARD: "watching",
@@ -37,7 +37,7 @@ THROTTLE = 2
 # In these cases a program sends setpoints on a link of its own.
 _BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 # After these the vehicle is given back to hold whatever is configured.
-_TO_HOLD = (Trigger.STOPPED, Trigger.HIT_BESIDE_PROGRAM, Trigger.NOT_CONFIRMED, Trigger.BLIND, Trigger.CROSSED)
+_TO_HOLD = (Trigger.STOPPED, Trigger.HIT_BESIDE_PROGRAM, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT, Trigger.CROSSED)
 
 
 @dataclass
@@ -124,8 +124,8 @@ class GuardMachine(StateMachine):
             return Move(Trigger.STOPPED, inputs.stop_reason)
         if self.state not in HOLDING:
             return self._link_restored(now_us)
-        blind = silent_position(guard)
-        return None if blind is None else Move(Trigger.BLIND, blind)
+        silent = silent_position(guard)
+        return None if silent is None else Move(Trigger.POSITION_SILENT, silent)
 
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight

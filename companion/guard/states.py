@@ -32,7 +32,7 @@ class Trigger(Enum):
     NOT_TO_GUARD = "landing, or in a mode that may not be taken over"
     CONFIRMED = "OFFBOARD confirmed"
     NOT_CONFIRMED = "OFFBOARD refused or not confirmed in time"
-    BLIND = "position silent"
+    POSITION_SILENT = "position silent"
     CROSSED = "another program's setpoints reach the vehicle"
     SETTLED = "settled, or not in time"
     GIVEN_BACK = "mode confirmed"
@@ -68,13 +68,13 @@ TABLE = StateTable[State, Trigger](
             Trigger.HIT: State.TAKING_OVER,
             Trigger.CONFIRMED: State.RECOVERING,
             Trigger.NOT_CONFIRMED: State.GIVING_BACK,
-            Trigger.BLIND: State.GIVING_BACK,
+            Trigger.POSITION_SILENT: State.GIVING_BACK,
         },
         State.RECOVERING: {
             **_RELEASED,
             Trigger.STOPPED: State.GIVING_BACK,
             Trigger.HIT: State.RECOVERING,
-            Trigger.BLIND: State.GIVING_BACK,
+            Trigger.POSITION_SILENT: State.GIVING_BACK,
             Trigger.CROSSED: State.GIVING_BACK,
             Trigger.SETTLED: State.GIVING_BACK,
         },
