@@ -44,7 +44,7 @@ class Claim:
     is_turned: bool = False  # by it, as no motor turns
 
     def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
-        """With the newest IMU sample: the first one after the claim's shows how the vehicle turns now."""
+        """Take the newest IMU sample's time and rates (FRD). The first one after the claim shows a rate jump."""
         if self.later_boot_us is None and time_boot_us > self.time_boot_us:
             self.later_boot_us = time_boot_us
             elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)

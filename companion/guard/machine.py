@@ -37,7 +37,13 @@ THROTTLE = 2
 # In these cases a program sends setpoints on a link of its own.
 _BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 # After these the vehicle is given back to hold whatever is configured.
-_TO_HOLD = (Trigger.STOPPED, Trigger.HIT_BESIDE_PROGRAM, Trigger.NOT_CONFIRMED, Trigger.POSITION_SILENT, Trigger.CROSSED)
+_TO_HOLD = (
+    Trigger.STOPPED,
+    Trigger.HIT_BESIDE_PROGRAM,
+    Trigger.NOT_CONFIRMED,
+    Trigger.POSITION_SILENT,
+    Trigger.CROSSED,
+)
 
 
 @dataclass

@@ -105,7 +105,8 @@ class CommandClient:
     ) -> tuple[messages.SendCommand | None, CommandOutcome | None]:
         """`seen`: the command's effect shows in the vehicle's own messages.
 
-        What may not be sent when its time has come is as good as lost on the way: it counts as an attempt.
+        Returns what to send now, and the outcome once there is one. An attempt that `may_send` forbids counts as sent
+        and lost.
         """
         pending = self._pending
         if pending is None:

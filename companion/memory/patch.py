@@ -94,6 +94,7 @@ def goes_on_m(known_m: float, reaches_m: float) -> float:
 
 
 def mean_of(places: Sequence[Vector3]) -> Vector3:
+    """Mean of one or more positions, m."""
     n, e, d = (sum(axis) / len(places) for axis in zip(*places, strict=True))
     return (n, e, d)
 

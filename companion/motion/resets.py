@@ -93,7 +93,7 @@ class Resets:
         return (n, e, d)
 
     def sent(self, setpoint: PositionSetpoint) -> PositionSetpoint:
-        """A setpoint in the vehicle's own frame."""
+        """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""
         if self.shift_ned_m == STILL:
             return setpoint
         x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))

@@ -46,6 +46,7 @@ class Pushes(Group[Push]):
     """Forces on a point of the body, one at a time."""
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
+        """Write the force (NED, N) and its point (FRD, m) at this boot time into ``disturbance``."""
         disturbance.pushes = 0
         for push in self._faults:
             start_s, end_s = push.window_s

@@ -91,7 +91,7 @@ class Exchange:
         return self._sent_at_us if self.phase is ExchangePhase.READY else None
 
     def sent(self, time_us: int, now_us: int) -> None:
-        """A sample of that time has gone out."""
+        """Note that the sample of the vehicle's `time_us` was sent at the clock's `now_us`."""
         self._move(ExchangeEvent.SENT)
         self._sent_time_us = time_us
         self._sent_at_us = now_us

@@ -46,7 +46,9 @@ class Line:
         return int(delay_us) // 10 * round(10 * _EARLY_SHARE)
 
     def share(self, streams: Iterable[tuple[int, int]], constant: Iterable[tuple[int, int]]) -> float:
-        """By how much the rates of ``streams`` shrink. Both: bytes and interval in microseconds of each stream."""
+        """The factor, at most 1, by which the rates of ``streams`` shrink so that all fit beside ``constant``. Both:
+        bytes and interval in microseconds of each stream.
+        """
         wanted = sum(size * 1e6 / interval_us for size, interval_us in streams if interval_us > 0)
         kept = sum(size * 1e6 / interval_us for size, interval_us in constant if interval_us > 0)
         if wanted <= 0:
