@@ -92,7 +92,9 @@ class Stepped(ABC, Generic[CoreT]):
             self._core.flight.tell(self._core.now_us, kind, text)
 
     def tell_computer(self, computer: ComputerStatus) -> None:
-        """How this computer is, for the ground station: sent with the next step; nothing before the first."""
+        """Take this computer's load, sent to the ground station with the next step. Nothing is sent before the first
+        call.
+        """
         if self._core is not None:
             self._core.flight.outbox.append(computer)
 

@@ -16,11 +16,11 @@ from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.envelope import Surroundings, bounded
-from companion.flight.hearing import hear, landed, note_height, too_low
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.operator import Texts, status_text, values
 from companion.flight.remembering import known_surfaces
 from companion.flight.states import FINAL_STATES, State
+from companion.flight.vehicle_update import landed, note_height, too_low, update_vehicle
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outgoing, Sample, Vector3
@@ -133,7 +133,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in the frame of this flight, and why the vehicle is refused."""
-        return samples, hear(self.flight, samples, now_us)
+        return samples, update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
         """Let the state machine act; whether it moved."""

@@ -111,15 +111,15 @@ class Fence(Written):
     def shortened(self, start: tuple[float, float], end: tuple[float, float]) -> tuple[float, float]:
         """Where the straight way from `start`, which is inside, to `end` leaves the fence; `end` if it does not."""
         leaves_at = 1.0
-        way = (end[0] - start[0], end[1] - start[1])
+        step = (end[0] - start[0], end[1] - start[1])
         if self.radius_m is not None and math.hypot(*end) > self.radius_m:
-            # |start + s * way| = radius, for the s in [0, 1] that leaves the circle
-            a = way[0] ** 2 + way[1] ** 2
-            b = start[0] * way[0] + start[1] * way[1]
+            # |start + s * step| = radius, for the s in [0, 1] that leaves the circle
+            a = step[0] ** 2 + step[1] ** 2
+            b = start[0] * step[0] + start[1] * step[1]
             c = start[0] ** 2 + start[1] ** 2 - self.radius_m**2
             leaves_at = (-b + math.sqrt(max(0.0, b * b - a * c))) / a
-        if self._polygon is not None and way != (0.0, 0.0):
+        if self._polygon is not None and step != (0.0, 0.0):
             line = LineString((start, end))
             for crossing in shapely.get_coordinates(line.intersection(self._polygon.exterior)):
                 leaves_at = min(leaves_at, line.project(Point(crossing), normalized=True))
-        return (start[0] + leaves_at * way[0], start[1] + leaves_at * way[1])
+        return (start[0] + leaves_at * step[0], start[1] + leaves_at * step[1])

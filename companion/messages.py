@@ -75,7 +75,7 @@ class MessageId(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Refused(Sample):
-    """A message of the vehicle's that was not believed: a value that is not finite, or that no vehicle can have."""
+    """A message of the vehicle's that was not accepted: a value is not finite, or no vehicle can have it."""
 
     message: str
     reason: str
@@ -232,7 +232,7 @@ class EstimatorStatus(Sample):
 
     ratios: tuple[float, ...]  # of velocity and place, as far as a sensor measures them
     horizontal_velocity_is_good: bool
-    accelerometer_is_doubted: bool
+    accelerometer_is_faulty: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -150,7 +150,7 @@ def advance(survey: Survey, samples: Sequence[Sample], now_us: int) -> list[mess
 
 def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> None:
     now_us, listens = survey.now_us, survey.listening_since_us is not None
-    survey.vehicle.hear(sample, now_us)
+    survey.vehicle.update(sample, now_us)
     survey.streams.count(type(sample), now_us)
     match sample:
         case messages.Heartbeat() if is_autopilot(sample) and survey.heard_since_us is None and survey.refusal is None:
@@ -166,7 +166,7 @@ def _hear(survey: Survey, sample: Sample, outgoing: list[messages.Outgoing]) -> 
         case messages.TimeSyncRequest(vehicle_time_ns):
             outgoing.append(messages.TimeSyncReply(vehicle_time_ns, now_us * 1000))
         case messages.TimeSyncAnswer():
-            survey.round_trip.hear(sample, now_us)
+            survey.round_trip.update(sample, now_us)
         case messages.ImuSample() if listens:
             survey.imu.append(sample)
             survey.delivery.arrived(sample.time_boot_us, now_us)
@@ -445,7 +445,7 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
         yield Finding("estimator", BAD, "no horizontal velocity", remedy)
     else:
-        is_bad = worst >= BAD_RATIO or any(status.accelerometer_is_doubted for status in survey.estimator)
+        is_bad = worst >= BAD_RATIO or any(status.accelerometer_is_faulty for status in survey.estimator)
         yield _judged(
             "estimator",
             f"largest innovation test ratio {worst:.2f}",

@@ -39,14 +39,13 @@ class Status:
 class CollisionReport:
     """One collision, as the companion measured it from telemetry. Positions are the vehicle's local NED.
 
-    `impact_velocity_ned_m_s` is v_c of the paper: the velocity just before contact.
-    `normal_ned` is the horizontal unit direction of the obstacle's push, taken over the whole contact.
-    `peak_specific_force_m_s2` is the largest specific force perpendicular to thrust in one IMU sample.
-    `settled_after_s` runs from the detection to the start of the interval in which the vehicle stayed
-    settled; None when it did not settle.
-    `overshoot_m` is the largest distance past the setpoint, away from the obstacle, until the recovery ended.
-    `rebound_speed_m_s` is the speed back along the approach when the contact ended; 0 when it never moved back, None
-    when the vehicle's velocity could not be believed then (a clipped hit).
+    `impact_velocity_ned_m_s` is v_c of the paper: the velocity just before contact. `normal_ned` is the horizontal unit
+    direction of the obstacle's push, taken over the whole contact. `peak_specific_force_m_s2` is the largest specific
+    force perpendicular to thrust in one IMU sample. `settled_after_s` runs from the detection to the start of the
+    interval in which the vehicle stayed settled; None when it did not settle. `overshoot_m` is the largest distance
+    past the setpoint, away from the obstacle, until the recovery ended. `rebound_speed_m_s` is the speed back along the
+    approach when the contact ended; 0 when it never moved back, None when the vehicle's velocity was not valid then (a
+    clipped hit).
     """
 
     detected_at_us: int
@@ -91,14 +90,13 @@ class ExpectationReport:
 class FlightReport:
     """The outcome of a flight.
 
-    `failed`: the flight never began (no vehicle, wrong vehicle, streams too slow, refused), or it ended as it
-    should but not as the mission expected (`expectations`).
-    `aborted`: it began, or was stopped by the person, and ended before the mission did.
-    `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission coordinates.
-    `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits, in mission
-    coordinates. `unreachable` are the labels of items, or "home", to which that left no way. `refused_messages` counts
-    the vehicle's messages that were not believed, by name. `unconfirmed` counts the hits that were none: one sample
-    showed them, and nothing else.
+    `failed`: the flight never began (no vehicle, wrong vehicle, streams too slow, refused), or it ended as it should
+    but not as the mission expected (`expectations`). `aborted`: it began, or was stopped by the person, and ended
+    before the mission did. `origin_ned_m` is the arming position in the vehicle's local NED: the zero of mission
+    coordinates. `obstacles` is what is known of the surroundings at the end, from before and from this flight's hits,
+    in mission coordinates. `unreachable` are the labels of items, or "home", to which that left no way.
+    `refused_messages` counts the vehicle's messages that were not accepted, by name. `unconfirmed` counts the hits that
+    were none: one sample showed them, and nothing else.
     """
 
     outcome: Outcome

@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from sim_vehicle.aiding import Estimator, Sensors
 from sim_vehicle.errors import AirframeError
 
+# Arms, each with a motor and a guard, and all of one length. `physics/layout.py` has their directions.
+ARMS = 4
 BUILT_IN_FOLDER = Path(__file__).parent / "airframes"
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -221,7 +223,7 @@ class Airframe(_Part):
     @property
     def hover_fraction(self) -> float:
         """Thrust to hover over the greatest thrust."""
-        return self.mass_kg * 9.81 / (4 * self.motors.max_thrust_n)
+        return self.mass_kg * 9.81 / (ARMS * self.motors.max_thrust_n)
 
     @model_validator(mode="after")
     def _can_navigate(self) -> "Airframe":

@@ -62,7 +62,7 @@ class Hit:
     surface_velocity_ned_m_s: Vector3 = (0.0, 0.0, 0.0)
     """Of the obstacle at the first touch."""
     frame_offset_ned_m: Vector3 = (0.0, 0.0, 0.0)
-    """What the vehicle believed its position to be, less what it was, at the first touch; without its delay."""
+    """Estimated less true position at the first touch, NED; without the estimate's delay."""
 
     @property
     def contact_duration_s(self) -> float:

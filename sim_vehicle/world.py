@@ -68,6 +68,10 @@ class Box:
     edge_radius_m: float = BOX_EDGE_RADIUS_M
     motion: Motion | None = None
 
+    def box(self) -> "Box":
+        """Itself: every solid but a pole is drawn and touched as a box."""
+        return self
+
     def distance_m(self, position_ned_m: Vector3) -> float:
         """From a point to the nearest point of the solid, its edges taken as sharp; 0 inside."""
         local = np.abs(np.array(self.axes_ned) @ (np.array(position_ned_m) - np.array(self.centre_ned_m)))
@@ -203,7 +207,7 @@ def _rows_of(obstacle: Obstacle) -> list[tuple[str, Floats]]:
         half_m = 0.5 * float(np.linalg.norm(top - foot))
         axis = np.array(obstacle.axis_ned)
         return [("pole", _round(0.5 * (foot + top), axis, half_m, obstacle.radius_m, np.zeros(3), np.zeros(3), True))]
-    box = obstacle.box() if isinstance(obstacle, Wall) else obstacle
+    box = obstacle.box()
     return _sides(box) + _edges(box)
 
 

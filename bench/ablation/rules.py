@@ -37,6 +37,8 @@ def _argument(number: int) -> Callable[[Arguments, Any], Any]:
 _DETECTION, _ESTIMATE, _REFLEX, _FLIGHT = (
     f"companion.{room}." for room in ("detection", "estimate", "reflex", "flight")
 )
+_HORIZONTAL = _FLIGHT + "horizontal_force:HorizontalForceMonitor."
+_VERTICAL = _FLIGHT + "vertical_force:VerticalForceMonitor."
 
 RULES = (
     Rule(
@@ -58,8 +60,8 @@ RULES = (
         _DETECTION + "force_signs:pushes_on",
         _says(True),
     ),
-    Rule("leaning", "a lean that moves nothing is a hit", _FLIGHT + "leaning:Leaning.step", _says(None)),
-    Rule("pressing", "thrust that lifts nothing is a hit", _FLIGHT + "pressing:Pressing.step", _says(None)),
+    Rule("leaning", "a lean that moves nothing is a hit", _HORIZONTAL + "step", _says(None)),
+    Rule("pressing", "thrust that lifts nothing is a hit", _VERTICAL + "step", _says(None)),
     Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule("attitude by rates", "no clipped attitude", _ESTIMATE + "trust:Trust.is_attitude_right", _says(True)),

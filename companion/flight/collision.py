@@ -70,7 +70,7 @@ class CollisionRecord:
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
     ) -> None:
-        """While the contact lasts: its largest force and its end; the normal as it is known by now."""
+        """While the contact lasts: its largest force, its end, and the newest estimate of the normal."""
         self.fixes = fixes
         claim = self.claim
         is_turned = isinstance(claim, Claim) and claim.is_turned
@@ -127,7 +127,8 @@ class CollisionRecord:
 
     def rebound_speed_m_s(self) -> float | None:
         """Largest speed back in the tenth of a second after the contact's last loud sample; None where no velocity of
-        that time could be believed."""
+        that time was valid.
+        """
         start, end = self.contact_ended_boot_us, self.contact_ended_boot_us + REBOUND_WINDOW_US
         speeds = [speed for time_us, speed in self._speeds_away if start < time_us <= end]
         return max(0.0, *speeds) if speeds else None

@@ -1,9 +1,9 @@
 """Was it a hit? One sample is answered at once; it counts as a hit when something else shows it, too.
 
-One row is an accelerometer's sample. A second one is another sample of the contact's force; or rates of turn that no
-motor makes so fast; or the vehicle's own velocity, which a true push of the length of that sample's mean must have
-changed. A broken or forged packet does none of this: rates and velocity go on as all other samples say. Nor do the
-velocities after a forged one stay where it was.
+The first piece of evidence is one IMU sample. The second is another sample of the contact's force, or angular rates
+that no motor makes so fast, or a change of the vehicle's own velocity. A true impulse over that sample's averaging time
+must have changed the velocity. A broken or forged packet does none of this: the next rates and velocities contradict
+it.
 """
 
 import math
@@ -44,7 +44,7 @@ class Claim:
     is_turned: bool = False  # by it, as no motor turns
 
     def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
-        """With the newest IMU sample: the first one after the claim's shows how the vehicle turns now."""
+        """Take the newest IMU sample's time and rates (FRD). The first one after the claim shows a rate jump."""
         if self.later_boot_us is None and time_boot_us > self.time_boot_us:
             self.later_boot_us = time_boot_us
             elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)
@@ -54,9 +54,8 @@ class Claim:
     def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
         """Whether the velocities after the sample show that the push it claims has not been.
 
-        `fixes` hold each velocity beside the accelerometer's sum (trapezoids). Without the claimed sample's own share
-        in the sum, the velocity of a vehicle that was pushed is ahead of it, by the whole impulse; of one that was not,
-        it is where it was.
+        `fixes` hold each velocity beside the accelerometer's sum (trapezoids). The claimed sample is taken out of the
+        sum. After a true impulse the velocity is ahead of the sum by the whole impulse; otherwise both agree.
         """
         hit_us, later_us = self.time_boot_us, self.later_boot_us
         before = [fix for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]

@@ -77,7 +77,7 @@ class Meet(Silent, ABC, Generic[MoveT]):
             flight.tell(now_us, "link", text)
         self._requests, self._measuring_since_us = iter(self._commands(flight)), None
 
-    def _tell_streams(self, flight: FlightContext, now_us: int) -> None:
+    def _report_streams(self, flight: FlightContext, now_us: int) -> None:
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         window_s = flight.mission.companion.streams.window_s
@@ -95,7 +95,7 @@ class Connect(Meet[Move]):
         if too_slow is not None and flight.mission.companion.link.wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None
-        self._tell_streams(flight, now_us)
+        self._report_streams(flight, now_us)
         complaint = too_slow or ground_check(flight)
         return Move(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
 

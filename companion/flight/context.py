@@ -1,4 +1,4 @@
-"""What the parts of a flight share: the mission, the vehicle as heard, and what is to be sent and told."""
+"""What the parts of a flight share: the mission, the vehicle's state, messages to send and events."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -6,9 +6,9 @@ from typing import NamedTuple, Protocol
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
-from companion.flight.leaning import Leaning
-from companion.flight.pressing import Pressing
+from companion.flight.horizontal_force import HorizontalForceMonitor
 from companion.flight.states import State, Trigger
+from companion.flight.vertical_force import VerticalForceMonitor
 from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
@@ -16,7 +16,7 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import OLD_NEWS_US, Vehicle
 from companion.memory.patch import Patch
 from companion.messages import CommandAck, LocalPosition, Outgoing, PositionSetpoint, PositionTarget, Sticks, Vector3
-from companion.mission.course import Pace
+from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
@@ -140,9 +140,9 @@ class FlightContext:
     target: Target | None = None  # as last streamed
     origin_ned_m: Vector3 | None = None
     stepped_us: int | None = None  # when the step before was
-    unheard_us: int = 0  # since the last position: what late steps took, in which nobody listened
-    way_us: int = 0  # a clock that stands still while no position comes: nobody flies on who does not hear the vehicle
-    is_heard: bool = True  # a position has come within as long as the detector may be without a sample
+    missed_us: int = 0  # since the last position: the delay of late steps, in which nothing was received
+    trajectory_us: int = 0  # the trajectories' clock: it stops while no position comes
+    has_position: bool = True  # a position came within the detector's `silence_s`
     yaw_rad: float | None = None
     expected_mode: int | None = None  # the mode the companion has been seen to hold
     conflict_us: int | None = None  # when the vehicle's reports last contradicted each other
@@ -152,7 +152,7 @@ class FlightContext:
     steps: tuple[Step, ...] = ()
     step_index: int = 0  # the one that is flown, or is to be flown next
     tally: StepTally = field(default_factory=StepTally)
-    pace: Pace = field(init=False)
+    speeds: SpeedLimits = field(init=False)
     after_recovery: AfterRecovery = field(default_factory=AfterRecovery)
     returning_as: ReturnItem = field(default_factory=ReturnItem)
     going_home: bool = False
@@ -170,10 +170,10 @@ class FlightContext:
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     motors: MotorWatch = field(default_factory=MotorWatch)
-    leaning: Leaning = field(default_factory=Leaning)  # on something that no detector feels
+    horizontal_force: HorizontalForceMonitor = field(default_factory=HorizontalForceMonitor)
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
-    pressing: Pressing = field(default_factory=Pressing)
-    blind_since_us: int | None = None  # the detector, while it is on
+    vertical_force: VerticalForceMonitor = field(default_factory=VerticalForceMonitor)
+    no_data_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None
     reason: str = ""
@@ -182,7 +182,7 @@ class FlightContext:
 
     def __post_init__(self) -> None:
         config = self.mission.companion.flight
-        self.pace = Pace.of(config)
+        self.speeds = SpeedLimits.of(config)
         self.steps = self.steps or steps_to_fly(self.mission)
         self.patches = self.mission.obstacles.patches()
         last = self.steps[-1].action
@@ -199,11 +199,11 @@ class FlightContext:
         latest, origin = self.vehicle.history.latest(), self.origin_ned_m
         return None if latest is None or origin is None else origin[2] - latest.position_ned_m[2]
 
-    def under_way(
+    def on_trajectory(
         self, place_ned_m: Vector3, yaw_rad: float | None, velocity_ned_m_s: Vector3, acceleration_ned_m_s2: Vector3
     ) -> Target:
-        """A place on a way, local NED. While the way stands still, its speed would lead the vehicle past the place."""
-        if not self.is_heard:
+        """A position on a trajectory, local NED. While the trajectory stands still, its velocity is left out."""
+        if not self.has_position:
             return Target(place_ned_m, yaw_rad)
         return Target(place_ned_m, yaw_rad, velocity_ned_m_s, acceleration_ned_m_s2)
 
@@ -217,46 +217,47 @@ class FlightContext:
         return () if self.expected_mode is None else (self.expected_mode, self.command_client.requested_mode)
 
     def silent_s(self, now_us: int) -> float:
-        """How long nothing has been heard of the vehicle."""
-        return (now_us - self.vehicle.last_heard_us) * 1e-6
+        """Seconds since the last message of the vehicle."""
+        return (now_us - self.vehicle.last_received_us) * 1e-6
 
     @property
     def position_silent_s(self) -> float:
-        """How long the vehicle was heard, and no position. What a late step took says nothing of the vehicle."""
+        """Seconds of messages without a position. The delay of a late step does not count."""
         heard_us = self.vehicle.last_position_us
-        return 0.0 if heard_us is None else (self.vehicle.last_heard_us - heard_us - self.unheard_us) * 1e-6
+        return 0.0 if heard_us is None else (self.vehicle.last_received_us - heard_us - self.missed_us) * 1e-6
 
     def is_silent(self, now_us: int) -> bool:
-        """Whether a vehicle that is known has not been heard for longer than a silent link is put up with."""
+        """Whether an identified vehicle has been silent for longer than `link.silence_s`."""
         return self.vehicle.identity is not None and self.silent_s(now_us) > self.mission.companion.link.silence_s
 
     def note_silence(self, now_us: int) -> None:
         self.was_silent |= self.is_silent(now_us)
 
-    def may_ask(self, now_us: int) -> bool:
-        """Whether a command that moves a held vehicle may leave: not on old news, which the pilot may have made untrue.
+    def may_command(self, now_us: int) -> bool:
+        """Whether a command to a held vehicle may be sent: not on an old mode report, as the pilot may have changed the
+        mode.
 
-        Into a silence it is said once. A link cut in one direction delivers that, one cut in both loses it; what is
-        not repeated does not arrive after the pilot has taken over.
+        Into a silence it is sent once. A link cut in one direction delivers it; one cut in both loses it. A command
+        that is not repeated does not arrive after a pilot's takeover.
         """
         if self.expected_mode is None or self.vehicle.is_mode_known:
             return True
-        is_silent = now_us - self.vehicle.last_heard_us >= OLD_NEWS_US
-        return is_silent and self.vehicle.doubted_mode is None and self.command_client.is_unsaid
+        is_silent = now_us - self.vehicle.last_received_us >= OLD_NEWS_US
+        return is_silent and self.vehicle.unconfirmed_mode is None and self.command_client.is_unsaid
 
     def is_time_to_give_away(self, since_us: int, now_us: int) -> bool:
-        """Whether a mode may be asked for that ends the holding: straight after a report of the mode.
+        """Whether a mode that ends the holding may be requested: straight after a report of the mode.
 
-        A person's own request of before that report shows in it, and is not overruled. Where none comes, the wait ends.
+        A person's earlier request shows in that report, and is not overruled. Without a report the wait ends.
         """
-        silent_us = now_us - self.vehicle.last_heard_us
+        silent_us = now_us - self.vehicle.last_received_us
         waited_s = (now_us - since_us) * 1e-6
         is_over = silent_us >= OLD_NEWS_US or waited_s >= self.mission.companion.link.silence_s
-        return is_over or (self.vehicle.mode_heard_us == now_us and self.vehicle.is_mode_known)
+        return is_over or (self.vehicle.mode_received_us == now_us and self.vehicle.is_mode_known)
 
     def command_outcome(self, inputs: Inputs, seen: bool, now_us: int) -> CommandOutcome | None:
-        """Let the command client go on with its command; failures are told."""
-        send, outcome = self.command_client.step(inputs.acks, seen, now_us, self.may_ask(now_us))
+        """Advance the command client; report a failure."""
+        send, outcome = self.command_client.step(inputs.acks, seen, now_us, self.may_command(now_us))
         if send is not None:
             self.outbox.append(send)
         if outcome is not None and not outcome.succeeded:

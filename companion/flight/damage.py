@@ -1,4 +1,4 @@
-"""What is known of a motor that a hit has hurt, and what the mission wants then."""
+"""Detection of a motor damaged by a hit, and the mission's policy for it."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
         return
     hits = len(flight.collisions) - flight.motors.earlier_hits
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
-    # One that does not come to rest may hang on what it hit, or lie on the ground: that asks more of a motor, too.
+    # A vehicle not yet at rest may hang on the obstacle, or lie on the ground: that also loads a motor more.
     rests = hits == 0 or flight.collisions[-1].settled_at_boot_us is not None
     was_hit = hits > 0 if flies and rests else None
     for sample in samples:
@@ -31,8 +31,8 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
                 flight.tell(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
 
 
-def way_out(flight: FlightContext) -> Move | None:
-    """What the mission wants of a vehicle that is hurt."""
+def after_damage(flight: FlightContext) -> Move | None:
+    """The transition that the mission wants for a damaged vehicle."""
     damage, wanted = flight.motors.damage, flight.mission.on_damage
     if damage is None or wanted == "tell":
         return None

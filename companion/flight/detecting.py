@@ -1,11 +1,11 @@
-"""The samples through the watch: what it has to say is told, what asks for a recovery is returned."""
+"""The samples through the watch: its notices are reported, and its collisions returned."""
 
 from collections.abc import Sequence
 
 from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.context import FlightContext
-from companion.flight.leaning import Held
+from companion.flight.horizontal_force import SustainedForce
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 from companion.motion.history import REBOOT_US
 from companion.motion.rotation import ned_to_body
@@ -18,53 +18,56 @@ def collisions(
 ) -> list[ImpactEstimate]:
     """The impacts of this step that are collisions."""
     seen = watch.advance(watching, samples, situation, now_us)
-    if (watching.blind_reason is None) is not (flight.blind_since_us is None):
-        flight.blind_since_us = None if watching.blind_reason is None else now_us
+    if (watching.blind_reason is None) is not (flight.no_data_since_us is None):
+        flight.no_data_since_us = None if watching.blind_reason is None else now_us
     for notice in seen.notices:
         flight.tell(now_us, notice.kind, notice.text, **notice.data)
     for estimate in seen.impacts:
         if not estimate.impact.is_collision:
-            _tell_contact(flight, estimate, now_us)
+            _report_contact(flight, estimate, now_us)
     found = [estimate for estimate in seen.impacts if estimate.impact.is_collision]
-    held = None if found else _held(flight, samples, situation, now_us)
+    held = None if found else _sustained_force(flight, samples, situation, now_us)
     return found if held is None else [held]
 
 
-def _held(flight: FlightContext, samples: Sequence[Sample], situation: Situation, now_us: int) -> ImpactEstimate | None:
-    """What no detector feels: that the vehicle leans or presses on something, where it is to fly to a place."""
-    target, attitude, leaning, pressing = flight.target, flight.vehicle.attitude, flight.leaning, flight.pressing
+def _sustained_force(
+    flight: FlightContext, samples: Sequence[Sample], situation: Situation, now_us: int
+) -> ImpactEstimate | None:
+    """A sustained external force that no detector shows: only while the vehicle flies to a position."""
+    target, attitude = flight.target, flight.vehicle.attitude
+    horizontal, vertical = flight.horizontal_force, flight.vertical_force
     flown_to = situation.setpoint_position_ned_m
-    # Of a silence nothing is known: half a second without a place is no lean that lasted as long.
-    is_off = situation.off_reason is not None or situation.descent_commanded or not flight.is_heard
+    # Half a second without a position is no tilt that lasted half a second.
+    is_off = situation.off_reason is not None or situation.descent_commanded or not flight.has_position
     if is_off or flown_to is None or target is None or target.leans_only or attitude is None:
-        leaning.forget()
-        pressing.forget()
+        horizontal.forget()
+        vertical.forget()
         return None
     for sample in samples:
         if type(sample) is ImuSample:
-            leaning.feel(sample.specific_force_frd_m_s2)
+            horizontal.add_imu(sample.specific_force_frd_m_s2)
         elif type(sample) is AttitudeTarget:
-            pressing.tell(sample.time_boot_us, sample.thrust_fraction)
+            vertical.add_thrust(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, LocalPosition):
-            late_us = leaning.time_us - sample.time_boot_us
+            late_us = horizontal.time_us - sample.time_boot_us
             if late_us >= REBOOT_US:
-                leaning.forget()
-                pressing.forget()
+                horizontal.forget()
+                vertical.forget()
             elif late_us >= 0:
                 continue
-            held = leaning.step(sample, attitude.attitude_wxyz, flown_to)
-            held = pressing.step(sample, leaning.thrust_m_s2, flown_to[2]) or held
+            held = horizontal.step(sample, attitude.attitude_wxyz, flown_to)
+            held = vertical.step(sample, horizontal.thrust_m_s2, flown_to[2]) or held
             if held is not None:
-                _tell_held(flight, held, sample, now_us)
+                _report_sustained_force(flight, held, sample, now_us)
                 return _estimate_of(held, sample, attitude)
     return None
 
 
-def _estimate_of(held: Held, sample: LocalPosition, attitude: Attitude) -> ImpactEstimate:
-    """As of a hit: by a vehicle that hardly moves, and as sure of the normal as a lean is steady."""
+def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude) -> ImpactEstimate:
+    """The same as an impact estimate, of a vehicle that hardly moves."""
     n, e, d = held.normal_ned
-    push_ned = (held.push_m_s2 * n, held.push_m_s2 * e, held.push_m_s2 * d)
-    force = ned_to_body(attitude.attitude_wxyz, push_ned)
+    force_ned = (held.force_m_s2 * n, held.force_m_s2 * e, held.force_m_s2 * d)
+    force = ned_to_body(attitude.attitude_wxyz, force_ned)
     lasted_us = sample.time_boot_us - held.since_boot_us
     return ImpactEstimate(
         impact=Impact(sample.time_boot_us, held.since_boot_us, force, ImpactKind.STRUCK),
@@ -74,8 +77,8 @@ def _estimate_of(held: Held, sample: LocalPosition, attitude: Attitude) -> Impac
         velocity_ned_m_s=sample.velocity_ned_m_s,
         velocity_error_m_s=0.0,
         normal_ned=held.normal_ned,
-        peak_specific_force_m_s2=held.push_m_s2,
-        impulse_m_s=0.5 * held.push_m_s2 * lasted_us * 1e-6,
+        peak_specific_force_m_s2=held.force_m_s2,
+        impulse_m_s=0.5 * held.force_m_s2 * lasted_us * 1e-6,
         is_lower_bound=False,
         may_be_clipped=False,
         kind=ImpactKind.STRUCK,
@@ -84,23 +87,23 @@ def _estimate_of(held: Held, sample: LocalPosition, attitude: Attitude) -> Impac
     )
 
 
-def _tell_held(flight: FlightContext, held: Held, sample: LocalPosition, now_us: int) -> None:
+def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample: LocalPosition, now_us: int) -> None:
     lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
     does = "leant" if held.normal_ned[2] == 0.0 else "pressed up"
-    text = f"something is in the way: {does} on it for {lasted_s:.1f} s, by {held.push_m_s2:.1f} m/s^2 more"
-    flight.tell(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.push_m_s2, lasted_s=lasted_s)
+    text = f"something is in the way: {does} on it for {lasted_s:.1f} s, by {held.force_m_s2:.1f} m/s^2 more"
+    flight.tell(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
 
 
 def follow_contact(flight: FlightContext, watching: Watch) -> None:
-    """Let the latest collision's record see the contact's course."""
+    """Update the latest collision's record while the contact lasts."""
     if flight.collisions:
         record, inertial = flight.collisions[-1], watching.estimator.inertial
         record.follow_contact(watching.state, watching.estimate, inertial.fixes)
         record.follow_motion(inertial.strapdown)
 
 
-def _tell_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
-    """A touch that is no collision is worth a line and nothing more."""
+def _report_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
+    """Report a contact that is no collision."""
     kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
     text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
     flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)

@@ -1,4 +1,4 @@
-"""What ends a flight from outside, whatever it is doing, and how the vehicle is then given away; then silence."""
+"""What ends a flight from outside, in every state, and how the vehicle is handed over."""
 
 import math
 from enum import Enum
@@ -16,7 +16,7 @@ ON_SETPOINTS = (State.TAKEOFF, State.MISSION, State.RECOVERING, State.HOLDING, S
 # After a hit the setpoint jumps, and the vehicle takes its time.
 FOLLOWING = (State.MISSION, State.HOLDING, State.RETURNING)
 
-HEARD_AGAIN = "the vehicle was silent: its streams are asked for again"
+LINK_RESTORED = "the vehicle was silent: its streams are asked for again"
 # HEARTBEAT, which alone tells that the vehicle has disarmed, comes once a second; half a second for delays.
 DISARM_NEWS_US = 1_500_000
 
@@ -59,7 +59,7 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | No
 
 
 def _may_be_down(flight: FlightContext, now_us: int) -> bool:
-    """PX4 leaves the land mode by itself when it is down and disarms; the heartbeat that says so may be yet to come.
+    """PX4 leaves the land mode by itself when it has landed and disarms; the heartbeat that reports it may come later.
 
     Nothing is sent meanwhile: the setpoints ended when the land mode was confirmed.
     """
@@ -84,8 +84,8 @@ def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | Non
         flight.note_silence(now_us)
         if flight.is_silent(now_us) or not flight.was_silent:
             return None
-        flight.tell(now_us, "link", HEARD_AGAIN)
-        return Move(Trigger.HEARD_AGAIN)
+        flight.tell(now_us, "link", LINK_RESTORED)
+        return Move(Trigger.LINK_RESTORED)
     text = silent_link(flight, now_us)
     if text is None:
         return None
@@ -120,7 +120,7 @@ def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6
     if when.flight_time_above_s is not None and flown_s > when.flight_time_above_s:
         return f"flight time above {when.flight_time_above_s:g} s"
-    since_us = flight.blind_since_us
+    since_us = flight.no_data_since_us
     if when.blind_for_s is not None and since_us is not None and now_us - since_us > when.blind_for_s * 1e6:
         return f"the detector has been blind for {when.blind_for_s:g} s"
     if when.setpoint_missed_by_m is not None and state in FOLLOWING and flight.target is not None:
@@ -164,8 +164,8 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 
-class LetGo(Silent):
-    """Nothing more to do: the vehicle is not ours, or it was never taken."""
+class Released(Silent):
+    """Nothing more to do: somebody else has the vehicle, or it was never taken."""
 
     finished = True
 
@@ -176,10 +176,10 @@ class LetGo(Silent):
 class HandOver:
     """Disarm if the climb has not begun, then request the mode; setpoints go on until it is seen to hold.
 
-    The mode is asked for straight after a report of the present one, so that whoever has taken the vehicle by then is
-    seen first; whoever takes it later may have it, too. A vehicle that refuses to hold is asked to land. When the
-    command client gives up (about 2.5 s without an answer), and after LONGEST_US at the latest, the setpoints stop all
-    the same, and PX4's own loss-of-offboard action takes over.
+    The mode is requested straight after a report of the present one, so that a takeover before it is seen first. A
+    later takeover counts, too. A vehicle that refuses to hold is asked to land. The setpoints stop when the command
+    client gives up (about 2.5 s without an answer), and after LONGEST_US at the latest. Then PX4's own loss-of-offboard
+    action takes over.
     """
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:

@@ -1,9 +1,9 @@
-"""The safety envelope: every setpoint passes through it on its way out, whoever asked for it.
+"""The safety envelope: every setpoint passes through it before it is sent.
 
-It bounds all that a setpoint holds: place, step, velocity, acceleration, tilt, yaw, and where the setpoint leads when
-nothing follows it: off what is known and inside the fence, and neither below the floor nor out of the top.
-There an acceleration a beside a velocity v ends, by PX4's velocity loop, at v + a / MPC_Z_VEL_P_ACC. That velocity
-beside a height ends, by PX4's height loop, at v / MPC_Z_P from it.
+It bounds position, step, velocity, acceleration, tilt and yaw. It also bounds where the setpoint leads when no other
+follows it: off known surfaces, inside the fence, between floor and top. There an acceleration a beside a velocity v
+ends, by PX4's velocity loop, at v + a / MPC_Z_VEL_P_ACC. That velocity beside a height ends, by PX4's height loop, at v
+/ MPC_Z_P from it.
 """
 
 import math
@@ -44,7 +44,7 @@ _TIMES_S = tuple((HELD_S + NOTICED_S) * look / 6 for look in range(1, 7))
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class KnownSurface:
     """A surface that is known, local NED. Of a patch: in its own coordinates, how far it goes, and for whom."""
 
     surface: Surface
@@ -52,21 +52,21 @@ class Known:
     origin_ned_m: Vector3 = (0.0, 0.0, 0.0)
     reach_m: float = 0.0
 
-    def free_m(self, way: Sequence[Vector3], place_ned_m: Vector3) -> float:
-        """How much further off the way stays than it must; below 0 it leads too near.
+    def free_m(self, path: Sequence[Vector3], place_ned_m: Vector3) -> float:
+        """Clearance of the path beyond what it must keep, m; below 0 it comes too near.
 
         It must stay off by the clearance, or by what the vehicle now and the place it is to be at leave of it. Behind
         it nothing is in the way.
         """
-        offs_m = [self.surface.off_m(place) for place in way]
+        offs_m = [self.surface.off_m(place) for place in path]
         if min(offs_m) >= self.surface.distance_m or offs_m[0] < -BEHIND_M:
             return 0.0
         must_m = min(self.surface.distance_m, offs_m[0], self.surface.off_m(place_ned_m))
-        beside = [o - must_m for o, place in zip(offs_m, way, strict=True) if self._is_there(o, must_m, place)]
+        beside = [o - must_m for o, place in zip(offs_m, path, strict=True) if self._is_there(o, must_m, place)]
         return min([0.0, *beside])
 
     def _is_there(self, off_m: float, must_m: float, place_ned_m: Vector3) -> bool:
-        """Whether a place that is too near is so beside what is known of the surface, and not past its end."""
+        """Whether a place that is too near lies in front of the surface, and not past its end."""
         if self.patch is None:
             return True
         before = plus(place_ned_m, max(0.0, must_m - off_m), self.surface.normal_ned)
@@ -75,7 +75,7 @@ class Known:
 
 
 def unattended_text(speed_m_s: float) -> str:
-    """What a companion that dies leaves behind, for people."""
+    """What happens when the companion dies, for people."""
     return (
         f"if the companion dies, PX4 flies its last setpoint on for COM_OF_LOSS_T, made safe for {HELD_S:g} s; "
         f"every second more is {speed_m_s:g} m unattended at {speed_m_s:g} m/s"
@@ -91,11 +91,11 @@ def longer_loss_text(loss_s: float) -> str:
 
 
 def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:
-    """What a vehicle touched whose centre was there, and how far off a held setpoint is to lead it."""
+    """The surface that a vehicle with its centre there touched, and the clearance of a held setpoint."""
     return Surface(place_ned_m, normal_ned, LEAST_FREE_M)
 
 
-def held_way(target: Target, motion: Moving) -> list[Vector3]:
+def held_path(target: Target, motion: Moving) -> list[Vector3]:
     """Places that a vehicle which moves so passes, the present one first, the last where it stops.
 
     The motion's own acceleration comes to that of a lean.
@@ -124,11 +124,11 @@ def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_
     k_x, off_m = (0.0, 0.0) if x_s is None else (PLACE_GAINS_PER_S[axis], x_s - x)
     leans = x_s is None and v_s is None
     k_v = 0.0 if leans else VELOCITY_GAINS_PER_S[axis]
-    asked_m_s2, way, after_m_s = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, x, v
+    asked_m_s2, path, after_m_s = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, x, v
     for by_asked, by_speed, left in _answers(k_x, k_v):
-        way, after_m_s = x + by_asked * asked_m_s2 + by_speed * v, by_speed * asked_m_s2 + left * v
-        yield way
-    yield way + after_m_s * (REPAIRED_S if leans else 0.5 * abs(after_m_s) / BRAKES_M_S2)
+        path, after_m_s = x + by_asked * asked_m_s2 + by_speed * v, by_speed * asked_m_s2 + left * v
+        yield path
+    yield path + after_m_s * (REPAIRED_S if leans else 0.5 * abs(after_m_s) / BRAKES_M_S2)
 
 
 @cache
@@ -176,7 +176,7 @@ class Surroundings:
     last_ned_m: Vector3 | None = None
     since_last_s: float = 0.0
     velocity_ned_m_s: Vector3 | None = None
-    known: Sequence[Known] = ()
+    known: Sequence[KnownSurface] = ()
 
 
 def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) -> tuple[Target, str]:
@@ -191,7 +191,7 @@ def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) 
     target = _with_place(target, around, fence, limits, reasons)
     target = _with_velocity(target, limits, reasons)
     target = _with_acceleration(target, limits, reasons)
-    target = _with_way(target, around, fence, reasons)
+    target = _with_path(target, around, fence, reasons)
     target = _with_height(target, around, fence, reasons)
     target = _with_tilt(target, limits)
     if target.yaw_rad is not None and abs(target.yaw_rad) > math.pi:
@@ -262,7 +262,7 @@ def _with_acceleration(target: Target, limits: Limits, reasons: list[str]) -> Ta
     return replace(target, acceleration_ned_m_s2=(n, e, d))
 
 
-def _with_way(target: Target, around: Surroundings, fence: Fence, reasons: list[str]) -> Target:
+def _with_path(target: Target, around: Surroundings, fence: Fence, reasons: list[str]) -> Target:
     """What of velocity and acceleration leads, held, out of the fence or too near to what is known, taken away.
 
     Where that is not enough the place alone is left, or the vehicle's level attitude, if that leads less far.
@@ -276,16 +276,16 @@ def _with_way(target: Target, around: Surroundings, fence: Fence, reasons: list[
         # The vehicle is wrong about its motion, and what is expected is no more than that: places and velocities of
         # both count. So does a tilt that the vehicle is right about by then.
         expected = replace(target.expected, acceleration_ned_m_s2=REST)
-        told = replace(expected, velocity_ned_m_s=around.velocity_ned_m_s)
-        later = replace(told, acceleration_ned_m_s2=plus(REST, -1.0, target.expected.acceleration_ned_m_s2))
-        motions = list(dict.fromkeys((expected, told, later, *motions)))
+        reported = replace(expected, velocity_ned_m_s=around.velocity_ned_m_s)
+        later = replace(reported, acceleration_ned_m_s2=plus(REST, -1.0, target.expected.acceleration_ned_m_s2))
+        motions = list(dict.fromkeys((expected, reported, later, *motions)))
     known = list(around.known)
     for motion in motions:
-        known += _sides(held_way(target, motion), around.origin_ned_m, fence)
+        known += _sides(held_path(target, motion), around.origin_ned_m, fence)
 
-    def free_m(candidate: Target, surfaces: Sequence[Known] = known) -> float:
-        ways = [held_way(candidate, motion) for motion in motions]
-        return min((one.free_m(way, candidate.position_ned_m) for one in surfaces for way in ways), default=0.0)
+    def free_m(candidate: Target, surfaces: Sequence[KnownSurface] = known) -> float:
+        paths = [held_path(candidate, motion) for motion in motions]
+        return min((one.free_m(path, candidate.position_ned_m) for one in surfaces for path in paths), default=0.0)
 
     asked = target
     for surface in known:
@@ -300,7 +300,7 @@ def _with_way(target: Target, around: Surroundings, fence: Fence, reasons: list[
     return max(target, still, asked, key=free_m)
 
 
-def _off(target: Target, known: Known, free_m: Callable[[Target, Sequence[Known]], float]) -> Target:
+def _off(target: Target, known: KnownSurface, free_m: Callable[[Target, Sequence[KnownSurface]], float]) -> Target:
     """With as little as possible taken from what leads towards one surface; all of it where that is not enough."""
     least, most = 0.0, 1.0
     for _ in range(_HALVINGS):
@@ -322,20 +322,20 @@ def _less(target: Target, normal: Vector3 | None, share: float) -> Target:
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
 
 
-def _sides(way: Sequence[Vector3], origin: Vector3 | None, fence: Fence) -> list[Known]:
+def _sides(path: Sequence[Vector3], origin: Vector3 | None, fence: Fence) -> list[KnownSurface]:
     """The fence as a surface, where a way that begins inside leaves it the furthest."""
     if origin is None:
         return []
-    places = [(n - origin[0], e - origin[1]) for n, e, _ in way]
+    places = [(n - origin[0], e - origin[1]) for n, e, _ in path]
     if not fence.contains(*places[0]):
         return []
-    furthest_m, sides = 0.0, list[Known]()
+    furthest_m, sides = 0.0, list[KnownSurface]()
     for place in places[1:]:
         inside = fence.nearest_inside(*place)
         beyond_m = math.dist(inside, place)
         if beyond_m > furthest_m + _ROUNDING_M:
             furthest_m, normal = beyond_m, ((inside[0] - place[0]) / beyond_m, (inside[1] - place[1]) / beyond_m, 0.0)
-            sides = [Known(Surface((origin[0] + inside[0], origin[1] + inside[1], 0.0), normal, 0.0))]
+            sides = [KnownSurface(Surface((origin[0] + inside[0], origin[1] + inside[1], 0.0), normal, 0.0))]
     return sides
 
 
@@ -375,8 +375,8 @@ def _with_tilt(target: Target, limits: Limits) -> Target:
     """
     if target.expected is not None and target.acceleration_ned_m_s2 is not None:
         asked = plus(target.acceleration_ned_m_s2, -1.0, target.expected.acceleration_ned_m_s2)
-        is_told = replace(target.expected, acceleration_ned_m_s2=REST)
-        target = replace(target, acceleration_ned_m_s2=asked, expected=is_told)
+        is_reported = replace(target.expected, acceleration_ned_m_s2=REST)
+        target = replace(target, acceleration_ned_m_s2=asked, expected=is_reported)
     return _with_acceleration(target, limits, [])
 
 

@@ -10,7 +10,7 @@ from companion.flight import expecting
 from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
 from companion.flight.context import Activity, FlightContext, Inputs, Move
-from companion.flight.ending import ON_THE_GROUND, HandOver, LetGo, early_end
+from companion.flight.ending import ON_THE_GROUND, HandOver, Released, early_end
 from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.remembering import remember
@@ -52,7 +52,7 @@ class StateMachine(ABC):
         """Whether that has begun."""
 
     @abstractmethod
-    def _let_go(self, text: str) -> None:
+    def _release(self, text: str) -> None:
         """Even giving away fails: silence lets the vehicle's own failsafe act."""
 
     def fail(self, error: Exception, now_us: int) -> bool:
@@ -65,13 +65,13 @@ class StateMachine(ABC):
         text = f"fault of the {self.program}, please report it: {type(error).__name__} in {place.name}: {error}"
         flight.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
         if flight.fault or self._gives_away:
-            self._let_go(text)
+            self._release(text)
         flight.fault = text
         try:
             self._give_away(text, now_us)
         except Exception as second:
             flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
-            self._let_go(text)
+            self._release(text)
         return self.activity is not before
 
 
@@ -117,8 +117,8 @@ class Machine(StateMachine):
     def _give_away(self, text: str, now_us: int) -> None:
         self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
 
-    def _let_go(self, text: str) -> None:
-        self.activity = LetGo()
+    def _release(self, text: str) -> None:
+        self.activity = Released()
         if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
@@ -171,7 +171,7 @@ class Machine(StateMachine):
         flight.reason = failure or f"landed and disarmed{left}"
         text = f"done: landed and disarmed, {_hits(len(flight.collisions))}{left}"
         flight.tell(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
-        return LetGo()
+        return Released()
 
     def _aborted(self, move: Move, now_us: int) -> Activity:
         flight = self.flight
@@ -180,7 +180,7 @@ class Machine(StateMachine):
         expecting.close(flight, now_us)
         text = f"{flight.outcome}: {move.text}"
         flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index)
-        return HandOver(flight, now_us) if move.hand_over else LetGo()
+        return HandOver(flight, now_us) if move.hand_over else Released()
 
 
 def _hits(count: int) -> str:

@@ -17,7 +17,7 @@ from companion.report import Event, JsonValue
 
 # Numbers for plots.
 _PHASE_NUMBER = {Phase.OFF: 0.0, Phase.QUIET: 1.0, Phase.ARMED: 2.0, Phase.CONTACT: 3.0}
-_BLIND = -1.0
+_NO_DATA = -1.0
 
 _COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 # Slower than this a hit came to the vehicle, and from where is told by the push.
@@ -93,7 +93,7 @@ def values(
     state: Enum, watch: Watch, latest: CollisionRecord | None, hits: int, time_us: int
 ) -> list[NamedValue | DebugVector]:
     """The detector's numbers: phase, threshold and the latest hit's; and the state's, its place among all states."""
-    phase = _PHASE_NUMBER[watch.state.phase] if watch.blind_reason is None else _BLIND
+    phase = _PHASE_NUMBER[watch.state.phase] if watch.blind_reason is None else _NO_DATA
     sent: list[NamedValue | DebugVector] = [
         NamedValue(time_us, "rb_state", float(list(type(state)).index(state))),
         NamedValue(time_us, "rb_phase", phase),

@@ -5,13 +5,21 @@ from dataclasses import dataclass, replace
 
 from companion.flight import expecting
 from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
-from companion.flight.damage import way_out
+from companion.flight.damage import after_damage
 from companion.flight.plan import describe_item
 from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
 from companion.messages import Vector3
 from companion.mission import items
-from companion.mission.course import LEAST_TRY_M_S, climb, first_leg, home_around, passed, stay, way_around
+from companion.mission.item_trajectory import (
+    LEAST_TRY_M_S,
+    climb,
+    first_leg,
+    home_around,
+    passed,
+    stay,
+    trajectory_around,
+)
 from companion.mission.trajectory import Motion, Trajectory
 
 # Of a time-out, and of a goal out of reach; "continue" is no move.
@@ -22,16 +30,16 @@ _TRIGGERS = {
 }
 
 
-class _OnAWay:
-    """A way in mission coordinates, begun at a time on the clock of ways."""
+class _OnTrajectory:
+    """A trajectory in mission coordinates, begun at a time of the trajectories' clock."""
 
     _flight: FlightContext
-    _way: Trajectory
-    _way_began_us: int
+    _trajectory: Trajectory
+    _trajectory_began_us: int
 
     @property
     def _elapsed_s(self) -> float:
-        return (self._flight.way_us - self._way_began_us) * 1e-6
+        return (self._flight.trajectory_us - self._trajectory_began_us) * 1e-6
 
     def _turned(self, motion: Motion, now_us: int) -> float | None:
         """The heading at this motion."""
@@ -39,47 +47,47 @@ class _OnAWay:
 
     def target(self, now_us: int) -> Target | None:
         elapsed_s = self._elapsed_s
-        motion = self._way.at(elapsed_s)
+        motion = self._trajectory.at(elapsed_s)
         yaw_rad, place = self._turned(motion, now_us), self._flight.local_ned_m(motion[0])
-        if elapsed_s >= self._way.duration_s:
+        if elapsed_s >= self._trajectory.duration_s:
             return Target(place, yaw_rad)
-        # Without the acceleration the vehicle falls behind the way as it speeds up and then overruns the speed.
-        return self._flight.under_way(place, yaw_rad, *motion[1:])
+        # Without the acceleration the vehicle falls behind as it speeds up, and then overshoots the speed.
+        return self._flight.on_trajectory(place, yaw_rad, *motion[1:])
 
     def _arrived(self) -> bool:
         flight = self._flight
-        latest, goal = flight.vehicle.history.latest(), flight.local_ned_m(self._way.target_m)
+        latest, goal = flight.vehicle.history.latest(), flight.local_ned_m(self._trajectory.target_m)
         radius_m = flight.mission.companion.flight.acceptance_radius_m
         return latest is not None and math.dist(latest.position_ned_m, goal) <= radius_m
 
 
-class FlyItems(_OnAWay):
+class FlyItems(_OnTrajectory):
     """From `flight.step_index` on, until the step is land or return. Every step starts where the last setpoint was."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._begin(flight, now_us)
 
     def _begin(self, flight: FlightContext, now_us: int) -> None:
-        """Take up the present step: a way to go (of no length for a hold) and a heading to turn to."""
+        """Begin the present step: a trajectory (of no length for a hold) and a heading."""
         assert flight.target is not None and flight.origin_ned_m is not None, "the flight is in the air"
         if flight.tally.index != flight.step_index or flight.tally.began_us is None:
             flight.tally = StepTally(flight.step_index, now_us)
         step, start = flight.step, flight.mission_ned_m(flight.target.position_ned_m)
         self._flight, self._action = flight, step.action
-        self._started_us, self._way_began_us = now_us, flight.way_us
+        self._started_us, self._trajectory_began_us = now_us, flight.trajectory_us
         self._over_since_us: int | None = None
         self._heading = Heading.of_step(step, flight.yaw_rad, now_us)
         self._steady_since_us: int | None = None
-        self._way: Trajectory = stay(start)
+        self._trajectory: Trajectory = stay(start)
         self._out_of_reach = ""
         match self._action:
             case items.TakeoffItem():
                 # tried again after a hit in the climb
-                self._way = climb(start, self._action.height_m, flight.mission.companion.flight)
+                self._trajectory = climb(start, self._action.height_m, flight.mission.companion.flight)
             case items.WaitForItem(file=file):
                 flight.file_awaited, flight.file_is_there = file, False
             case items.SetSpeedItem():
-                flight.pace = flight.pace.changed_to(self._action)
+                flight.speeds = flight.speeds.changed_to(self._action)
         factor = flight.tally.pace_factor
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
@@ -87,42 +95,43 @@ class FlyItems(_OnAWay):
         flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
         if isinstance(self._action, items.ExpectItem):
             expecting.begin(flight, step.label, self._action, now_us)
-        elif isinstance(self._action, items.GoToItem | items.VelocityItem | items.PathItem | items.OrbitItem):
+        elif isinstance(self._action, items.Motion):
             self._plan(self._action, start, now_us)
 
     def _plan(self, action: items.Motion, start_m: Vector3, now_us: int) -> None:
-        """The item's own way, or one round what is known; what is left of a path that was interrupted."""
+        """The item's own trajectory, or one round known obstacles; of an interrupted path what is left."""
         flight = self._flight
         behind = flight.tally.points_passed if flight.after_recovery.trigger is Trigger.RECOVERED_TO_DETOUR else 0
         if isinstance(action, items.PathItem) and 0 < behind < len(action.points_ned_m):
             action = action.model_copy(update={"points_ned_m": action.points_ned_m[behind:]})
         known = surroundings(flight)
-        pace = replace(flight.pace, factor=flight.tally.pace_factor)
-        planned = way_around(action, start_m, pace.against(flight.leaning.wind_m_s2, first_leg(action, start_m)), known)
-        if planned.way is None:
+        speeds = replace(flight.speeds, factor=flight.tally.pace_factor)
+        speeds = speeds.against(flight.horizontal_force.wind_m_s2, first_leg(action, start_m))
+        planned = trajectory_around(action, start_m, speeds, known)
+        if planned.trajectory is None:
             self._out_of_reach = f"{describe_item(action)}: no way round what is known"
             flight.unreachable.append(flight.step.label)
             policy = flight.mission.obstacles.on_unreachable
             text = f"item {flight.step.label} out of reach: {self._out_of_reach}; then: {policy}"
             flight.tell(now_us, "unreachable", text, item=flight.step.label, then=policy)
             return
-        self._way = planned.way
+        self._trajectory = planned.trajectory
         if planned.is_detour:
             left_out = f", {planned.left_out} points left out" if planned.left_out else ""
-            text = f"round what is known: {planned.way.distance_m:.1f} m{left_out}"
-            flight.tell(now_us, "detour", text, distance_m=planned.way.distance_m, left_out=planned.left_out)
+            text = f"round what is known: {planned.trajectory.distance_m:.1f} m{left_out}"
+            flight.tell(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
     def interrupt(self, now_us: int) -> None:
-        """A hit ends the present way: how much of a path has been flown?"""
+        """A hit ends the present trajectory: note which points of a path were passed."""
         if isinstance(self._action, items.PathItem):
             tally = self._flight.tally
-            tally.points_passed = max(tally.points_passed, passed(self._action, self._way, self._elapsed_s))
+            tally.points_passed = max(tally.points_passed, passed(self._action, self._trajectory, self._elapsed_s))
 
     def _turned(self, motion: Motion, now_us: int) -> float | None:
         return self._heading.turn(motion[0], motion[1], now_us)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        if (hurt := way_out(flight)) is not None:
+        if (hurt := after_damage(flight)) is not None:
             return hurt
         while True:
             if isinstance(self._action, items.ReturnItem):
@@ -155,11 +164,11 @@ class FlyItems(_OnAWay):
             case items.WaitForItem():
                 return self._has_come(self._action, flight, now_us)
             case items.VelocityItem():
-                return elapsed_s >= self._way.duration_s and self._has_turned(now_us)
+                return elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
             case items.SetYawItem():
                 return self._has_turned(now_us)
             case _:
-                over = elapsed_s >= self._way.duration_s and self._has_turned(now_us)
+                over = elapsed_s >= self._trajectory.duration_s and self._has_turned(now_us)
                 if over and self._over_since_us is None:
                     self._over_since_us = now_us
                 return over and self._arrived()
@@ -183,7 +192,7 @@ class FlyItems(_OnAWay):
 
     def _has_turned(self, now_us: int) -> bool:
         if self._heading.is_fixed:
-            self._heading.turn(self._way.target_m, (0.0, 0.0, 0.0), now_us)
+            self._heading.turn(self._trajectory.target_m, (0.0, 0.0, 0.0), now_us)
         return self._heading.is_reached
 
     def _overdue(self, flight: FlightContext, now_us: int) -> Move | None:
@@ -228,7 +237,7 @@ _LEAST_DISTANCE_M = 0.05
 
 @dataclass(slots=True)
 class Heading:
-    """A heading on its way to another. Radians clockwise from north; None: the vehicle's own affair."""
+    """A heading that turns to another. Radians clockwise from north; None: the vehicle chooses."""
 
     yaw_rad: float | None
     at_us: int
@@ -258,15 +267,15 @@ class Heading:
         return not self.is_fixed or self.yaw_rad == self.fixed_rad
 
     def turn(self, position_m: Vector3, velocity_m_s: Vector3, now_us: int) -> float | None:
-        """Turn on until now, the shorter way."""
+        """Turn on until now, in the shorter direction."""
         wanted = self._wanted(position_m, velocity_m_s)
         elapsed_s, self.at_us = (now_us - self.at_us) * 1e-6, now_us
         if wanted is None or self.yaw_rad is None:
             self.yaw_rad = wanted
             return wanted
-        way = math.remainder(wanted - self.yaw_rad, math.tau)
+        turn = math.remainder(wanted - self.yaw_rad, math.tau)
         step = self.rate_rad_s * elapsed_s
-        self.yaw_rad = wanted if abs(way) <= step else self.yaw_rad + math.copysign(step, way)
+        self.yaw_rad = wanted if abs(turn) <= step else self.yaw_rad + math.copysign(step, turn)
         return self.yaw_rad
 
     def _wanted(self, position_m: Vector3, velocity_m_s: Vector3) -> float | None:
@@ -279,32 +288,33 @@ class Heading:
         return self.fixed_rad
 
 
-class FlyHome(_OnAWay):
+class FlyHome(_OnTrajectory):
     """Up where that is asked for, then straight; planned again after each recovery on the way."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         assert flight.target is not None, "the flight is in the air"
         self._flight = flight
-        self._way_began_us = flight.way_us
+        self._trajectory_began_us = flight.trajectory_us
         flight.going_home = True
         flight.yaw_rad = flight.target.yaw_rad
         start = flight.mission_ned_m(flight.target.position_ned_m)
-        pace = replace(flight.pace, factor=1.0).against(flight.leaning.wind_m_s2, (-start[0], -start[1], 0.0))
-        planned = home_around(start, flight.returning_as, pace, surroundings(flight))
-        self._is_cut_off = planned.way is None
-        self._way: Trajectory = planned.way or stay(start)
+        wind_m_s2, homewards = flight.horizontal_force.wind_m_s2, (-start[0], -start[1], 0.0)
+        speeds = replace(flight.speeds, factor=1.0).against(wind_m_s2, homewards)
+        planned = home_around(start, flight.returning_as, speeds, surroundings(flight))
+        self._is_cut_off = planned.trajectory is None
+        self._trajectory: Trajectory = planned.trajectory or stay(start)
         if self._is_cut_off:
             flight.unreachable.append("home")
             flight.tell(now_us, "unreachable", "home out of reach: no way round what is known; landing here")
             return
         round_it = " round what is known" if planned.is_detour else ""
-        text = f"returning over {self._way.distance_m:.1f} m{round_it}"
-        flight.tell(now_us, "return", text, distance_m=self._way.distance_m)
+        text = f"returning over {self._trajectory.distance_m:.1f} m{round_it}"
+        flight.tell(now_us, "return", text, distance_m=self._trajectory.distance_m)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         if self._is_cut_off or (flight.motors.damage is not None and flight.mission.on_damage == "land"):
             return Move(Trigger.LAND_DUE)
-        overdue_s = self._elapsed_s - self._way.duration_s
+        overdue_s = self._elapsed_s - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
         if self._arrived():

@@ -1,10 +1,10 @@
-"""The flight's part of the obstacle memory: what its hits have added, and what that means for ways and recoveries."""
+"""The flight's part of the obstacle map: what its hits add, for trajectories and for recoveries."""
 
 from collections.abc import Sequence
 
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
-from companion.flight.envelope import Known, touched
+from companion.flight.envelope import KnownSurface, touched
 from companion.flight.states import Trigger
 from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
@@ -15,7 +15,7 @@ from companion.reflex.laws import Contact
 
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:
-    """Take in the first so many hits, as they are known by now; what is new is told."""
+    """Add the first `hits` hits, by their newest estimates; report new patches."""
     before = flight.patches
     flight.patches, flight.hits_remembered = _with_hits(flight, hits), hits
     for patch in flight.patches:
@@ -24,15 +24,15 @@ def remember(flight: FlightContext, hits: int, now_us: int) -> None:
 
 
 def all_known(flight: FlightContext) -> tuple[Patch, ...]:
-    """With the hit that is being recovered from, as far as it is known: what is to be kept if the program ends now."""
+    """With the hit of the present recovery: the map to keep if the program ends now."""
     new = flight.collisions[flight.hits_remembered :]
     return remembered(flight.patches, _touches(flight, new), _clearance_m(flight)) if new else flight.patches
 
 
 def surroundings(flight: FlightContext) -> Surroundings:
-    """What the flight plans its ways around.
+    """The obstacles that the flight plans its trajectories around.
 
-    An item that is tried again is to meet what stopped it: that is left out, and nothing else.
+    An item that is tried again shall meet what stopped it: that hit is left out, and nothing else.
     """
     patches, tally = flight.patches, flight.tally
     is_retry = flight.after_recovery.trigger is Trigger.RECOVERED_TO_RETRY and tally.index == flight.step_index
@@ -59,19 +59,19 @@ def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface
     ]
 
 
-def known_surfaces(flight: FlightContext) -> list[Known]:
-    """What a setpoint must not lead into: what has been hit in this recovery, and what ways are planned around."""
+def known_surfaces(flight: FlightContext) -> list[KnownSurface]:
+    """Surfaces that a setpoint must not lead into: those hit in this recovery, and the obstacle map."""
     known = []
     for record in in_one_recovery(flight.collisions):
         surface = touched(record.contact.position_ned_m, record.contact.normal_ned)
-        # One past which the vehicle has slid, and where it is to come to rest behind, is in nobody's way.
+        # A surface that the recovery setpoint lies behind does not count: the vehicle has slid past it.
         if surface.off_m(record.setpoint_ned_m) > 0.0:
-            known.append(Known(surface))
+            known.append(KnownSurface(surface))
     if flight.patches and flight.origin_ned_m is not None:
         reach_m = flight.mission.companion.estimate.reach_m
         for patch in surroundings(flight).patches:
             surface = touched(_touching_ned_m(flight, patch), patch.normal_ned)
-            known.append(Known(surface, patch, flight.origin_ned_m, reach_m))
+            known.append(KnownSurface(surface, patch, flight.origin_ned_m, reach_m))
     return known
 
 

@@ -26,7 +26,7 @@ class Trigger(Enum):
     CONTROL_LOST = "pilot, failsafe or disarm took over"
     REFUSED = "the vehicle cannot or will not fly"
     INTERRUPTED = "stop, silent link, abort condition or a step that did not end in time"
-    HEARD_AGAIN = "heard again after a silence, as of a restart"
+    LINK_RESTORED = "the link is back after a silence, as after a restart"
     COLLISION = "hit detected"
     VEHICLE_READY = "identified, streams fast enough"
     PLAN_CONFIRMED = "person confirmed the plan"
@@ -54,7 +54,7 @@ _IN_THE_AIR = {
 _ON_THE_GROUND = {
     Trigger.INTERRUPTED: State.ABORTED,
     Trigger.REFUSED: State.ABORTED,
-    Trigger.HEARD_AGAIN: State.CONNECT,
+    Trigger.LINK_RESTORED: State.CONNECT,
 }
 TABLE = StateTable[State, Trigger](
     {

@@ -14,12 +14,12 @@ from companion.px4_mode import AUTO_LAND, OFFBOARD
 ORIGIN_MEAN_US = 1_000_000
 
 
-# How far a vehicle's boot clock may go wrong and still be the same: SITL's may run 1 % off (measured), and the wall's
-# clock may be set by a second or two.
+# Largest error of a boot clock that was not restarted. SITL's runs up to 1 % off (measured); the wall clock may be set
+# by a second or two.
 BOOT_CLOCK_DRIFT = 0.02
 BOOT_CLOCK_SLACK_US = 3_000_000
-# While the motors spin up (PX4 takes two seconds from arming to lifting off) the setpoint waits: a vehicle left half a
-# metre behind it climbs 0.65 m/s faster than it was asked to, into whatever is above.
+# The setpoint waits while the motors spin up: PX4 takes two seconds from arming to lift-off. A vehicle half a metre
+# behind its setpoint climbs 0.65 m/s faster than commanded, into whatever is above.
 MOST_AHEAD_M = 0.15
 
 
@@ -33,7 +33,7 @@ class TakeOff:
         self._started_us = now_us
         self._profile: LineProfile | None = None
         self._climbing_s = 0.0  # along the profile
-        self._climbed_until_us = flight.way_us  # on the clock of ways
+        self._climbed_until_us = flight.trajectory_us  # on the clock of ways
         attitude = flight.vehicle.attitude
         flight.yaw_rad = yaw_rad(attitude.attitude_wxyz) if attitude is not None else None
         self._yaw_rad = flight.yaw_rad
@@ -44,7 +44,7 @@ class TakeOff:
         if self._profile is None:
             return Target(self._ground_ned_m, self._yaw_rad)
         position, velocity, acceleration = self._profile.at(self._climbing_s)
-        return self._flight.under_way(position, self._yaw_rad, velocity, acceleration)
+        return self._flight.on_trajectory(position, self._yaw_rad, velocity, acceleration)
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
         return self._now(flight, inputs, now_us)
@@ -77,7 +77,7 @@ class TakeOff:
             return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
         self._now = self._climb
         self._started_us = flight.armed_at_us = now_us
-        self._climbed_until_us = flight.way_us
+        self._climbed_until_us = flight.trajectory_us
         self._ground_ned_m = mean_position(flight)
         latest = flight.vehicle.history.latest()
         assert latest is not None, "a flight begins only with positions arriving"
@@ -95,8 +95,8 @@ class TakeOff:
         assert profile is not None
         limits = flight.mission.companion.flight
         if latest is not None and latest.position_ned_m[2] - profile.at(self._climbing_s)[0][2] < MOST_AHEAD_M:
-            self._climbing_s += (flight.way_us - self._climbed_until_us) * 1e-6
-        self._climbed_until_us = flight.way_us
+            self._climbing_s += (flight.trajectory_us - self._climbed_until_us) * 1e-6
+        self._climbed_until_us = flight.trajectory_us
         is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
         if is_up and self._climbing_s >= profile.duration_s:
             return Move(Trigger.TAKEN_OFF)
@@ -130,8 +130,8 @@ def mean_position(flight: FlightContext) -> Vector3:
     return (n, e, d)
 
 
-# From 12 m at PX4's MPC_LAND_SPEED of 0.7 m/s it takes under 30 s with detection and disarming; this allows for
-# the slowest speed it can be set to (0.6 m/s) from 60 m.
+# From 12 m at PX4's MPC_LAND_SPEED of 0.7 m/s it takes under 30 s with detection and disarming. This allows for its
+# lowest value, 0.6 m/s, from 60 m.
 LANDING_TIMEOUT_US = 120_000_000
 
 

@@ -9,10 +9,10 @@ from companion.guard.states import Trigger
 from companion.messages import GlobalPosition, PositionTarget, Reposition, SetMode, Vector3
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
 
-# The vehicle tells what it flies to. Further than this from all that was sent it is somebody else's: a moving
-# setpoint of ours is 0.24 m further on at most from one to the next, at 12 m/s.
+# The vehicle reports its setpoint. Further than this from all that was sent, it is somebody else's: at 12 m/s a moving
+# setpoint advances 0.24 m from one to the next.
 CROSSED_M = 0.5
-# A mixed-up echo is one, three are a second stream.
+# One may be an echo out of order; three are a second stream.
 CROSSED_TIMES = 3
 # What is echoed was sent at most this long ago: a slow echo's period of 0.1 s and the link's delays.
 ECHO_AGE_US = 400_000
@@ -21,18 +21,18 @@ ECHO_STALE_US = 200_000
 # Mean radius: over the metre in question any earth is a ball.
 EARTH_RADIUS_M = 6_371_000.0
 # PX4's AUTO modes begin with the acceleration that the estimator shows at that moment (FlightTaskAuto::activate) and
-# change it by MPC_JERK_AUTO = 4 m/s^3. Asked for at the hit itself, a real PX4 began with -64 m/s^2 and flew off
-# backwards at its greatest speed; asked for 0.3 s later, the program's setpoints had pushed it into the wall again.
-# So as soon as the contact is over: nothing pushes for 40 ms, ten samples of a fast IMU stream.
+# change it by MPC_JERK_AUTO = 4 m/s^3. Requested at the hit itself, a real PX4 began with -64 m/s^2 and flew off
+# backwards at its highest speed. Requested 0.3 s later, the program's setpoints had pushed it into the wall again. So
+# it is requested when the contact is over: no external force for 40 ms, ten samples of a fast IMU stream.
 CONTACT_OVER_US = 40_000
-# A contact that never ends is no reason to wait for ever.
+# Bound for a contact that does not end.
 LONGEST_WAIT_US = 300_000
 # PX4 answers in 10 ms; when it does not take the mode its own action for lost setpoints is the next best.
 HAND_OVER_US = 500_000
 
 
 class TakeOver:
-    """The recovery has begun with the first setpoint; here until the vehicle is seen to fly by it."""
+    """The recovery began with the first setpoint. The state lasts until the vehicle reports OFFBOARD."""
 
     def __init__(self, guard: GuardContext, recover: Recover, now_us: int) -> None:
         self.recover = recover

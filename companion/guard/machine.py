@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from companion.flight.after_hit import note_before
 from companion.flight.context import Inputs
-from companion.flight.ending import HEARD_AGAIN, Holder, LetGo, silent_link, silent_position, who_decided
+from companion.flight.ending import LINK_RESTORED, Holder, Released, silent_link, silent_position, who_decided
 from companion.flight.machine import StateMachine
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
@@ -21,7 +21,7 @@ from companion.px4_mode import OFFBOARD, mode_name
 _KINDS = {
     Trigger.CONTROL_LOST: "let_go",
     Trigger.NOT_CONFIRMED: "refused",
-    Trigger.BLIND: "link",
+    Trigger.POSITION_SILENT: "link",
     Trigger.CROSSED: "crossed",
     Trigger.WORTH_GUARDING: "watching",
     Trigger.NOT_TO_GUARD: "watching",
@@ -37,7 +37,13 @@ THROTTLE = 2
 # In these cases a program sends setpoints on a link of its own.
 _BESIDE_PROGRAM = (Trigger.HIT_BESIDE_PROGRAM, Trigger.CROSSED)
 # After these the vehicle is given back to hold whatever is configured.
-_TO_HOLD = (Trigger.STOPPED, Trigger.HIT_BESIDE_PROGRAM, Trigger.NOT_CONFIRMED, Trigger.BLIND, Trigger.CROSSED)
+_TO_HOLD = (
+    Trigger.STOPPED,
+    Trigger.HIT_BESIDE_PROGRAM,
+    Trigger.NOT_CONFIRMED,
+    Trigger.POSITION_SILENT,
+    Trigger.CROSSED,
+)
 
 
 @dataclass
@@ -87,8 +93,8 @@ class GuardMachine(StateMachine):
     def _give_away(self, text: str, now_us: int) -> None:
         self._take(Move(Trigger.STOPPED, text), now_us)
 
-    def _let_go(self, text: str) -> None:
-        self.state, self.activity, self.outcome = State.ENDED, LetGo(), text
+    def _release(self, text: str) -> None:
+        self.state, self.activity, self.outcome = State.ENDED, Released(), text
 
     def _trigger_of_hit(self) -> Trigger:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
@@ -123,9 +129,9 @@ class GuardMachine(StateMachine):
         if inputs.stop_reason is not None and TABLE.moves(self.state, Trigger.STOPPED):
             return Move(Trigger.STOPPED, inputs.stop_reason)
         if self.state not in HOLDING:
-            return self._heard_again(now_us)
-        blind = silent_position(guard)
-        return None if blind is None else Move(Trigger.BLIND, blind)
+            return self._link_restored(now_us)
+        silent = silent_position(guard)
+        return None if silent is None else Move(Trigger.POSITION_SILENT, silent)
 
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
@@ -146,13 +152,13 @@ class GuardMachine(StateMachine):
         who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot or a program"
         return f"{who} took over in {mode_name(report.custom_mode)}"
 
-    def _heard_again(self, now_us: int) -> Move | None:
+    def _link_restored(self, now_us: int) -> Move | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
         guard = self.flight
         may_be_restarted = self.state is State.CONNECTING or guard.vehicle.armed is False
         if not may_be_restarted or guard.is_silent(now_us) or not guard.was_silent:
             return None
-        return Move(Trigger.STREAMS_GONE, HEARD_AGAIN)
+        return Move(Trigger.STREAMS_GONE, LINK_RESTORED)
 
     def _take(self, move: Move | None, now_us: int) -> None:
         if move is None or not TABLE.moves(self.state, move.trigger):
@@ -198,7 +204,7 @@ class GuardMachine(StateMachine):
                 return StandDown(guard, move.text.startswith(STICKS), now_us)
             case State.ENDED:
                 self.outcome = move.text
-                return LetGo()
+                return Released()
 
 
 def has_moved(before: Sticks, now: Sticks) -> bool:

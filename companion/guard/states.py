@@ -32,7 +32,7 @@ class Trigger(Enum):
     NOT_TO_GUARD = "landing, or in a mode that may not be taken over"
     CONFIRMED = "OFFBOARD confirmed"
     NOT_CONFIRMED = "OFFBOARD refused or not confirmed in time"
-    BLIND = "position silent"
+    POSITION_SILENT = "position silent"
     CROSSED = "another program's setpoints reach the vehicle"
     SETTLED = "settled, or not in time"
     GIVEN_BACK = "mode confirmed"
@@ -40,8 +40,8 @@ class Trigger(Enum):
     ENABLED = "person enabled it again"
 
 
-# What ends the holding of a vehicle whatever is done with it.
-_LET_GO = {Trigger.DISARMED: State.STANDING_BY, Trigger.CONTROL_LOST: State.STOOD_DOWN}
+# What ends the holding in every state.
+_RELEASED = {Trigger.DISARMED: State.STANDING_BY, Trigger.CONTROL_LOST: State.STOOD_DOWN}
 TABLE = StateTable[State, Trigger](
     {
         State.CONNECTING: {
@@ -63,23 +63,23 @@ TABLE = StateTable[State, Trigger](
             Trigger.NOT_TO_GUARD: State.STANDING_BY,
         },
         State.TAKING_OVER: {
-            **_LET_GO,
+            **_RELEASED,
             Trigger.STOPPED: State.GIVING_BACK,
             Trigger.HIT: State.TAKING_OVER,
             Trigger.CONFIRMED: State.RECOVERING,
             Trigger.NOT_CONFIRMED: State.GIVING_BACK,
-            Trigger.BLIND: State.GIVING_BACK,
+            Trigger.POSITION_SILENT: State.GIVING_BACK,
         },
         State.RECOVERING: {
-            **_LET_GO,
+            **_RELEASED,
             Trigger.STOPPED: State.GIVING_BACK,
             Trigger.HIT: State.RECOVERING,
-            Trigger.BLIND: State.GIVING_BACK,
+            Trigger.POSITION_SILENT: State.GIVING_BACK,
             Trigger.CROSSED: State.GIVING_BACK,
             Trigger.SETTLED: State.GIVING_BACK,
         },
         State.GIVING_BACK: {
-            **_LET_GO,
+            **_RELEASED,
             Trigger.HIT: State.TAKING_OVER,
             Trigger.HIT_BESIDE_PROGRAM: State.GIVING_BACK,
             Trigger.GIVEN_BACK: State.WATCHING,

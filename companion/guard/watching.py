@@ -8,7 +8,7 @@ from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, SetMessageInterval, VehicleCommand
 from companion.px4_mode import OFFBOARD, mode_name
 
-# Another's setpoints are noticed in a few tens of milliseconds: two streams that fight throw the vehicle about.
+# Another's setpoints are noticed in a few tens of milliseconds: two streams of setpoints shake the vehicle.
 ECHO_HZ = 50.0
 # The pilot is noticed within a twentieth of a second.
 STICKS_HZ = 20.0
@@ -60,20 +60,21 @@ class Connect(Meet[Move]):
         if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
             return None
-        self._tell_streams(flight, now_us)
+        self._report_streams(flight, now_us)
         flight.tell(now_us, "unattended", unattended_text(flight.mission.limits.max_speed_m_s))
         return Move(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
 
 
 class StandBy(Silent):
-    """Nothing to guard; why is told when it changes."""
+    """Nothing to guard; the reason is reported when it changes."""
 
     def __init__(self) -> None:
         self._told: str | None = None
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
         vehicle = guard.vehicle
-        if vehicle.last_position_us is not None and vehicle.last_heard_us - vehicle.last_position_us > STREAMS_GONE_US:
+        position_us = vehicle.last_position_us
+        if position_us is not None and vehicle.last_received_us - position_us > STREAMS_GONE_US:
             return Move(Trigger.STREAMS_GONE, "streams ended, asking for them again")
         reason = why_not(guard)
         if reason is None and guard.round_trip.complaint() is not None:
@@ -88,13 +89,13 @@ class StandBy(Silent):
 
 
 class Watch:
-    """Until a hit. Setpoints lead the way, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
+    """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
         self._guard = guard
 
     def target(self, now_us: int) -> Target | None:
-        """Stay where you are; PX4 looks at it in no mode but OFFBOARD, and then somebody else's stream counts."""
+        """A setpoint at the present position. PX4 uses it in OFFBOARD alone, and then somebody else's stream counts."""
         guard, vehicle = self._guard, self._guard.vehicle
         latest = vehicle.history.latest()
         seen_us = guard.others_setpoint_us

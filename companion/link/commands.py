@@ -105,19 +105,20 @@ class CommandClient:
     ) -> tuple[messages.SendCommand | None, CommandOutcome | None]:
         """`seen`: the command's effect shows in the vehicle's own messages.
 
-        What may not be sent when its time has come is as good as lost on the way: it counts as an attempt.
+        Returns what to send now, and the outcome once there is one. An attempt that `may_send` forbids counts as sent
+        and lost.
         """
         pending = self._pending
         if pending is None:
             return None, None
-        is_confirmed_by_sight = needs_confirmation(pending.command)
-        if is_confirmed_by_sight and seen:
+        is_confirmed_by_state = needs_confirmation(pending.command)
+        if is_confirmed_by_state and seen:
             return self._end(pending, True, "confirmed")
         for ack in acks:
             if ack.command == pending.command.command_id and pending.attempts > 0:
                 wait_us = CONFIRMATION_TIMEOUT_US if ack.result in TAKEN_UP else REFUSAL_PAUSE_US
                 pending.last_result, pending.repeat_at_us = ack.result, now_us + wait_us
-                if ack.result is CommandResult.ACCEPTED and not is_confirmed_by_sight:
+                if ack.result is CommandResult.ACCEPTED and not is_confirmed_by_state:
                     return self._end(pending, True, "accepted")
                 if is_final(pending.command, ack.result):
                     return self._end(pending, False, f"the vehicle answered {ack.result.name}")

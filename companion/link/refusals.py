@@ -1,4 +1,4 @@
-"""Messages of the vehicle's that were not believed: counted, and told when it lasts."""
+"""Messages of the vehicle's that were not accepted: counted, and reported when they go on."""
 
 from dataclasses import dataclass, field
 
@@ -35,4 +35,4 @@ class Refusals:
         if run.is_told or now_us - run.since_us < LASTING_US:
             return None
         run.is_told = True
-        return f"{name} is not believed: {refused.reason}"
+        return f"{name} is not accepted: {refused.reason}"

@@ -43,7 +43,7 @@ class RoundTrip:
         self._asked_ns.append(now_us * 1000)
         return TimeSyncAsk(now_us * 1000)
 
-    def hear(self, answer: TimeSyncAnswer, now_us: int) -> None:
+    def update(self, answer: TimeSyncAnswer, now_us: int) -> None:
         """An answer; the first to each question counts."""
         asked_ns = answer.companion_time_ns
         if asked_ns not in self._asked_ns:

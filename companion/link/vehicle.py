@@ -60,8 +60,8 @@ class ModeReport:
     failsafe: bool
 
 
-# So long without a word, and what is known of the mode is old: PX4 gives OFFBOARD up by itself after as long without
-# a setpoint (COM_OF_LOSS_T), and a setpoint that comes later would take it back from whoever has it by then.
+# After this silence the last reported mode is old. PX4 leaves OFFBOARD by itself after as long without a setpoint
+# (COM_OF_LOSS_T). A setpoint that comes later would take the vehicle back from whoever has it then.
 OLD_NEWS_US = 1_000_000
 
 
@@ -70,7 +70,7 @@ class Vehicle:
     """The vehicle as heard. Ages are in the companion's clock, motion in the vehicle's.
 
     A mode that is not the companion's, and a disarm in the air, count from the second report on: one forged or broken
-    packet ends no flight. They are in doubt from the first one on, and nothing is commanded on what is in doubt.
+    packet ends no flight. After the first report they are unconfirmed, and no command is sent.
     """
 
     identity: Identity | None = None
@@ -82,29 +82,29 @@ class Vehicle:
     attitude: messages.Attitude | None = None
     battery_percent: int | None = None
     history: MotionHistory = field(default_factory=MotionHistory)
-    last_heard_us: int = 0
+    last_received_us: int = 0
     last_position_us: int | None = None
-    mode_heard_us: int = 0
+    mode_received_us: int = 0
     unsure_since_us: int = -1  # only a report of the mode that is newer than this says who has the vehicle
-    doubted_mode: ModeReport | None = None  # reported once, and not the companion's
-    is_disarm_doubted: bool = False  # reported once, in the air
+    unconfirmed_mode: ModeReport | None = None  # reported once, and not the companion's
+    is_disarm_unconfirmed: bool = False  # reported once, in the air
     is_disarm_unexplained: bool = False  # and not yet contradicted by a vehicle that says that it flies
     conflicts: int = 0
 
     @property
     def is_mode_known(self) -> bool:
         """Whether it may be commanded: its mode was heard since the last silence, and nothing speaks against it."""
-        is_new = self.mode_heard_us > self.unsure_since_us
-        return is_new and self.doubted_mode is None and not self.is_disarm_unexplained
+        is_new = self.mode_received_us > self.unsure_since_us
+        return is_new and self.unconfirmed_mode is None and not self.is_disarm_unexplained
 
     def note_silence(self, now_us: int) -> None:
-        """Before what a step brings is heard: after a silence it may be as old as the silence."""
-        if self.identity is not None and now_us - self.last_heard_us >= OLD_NEWS_US:
+        """Called before a step's samples: after a silence they may be as old as the silence."""
+        if self.identity is not None and now_us - self.last_received_us >= OLD_NEWS_US:
             self.unsure_since_us = now_us
 
-    def hear(self, sample: object, now_us: int, own_modes: tuple[int | None, ...] = ()) -> None:
-        """Take in one sample of the identified vehicle. Without `own_modes` every mode is believed at once."""
-        self.last_heard_us = now_us
+    def update(self, sample: object, now_us: int, own_modes: tuple[int | None, ...] = ()) -> None:
+        """Take one sample of the identified vehicle. Without `own_modes` every mode is accepted at once."""
+        self.last_received_us = now_us
         match sample:
             case messages.ImuSample():
                 pass  # the most frequent of all: first, and nothing of it is kept here
@@ -114,18 +114,18 @@ class Vehicle:
             case messages.Attitude():
                 self.attitude = sample
             case messages.Heartbeat():
-                self._hear_armed(sample.armed)
+                self._update_armed(sample.armed)
                 self.failsafe = sample.system_status >= FAILSAFE_STATUS
-                self._hear_mode(ModeReport(sample.custom_mode, None, self.failsafe), own_modes, now_us)
+                self._update_mode(ModeReport(sample.custom_mode, None, self.failsafe), own_modes, now_us)
             case messages.CurrentMode():
                 # The intended mode is newer than the last HEARTBEAT's status, where it is given.
                 failsafe = self.failsafe and sample.intended_custom_mode is None
                 report = ModeReport(sample.custom_mode, sample.intended_custom_mode, failsafe)
-                self._hear_mode(report, own_modes, now_us)
+                self._update_mode(report, own_modes, now_us)
             case messages.ExtendedState():
                 self.landed = sample.landed_state
-                if self.is_disarm_doubted and self.landed is messages.LandedState.ON_GROUND:
-                    self._believe_armed(False)
+                if self.is_disarm_unconfirmed and self.landed is messages.LandedState.ON_GROUND:
+                    self._accept_armed(False)
                 elif self.is_disarm_unexplained and self.landed is messages.LandedState.IN_AIR:
                     self.is_disarm_unexplained = False
                     self.conflicts += 1
@@ -136,24 +136,25 @@ class Vehicle:
             case _:
                 pass
 
-    def _hear_mode(self, report: ModeReport, own_modes: tuple[int | None, ...], now_us: int) -> None:
-        self.mode_heard_us = now_us
+    def _update_mode(self, report: ModeReport, own_modes: tuple[int | None, ...], now_us: int) -> None:
+        self.mode_received_us = now_us
         is_known = self.mode is None or report.custom_mode in (self.mode.custom_mode, *own_modes)
-        if is_known or not own_modes or self.doubted_mode is not None:
-            self.conflicts += is_known and self.doubted_mode is not None
-            self.mode, self.doubted_mode = report, None
+        if is_known or not own_modes or self.unconfirmed_mode is not None:
+            self.conflicts += is_known and self.unconfirmed_mode is not None
+            self.mode, self.unconfirmed_mode = report, None
         else:
-            self.doubted_mode = report
+            self.unconfirmed_mode = report
 
-    def _hear_armed(self, armed: bool) -> None:
-        if armed or self.armed is not True or self.is_disarm_doubted or self.landed is messages.LandedState.ON_GROUND:
+    def _update_armed(self, armed: bool) -> None:
+        is_on_ground = self.landed is messages.LandedState.ON_GROUND
+        if armed or self.armed is not True or self.is_disarm_unconfirmed or is_on_ground:
             self.conflicts += armed and self.is_disarm_unexplained
-            self._believe_armed(armed)
+            self._accept_armed(armed)
         else:
-            self.is_disarm_doubted = self.is_disarm_unexplained = True
+            self.is_disarm_unconfirmed = self.is_disarm_unexplained = True
 
-    def _believe_armed(self, armed: bool) -> None:
-        self.armed, self.is_disarm_doubted, self.is_disarm_unexplained = armed, False, False
+    def _accept_armed(self, armed: bool) -> None:
+        self.armed, self.is_disarm_unconfirmed, self.is_disarm_unexplained = armed, False, False
 
     @property
     def custom_mode(self) -> int | None:

@@ -76,7 +76,7 @@ class Encoder:
         return self._chunks(outgoing) if isinstance(outgoing, StatusText) else [self._message(outgoing)]
 
     def fields(self, outgoing: Outgoing) -> list[tuple[str, dict[str, Any]]]:
-        """The same as name and fields, for programs that hand them over so; NaN as None."""
+        """The same packets as names and fields, for MAVSDK, which makes the bytes itself; NaN as None."""
         found = self._messages(outgoing)
         return [(one.get_type(), {name: _plain(getattr(one, name)) for name in one.fieldnames}) for one in found]
 

@@ -1,1 +1,1 @@
-"""What hits have shown of the surroundings: surface patches, merged, planned around, saved and loaded."""
+"""The obstacle map: surface patches from hits, merged, planned around, saved and loaded."""

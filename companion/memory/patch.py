@@ -1,4 +1,4 @@
-"""Touches and patches: what a hit says of a surface, what touches of one say together, how far it is believed to go on.
+"""Surface patches: what one hit shows of a surface, how hits of one surface merge, and how far it is assumed to extend.
 
 Mission coordinates, metres.
 """
@@ -11,11 +11,11 @@ from companion.messages import Vector3
 from companion.reflex.config import STEEP
 from companion.reflex.halfspace import away_from
 
-# One touch shows one place. Half a metre to every side is believed: the way round then passes a metre beside the touch,
-# clear of a pole, a post or the leaf of a door, and a surface that goes on costs one hit more.
+# One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the
+# touch, clear of a pole or a door leaf. A surface that is longer costs one more hit.
 REACHES_M = 0.5
-# What has been touched in places far apart is long: it is believed to go on by half of what is known of it. The end of
-# a wall is then found in a number of hits that grows with the logarithm of its length ...
+# A surface touched in places far apart is long: it is assumed to extend by half of its known length. The end of a wall
+# is then found in a number of hits that grows with the logarithm of its length ...
 GOES_ON = 0.5
 # ... but by no more than this, in which a door or the gap between two racks has room.
 GOES_ON_MOST_M = 2.0
@@ -25,8 +25,8 @@ GOES_ON_MOST_M = 2.0
 class Patch:
     """One surface: all touches of it, the unit normal that they agree on and its standard deviation.
 
-    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `reaches_m` is how far it is
-    believed to reach beyond its touches, whatever else is known; `found_at_us` the first touch.
+    The normal is horizontal, or the surface is a ceiling, a floor or a roof (`is_steep`). `reaches_m`: the least that
+    it is assumed to extend beyond its touches. `found_at_us`: time of the first touch.
     """
 
     touches_ned_m: tuple[Vector3, ...]
@@ -60,40 +60,41 @@ class Patch:
         """Of a wall: from where to where it was touched."""
         return _range([self.along_m(place) for place in self.touches_ned_m])
 
-    def believed_along_m(self) -> tuple[float, float]:
-        """Of a wall: from where to where it is believed to go."""
+    def assumed_along_m(self) -> tuple[float, float]:
+        """Of a wall: both ends of its assumed extent."""
         return _grown(self.touched_along_m(), self.reaches_m)
 
-    def believed_heights_m(self) -> tuple[float, float]:
-        """From which height to which it is believed to go; behind a ceiling and below a floor without an end."""
+    def assumed_heights_m(self) -> tuple[float, float]:
+        """Lowest and highest height of its assumed extent; unbounded above a ceiling and below a floor."""
         low, high = touched = _range([-place[2] for place in self.touches_ned_m])
         if not self.is_steep:
             return _grown(touched, self.reaches_m)
         return (low, math.inf) if self.normal_ned[2] > 0.0 else (-math.inf, high)
 
     def faces(self, place_ned_m: Vector3, beside_m: float) -> bool:
-        """Whether a place is in front of what is believed of it, or up to so much beside that."""
+        """Whether a place is in front of the assumed extent, or at most `beside_m` beside it."""
         if self.off_m(place_ned_m) <= 0.0:
             return False
         if self.is_steep:
             away_m = min(math.dist(place_ned_m[:2], touch[:2]) for touch in self.touches_ned_m)
-            return away_m <= self.believed_beyond_m() + beside_m
-        (left_m, right_m), (low_m, high_m) = self.believed_along_m(), self.believed_heights_m()
+            return away_m <= self.assumed_beyond_m() + beside_m
+        (left_m, right_m), (low_m, high_m) = self.assumed_along_m(), self.assumed_heights_m()
         along_m, height_m = self.along_m(place_ned_m), -place_ned_m[2]
         return left_m - beside_m <= along_m <= right_m + beside_m and low_m - beside_m <= height_m <= high_m + beside_m
 
-    def believed_beyond_m(self) -> float:
-        """Of a ceiling or a floor: how far it is believed to go on beyond its touches."""
+    def assumed_beyond_m(self) -> float:
+        """Of a ceiling or a floor: how far it is assumed to extend beyond its touches."""
         widest_m = max(math.dist(a[:2], b[:2]) for a in self.touches_ned_m for b in self.touches_ned_m)
         return goes_on_m(widest_m, self.reaches_m)
 
 
 def goes_on_m(known_m: float, reaches_m: float) -> float:
-    """How far a surface of which so much is known is believed to go on beyond it."""
+    """How far a surface of known length `known_m` is assumed to extend beyond it."""
     return max(reaches_m, min(GOES_ON_MOST_M, GOES_ON * known_m))
 
 
 def mean_of(places: Sequence[Vector3]) -> Vector3:
+    """Mean of one or more positions, m."""
     n, e, d = (sum(axis) / len(places) for axis in zip(*places, strict=True))
     return (n, e, d)
 
@@ -119,11 +120,11 @@ APPROACH_ERROR_RAD = math.radians(45.0)
 LEAST_AGAINST = -0.2
 # A hit hard enough to clip the sensor goes into the surface, not along it: within 60 degrees of its normal.
 LEAST_CLIPPED = 0.5
-# Slower than this a hit came to the vehicle: it moves, or blew past, and will not stand there as a wall does. It is
-# remembered where it was, and believed to be no larger.
+# Slower than this the obstacle came to the vehicle: it moves, and will not stand there as a wall does. The map keeps it
+# where it was, with no assumed extent.
 LEAST_SPEED_M_S = 0.3
-# So does what pushes the vehicle on the way it flies: within 60 degrees of it no obstacle that stands can push, and a
-# push of which clipping left no direction has been turned round by then (see estimate.facing).
+# The same holds for a force along the direction of flight: no obstacle at rest pushes within 60 degrees of it. A
+# clipped force without a direction was turned round before (see estimate.facing).
 FROM_BEHIND = -0.5
 
 
@@ -136,7 +137,7 @@ def touch_of(
     found_at_us: int,
     is_behind: bool = False,
 ) -> Patch | None:
-    """The one touch by a vehicle whose centre was there and moved so; None where nothing says from where it came.
+    """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known.
 
     ``normal_ned`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
     ``is_behind``: what was hit is known to have come after the vehicle.
@@ -159,7 +160,7 @@ def _agreement(a: Vector3, b: Vector3) -> float:
 
 
 def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vector3, float]:
-    """The normal to believe and its error: between the push and the way back where the push is not to be trusted."""
+    """The normal to use, and its error: between the force and the direction back where clipping tilts the force."""
     if against == (0.0, 0.0, 0.0):
         return normal, CLIPPED_ERROR_RAD
     agreement = _agreement(normal, against)
@@ -173,8 +174,8 @@ def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vec
     return middle, max(CLIPPED_ERROR_RAD, half_rad)
 
 
-# A place is good to this: the estimate wanders by some centimetres between two hits, and which part of which guard
-# touched is not known.
+# Error of a touch's place: the position drifts by some centimetres between two hits, and the touching part of the guard
+# is not known.
 PLACE_ERROR_M = 0.1
 # Normals this near to each other may be one surface's however sure each is of itself: a wall is not quite plane.
 LEAST_ANGLE_RAD = math.radians(25.0)
@@ -210,13 +211,13 @@ def is_same(patch: Patch, touch: Patch, clearance_m: float) -> bool:
         return False
     if patch.is_steep:
         beside_m = min(math.dist(place[:2], one[:2]) for one in patch.touches_ned_m)
-        is_near = beside_m <= patch.believed_beyond_m() + 2.0 * clearance_m
+        is_near = beside_m <= patch.assumed_beyond_m() + 2.0 * clearance_m
     else:
         along_m, height_m = patch.along_m(place), -place[2]
         beside_m = _outside_m(along_m, patch.touched_along_m())
         is_near = (
-            _outside_m(along_m, patch.believed_along_m()) <= 2.0 * clearance_m
-            and _outside_m(height_m, patch.believed_heights_m()) <= 2.0 * clearance_m
+            _outside_m(along_m, patch.assumed_along_m()) <= 2.0 * clearance_m
+            and _outside_m(height_m, patch.assumed_heights_m()) <= 2.0 * clearance_m
         )
     bends_m = beside_m * math.tan(min(patch.normal_error_rad, MOST_ANGLE_RAD))
     return is_near and abs(patch.off_m(place)) <= 2.0 * PLACE_ERROR_M + bends_m

@@ -1,6 +1,6 @@
 """Ways round what is known: a visibility graph (Lozano-Perez and Wesley, 1979) in plan, and levels above and below.
 
-The vehicle's centre keeps `clearance_m` off everything believed. Shapes and their distances are shapely's; of the graph
+The vehicle's centre keeps `clearance_m` off every assumed area. Shapes and their distances are shapely's; of the graph
 only the edges that the search comes to are looked at. Mission coordinates, metres.
 """
 
@@ -93,7 +93,7 @@ class _Graph:
             return not self._inner.intersects(line)
         # From the start and to the goal as near as those themselves are.
         start, goal = self.places[START] if here == START else None, self.places[GOAL] if there == GOAL else None
-        return self._walls.let_pass(line, start, goal)
+        return self._walls.keeps_off(line, start, goal)
 
     def traced(self, before: dict[int, int]) -> list[Place]:
         here, places = GOAL, list[Place]()

@@ -27,7 +27,7 @@ class KnownPatch(Written):
     normal_error_deg: Annotated[NotNegative, Field(le=90.0)] = 15.0
     """One standard deviation; the normal of one whole contact."""
     reaches_m: NotNegative = REACHES_M
-    """How far it is believed to reach beyond its touches, at least."""
+    """The least that it is assumed to extend beyond its touches."""
     found_at_us: Annotated[int, Field(strict=True, ge=0)] = 0
     """When it was first touched, by the clock of the flight that did."""
 
@@ -104,8 +104,8 @@ def describe(patch: Patch) -> str:
     hits = "touched once" if patch.hits == 1 else f"touched {patch.hits} times"
     size = ""
     if not patch.is_steep:
-        low_m, high_m = patch.believed_along_m()
-        size = f", believed {high_m - low_m:.1f} m wide"
+        low_m, high_m = patch.assumed_along_m()
+        size = f", assumed {high_m - low_m:.1f} m wide"
     return f"{_what(patch)} at [{n:.2f}, {e:.2f}, {d:.2f}], {hits}{size}"
 
 

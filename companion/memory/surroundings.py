@@ -1,4 +1,4 @@
-"""What is known, as one vehicle sees it: its shapes in plan, what is in its way at a height, how near it may come."""
+"""The obstacle map for one vehicle: shapes in plan, obstacles at a height, and how near the vehicle may come."""
 
 import math
 from collections.abc import Sequence
@@ -14,13 +14,13 @@ from companion.messages import Vector3
 
 Place = tuple[float, float]
 
-# Ways planned along the clearance may waver by so much before they are planned anew: what a place estimate moves
-# between two hits, and the merging of one more touch.
+# A trajectory along the clearance may come this much nearer before it is planned again: a position estimate drifts by
+# as much between two hits, and one more touch moves a patch.
 SLACK_M = 0.05
 # Corners and ends, computed, and what a vehicle at rest is beside its setpoint.
 ROUNDING_M = 0.02
-# A goal may lie nearer to a surface than the clearance, but a place is good to 0.1 m (see patch): with so much and
-# 5 cm between guards and surface it can be flown to without a touch.
+# A goal may lie nearer to a surface than the clearance. A touch's place is good to 0.1 m (see patch); 5 cm more between
+# guards and surface make it safe to fly to.
 LEAST_FREE_M = 0.15
 # A level this near to the bound of a patch's heights is beside it.
 LEVEL_SLACK_M = 0.01
@@ -28,9 +28,9 @@ LEVEL_SLACK_M = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Walls:
-    """What is in the way at some height: what is believed of each patch, and its core."""
+    """Obstacles at some height: the assumed area of each patch, and its core."""
 
-    believed: Sequence[BaseGeometry]
+    areas: Sequence[BaseGeometry]
     cores: Sequence[BaseGeometry]
     reach_m: float
     clearance_m: float
@@ -44,18 +44,18 @@ class Walls:
         """Whether a place lies in one of them, for a vehicle that has a size."""
         return any(distance_m < self.least_m for distance_m in _distances_m(Point(place), self.cores))
 
-    def let_pass(self, way: BaseGeometry, start: Place | None, goal: Place | None) -> bool:
-        """Whether a way stays off by the clearance, or by what its ends leave of it, and off the cores.
+    def keeps_off(self, line: BaseGeometry, start: Place | None, goal: Place | None) -> bool:
+        """Whether a line keeps the clearance, or what its ends leave of it, and stays off the cores.
 
-        An end that is None leaves it whole.
+        An end that is None does not reduce the clearance.
         """
-        return _keeps(way, start, goal, self.believed, self.clearance_m - SLACK_M) and _keeps(
-            way, start, goal, self.cores, self.least_m
+        return _keeps(line, start, goal, self.areas, self.clearance_m - SLACK_M) and _keeps(
+            line, start, goal, self.cores, self.least_m
         )
 
     def grown(self, by_m: float) -> list[BaseGeometry]:
-        """What is believed, and so much more on every side."""
-        return [shape.buffer(by_m, join_style="mitre") for shape in self.believed]
+        """The assumed areas, grown by `by_m` on every side."""
+        return [shape.buffer(by_m, join_style="mitre") for shape in self.areas]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +76,15 @@ class Surroundings:
         low_m, high_m = min(from_m, to_m), max(from_m, to_m)
         here = [patch for patch in self.patches if self._meets(patch, low_m, high_m)]
         there = [patch for patch in here if not _is_within(patch, start_ned_m)]
-        return Walls([*map(believed, there)], [*map(core, there)], self.reach_m, self.clearance_m)
+        return Walls([*map(assumed_area, there)], [*map(core, there)], self.reach_m, self.clearance_m)
 
     def is_clear(self, place_ned_m: Vector3, start_ned_m: Vector3) -> bool:
         """Whether a place keeps the whole clearance."""
         walls = self.walls(-place_ned_m[2], -place_ned_m[2], start_ned_m)
-        return walls.let_pass(Point(place_ned_m[:2]), None, None)
+        return walls.keeps_off(Point(place_ned_m[:2]), None, None)
 
     def _meets(self, patch: Patch, low_m: float, high_m: float) -> bool:
-        bottom_m, top_m = patch.believed_heights_m()
+        bottom_m, top_m = patch.assumed_heights_m()
         off_m = self.clearance_m - LEVEL_SLACK_M
         return low_m < top_m + off_m and high_m > bottom_m - off_m
 
@@ -92,7 +92,7 @@ class Surroundings:
         """Heights just above walls and floors and just below ceilings, inside the fence."""
         levels = set[float]()
         for patch in self.patches:
-            bottom_m, top_m = patch.believed_heights_m()
+            bottom_m, top_m = patch.assumed_heights_m()
             is_ceiling = patch.is_steep and patch.normal_ned[2] > 0.0
             levels.add(bottom_m - self.clearance_m if is_ceiling else top_m + self.clearance_m)
         return sorted(level for level in levels if self.fence.min_height_m <= level <= self.fence.max_height_m)
@@ -104,32 +104,32 @@ class Surroundings:
         return any(core(patch).distance(Point(start)) < self.reach_m for patch in steep)
 
     def block(self, points_ned_m: Sequence[Vector3]) -> bool:
-        """Whether a way through these points, one near the other, comes too near to what is known."""
+        """Whether a line through these points comes too near to a patch."""
         if not self.patches:
             return False
         heights, places = [-point[2] for point in points_ned_m], [point[:2] for point in points_ned_m]
         start, goal = places[0], places[-1]
         walls = self.walls(min(heights), max(heights), points_ned_m[0])
-        way = LineString(places) if any(place != start for place in places) else Point(start)
-        return bool(walls.cores) and (walls.holds(goal) or not walls.let_pass(way, start, goal))
+        line = LineString(places) if any(place != start for place in places) else Point(start)
+        return bool(walls.cores) and (walls.holds(goal) or not walls.keeps_off(line, start, goal))
 
 
 def _is_within(patch: Patch, place_ned_m: Vector3) -> bool:
     """A patch in which the vehicle itself is cannot be there, or not any more."""
-    bottom_m, top_m = patch.believed_heights_m()
+    bottom_m, top_m = patch.assumed_heights_m()
     return bottom_m <= -place_ned_m[2] <= top_m and core(patch).distance(Point(place_ned_m[:2])) < 2.0 * ROUNDING_M
 
 
 def _keeps(
-    way: BaseGeometry, start: Place | None, goal: Place | None, shapes: Sequence[BaseGeometry], off_m: float
+    line: BaseGeometry, start: Place | None, goal: Place | None, shapes: Sequence[BaseGeometry], off_m: float
 ) -> bool:
-    """Off every shape by so much, or as far as both ends are; never through one outside of which both are."""
+    """Off every shape by `off_m`, or as far as both ends are; never through a shape that both ends are outside of."""
     needs_m = [off_m] * len(shapes)
     for end in (start, goal):
         if end is not None:
             ends_m = _distances_m(Point(end), shapes)
             needs_m = [min(need_m, end_m - ROUNDING_M) for need_m, end_m in zip(needs_m, ends_m, strict=True)]
-    return all(distance_m >= need_m for distance_m, need_m in zip(_distances_m(way, shapes), needs_m, strict=True))
+    return all(distance_m >= need_m for distance_m, need_m in zip(_distances_m(line, shapes), needs_m, strict=True))
 
 
 def _distances_m(geometry: BaseGeometry, shapes: Sequence[BaseGeometry]) -> list[float]:
@@ -140,36 +140,36 @@ def _distances_m(geometry: BaseGeometry, shapes: Sequence[BaseGeometry]) -> list
 THICKNESS_M = 0.1
 
 
-def believed(patch: Patch) -> BaseGeometry:
-    """What the surface is believed to cover, wherever it is believed to be in height.
+def assumed_area(patch: Patch) -> BaseGeometry:
+    """The area in plan that the surface is assumed to cover, whatever its heights.
 
-    Of a wall a rectangle behind its front; it widens to both sides with what the normal's error makes of its length, so
-    that a surface that is turned against what is believed still lies within it.
+    Of a wall: a rectangle behind its front. The normal's error over the wall's length widens it, so that a surface
+    turned by that error still lies within it.
     """
     if patch.is_steep:
         return _level(patch)
-    low_m, high_m = patch.believed_along_m()
+    low_m, high_m = patch.assumed_along_m()
     touched_low_m, touched_high_m = patch.touched_along_m()
     beyond_m = max(touched_low_m - low_m, high_m - touched_high_m)
     return _wall(patch, beyond_m * math.sin(patch.normal_error_rad))
 
 
 def core(patch: Patch) -> BaseGeometry:
-    """The same as if the normal were right: what a vehicle beside it is certainly not in."""
+    """The same without the normal's error: an area that a vehicle beside the wall cannot be in."""
     return _level(patch) if patch.is_steep else _wall(patch, 0.0)
 
 
 def _level(patch: Patch) -> BaseGeometry:
     touched = MultiPoint([place[:2] for place in patch.touches_ned_m]).convex_hull
-    return touched.buffer(max(patch.believed_beyond_m(), THICKNESS_M), quad_segs=2)
+    return touched.buffer(max(patch.assumed_beyond_m(), THICKNESS_M), quad_segs=2)
 
 
 def _wall(patch: Patch, wavers_m: float) -> BaseGeometry:
     (north, east, _), (ahead_n, ahead_e, _) = patch.centre_ned_m, patch.normal_ned
     offs_m = [patch.off_m(place) for place in patch.touches_ned_m]
     back_m, front_m = min(offs_m) - max(THICKNESS_M, wavers_m), max(offs_m) + wavers_m
-    # A touch that is believed to reach no further is still as wide as it is thick.
-    low_m, high_m = patch.believed_along_m()
+    # A touch without an assumed extent is as wide as it is thick.
+    low_m, high_m = patch.assumed_along_m()
     low_m, high_m = min(low_m, high_m - THICKNESS_M), max(high_m, low_m + THICKNESS_M)
     corners = ((low_m, back_m), (low_m, front_m), (high_m, front_m), (high_m, back_m))
     return Polygon(
@@ -181,5 +181,5 @@ def _wall(patch: Patch, wavers_m: float) -> BaseGeometry:
 
 
 def outline(patch: Patch) -> Sequence[tuple[float, float]]:
-    """The corners of what is believed, for drawing."""
-    return [(float(n), float(e)) for n, e in believed(patch).exterior.coords]
+    """The corners of the assumed area, for drawing."""
+    return [(float(n), float(e)) for n, e in assumed_area(patch).exterior.coords]

@@ -37,11 +37,11 @@ class ExpectHits(Written):
     """How many hits there have been until here."""
 
     exactly: Count | None = None
-    """So many."""
+    """The number."""
     at_least: Count | None = None
-    """So many or more."""
+    """The least number."""
     at_most: Count | None = None
-    """So many or fewer."""
+    """The largest number."""
 
     @model_validator(mode="after")
     def _something(self) -> Self:
@@ -54,9 +54,9 @@ class ExpectRecovered(Written):
     """Until here there was a hit, and the latest one has been recovered from."""
 
     within_s: Positive | None = None
-    """At rest again so long after the hit."""
+    """Largest time from the hit until rest."""
     max_overshoot_m: Positive | None = None
-    """So far past the recovery setpoint at most."""
+    """Largest overshoot past the recovery setpoint."""
 
 
 class ExpectPosition(Written):
@@ -197,13 +197,13 @@ class PathItem(Written):
     """Fly a smooth curve through all the points without stopping, as fast as speed and acceleration allow."""
 
     points_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1, max_length=200)]
-    """North, east, down of the arming position; the way begins where the item before ended."""
+    """North, east, down of the arming position; the path begins where the item before ended."""
     speed_m_s: Speed | None = None
     """At most; slower in bends."""
     acceleration_m_s2: Acceleration | None = None
-    """Also across the way, in bends."""
+    """Also across the path, in bends."""
     yaw_deg: Yaw | Literal["along"] | None = None
-    """Heading, clockwise from north, or along the way."""
+    """Heading, clockwise from north, or along the path."""
 
 
 class OrbitItem(Written):
@@ -212,7 +212,7 @@ class OrbitItem(Written):
     centre_ned_m: PositionNed
     """North, east, down of the arming position; the circle lies at its height."""
     radius_m: Positive
-    """From the centre to the way."""
+    """Of the circle."""
     turns: Annotated[Positive, Field(le=1000.0)] = 1.0
     """How often round; parts of a turn count too."""
     clockwise: bool = True
@@ -222,7 +222,7 @@ class OrbitItem(Written):
     acceleration_m_s2: Acceleration | None = None
     """Also towards the centre."""
     yaw_deg: Yaw | Literal["centre", "along"] | None = "centre"
-    """Heading, clockwise from north, or towards the centre, or along the way."""
+    """Heading, clockwise from north, or towards the centre, or along the path."""
 
 
 class HoldItem(Written):
@@ -244,12 +244,12 @@ class SteadyCondition(Written):
 
 
 class WaitForItem(Written):
-    """Hold until something is so: give exactly one condition. `timeout_s` beside the item limits the patience."""
+    """Hold until a condition is met; give exactly one. `timeout_s` beside the item limits the wait."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
     flight_time_s: Positive | None = None
-    """So long after arming."""
+    """Time since arming."""
     hit: Literal[True] | None = None
     """Something hits the waiting vehicle; what then: `on_collision`."""
     steady: SteadyCondition | None = None
@@ -274,7 +274,7 @@ class SetSpeedItem(Written):
 
 
 class SetYawItem(Written):
-    """Turn on the spot, the shorter way."""
+    """Turn on the spot, in the shorter direction."""
 
     yaw_deg: Yaw
     """Heading, clockwise from north."""

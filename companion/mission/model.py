@@ -17,7 +17,7 @@ from companion.memory.surroundings import Surroundings
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
-from companion.mission.course import Pace, Planned, climb, home_around, way_around
+from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, trajectory_around
 from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, OnDamage, Resume
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
@@ -91,7 +91,7 @@ class Mission(Written):
             raise ValueError(f"items: {flies}, above limits.max_speed_m_s = {limit_m_s:g}")
 
     @model_validator(mode="after")
-    def _ways_inside_fence(self) -> Self:
+    def _trajectories_inside_fence(self) -> Self:
         complaint = first_complaint(self)
         if complaint is not None:
             raise ValueError(complaint)
@@ -117,14 +117,14 @@ class Leg:
 
     step: items.Step
     start_ned_m: Vector3
-    way: Trajectory | None
+    trajectory: Trajectory | None
     lasts_s: float | None
     is_cut_off: bool = False
     is_detour: bool = False
 
     @property
     def end_ned_m(self) -> Vector3:
-        return self.start_ned_m if self.way is None else self.way.target_m
+        return self.start_ned_m if self.trajectory is None else self.trajectory.target_m
 
 
 def itinerary(mission: Mission) -> tuple[Leg, ...]:
@@ -146,15 +146,15 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
     begin = tuple(_legs(mission))[at]
     there = items.GoToItem(position_ned_m=begin.start_ned_m)
     back = items.Step(at, begin.step.label, items.MissionItem(go_to=there), there)
-    paces = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, items.SetSpeedItem)]
-    return (steps[0], *paces[-1:], back, *steps[at:])
+    set_speeds = [replace(step, index=at) for step in steps[:at] if isinstance(step.action, items.SetSpeedItem)]
+    return (steps[0], *set_speeds[-1:], back, *steps[at:])
 
 
 def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
     known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
-    pace = Pace.of(flight)
+    speeds = SpeedLimits.of(flight)
     for step in items.program(mission.items):
         action = step.action
         lasts_s: float | None = 0.0
@@ -167,24 +167,24 @@ def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
             case items.WaitForItem():
                 lasts_s = step.item.timeout_s
             case items.SetSpeedItem():
-                pace = pace.changed_to(action)
+                speeds = speeds.changed_to(action)
             case items.SetYawItem():
                 lasts_s = 180.0 / action.rate_deg_s
             case items.ExpectItem():
                 pass
             case items.ReturnItem():
-                planned = home_around(place, action, pace, known)
-                lasts_s = _landing_s(place if planned.way is None else planned.way.target_m)
+                planned = home_around(place, action, speeds, known)
+                lasts_s = _landing_s(place if planned.trajectory is None else planned.trajectory.target_m)
             case items.LandItem():
                 lasts_s = _landing_s(place)
             case _:
-                planned = way_around(action, place, pace, known)
-        way = None if planned is None else planned.way
-        if way is not None:
+                planned = trajectory_around(action, place, speeds, known)
+        trajectory = None if planned is None else planned.trajectory
+        if trajectory is not None:
             assert lasts_s is not None
-            lasts_s += way.duration_s
-        is_cut_off = planned is not None and planned.way is None
-        leg = Leg(step, place, way, lasts_s, is_cut_off, planned is not None and planned.is_detour)
+            lasts_s += trajectory.duration_s
+        is_cut_off = planned is not None and planned.trajectory is None
+        leg = Leg(step, place, trajectory, lasts_s, is_cut_off, planned is not None and planned.is_detour)
         yield leg
         place = leg.end_ned_m
 
@@ -199,7 +199,7 @@ def first_complaint(mission: Mission) -> str | None:
     seen: set[tuple[int, Vector3]] = set()
     for leg in _legs(mission):
         # On the way up from the ground only the end can be wrong. A repeat's laps mostly go the same ways.
-        if leg.way is None or (id(leg.step.action), leg.start_ned_m) in seen:
+        if leg.trajectory is None or (id(leg.step.action), leg.start_ned_m) in seen:
             continue
         seen.add((id(leg.step.action), leg.start_ned_m))
         number = leg.step.label.partition(" ")[0]
@@ -207,24 +207,24 @@ def first_complaint(mission: Mission) -> str | None:
         if complaint is not None:
             return f"items: the position of item {number} ({leg.step.name}) {complaint}"
         if not isinstance(leg.step.action, items.TakeoffItem):
-            complaint = _way_complaint(mission.fence, leg.way)
+            complaint = _trajectory_complaint(mission.fence, leg.trajectory)
         if complaint is not None:
             return f"items: on its way item {number} ({leg.step.name}) {complaint}"
     return None
 
 
-def _way_complaint(fence: Fence, way: Trajectory) -> str | None:
-    if isinstance(way, Chain):
-        return next((complaint for part in way.parts if (complaint := _way_complaint(fence, part))), None)
-    if isinstance(way, LineProfile):
+def _trajectory_complaint(fence: Fence, trajectory: Trajectory) -> str | None:
+    if isinstance(trajectory, Chain):
+        return next((complaint for part in trajectory.parts if (complaint := _trajectory_complaint(fence, part))), None)
+    if isinstance(trajectory, LineProfile):
         # Between two heights that are allowed, and two places in a round fence, a line is allowed too.
-        start, end = way.start_m[:2], way.target_m[:2]
+        start, end = trajectory.start_m[:2], trajectory.target_m[:2]
         leaves = fence.shortened(start, end)
         is_out = math.dist(leaves, end) > _ROUNDING_M
         return f"leaves fence.polygon_ne_m at [{leaves[0]:.2f}, {leaves[1]:.2f}]" if is_out else None
-    looks = min(_MOST_LOOKS, math.ceil(way.duration_s / _LOOK_EVERY_S))
+    looks = min(_MOST_LOOKS, math.ceil(trajectory.duration_s / _LOOK_EVERY_S))
     for look in range(looks):
-        position = way.at(way.duration_s * look / looks)[0]
+        position = trajectory.at(trajectory.duration_s * look / looks)[0]
         beyond_m = max(fence.outside_by_m(position), position[2] + fence.min_height_m)
         if beyond_m > _ROUNDING_M:
             return fence.complaint(position)

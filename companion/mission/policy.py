@@ -40,8 +40,9 @@ class AbortWhen(Written):
     setpoint_missed_by_m: Positive | None = None
     """Further from the setpoint than this, the vehicle is not being flown by it."""
     blind_for_s: Positive | None = 10.0
-    """A detector that has not seen for so long protects nothing. Links come back within seconds; a stream that was lost
-    or a vehicle that shakes too much does not."""
+    """A detector without data for this time protects nothing. Links come back within seconds; a stream that was lost or
+    a vehicle that shakes too much does not.
+    """
     hit_above_m_s: Positive | None = None
     """After the recovery from a hit this hard: the airframe wants to be looked at."""
 
@@ -74,4 +75,4 @@ class Resume(Written):
     armed_boot_us: Annotated[int, Field(strict=True, ge=0)]
     """By the vehicle's clock."""
     hits: Annotated[int, Field(strict=True, ge=0)] = 0
-    """So many before; the mission's expectations count them."""
+    """Number of earlier hits; the mission's expectations count them."""

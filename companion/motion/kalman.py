@@ -19,12 +19,14 @@ class KalmanFilter:
     P: Floats
 
     def predict(self, F: Floats, Q: Floats) -> None:  # noqa: N803
-        """Carry the state on by F (n, n) with noise of covariance Q (n, n)."""
+        """Predict x = F x and P = F P F^T + Q. F: transition (n, n); Q: covariance of the process noise (n, n)."""
         self.x = F @ self.x
         self.P = F @ self.P @ F.T + Q
 
     def update(self, z: Floats, H: Floats, R: Floats) -> float:  # noqa: N803
-        """Take in z (m) = H x + noise of covariance R (m, m); the normalised innovation squared (NIS)."""
+        """Correct by a measurement z (m) = H x + noise of covariance R (m, m); H (m, n). Returns the normalised
+        innovation squared (NIS), without unit.
+        """
         innovation = z - H @ self.x
         covariance = self.P @ H.T
         inverse = np.linalg.inv(H @ covariance + R)

@@ -36,7 +36,7 @@ class Resets:
     _first: Odometry | None = None
     """The first message with another counter than the latest's."""
     _place: LocalPosition | None = None
-    """The latest one believed; None after a reset."""
+    """The latest one accepted; None after a reset."""
 
     def follow(self, samples: Sequence[Sample], most_m: float) -> Sequence[Sample]:
         """What was heard, in this frame. A jump of more than `most_m` does not shift it."""
@@ -93,7 +93,7 @@ class Resets:
         return (n, e, d)
 
     def sent(self, setpoint: PositionSetpoint) -> PositionSetpoint:
-        """A setpoint in the vehicle's own frame."""
+        """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""
         if self.shift_ned_m == STILL:
             return setpoint
         x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))

@@ -141,6 +141,7 @@ class StreamConnection:
                 self._closed.wait(RETRY_S)
 
     def send(self, frame: bytes) -> None:
+        """Send one packet; it is dropped while there is no stream."""
         if self._stream is not None:
             self._stream.send(frame)
 

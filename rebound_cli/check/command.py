@@ -12,7 +12,7 @@ from companion.errors import ConfigurationError, ReboundError
 from companion.flight.plan import describe_item, describe_modifiers, mission_lines
 from companion.mission.model import Mission
 from companion.reflex.laws import RECOVERY_LAWS
-from rebound_cli.check.ways import Way, planned_ways
+from rebound_cli.check.legs import FlownLeg, flown_legs
 from rebound_cli.extras import needed_text
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from sim_vehicle.errors import SimulationError
@@ -45,8 +45,8 @@ def _check(path: Path, options: Namespace) -> None:
     document = load_mission_document(path, options.set)
     world = world_from(document)
     mission = mission_from(document, world)
-    ways = planned_ways(mission, world)
-    print(mission_text(mission, ways))
+    legs = flown_legs(mission, world)
+    print(mission_text(mission, legs))
     if options.no_picture:
         return
     try:
@@ -58,29 +58,33 @@ def _check(path: Path, options: Namespace) -> None:
     picture = options.out / f"{mission.name}.png"
     try:
         options.out.mkdir(parents=True, exist_ok=True)
-        draw_mission(picture, mission, world.scene, ways)
+        draw_mission(picture, mission, world.scene, legs)
     except OSError as error:
         raise ConfigurationError(f"{picture} cannot be written: {error.strerror}.") from error
     print(f"\ndrawn in {picture}")
 
 
-def mission_text(mission: Mission, ways: Sequence[Way]) -> str:
+def mission_text(mission: Mission, legs: Sequence[FlownLeg]) -> str:
     """A table: what, how far, how long, and what stands in the way."""
     title = f"{mission.name}: {mission.description}" if mission.description else mission.name
-    shown = ways if len(ways) <= _MOST_ROWS else ways[: _MOST_ROWS - 1]
-    width = max(4, *(len(way.leg.step.label) for way in shown)) + 2
-    text_width = max(len(describe_item(way.leg.step.action)) for way in shown) + 1
+    shown = legs if len(legs) <= _MOST_ROWS else legs[: _MOST_ROWS - 1]
+    width = max(4, *(len(flown.leg.step.label) for flown in shown)) + 2
+    text_width = max(len(describe_item(flown.leg.step.action)) for flown in shown) + 1
     rows = [f"  {'item':<{width + text_width}}{'length':>9}{'time':>9}{'begins':>9}"]
-    for way in shown:
-        step, leg = way.leg.step, way.leg
-        length, lasts, begins = f"{way.length_m:.1f} m" if way.length_m else "", _time(leg.lasts_s), _time(way.begins_s)
+    for flown in shown:
+        step, leg = flown.leg.step, flown.leg
+        length, lasts, begins = (
+            f"{flown.length_m:.1f} m" if flown.length_m else "",
+            _time(leg.lasts_s),
+            _time(flown.begins_s),
+        )
         text = f"{step.label:<{width}}{describe_item(step.action):<{text_width}}"
         rows.append(f"  {text}{length:>9}{lasts:>9}{begins:>9}")
-        rows += [f"  {'':<{width + 2}}{note}" for note in _notes(way)]
-    if len(shown) < len(ways):
-        rows.append(f"  ... {len(ways) - len(shown)} more steps")
-    total = f"in all {sum(way.length_m for way in ways):.1f} m"
-    lasts_s = ways[-1].ends_s
+        rows += [f"  {'':<{width + 2}}{note}" for note in _notes(flown)]
+    if len(shown) < len(legs):
+        rows.append(f"  ... {len(legs) - len(shown)} more steps")
+    total = f"in all {sum(flown.length_m for flown in legs):.1f} m"
+    lasts_s = legs[-1].ends_s
     known = "; how long depends on how long it waits"
     known = known if lasts_s is None else f" in {lasts_s:.0f} s after arming, if nothing is hit"
     # the policies, without the items: those are in the table
@@ -92,14 +96,14 @@ def _time(seconds: float | None) -> str:
     return "?" if seconds is None else f"{seconds:.1f} s"
 
 
-def _notes(way: Way) -> Iterator[str]:
-    if way.leg.is_cut_off or way.leg.is_detour:
-        yield "no way round what is known" if way.leg.is_cut_off else "round what is known"
-    if way.meets is not None:
-        north, east, down = way.points_ned_m[way.meets.index]
-        meets = "may meet" if way.meets.moves else "meets"
-        yield f"{meets} '{way.meets.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
-    if modifiers := describe_modifiers(way.leg.step.item):
+def _notes(flown: FlownLeg) -> Iterator[str]:
+    if flown.leg.is_cut_off or flown.leg.is_detour:
+        yield "no way round what is known" if flown.leg.is_cut_off else "round what is known"
+    if flown.meets is not None:
+        north, east, down = flown.points_ned_m[flown.meets.index]
+        meets = "may meet" if flown.meets.moves else "meets"
+        yield f"{meets} '{flown.meets.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
+    if modifiers := describe_modifiers(flown.leg.step.item):
         yield modifiers
 
 

@@ -14,13 +14,13 @@ from companion.fence import Fence
 from companion.flight.plan import describe_after_recovery, describe_limit
 from companion.mission.items import program
 from companion.mission.model import Mission
-from rebound_cli.check.ways import Way
+from rebound_cli.check.legs import FlownLeg
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches, footprint
 from sim_vehicle.scene import Scene
 
 Floats = npt.NDArray[np.float64]
 
-_WAY = "tab:orange"
+_TRAJECTORY = "tab:orange"
 _FENCE = "tab:green"
 _MEETING = "tab:red"
 # Numbers of items: not on the way itself.
@@ -39,21 +39,21 @@ _ON_IT: Any = {
 _UNKNOWN_S = 5.0
 
 
-def draw_mission(path: Path, mission: Mission, scene: Scene, ways: Sequence[Way]) -> None:
+def draw_mission(path: Path, mission: Mission, scene: Scene, legs: Sequence[FlownLeg]) -> None:
     figure = Figure(figsize=(13, 7.2), layout="constrained")
     above, side = figure.subplots(1, 2)
-    _draw_from_above(above, mission, scene, ways)
-    _draw_heights(side, mission.fence, ways)
+    _draw_from_above(above, mission, scene, legs)
+    _draw_heights(side, mission.fence, legs)
     policies = "\n".join(_policies(mission, scene))
     shown = above.get_legend_handles_labels()
     figure.legend(*shown, loc="outside lower center", ncols=8, fontsize=8, title=policies, title_fontsize=9)
-    known = ways[-1].ends_s
+    known = legs[-1].ends_s
     lasts = "" if known is None else f", {known:.0f} s"
-    figure.suptitle(f"Mission '{mission.name}': {sum(way.length_m for way in ways):.0f} m{lasts} if nothing is hit")
+    figure.suptitle(f"Mission '{mission.name}': {sum(flown.length_m for flown in legs):.0f} m{lasts} if nothing is hit")
     figure.savefig(path, dpi=110)
 
 
-def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[Way]) -> None:
+def _draw_from_above(axis: Any, mission: Mission, scene: Scene, legs: Sequence[FlownLeg]) -> None:
     start = np.array(scene.start.position_ned_m)
     draw_obstacles(axis, scene, start, "obstacles (simulated)", 0.7)
     for _, obstacle in scene.obstacles():
@@ -62,17 +62,17 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
         axis.annotate(obstacle.name, (east, north), **_ON_IT)
     draw_patches(axis, mission.obstacles.patches())
     _draw_fence(axis, mission.fence)
-    for number, way in enumerate(ways):
-        points = way.points_ned_m
-        axis.plot(points[:, 1], points[:, 0], color=_WAY, linewidth=1.6, label="way" if number == 0 else None)
-        if way.meets:
-            label = None if any(before.meets for before in ways[:number]) else "would be hit"
-            axis.plot(*points[way.meets.index, 1::-1], "x", color=_MEETING, label=label, linestyle="none")
-    for number, (start_ned_m, end_ned_m) in enumerate(after_hits(mission, ways)):
+    for number, flown in enumerate(legs):
+        points = flown.points_ned_m
+        axis.plot(points[:, 1], points[:, 0], color=_TRAJECTORY, linewidth=1.6, label="way" if number == 0 else None)
+        if flown.meets:
+            label = None if any(before.meets for before in legs[:number]) else "would be hit"
+            axis.plot(*points[flown.meets.index, 1::-1], "x", color=_MEETING, label=label, linestyle="none")
+    for number, (start_ned_m, end_ned_m) in enumerate(after_hits(mission, legs)):
         along = {"linestyle": ":", "color": _MEETING, "marker": "v", "markevery": [1], "markersize": 5}
         label = "then flies or lands here" if number == 0 else None
         axis.plot(*np.array([start_ned_m, end_ned_m])[:, 1::-1].T, label=label, **along)
-    for (north, east), numbers in ends(ways).items():
+    for (north, east), numbers in ends(legs).items():
         axis.annotate(", ".join(numbers), (east, north), **_BESIDE)
     axis.plot([0.0], [0.0], "^", color="black", label="arming position")
     axis.set(title="From above; numbers are items", xlabel="east [m]", ylabel="north [m]")
@@ -80,18 +80,18 @@ def _draw_from_above(axis: Any, mission: Mission, scene: Scene, ways: Sequence[W
     axis.grid(alpha=0.3)
 
 
-def after_hits(mission: Mission, ways: Sequence[Way]) -> list[tuple[Floats, Floats]]:
+def after_hits(mission: Mission, legs: Sequence[FlownLeg]) -> list[tuple[Floats, Floats]]:
     """From where each way would be hit to where the mission goes on after the recovery, if it is the first hit."""
     found = []
-    for number, way in enumerate(ways):
-        if way.meets is not None:
-            policy = way.leg.step.item.on_collision or mission.on_collision
+    for number, flown in enumerate(legs):
+        if flown.meets is not None:
+            policy = flown.leg.step.item.on_collision or mission.on_collision
             then = policy.after_max_hits if policy.max_hits == 1 else policy.then
-            here = way.points_ned_m[way.meets.index]
-            following = [later.points_ned_m[-1] for later in ways[number + 1 :] if later.length_m]
+            here = flown.points_ned_m[flown.meets.index]
+            following = [later.points_ned_m[-1] for later in legs[number + 1 :] if later.length_m]
             goes_to = {
                 **dict.fromkeys(("hold", "continue"), (following or [here])[0]),
-                **dict.fromkeys(("retry", "detour"), way.points_ned_m[-1]),
+                **dict.fromkeys(("retry", "detour"), flown.points_ned_m[-1]),
                 "return": np.zeros(3),
             }
             found.append((here, goes_to.get(then, here)))
@@ -110,13 +110,13 @@ def _policies(mission: Mission, scene: Scene) -> Iterator[str]:
         yield "Obstacles' times: s since the vehicle's boot, which is some seconds before arming."
 
 
-def ends(ways: Sequence[Way]) -> dict[tuple[float, float], list[str]]:
+def ends(legs: Sequence[FlownLeg]) -> dict[tuple[float, float], list[str]]:
     """Where ways end, to 0.1 m, with the items that end there; each lap of a repeat ends where the one before did."""
     found: dict[tuple[float, float], list[str]] = {}
-    for way in ways:
-        north, east = (round(float(axis), 1) for axis in way.points_ned_m[-1, :2])
-        number, there = way.leg.step.label.partition(" ")[0], found.setdefault((north, east), [])
-        if way.length_m and number not in there:
+    for flown in legs:
+        north, east = (round(float(axis), 1) for axis in flown.points_ned_m[-1, :2])
+        number, there = flown.leg.step.label.partition(" ")[0], found.setdefault((north, east), [])
+        if flown.length_m and number not in there:
             there.append(number)
     return found
 
@@ -132,27 +132,27 @@ def _draw_fence(axis: Any, fence: Fence) -> None:
         axis.update_datalim(corners)
 
 
-def _draw_heights(axis: Any, fence: Fence, ways: Sequence[Way]) -> None:
+def _draw_heights(axis: Any, fence: Fence, legs: Sequence[FlownLeg]) -> None:
     begins_s = 0.0
-    for way in ways:
-        lasts_s = _UNKNOWN_S if way.leg.lasts_s is None else way.leg.lasts_s
-        moving_s = 0.0 if way.leg.way is None else way.leg.way.duration_s
-        times = begins_s + way.fractions * moving_s
-        heights = -way.points_ned_m[:, 2]
-        axis.plot(times, heights, color=_WAY, linewidth=1.6)
-        resting_to = 0.0 if way.leg.step.name in ("land", "return") else heights[-1]
-        axis.plot([times[-1], begins_s + lasts_s], [heights[-1], resting_to], color=_WAY, linewidth=1.6)
+    for flown in legs:
+        lasts_s = _UNKNOWN_S if flown.leg.lasts_s is None else flown.leg.lasts_s
+        moving_s = 0.0 if flown.leg.trajectory is None else flown.leg.trajectory.duration_s
+        times = begins_s + flown.fractions * moving_s
+        heights = -flown.points_ned_m[:, 2]
+        axis.plot(times, heights, color=_TRAJECTORY, linewidth=1.6)
+        resting_to = 0.0 if flown.leg.step.name in ("land", "return") else heights[-1]
+        axis.plot([times[-1], begins_s + lasts_s], [heights[-1], resting_to], color=_TRAJECTORY, linewidth=1.6)
         if lasts_s:
-            axis.annotate(way.leg.step.label.partition(" ")[0], (begins_s + 0.5 * lasts_s, heights[-1]), **_BESIDE)
-        if way.meets:
-            met_s, height_m = times[way.meets.index], heights[way.meets.index]
+            axis.annotate(flown.leg.step.label.partition(" ")[0], (begins_s + 0.5 * lasts_s, heights[-1]), **_BESIDE)
+        if flown.meets:
+            met_s, height_m = times[flown.meets.index], heights[flown.meets.index]
             axis.plot([met_s], [height_m], "x", color=_MEETING)
             beside = {"xytext": (2, -4), "textcoords": "offset points", "va": "top", "rotation": -60}
-            axis.annotate(way.meets.name, (met_s, height_m), fontsize=7, color=_MEETING, **beside)
+            axis.annotate(flown.meets.name, (met_s, height_m), fontsize=7, color=_MEETING, **beside)
         begins_s += lasts_s
     for height_m in (fence.max_height_m, fence.min_height_m):
         axis.axhline(height_m, color=_FENCE, linestyle="--", linewidth=1.2)
     axis.set(title="Height", xlabel="time after arming, when nothing is hit [s]")
     axis.set_ylabel("height above the arming position [m]")
-    axis.set_ylim(bottom=min(0.0, math.floor(-max(float(way.points_ned_m[:, 2].max()) for way in ways))))
+    axis.set_ylim(bottom=min(0.0, math.floor(-max(float(flown.points_ned_m[:, 2].max()) for flown in legs))))
     axis.grid(alpha=0.3)

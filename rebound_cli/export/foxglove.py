@@ -24,7 +24,7 @@ from rebound_cli.report.content import finite, surfaces
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.run_folder import HIT_KINDS
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
-from sim_vehicle.world import Box, Obstacle, Pole
+from sim_vehicle.world import Obstacle, Pole
 
 Json: TypeAlias = dict[str, Any]
 # When, on which topic, and what.
@@ -211,7 +211,7 @@ def _shape(obstacle: Obstacle, moved_ned_m: Vector3) -> Json:
         pose = {"position": _enu(middle.tolist()), "orientation": _along(obstacle.axis_ned, 2)}
         size = _xyz(2 * obstacle.radius_m, 2 * obstacle.radius_m, obstacle.height_m)
         return {"cylinders": [_cylinder(pose, size, _ORANGE)]}
-    box = obstacle if isinstance(obstacle, Box) else obstacle.box()
+    box = obstacle.box()
     pose = {"position": _enu((np.array(box.centre_ned_m) + moved_ned_m).tolist()), "orientation": _turn(box.axes_ned)}
     return {"cubes": [{"pose": pose, "size": _xyz(*box.sizes_m), "color": _ORANGE}]}
 

@@ -13,7 +13,7 @@ from shapely import MultiPoint, get_coordinates
 from companion.memory.patch import Patch
 from companion.memory.surroundings import outline
 from sim_vehicle.scene import Scene
-from sim_vehicle.world import Box, Obstacle, Pole
+from sim_vehicle.world import Obstacle, Pole
 
 Floats = npt.NDArray[np.float64]
 
@@ -26,7 +26,7 @@ def footprint(obstacle: Obstacle) -> Floats:
     if isinstance(obstacle, Pole):
         shape = MultiPoint([end[:2] for end in obstacle.ends()]).convex_hull.buffer(obstacle.radius_m)
     else:
-        box = obstacle if isinstance(obstacle, Box) else obstacle.box()
+        box = obstacle.box()
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
         places = np.array(box.centre_ned_m) + (signs * 0.5 * np.array(box.sizes_m)) @ np.array(box.axes_ned)
         shape = MultiPoint(places[:, :2]).convex_hull

@@ -120,8 +120,8 @@ def _corners(action: items.GoToItem | items.PathItem | items.OrbitItem, leg: Leg
         return [action.position_ned_m]
     if isinstance(action, items.PathItem):
         return action.points_ned_m
-    assert leg.way is not None
-    (north_m, east_m, down_m), end = action.centre_ned_m, leg.way.target_m
+    assert leg.trajectory is not None
+    (north_m, east_m, down_m), end = action.centre_ned_m, leg.trajectory.target_m
     last_rad = math.atan2(end[1] - east_m, end[0] - north_m)
     count = max(1, math.ceil(action.turns * _CORNERS_A_TURN))
     angle_rad = math.tau * action.turns * (1.0 if action.clockwise else -1.0)

@@ -17,7 +17,7 @@ from rebound_cli.report.packing import kept_rows, packed
 from rebound_cli.report.shown_flight import ShownFlight, patch_of
 from rebound_cli.report.tail import COLUMNS
 from rebound_cli.report.words import lines, link_rows, sentence
-from sim_vehicle.world import Box, Motion, Obstacle, Pole
+from sim_vehicle.world import Motion, Obstacle, Pole
 
 Floats = npt.NDArray[np.float64]
 
@@ -224,7 +224,7 @@ def _obstacle(flight: ShownFlight, obstacle: Obstacle) -> dict[str, Any]:
     if isinstance(obstacle, Pole):
         shape = {"foot": obstacle.foot_ned_m, "axis": obstacle.axis_ned, "radius": obstacle.radius_m}
         return {"name": obstacle.name, "kind": "pole", "height": obstacle.height_m, **shape, "motion": motion}
-    box = obstacle if isinstance(obstacle, Box) else obstacle.box()
+    box = obstacle.box()
     shape = {"centre": box.centre_ned_m, "axes": box.axes_ned, "sizes": box.sizes_m}
     return {"name": obstacle.name, "kind": "box", **shape, "motion": motion}
 
@@ -260,7 +260,7 @@ def _corners(flight: ShownFlight, patch: Patch) -> list[list[float]]:
         corners = [(north, east, patch.centre_ned_m[2]) for north, east in outline(patch)[:-1]]
     else:
         (n, e, _), (north, east, _) = patch.centre_ned_m, patch.normal_ned
-        (left_m, right_m), (low_m, high_m) = patch.believed_along_m(), patch.believed_heights_m()
+        (left_m, right_m), (low_m, high_m) = patch.assumed_along_m(), patch.assumed_heights_m()
         around = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
         corners = [(n - along_m * east, e + along_m * north, -height_m) for along_m, height_m in around]
     return [[round(p + o, 4) for p, o in zip(corner, origin, strict=True)] for corner in corners]

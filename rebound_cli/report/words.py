@@ -102,7 +102,7 @@ def _summary_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rates = summary.get("stream_rates_hz") or {}
     if rates:
         rows.append(("Streams", ", ".join(f"{name} {rate:.0f} Hz" for name, rate in rates.items())))
-    for key, word in (("refused_messages", "Messages not believed"), ("refused_packets", "Packets refused")):
+    for key, word in (("refused_messages", "Messages not accepted"), ("refused_packets", "Packets refused")):
         counts = summary.get(key) or {}
         if counts:
             rows.append((word, ", ".join(f"{name} {count}" for name, count in counts.items())))

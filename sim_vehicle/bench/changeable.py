@@ -90,7 +90,7 @@ class ChangeableVehicle(SimulatedVehicle):
                 link.add(fault)
 
     def remove_fault(self, fault: Fault) -> None:
-        """The very fault that was added is over, or never comes."""
+        """End or cancel a fault: the same object that was added."""
         self._faults = [kept for kept in self._faults if kept is not fault]
         self._plant.remove_fault(fault)
         for link in self._links:

@@ -53,8 +53,9 @@ class LockstepVehicle:
         self._link.push(data)
 
     def advance(self, seconds: float) -> bytes:
-        """Let so much time pass, in whole intervals (4 ms unless IMU_INTEG_RATE is changed), at least one; return what
-        the vehicle has sent."""
+        """Advance time in whole intervals (4 ms unless IMU_INTEG_RATE is changed), at least one; return what the
+        vehicle has sent.
+        """
         until_us = self._bench.vehicle.time_boot_us + round(1e6 * seconds)
         sent = self._step()
         while self._bench.vehicle.time_boot_us < until_us:

@@ -14,7 +14,7 @@ Floats = npt.NDArray[np.float64]
 
 # From appearing to touching: short, so that a vehicle that brakes by 7 m/s2 is met within 0.15 m/s of the speed.
 LEAD_S = 0.02
-# The longest contact of spring arms is 0.101 s (eq. 2); the plate goes on for that long and is taken back, so that it
+# The longest contact of spring arms is 0.101 s (eq. 2). The plate goes on for that time and is taken back, so that it
 # does not strike again when the vehicle brakes.
 FOLLOW_S = 0.11
 RETREAT_M_S, RETREAT_S = 5.0, 0.3

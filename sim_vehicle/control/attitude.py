@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.inertia import times
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, Constants, Gains, PlantState
@@ -63,7 +64,7 @@ def _carried(state: PlantState, rates: Floats) -> Floats:
 @njit
 def take_thrust(state: PlantState, constants: Constants, thrust: float) -> None:
     """The collective thrust f as it is asked for, a fraction of all that the motors have."""
-    state.collective_n = thrust * 4 * constants.motor_max_n
+    state.collective_n = thrust * ARMS * constants.motor_max_n
 
 
 @njit
@@ -72,23 +73,23 @@ def allocate_motors(state: PlantState, constants: Constants, motor_radius_m: flo
 
     A vehicle that cannot have everything must at least stay upright; yaw matters least.
     """
-    lever = 4 * motor_radius_m / math.sqrt(2)
+    lever = ARMS * motor_radius_m / math.sqrt(2)
     low, high = constants.motor_idle_n, constants.motor_max_n
-    tilt = np.empty(4)
+    tilt = np.empty(ARMS)
     smallest, largest = 0.0, 0.0
-    for motor in range(4):
+    for motor in range(ARMS):
         roll = -math.copysign(1.0, ARM_DIRECTIONS_FRD[motor, 1]) * state.moment_frd_n_m[0]
         pitch = math.copysign(1.0, ARM_DIRECTIONS_FRD[motor, 0]) * state.moment_frd_n_m[1]
         tilt[motor] = (roll + pitch) / lever
         smallest = min(smallest, tilt[motor])
         largest = max(largest, tilt[motor])
     scale = min(1.0, (high - low) / max(largest - smallest, 1e-9))
-    each = min(max(state.collective_n / 4, low - scale * smallest), high - scale * largest)
+    each = min(max(state.collective_n / ARMS, low - scale * smallest), high - scale * largest)
     room = high
-    for motor in range(4):
+    for motor in range(ARMS):
         thrust = each + scale * tilt[motor]
         room = min(room, thrust - low, high - thrust)
-    yaw = state.moment_frd_n_m[2] / (4 * constants.moment_per_thrust_m)
+    yaw = state.moment_frd_n_m[2] / (ARMS * constants.moment_per_thrust_m)
     yaw = min(max(yaw, -max(room, 0.0)), max(room, 0.0))
-    for motor in range(4):
+    for motor in range(ARMS):
         state.motor_command_n[motor] = each + scale * tilt[motor] + ROTOR_YAW_SIGNS[motor] * yaw

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.jit import njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Gains, PlantState, SetpointRows
 from sim_vehicle.physics.rotation import yaw_of
@@ -40,7 +41,7 @@ def position_control(state: PlantState, mass_kg: float, motor_max_n: float, aske
         state.yaw_setpoint_rad = asked.yaw[0]
     else:
         state.yaw_setpoint_rad += asked.yaw[2] * step_s
-    _thrust(acceleration, gains.tilt_max_rad, 4 * motor_max_n / mass_kg)
+    _thrust(acceleration, gains.tilt_max_rad, ARMS * motor_max_n / mass_kg)
     state.collective_n = mass_kg * math.sqrt(acceleration @ acceleration)
     _attitude(state, acceleration)
 
@@ -75,8 +76,8 @@ def _axis_acceleration(axis: int, state: PlantState, asked: SetpointRows, gains:
 def _thrust(acceleration: Floats, tilt_max_rad: float, most_m_s2: float) -> None:
     """Turn what is asked into thrust over mass, of ``most_m_s2`` at most, NED; as `PositionControl.cpp` of PX4.
 
-    It leans as if it hovered (MPC_ACC_DECOUPLE) and thrusts so as to hold the height once it leans so, not as it leans
-    now: tipped onto a wall it presses with all of its weight. Where there is too little thrust, height comes first.
+    It tilts as if it hovered (MPC_ACC_DECOUPLE). Its thrust holds the height at the commanded tilt, not at the present
+    one: tipped onto a wall it presses with all of its weight. Where there is too little thrust, height comes first.
     """
     horizontal = math.hypot(acceleration[0], acceleration[1])
     leant = min(horizontal / GRAVITY_M_S2, math.tan(tilt_max_rad))

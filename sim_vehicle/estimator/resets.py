@@ -17,5 +17,5 @@ class ResetClock:
         self._fused_us = now_us
 
     def is_due(self, now_us: int) -> bool:
-        """Whether the aid has been missing, or has been turned down, for too long."""
+        """Whether the aid has been missing or rejected for too long, so that the filter resets to it."""
         return now_us - self._fused_us > self._after_us

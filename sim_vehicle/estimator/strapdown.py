@@ -1,9 +1,9 @@
 """Inertial navigation through one sample, and the error's transition with it (kernels).
 
-The state that is carried along, ``nominal``: position and velocity NED, attitude (w, x, y, z), as in
-`PlantState.body`; biases of gyroscope and accelerometer, FRD; the flow over the ground integrated since the flow
-sensor's last sample. The errors that the Kalman filter estimates are those of the true state from it: attitude
-(a turn about the body's axes), velocity, position, biases, integrated flow.
+The nominal state, ``nominal``: position and velocity NED and attitude (w, x, y, z) as in `PlantState.body`; biases of
+gyroscope and accelerometer, FRD; optical flow integrated since the sensor's last sample. The errors that the Kalman
+filter estimates are those of the true state from it: attitude (a turn about the body's axes), velocity, position,
+biases, integrated flow.
 """
 
 import math

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import BatterySag, FreeFall, HandCatch, MotorFailure, PayloadDrop, Push
 from sim_vehicle.faults.wind import risen
@@ -16,7 +17,7 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
         self.voltage_share = 1.0
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
-        shares, self.voltage_share = [1.0] * 4, 1.0
+        shares, self.voltage_share = [1.0] * ARMS, 1.0
         for fault in self._faults:
             start_s, end_s = fault.window_s
             if time_s < start_s:
@@ -30,7 +31,7 @@ class Motors(Group[MotorFailure | FreeFall | BatterySag]):
             elif time_s < end_s and isinstance(fault, MotorFailure):
                 shares[fault.motor] *= fault.thrust_share
             elif time_s < end_s:
-                shares = [0.0] * 4
+                shares = [0.0] * ARMS
         disturbance.motor_share[:] = shares
 
 
@@ -45,6 +46,7 @@ class Pushes(Group[Push]):
     """Forces on a point of the body, one at a time."""
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
+        """Write the force (NED, N) and its point (FRD, m) at this boot time into ``disturbance``."""
         disturbance.pushes = 0
         for push in self._faults:
             start_s, end_s = push.window_s

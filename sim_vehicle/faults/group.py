@@ -13,10 +13,10 @@ class Group(Generic[FaultType]):
         self.had_any = False
 
     def add(self, fault: FaultType) -> None:
-        """One more; it acts when its time comes."""
+        """Add a fault. It acts in its own window of the boot clock, s."""
         self._faults.append(fault)
         self.had_any = True
 
     def remove(self, fault: FaultType) -> None:
-        """The very fault that was added acts no more."""
+        """End or cancel a fault: the same object that was added."""
         self._faults = [kept for kept in self._faults if kept is not fault]

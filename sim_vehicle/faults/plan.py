@@ -69,7 +69,7 @@ class Faults:
             self.add(fault)
 
     def add(self, fault: Fault) -> None:
-        """One more; it acts when its time comes."""
+        """Add a fault. It acts in its own window of the boot clock."""
         number, self._count = self._count, self._count + 1
         self._faults[number] = fault
         for time_s in _turns_s(fault):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.faults.group import Group
 from sim_vehicle.faults.spec import ImuBias, ImuStuck, Vibration
 from sim_vehicle.physics.layout import Disturbance, PlantState
@@ -15,13 +16,13 @@ class Shaking(Group[Vibration]):
     """Vibration of the rotors, several sources of it adding as powers do."""
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
-        squares = np.zeros((2, 4))
+        squares = np.zeros((2, ARMS))
         for vibration in self._faults:
             start_s, end_s = vibration.window_s
             if not start_s <= time_s < end_s:
                 continue
             # Rotors of which none keeps step with another: their powers add.
-            motors, share = (slice(0, 4), 0.25) if vibration.motor is None else (vibration.motor, 1.0)
+            motors, share = (slice(0, ARMS), 1.0 / ARMS) if vibration.motor is None else (vibration.motor, 1.0)
             squares[0, motors] += share * vibration.accelerometer_rms_m_s2**2
             squares[1, motors] += share * vibration.gyroscope_rms_rad_s**2
             disturbance.shake_hz = vibration.motor_hz
@@ -31,7 +32,7 @@ class Shaking(Group[Vibration]):
     @staticmethod
     def scatter(state: PlantState, rng: np.random.Generator) -> None:
         """Let the rotors start at different places of their turn."""
-        state.rotor_phase[:] = rng.uniform(0.0, 2.0 * math.pi, 4)
+        state.rotor_phase[:] = rng.uniform(0.0, 2.0 * math.pi, ARMS)
 
 
 class InertialSensor(Group[ImuBias | ImuStuck]):

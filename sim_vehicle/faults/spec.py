@@ -227,7 +227,7 @@ class WireFault(Timed):
     delay_s: NotNegative = 0.0
     """Every packet is so late."""
     jitter_s: NotNegative = 0.0
-    """Up to so much more, evenly; the order stays."""
+    """Largest extra delay, uniformly distributed; the order stays."""
     reorder: Share = 0.0
     """Share of packets that are overtaken."""
     reorder_by_s: Positive = 0.02

@@ -99,6 +99,7 @@ class Air(Group[Gust | Turbulence]):
         self._drydens = [(kept, dryden) for kept, dryden in self._drydens if kept is not fault]
 
     def act(self, time_s: float, state: PlantState, disturbance: Disturbance) -> None:
+        """Write the wind (NED, m/s) at this boot time into ``disturbance``: steady, gusts and turbulence."""
         wind = self._steady_ned_m_s.copy()
         for gust in self._faults:
             if isinstance(gust, Gust):

@@ -14,9 +14,8 @@ from sim_vehicle.hil.messages import MOTORS_STOPPED, ActuatorControls, Quadruple
 # Real time between samples while PX4 boots: its modules start on threads of their own, and need some real
 # time, not simulated time, before the first motor command.
 STARTING_PERIOD_US = 4_000
-# PX4 answers in 0.11 ms, and in 100 ms on a machine that is out of breath. Ten times that is a lost answer
-# or a PX4 that somebody has stopped: one more sample sets the first going again and moves a vehicle whose
-# PX4 is stopped by 4 ms a second.
+# PX4 answers in 0.11 ms, and in 100 ms on a machine that is out of breath. Ten times that is a lost answer, or a PX4
+# that was stopped. One more sample starts a PX4 that waits; a stopped one loses 4 ms a second.
 ANSWER_TIMEOUT_US = 1_000_000
 # Booting takes 2 s; a PX4 with no answer after ten times that has no motors to command.
 STARTING_TIMEOUT_US = 20_000_000
@@ -92,7 +91,7 @@ class Exchange:
         return self._sent_at_us if self.phase is ExchangePhase.READY else None
 
     def sent(self, time_us: int, now_us: int) -> None:
-        """A sample of that time has gone out."""
+        """Note that the sample of the vehicle's `time_us` was sent at the clock's `now_us`."""
         self._move(ExchangeEvent.SENT)
         self._sent_time_us = time_us
         self._sent_at_us = now_us

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from sim_vehicle.airframe import Airframe
+from sim_vehicle.airframe import ARMS, Airframe
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS
 
 # PX4 scales a quadrotor's roll and pitch columns so that a torque setpoint of 1 moves every motor by
@@ -55,7 +55,7 @@ def px4_parameters(airframe: Airframe, position: Position = "mocap") -> tuple[Pa
 def _allocation(airframe: Airframe) -> Iterable[Parameter]:
     radius_m, moment_m = airframe.geometry.motor_radius_m, airframe.motors.moment_per_thrust_m
     yield Parameter("CA_AIRFRAME", 0, "multirotor")
-    yield Parameter("CA_ROTOR_COUNT", 4, "quad-x, in PX4's order")
+    yield Parameter("CA_ROTOR_COUNT", ARMS, "quad-x, in PX4's order")
     for rotor, (direction, sign) in enumerate(zip(ARM_DIRECTIONS_FRD, ROTOR_YAW_SIGNS, strict=True)):
         yield Parameter(f"CA_ROTOR{rotor}_PX", float(radius_m * direction[0]), "motor, metres ahead of the centre")
         yield Parameter(f"CA_ROTOR{rotor}_PY", float(radius_m * direction[1]), "metres to the right")
@@ -68,7 +68,7 @@ def _allocation(airframe: Airframe) -> Iterable[Parameter]:
 def _gains(airframe: Airframe) -> Iterable[Parameter]:
     """Attitude as a cascade: w^2 and 2 z w of the airframe's loop are P_angle * P_rate and P_rate."""
     control, motors = airframe.control, airframe.motors
-    all_n = 4 * motors.max_thrust_n
+    all_n = ARMS * motors.max_thrust_n
     arm_m = airframe.geometry.motor_radius_m / math.sqrt(2)
     jx, jy, jz = airframe.inertia_kg_m2
     rate_per_s = 2 * control.attitude_damping * control.attitude_frequency_rad_s
@@ -106,8 +106,8 @@ def _limits(airframe: Airframe) -> Iterable[Parameter]:
 def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
     interval_us = airframe.imu.integration_interval_us
     yield Parameter("IMU_INTEG_RATE", round(1e6 / interval_us), "one HIGHRES_IMU a sample of the simulator")
-    # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s at 2 m/s and by 4 m/s at 4: it
-    # should then doubt its accelerometer, not its attitude, and correct itself soon (bench/notes/px4.md).
+    # A hit that clips the accelerometer leaves PX4's velocity wrong by 0.7 m/s at 2 m/s and by 4 m/s at 4. PX4 should
+    # then correct the velocity, not the attitude, and soon (bench/notes/px4.md).
     yield Parameter("EKF2_ACC_NOISE", 1.0, "m/s2; leaves room for what a hit hides from the accelerometer")
     gyroscope_noise_rad_s = airframe.imu.gyroscope_noise_rad_s * math.sqrt(1e-6 * interval_us / EKF_PERIOD_S)
     yield Parameter("EKF2_GYR_NOISE", gyroscope_noise_rad_s, "rad/s; the gyroscope's own, over a step of EKF2")
@@ -135,14 +135,14 @@ def _sensors(airframe: Airframe, position: Position) -> Iterable[Parameter]:
         yield Parameter("EKF2_MIN_RNG", airframe.geometry.foot_depth_m, "m; what it shows on the ground")
         yield Parameter("SENS_FLOW_MAXHGT", sensors.optical_flow.distance_max_m, "m")
         yield Parameter("SENS_FLOW_MAXR", sensors.optical_flow.rate_max_rad_s, "rad/s")
-        # On the ground the camera is too near to see, and says so by its quality; above this height's limit PX4 would
-        # not even begin to use it, and not arm.
+        # On the ground the camera is out of focus and reports a low quality. Above this limit PX4 would not use it, and
+        # not arm.
         yield Parameter("SENS_FLOW_MINHGT", airframe.geometry.foot_depth_m / 2, "m; less than on the ground")
         yield Parameter("SENS_FLOW_ROT", 0, "mounted along the body's axes")
     else:
         yield Parameter("EKF2_EV_CTRL", 0, "no motion capture outdoors")
-        # At the default of 5 PX4 rejects the true fix for 5 s after a hit at 3.4 m/s, meanwhile flies 14 m off at
-        # 3 m/s, then finds its position invalid and lands.
+        # At the default of 5, PX4 rejects the true fix for 5 s after a hit at 3.4 m/s. It flies 14 m off at 3 m/s, then
+        # finds its position invalid and lands.
         yield Parameter("EKF2_GPS_P_GATE", 50.0, "standard deviations; a hit must not make the true fix incredible")
         yield Parameter("EKF2_GPS_V_GATE", 50.0, "the same")
         yield Parameter("EKF2_GPS_P_NOISE", 0.05, "m; the fix is an RTK receiver's")

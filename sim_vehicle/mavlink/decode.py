@@ -61,8 +61,8 @@ class Decoder:
     def push(self, data: bytes) -> list[object]:
         """The messages completed by ``data``, in order; what this vehicle does not read or is not meant for is dropped.
 
-        A packet whose checksum is wrong is skipped by one byte only, and one that is not complete
-        holds up nothing that follows: what looked like a packet may have been noise.
+        A packet with a wrong checksum is skipped by one byte only, and an incomplete one holds up nothing that follows:
+        its start may have been noise.
         """
         if not data:
             return []

@@ -46,7 +46,9 @@ class Line:
         return int(delay_us) // 10 * round(10 * _EARLY_SHARE)
 
     def share(self, streams: Iterable[tuple[int, int]], constant: Iterable[tuple[int, int]]) -> float:
-        """By how much the rates of ``streams`` shrink. Both: bytes and interval in microseconds of each stream."""
+        """The factor, at most 1, by which the rates of ``streams`` shrink so that all fit beside ``constant``. Both:
+        bytes and interval in microseconds of each stream.
+        """
         wanted = sum(size * 1e6 / interval_us for size, interval_us in streams if interval_us > 0)
         kept = sum(size * 1e6 / interval_us for size, interval_us in constant if interval_us > 0)
         if wanted <= 0:
@@ -114,7 +116,7 @@ class Outbox:
             self._packets.append(packet)
 
     def has_room(self, count: int) -> bool:
-        """Whether so many bytes more would not be lost."""
+        """Whether the line's buffer has room for these bytes."""
         return self._buffer.has_room(count)
 
     def take(self) -> tuple[bytes, ...]:

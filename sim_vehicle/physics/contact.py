@@ -132,7 +132,7 @@ def relax_arms(state: PlantState, step_s: float, contact: ContactSprings, relaxe
     the stop): eq. 2 ends there. A free arm has its end's mass to move as well (implicit Euler: its fastest time,
     3 ms, is far above any step). The hysteresis holds it where eq. 2 would take it back to zero.
     """
-    for arm in range(4):
+    for arm in range(GUARDS):
         fold = state.fold_m[arm]
         if fold == 0.0 and state.fold_rate_m_s[arm] == 0.0:
             relaxed_m[arm] = 0.0
@@ -207,8 +207,8 @@ def settle_contacts(
             if behind[point, face] != IN_FRONT:
                 continue
             state.depth_m[point] = max(state.depth_m[point], depth)
-            # A guard that rolls over a pole or an edge goes on pressing its arm as it began: else the same depth would
-            # cost more and more force, and the roll would make energy.
+            # A guard that rolls over a pole or an edge keeps pressing the same arm. Otherwise the same depth would cost
+            # more and more force, and the roll would make energy.
             if faces[face, FACE_RADIUS] > 0.0 and depth > 0.0:
                 share = state.share[point] = scratch.share[point] if scratch.share[point] > 0.0 else share
             if point >= GUARDS:

@@ -46,8 +46,8 @@ class EstimateErrors:
 
 
 def estimate_errors(airframe: Airframe, body: Floats, rng: np.random.Generator) -> tuple[EstimateErrors, Floats]:
-    """Errors in their stationary state, so that the first second is as noisy as the last; and the ring of past bodies
-    (delay in intervals + 1, PAST_COLUMNS): without rows the estimate comes from elsewhere.
+    """Errors in their stationary state, so that the first second is as noisy as the last. And the ring of past bodies
+    (delay in intervals + 1, PAST_COLUMNS); without rows the estimate comes from elsewhere.
     """
     estimate = airframe.estimate
     interval_s = 1e-6 * airframe.imu.integration_interval_us
@@ -118,8 +118,8 @@ def note_what_is_clipped(state: PlantState, errors: EstimateErrors, row: Floats)
 def miss_what_was_clipped(errors: EstimateErrors, delayed: Floats) -> None:
     """What clipping hides of a hit is missing in the velocity, until other sensors have put velocity and place right.
 
-    Some time after the hit the error of the position corrects position, velocity and, on the level, tilt, by constant
-    gains: a swing of the frequency and the damping given, and a slow rest, tilt_per_s.
+    Some time after the hit the position error corrects position, velocity and, horizontally, tilt, by constant gains.
+    The correction oscillates with the given frequency and damping, and ends slowly, by tilt_per_s.
     """
     step_s, frequency, missed = errors.step_s, errors.frequency_rad_s, errors.missed
     swing, rest = 2.0 * errors.damping * frequency, errors.tilt_per_s

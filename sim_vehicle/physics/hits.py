@@ -92,7 +92,7 @@ def note_contact(
 
 @njit
 def moving_energy(state: PlantState, mass_kg: float) -> float:
-    """Kinetic energy of the vehicle against what it hits, joules."""
+    """Kinetic energy of the vehicle relative to the obstacle, J."""
     against = state.hit[HIT_SURFACE_VELOCITY]
     x, y, z = state.body[3] - against[0], state.body[4] - against[1], state.body[5] - against[2]
     turning: float = turning_energy(state.inertia, state.body[10], state.body[11], state.body[12])

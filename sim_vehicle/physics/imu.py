@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import GRAVITY_M_S2, Constants, Disturbance, PlantState, Scratch
 
@@ -59,12 +60,12 @@ def add_raw_sample(
 def shake(state: PlantState, raw_s: float, constants: Constants, disturbance: Disturbance, shaken: Floats) -> None:
     """Turn the rotors on and write the vibration that they make on the raw axes into ``shaken`` (6,), m/s2 and rad/s.
 
-    An unbalanced rotor pulls outward as it turns, with the square of its speed, as thrust goes: once a turn across the
-    rotors' axes, and twice a turn (two blades that do not track) along them.
+    An unbalanced rotor's force grows with the square of its speed, as thrust does. It acts once a turn across the
+    rotors' axes, and twice a turn along them (two blades that do not track).
     """
     shaken[:] = 0.0
-    hover_n = constants.mass_kg * GRAVITY_M_S2 / 4
-    for motor in range(4):
+    hover_n = constants.mass_kg * GRAVITY_M_S2 / ARMS
+    for motor in range(ARMS):
         strength = max(state.motor_thrust_n[motor], 0.0) / hover_n
         phase = state.rotor_phase[motor] + 2 * math.pi * disturbance.shake_hz * math.sqrt(strength) * raw_s
         state.rotor_phase[motor] = phase % (2 * math.pi)

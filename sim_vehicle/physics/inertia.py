@@ -8,6 +8,7 @@ arms folded fully move it by 2 mm.
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.jit import inlined, njit
 from sim_vehicle.physics.layout import ARM_DIRECTIONS_FRD, Constants
 
@@ -25,7 +26,7 @@ def inertia_of(fold_m: Floats, fold_rate_m_s: Floats, constants: Constants, iner
         rate[entry] = 0.0
     inertia[XY], rate[XY] = 0.0, 0.0
     out = constants.motor_radius_m
-    for arm in range(4):
+    for arm in range(ARMS):
         if fold_m[arm] == 0.0 and fold_rate_m_s[arm] == 0.0:
             continue
         x, y = ARM_DIRECTIONS_FRD[arm, 0], ARM_DIRECTIONS_FRD[arm, 1]

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from sim_vehicle.airframe import Airframe, Bounce
+from sim_vehicle.airframe import ARMS, Airframe, Bounce
 from sim_vehicle.physics.record import Floats, Matrix3, Vector3, Vector4, new_record
 
 GRAVITY_M_S2 = 9.81
@@ -13,14 +13,16 @@ GRAVITY_M_S2 = 9.81
 # Size of `PlantState.body`, the rigid body of the paper's eq. 1.
 BODY_SIZE = 13
 
-# Points that can touch something: four guards (motor order), the hub, four feet.
-GUARDS, HUB, FEET, POINTS = 4, 4, 5, 9
+# Points that can touch something: a guard an arm (motor order), the hub, four feet.
+GUARDS = HUB = ARMS
+FEET, POINTS = HUB + 1, HUB + 5
 
 # Unit vectors of the arms in the body frame, in PX4's quad-x motor order:
 # front right, rear left, front left, rear right.
 ARM_DIRECTIONS_FRD = np.array([[1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]) / math.sqrt(2)
 # +1 for rotors that turn counter-clockwise seen from above: their reaction yaws the body right (+).
 ROTOR_YAW_SIGNS = np.array([1.0, 1.0, -1.0, -1.0])
+PerArm = Annotated[Floats, (ARMS,)]
 
 
 class ContactSprings:
@@ -53,7 +55,7 @@ class Disturbance:
     """What acts on the vehicle besides itself and what it runs into; in a calm flight zero, shares one."""
 
     wind_ned_m_s: Vector3
-    motor_share: Vector4  # thrust given of what is commanded
+    motor_share: PerArm  # thrust given of what is commanded
     carried_kg: float  # at the centre of mass, unknown to the control
     pushes: int  # 1 while the push acts
     push_ned_n: Vector3
@@ -64,8 +66,8 @@ class Disturbance:
     hold_damping_n_s_m: float
     hold_turn_damping_n_m_s: float
     shakes: int  # 1 where any of the next is not zero
-    shake_m_s2: Vector4  # of each rotor, RMS on each raw axis at hover thrust
-    shake_rad_s: Vector4
+    shake_m_s2: PerArm  # of each rotor, RMS on each raw axis at hover thrust
+    shake_rad_s: PerArm
     shake_hz: float  # turns of a rotor a second at hover thrust
     accelerometer_bias_frd_m_s2: Vector3
     gyroscope_bias_frd_rad_s: Vector3
@@ -128,11 +130,11 @@ class PlantState:
 
     time_us: int  # since boot
     body: Annotated[Floats, (13,)]  # position NED, velocity NED, attitude (w, x, y, z), rates FRD
-    motor_thrust_n: Vector4
-    motor_command_n: Vector4
-    fold_m: Vector4  # of each arm, inward positive
-    fold_rate_m_s: Vector4
-    pressed: Annotated[Floats, (4,), int]  # 1 for the arms that a face presses
+    motor_thrust_n: PerArm
+    motor_command_n: PerArm
+    fold_m: PerArm  # of each arm, inward positive
+    fold_rate_m_s: PerArm
+    pressed: Annotated[Floats, (ARMS,), int]  # 1 for the arms that a face presses
     was_near: int  # 1 while the next two may be other than zero
     depth_m: Annotated[Floats, (9,)]  # of each point, in whatever it is deepest in
     share: Annotated[Floats, (9,)]  # of a round's normal in the guard's plane when it touched; 0 where none does
@@ -152,7 +154,7 @@ class PlantState:
     rate_sum: Vector3
     clip_counts: Annotated[Floats, (3,), int]  # since boot
     clipped_off_m_s: Vector3  # velocity that clipping has hidden in this interval, body FRD
-    rotor_phase: Vector4  # rad, of the vibration
+    rotor_phase: PerArm  # rad, of the vibration
     peak_force_n: float  # in this interval
     hit: Annotated[Floats, (32,)]  # the hit in progress
     finished_hits: Annotated[Floats, (2, 32)]  # ended in this interval; it is too short for a third
@@ -181,8 +183,8 @@ class Scratch:
     rates_ned: Vector3
     velocity_before: Vector3
     shaken: Annotated[Floats, (6,)]  # vibration on the raw axes
-    fold_before_m: Vector4
-    relaxed_m: Vector4  # folds that arms pressed by nothing would have
+    fold_before_m: PerArm
+    relaxed_m: PerArm  # folds that arms pressed by nothing would have
 
 
 # Rows of `PlantState.hit`.
@@ -223,9 +225,8 @@ def _ratio_for(restitution: float) -> float:
     return (low + high) / 2
 
 
-# A disc lying flat against a face (a ceiling) cannot fold its arm towards it; below this share of the
-# normal in the disc's plane the push is taken as straight through the frame. A frame without arms that fold is as
-# stiff one way as another.
+# A disc flat against a face (a ceiling) cannot fold its arm towards it. Below this share of the normal in the disc's
+# plane the force goes straight through the frame. A frame without arms that fold is as stiff one way as another.
 LEAST_IN_PLANE = 0.2
 
 
@@ -306,7 +307,7 @@ def constants_from(airframe: Airframe, rng: np.random.Generator) -> Constants:
 
 def calm(wind_ned_m_s: tuple[float, float, float]) -> Disturbance:
     """Nothing but a steady wind."""
-    return new_record(Disturbance, wind_ned_m_s=np.array(wind_ned_m_s), motor_share=np.ones(4))
+    return new_record(Disturbance, wind_ned_m_s=np.array(wind_ned_m_s), motor_share=np.ones(ARMS))
 
 
 def initial_state(position_ned_m: tuple[float, float, float], yaw_rad: float) -> PlantState:

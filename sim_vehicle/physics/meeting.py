@@ -54,8 +54,8 @@ def part_centre(point: int, rotation: Floats, position: Floats, contact: Contact
 def deepest_point(
     point: int, normal: Floats, rotation: Floats, position: Floats, contact: ContactSprings, out: Floats
 ) -> tuple[float, float]:
-    """Write the place (NED, m) of a guard, hub or foot that lies furthest against ``normal`` into ``out``; return the
-    share of the normal that lies in the guard's plane (1 for hub and feet) and how much further the part reaches (m).
+    """Write the point (NED, m) of a guard, hub or foot furthest against ``normal`` into ``out``. Return the share of
+    the normal in the guard's plane (1 for hub and feet), and the part's further reach (m).
 
     A guard is a hoop: its deepest point is on the rim, along the in-plane part of the inward normal, and on the
     edge of the hoop that leans into the face. Where a hoop gives a little, the force acts in between, and the reach
@@ -114,8 +114,8 @@ def _meet_round(
 ) -> tuple[float, float]:
     """The same for a round. The hoop is round too: a disc, and everything nearer to it than half of its height.
 
-    Depth and normal are those of the way on which two convex bodies come apart soonest, so that what pressing in costs
-    is what pressing out gives back, whichever way they roll on each other.
+    Depth and normal are those of the shortest separation of two convex bodies. So pressing in costs what pressing out
+    returns, however they roll on each other.
     """
     normal, where, on_line = scratch.normal, scratch.where, scratch.on_line
     part_centre(point, rotation, position, contact, scratch.centre)
@@ -187,8 +187,8 @@ def _way_out_of_hoop(face: int, rotation: Floats, contact: ContactSprings, faces
 
 @njit
 def _nearest_to_hoop(face: int, rotation: Floats, contact: ContactSprings, faces: Floats, scratch: Scratch) -> bool:
-    """Write the points of a round's line and of a hoop's inner disc nearest to each other, by going to and fro
-    between them: the line's into `scratch.on_line`, the way from there as the normal. Returns whether it is an end.
+    """Find the nearest points of a round's line and a hoop's inner disc, by alternating projection. Write the line's
+    point into `scratch.on_line`, and the direction from there as the normal. Returns whether it is an end.
     """
     normal, on_line, centre, where = scratch.normal, scratch.on_line, scratch.centre, scratch.where
     inner = contact.guard_radius_m - contact.guard_half_height_m

@@ -16,9 +16,9 @@ Ints = npt.NDArray[np.int64]
 # Values of `near`, per face: out of reach for this interval, out of reach now, within reach, and so close that
 # guards and hub must be looked at.
 ASLEEP, FAR, NEAR, CLOSE = range(4)
-# Values of `behind`, per point and face. A part is past a face whose plane it crossed beside the rectangle, and inside
-# where it got deep without having come from outside, as one that slips off an edge may: no spring was pressed on the
-# way, so none may push.
+# Values of `behind`, per point and face. A part is past a face whose plane it crossed beside the rectangle. It is
+# inside where it got deep without coming from outside, as a part that slips off an edge may. No spring was compressed,
+# so none may push.
 IN_FRONT, PASSED, INSIDE = range(3)
 # Room for the travel in one raw interval at any speed the vehicle can fly.
 NEAR_MARGIN_M = 0.01

@@ -3,6 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.physics.contact import contact_wrench
 from sim_vehicle.physics.inertia import XX, XY, YY, ZZ, inertia_of, times
 from sim_vehicle.physics.jit import inlined, njit
@@ -84,7 +85,7 @@ def derivative(
 def thrusts_moment(thrusts_n: Floats, constants: Constants, moment: Floats) -> None:
     """Write the moment (FRD, N m) of the motors' thrusts and of their drag."""
     moment[:] = 0.0
-    for motor in range(4):
+    for motor in range(ARMS):
         thrust = thrusts_n[motor]
         moment[0] -= constants.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 1] * thrust
         moment[1] += constants.motor_radius_m * ARM_DIRECTIONS_FRD[motor, 0] * thrust

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sim_vehicle.airframe import ARMS
 from sim_vehicle.control.attitude import (
     ATTITUDE_LOOP_HZ,
     allocate_motors,
@@ -184,7 +185,7 @@ def rest_loops(state: PlantState) -> None:
 @inlined
 def spin_motors(state: PlantState, share: float, constants: Constants, disturbance: Disturbance) -> None:
     """First-order lag of each motor's thrust: in a raw interval by ``share`` nearer to what it gives of its command."""
-    for motor in range(4):
+    for motor in range(ARMS):
         command = min(max(state.motor_command_n[motor], 0.0), constants.motor_max_n)
         given = disturbance.motor_share[motor] * command
         state.motor_thrust_n[motor] += share * (given - state.motor_thrust_n[motor])

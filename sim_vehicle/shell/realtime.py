@@ -1,4 +1,4 @@
-"""The simulated vehicle in real time, or so many times faster, on any number of ports."""
+"""The simulated vehicle in real time, or faster by a factor, on any number of ports."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -74,7 +74,7 @@ class RealtimePace:
         self.restart(speed)
 
     def restart(self, speed: float) -> None:
-        """Go on from here at a speed, after another one or a pause."""
+        """Go on from now at a speed (1: real time), after another speed or a pause."""
         self.speed = speed
         self._ns_per_us = 1000 / speed if speed > 0 else 0.0
         self._begin(self._monotonic_ns() - round(self._ns_per_us * self._time_boot_us))

@@ -8,7 +8,7 @@ from sim_vehicle.shell.port import bound_socket, connected
 from sim_vehicle.vehicle import SimulatedVehicle
 
 _READ_BYTES = 65_536
-# A client that leaves so much unread has stopped reading: some ten seconds of all streams.
+# Unread bytes of a client that has stopped reading: some ten seconds of all streams.
 _MOST_UNREAD_BYTES = 500_000
 
 

@@ -7,7 +7,7 @@ from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.shell.port import Address, bound_socket, connected, received_datagrams, send_datagrams
 from sim_vehicle.vehicle import SimulatedVehicle
 
-# A client that has been silent for so long is taken for gone; ground stations send a heartbeat a second.
+# A client silent for this time has gone; ground stations send a heartbeat a second.
 CLIENT_GONE_AFTER_US = 30_000_000
 # More clients than this are no ground stations: somebody sends from ever new ports.
 MOST_CLIENTS = 32

@@ -205,10 +205,10 @@ def test_own_request_failsafe_and_pilot_are_told_apart(report, requested, holder
 def test_an_intended_mode_is_newer_than_the_last_heartbeats_status():
     """A failsafe was on at the last HEARTBEAT; what the pilot intends since then is told by CURRENT_MODE."""
     vehicle = Vehicle()
-    vehicle.hear(Heartbeat(1, 1, 2, 12, True, OFFBOARD, 5), 0)
-    vehicle.hear(CurrentMode(POSCTL, POSCTL), 1)
+    vehicle.update(Heartbeat(1, 1, 2, 12, True, OFFBOARD, 5), 0)
+    vehicle.update(CurrentMode(POSCTL, POSCTL), 1)
     assert who_decided(vehicle.mode, OFFBOARD, None) is Holder.PILOT
-    vehicle.hear(CurrentMode(POSCTL, None), 2)
+    vehicle.update(CurrentMode(POSCTL, None), 2)
     assert who_decided(vehicle.mode, OFFBOARD, None) is Holder.FAILSAFE
 
 

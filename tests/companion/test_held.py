@@ -11,10 +11,10 @@ from companion.core import Limiter
 from companion.fence import Fence
 from companion.flight.context import Target
 from companion.flight.envelope import (
-    Known,
+    KnownSurface,
     Surroundings,
     bounded,
-    held_way,
+    held_path,
     touched,
     unattended_text,
 )
@@ -66,7 +66,7 @@ def flown(target: Target, motion: Moving, seconds: float) -> tuple[tuple, tuple]
 )
 def test_the_way_is_that_of_px4s_loops(target):
     motion = Moving(HERE, (0.8, -0.3, 0.2))
-    way = held_way(target, motion)
+    way = held_path(target, motion)
     place, velocity = flown(target, motion, HELD_S + NOTICED_S)
     assert way[0] == HERE
     assert way[-2] == pytest.approx(place, abs=0.01)
@@ -78,22 +78,22 @@ def test_the_way_is_that_of_px4s_loops(target):
 def test_a_brake_after_a_rebound_leads_back_to_the_wall_and_is_weakened_by_as_little_as_that_takes():
     """0.8 m/s off the wall and 3 m/s^2 towards it: after 1.1 s it would come back at 2.5 m/s."""
     off = (-0.8, 0.0, 0.0)
-    known = [Known(WALL)]
+    known = [KnownSurface(WALL)]
     asked = lean((3.0, 1.0, 0.0), off)
     sent, _ = bounded(asked, around(off, known), FENCE, LIMITS)
     north, east, _ = sent.acceleration_ned_m_s2
     assert 0.0 < north < 1.5 and east == 1.0
-    assert min(WALL.off_m(place) for place in held_way(sent, Moving(HERE, off))) == pytest.approx(0.15, abs=0.15)
+    assert min(WALL.off_m(place) for place in held_path(sent, Moving(HERE, off))) == pytest.approx(0.15, abs=0.15)
     # a hair more and it were too near
     more = lean((north + 0.2, 1.0, 0.0), off)
-    assert min(WALL.off_m(place) for place in held_way(more, Moving(HERE, off))) < 0.15
+    assert min(WALL.off_m(place) for place in held_path(more, Moving(HERE, off))) < 0.15
 
 
 def test_a_vehicle_that_is_slower_off_the_wall_than_expected_may_brake_no_harder_than_that_allows():
     """The estimate says 0.2 m/s off the wall, the hit's law 1 m/s: which of them is right nobody knows."""
     expected, told = (-1.0, 0.0, 0.0), (-0.2, 0.0, 0.0)
-    alone, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(expected, [Known(WALL)]), FENCE, LIMITS)
-    both, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(told, [Known(WALL)]), FENCE, LIMITS)
+    alone, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(expected, [KnownSurface(WALL)]), FENCE, LIMITS)
+    both, _ = bounded(lean((2.0, 0.0, 0.0), expected), around(told, [KnownSurface(WALL)]), FENCE, LIMITS)
     assert both.acceleration_ned_m_s2[0] < 0.6 * alone.acceleration_ned_m_s2[0]
 
 
@@ -101,7 +101,8 @@ def test_a_vehicle_that_is_nearer_to_the_wall_than_expected_may_brake_no_harder_
     """The hit's law has it 0.5 m off the wall, its estimate 0.2 m: which of them is right nobody knows."""
     off, asked = (-0.6, 0.0, 0.0), lean((2.0, 0.0, 0.0), (-0.6, 0.0, 0.0))
     far, near = (
-        bounded(asked, around(off, [Known(WALL)], vehicle), FENCE, LIMITS)[0] for vehicle in (HERE, (0.3, 0.0, -1.5))
+        bounded(asked, around(off, [KnownSurface(WALL)], vehicle), FENCE, LIMITS)[0]
+        for vehicle in (HERE, (0.3, 0.0, -1.5))
     )
     assert near.acceleration_ned_m_s2[0] < far.acceleration_ned_m_s2[0] - 0.1
 
@@ -109,7 +110,7 @@ def test_a_vehicle_that_is_nearer_to_the_wall_than_expected_may_brake_no_harder_
 def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
     # Given a vehicle that leans by 0.7 m/s^2 towards the wall where it takes itself for level
     off = Moving(HERE, (-1.0, 0.0, 0.0), (0.7, 0.0, 0.0))
-    surroundings = around(off.velocity_ned_m_s, [Known(WALL)])
+    surroundings = around(off.velocity_ned_m_s, [KnownSurface(WALL)])
     # When it is to brake by 0.5
     sent, _ = bounded(replace(lean((0.5, 0.2, 0.0)), expected=off), surroundings, FENCE, LIMITS)
     # Then it is told to lean off the wall by 0.2, once
@@ -125,26 +126,26 @@ def test_a_tilt_error_that_ends_meanwhile_does_not_lead_to_the_wall():
     """What is told to lean to the wall, because it leans off it by itself, must be safe when it does not any more."""
     off = Moving(HERE, (-1.0, 0.0, 0.0))
     plain, _ = bounded(
-        replace(lean((0.8, 0.0, 0.0)), expected=off), around(off.velocity_ned_m_s, [Known(WALL)]), FENCE, LIMITS
+        replace(lean((0.8, 0.0, 0.0)), expected=off), around(off.velocity_ned_m_s, [KnownSurface(WALL)]), FENCE, LIMITS
     )
     errs = replace(off, acceleration_ned_m_s2=(-0.9, 0.0, 0.0))
     sent, _ = bounded(
-        replace(lean((0.8, 0.0, 0.0)), expected=errs), around(off.velocity_ned_m_s, [Known(WALL)]), FENCE, LIMITS
+        replace(lean((0.8, 0.0, 0.0)), expected=errs), around(off.velocity_ned_m_s, [KnownSurface(WALL)]), FENCE, LIMITS
     )
     assert plain.acceleration_ned_m_s2[0] < sent.acceleration_ned_m_s2[0] < 0.8 + 0.9
-    assert min(WALL.off_m(place) for place in held_way(sent, off)) > 0.1
+    assert min(WALL.off_m(place) for place in held_path(sent, off)) > 0.1
 
 
 def test_what_leads_away_from_the_wall_or_along_it_passes():
     asked = lean((-3.0, 2.0, 0.0))
-    assert bounded(asked, around(REST, [Known(WALL)]), FENCE, LIMITS) == (asked, "")
+    assert bounded(asked, around(REST, [KnownSurface(WALL)]), FENCE, LIMITS) == (asked, "")
 
 
 def test_a_place_with_a_velocity_into_the_wall_loses_that_and_says_so():
     asked = Target((0.2, 0.0, -1.5), 0.0, (1.5, 0.5, 0.0), (1.0, 0.0, 0.0))
-    sent, said = bounded(asked, around((0.5, 0.5, 0.0), [Known(WALL)]), FENCE, LIMITS)
+    sent, said = bounded(asked, around((0.5, 0.5, 0.0), [KnownSurface(WALL)]), FENCE, LIMITS)
     assert said == "leads too near to what is known, or out of the fence"
-    way = held_way(sent, Moving(HERE, (0.5, 0.5, 0.0)))
+    way = held_path(sent, Moving(HERE, (0.5, 0.5, 0.0)))
     assert min(WALL.off_m(place) for place in way) > 0.1
     assert sent.position_ned_m == asked.position_ned_m
 
@@ -152,7 +153,7 @@ def test_a_place_with_a_velocity_into_the_wall_loses_that_and_says_so():
 def test_a_place_that_is_asked_for_beside_the_wall_may_be_flown_to():
     """Whoever plans a goal nearer than the clearance has decided on it."""
     asked = Target((0.42, 0.0, -1.5), 0.0)
-    assert bounded(asked, around(REST, [Known(WALL)]), FENCE, LIMITS) == (asked, "")
+    assert bounded(asked, around(REST, [KnownSurface(WALL)]), FENCE, LIMITS) == (asked, "")
 
 
 def test_a_velocity_that_leads_out_of_the_fence_is_held_back():
@@ -160,7 +161,7 @@ def test_a_velocity_that_leads_out_of_the_fence_is_held_back():
     asked = Target((11.2, 0.0, -1.5), 0.0, velocity, REST)
     sent, said = bounded(asked, around(velocity, vehicle=vehicle), FENCE, LIMITS)
     assert "out of the fence" in said
-    held, at_first = (held_way(target, Moving(vehicle, velocity))[-1][0] for target in (sent, asked))
+    held, at_first = (held_path(target, Moving(vehicle, velocity))[-1][0] for target in (sent, asked))
     assert held < at_first and held < 12.2
     # in its middle it passes
     asked = Target((0.2, 0.0, -1.5), 0.0, velocity, REST)
@@ -171,14 +172,14 @@ def test_a_surface_that_the_vehicle_is_behind_is_in_nobodys_way():
     """It is not where it was thought to be: a pole that was slid past, or an estimate that has jumped."""
     vehicle, velocity = (0.8, 0.0, -1.5), (1.0, 0.0, 0.0)
     asked = Target((0.9, 0.0, -1.5), 0.0, velocity, REST)
-    assert bounded(asked, around(velocity, [Known(WALL)], vehicle), FENCE, LIMITS) == (asked, "")
+    assert bounded(asked, around(velocity, [KnownSurface(WALL)], vehicle), FENCE, LIMITS) == (asked, "")
 
 
 @pytest.mark.parametrize(("east_m", "is_held_back"), [(0.0, True), (4.0, False)])
 def test_a_patch_counts_as_far_as_it_is_believed_to_go(east_m, is_held_back):
     # Given one touch of a wall, 0.7 m north of the origin, by a vehicle with a reach of 0.2 m
     patch = Patch(((0.7, 0.0, -1.5),), (-1.0, 0.0, 0.0), 0.2, 0.5, 0)
-    known = Known(touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0)), patch, ORIGIN, 0.2)
+    known = KnownSurface(touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0)), patch, ORIGIN, 0.2)
     vehicle, velocity = (0.0, east_m, -1.5), (1.5, 0.0, 0.0)
     # When a velocity leads through its plane
     _, said = bounded(Target(vehicle, 0.0, velocity, REST), around(velocity, [known], vehicle), FENCE, LIMITS)

@@ -61,7 +61,7 @@ def test_gyroscopes_that_are_never_a_number_are_no_hits_but_told_and_end_the_mis
     for _ in range(3000):
         attacked(f, [attacker.packet(mav.MAVLINK_MSG_ID_HIGHRES_IMU, name, float("nan")) for name in GYROSCOPES])
     assert f.companion.report().collisions == ()
-    assert "HIGHRES_IMU is not believed: specific force" in f.event("implausible").text
+    assert "HIGHRES_IMU is not accepted: specific force" in f.event("implausible").text
     assert f.kinds().count("implausible") == 1
     assert "blind" in f.companion.report().reason
 

@@ -90,20 +90,20 @@ def test_a_hit_of_which_nothing_is_known_leaves_nothing():
 def test_one_touch_is_believed_to_reach_a_little_to_all_sides():
     (patch,) = remembered((), [wall_touch(1.0)], CLEARANCE_M)
     # someone who looks south has the west on the right
-    assert patch.believed_along_m() == pytest.approx((-REACHES_M, REACHES_M))
-    assert patch.believed_heights_m() == pytest.approx((1.0, 2.0))
+    assert patch.assumed_along_m() == pytest.approx((-REACHES_M, REACHES_M))
+    assert patch.assumed_heights_m() == pytest.approx((1.0, 2.0))
     assert patch.hits == 1
 
 
 def test_two_touches_of_a_wall_are_one_patch_that_spans_both():
     (patch,) = remembered((), [wall_touch(0.0), wall_touch(1.05)], CLEARANCE_M)
-    low_m, high_m = patch.believed_along_m()
+    low_m, high_m = patch.assumed_along_m()
     assert patch.hits == 2 and high_m - low_m == pytest.approx(1.05 + 2 * 0.525, abs=0.01)
 
 
 def test_the_longer_a_wall_is_known_to_be_the_further_it_is_believed_to_go_on():
     known = remembered((), [wall_touch(east_m) for east_m in (0, 1, 2, 3, 4, 5, 6)], CLEARANCE_M)
-    (low_m, high_m), (touched_low_m, touched_high_m) = known[0].believed_along_m(), known[0].touched_along_m()
+    (low_m, high_m), (touched_low_m, touched_high_m) = known[0].assumed_along_m(), known[0].touched_along_m()
     assert high_m - touched_high_m == touched_low_m - low_m == GOES_ON_MOST_M
 
 
@@ -147,7 +147,7 @@ def test_an_uncertain_normal_does_not_split_a_wall():
 def test_a_ceiling_is_believed_upwards_without_an_end():
     lid = Patch(((1.0, 1.0, -2.5),), (0.0, 0.0, 1.0), math.radians(15.0), REACHES_M, 0)
     (patch,) = remembered((), [lid], CLEARANCE_M)
-    assert patch.is_steep and patch.believed_heights_m() == (2.5, math.inf)
+    assert patch.is_steep and patch.assumed_heights_m() == (2.5, math.inf)
 
 
 # --- files
@@ -160,11 +160,11 @@ def test_a_patch_comes_back_from_a_file_as_it_was():
         patch = after.patch()
         assert patch.hits == before.hits and patch.found_at_us == before.found_at_us
         assert patch.normal_ned == pytest.approx(before.normal_ned, abs=1e-3)
-        assert patch.believed_along_m() == pytest.approx(before.believed_along_m(), abs=1e-3)
+        assert patch.assumed_along_m() == pytest.approx(before.assumed_along_m(), abs=1e-3)
         # and a second time to the last digit
         assert as_data(KnownPatch.model_validate(as_data(patch)).patch()) == as_data(patch)
 
 
 def test_a_patch_in_words():
     (patch,) = remembered((), [wall_touch(0.0)], CLEARANCE_M)
-    assert describe(patch) == "surface facing 180 deg at [4.00, 0.00, -1.50], touched once, believed 1.0 m wide"
+    assert describe(patch) == "surface facing 180 deg at [4.00, 0.00, -1.50], touched once, assumed 1.0 m wide"

@@ -26,14 +26,14 @@ def answered(trip: RoundTrip, *trips_us: int, start_us: int = EPOCH_US) -> None:
         now_us = start_us + 2_000_000 * number
         question = trip.ask(now_us)
         assert question is not None
-        trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), now_us + trip_us)
+        trip.update(TimeSyncAnswer(question.companion_time_ns, 7), now_us + trip_us)
 
 
 def test_it_asks_ten_times_a_second_until_a_first_answer_and_then_once():
     trip = RoundTrip()
     first = asked_over(trip, 2.0)
     assert [b.companion_time_ns - a.companion_time_ns for a, b in itertools.pairwise(first)] == [100_000_000] * 19
-    trip.hear(TimeSyncAnswer(first[-1].companion_time_ns, 7), EPOCH_US + 2_000_000)
+    trip.update(TimeSyncAnswer(first[-1].companion_time_ns, 7), EPOCH_US + 2_000_000)
     assert len(asked_over(trip, 5.0, EPOCH_US + 2_000_000)) == 5
 
 
@@ -43,10 +43,10 @@ def test_an_answer_to_nobodys_question_and_a_second_answer_are_counted_and_no_mo
     question = trip.ask(EPOCH_US)
     assert question is not None
     # When another's answer comes, then its own twice
-    trip.hear(TimeSyncAnswer(question.companion_time_ns - 5_000_000_000, 7), EPOCH_US + 1_000)
+    trip.update(TimeSyncAnswer(question.companion_time_ns - 5_000_000_000, 7), EPOCH_US + 1_000)
     assert trip.present_us is None
-    trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 3_000)
-    trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 900_000)
+    trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 3_000)
+    trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 900_000)
     # Then one counts
     assert (trip.present_us, trip.report()) == (3_000, RoundTripReport(3_000, 3_000, 2))
 
@@ -65,7 +65,7 @@ def test_answers_in_any_order_are_matched_with_their_own_questions():
     order.shuffle(questions)
     now_us = EPOCH_US + 2_000_000
     for question in questions:
-        trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), now_us)
+        trip.update(TimeSyncAnswer(question.companion_time_ns, 7), now_us)
     assert trip.report() == RoundTripReport(1_500_000, 2_000_000, 0)
 
 
@@ -73,7 +73,7 @@ def test_questions_that_nobody_answers_are_forgotten_in_the_end():
     trip = RoundTrip()
     questions = asked_over(trip, 60.0)
     for question in questions:
-        trip.hear(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 60_000_000)
+        trip.update(TimeSyncAnswer(question.companion_time_ns, 7), EPOCH_US + 60_000_000)
     assert trip.ignored == len(questions) - 64
 
 

@@ -9,15 +9,15 @@ from shapely import LineString, Point
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
-from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings, believed, core
-from companion.mission.course import Pace, home_around, passed, way_around
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings, assumed_area, core
+from companion.mission.item_trajectory import SpeedLimits, home_around, passed, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
 from companion.mission.trajectory import CurveProfile
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M
 ERROR_RAD = math.radians(15.0)
-PACE = Pace(1.5, 2.0)
+PACE = SpeedLimits(1.5, 2.0)
 START, GOAL = (0.0, 0.0, -1.5), (7.0, 0.0, -1.5)
 
 
@@ -47,8 +47,8 @@ def test_the_way_round_a_touch_keeps_the_clearance_and_is_the_shortest():
     known = around(wall(0.2))
     assert known.block((START, GOAL))
     places = route(known, START, GOAL)
-    way = LineString([START[:2], *[place[:2] for place in places]])
-    assert way.distance(believed(known.patches[0])) >= CLEARANCE_M - SLACK_M
+    trajectory = LineString([START[:2], *[place[:2] for place in places]])
+    assert trajectory.distance(assumed_area(known.patches[0])) >= CLEARANCE_M - SLACK_M
     # round the nearer end, which is the western one
     assert all(place[1] < 0.0 for place in places[:-1])
     least_m = math.hypot(4.0, 0.3 + CLEARANCE_M) + math.hypot(3.0, 0.3 + CLEARANCE_M)
@@ -60,15 +60,15 @@ def test_an_unsure_normal_is_passed_in_a_wider_bow():
     assert unsure[0][0] < sure[0][0] - 0.2
     # a wall that is turned by 40 degrees against what is believed is within it
     turned_end = Point(4.0 - REACHES_M * math.sin(math.radians(40)), REACHES_M * math.cos(math.radians(40)))
-    assert believed(wall(0.0, error_rad=math.radians(40.0))).buffer(1e-9).covers(turned_end)
+    assert assumed_area(wall(0.0, error_rad=math.radians(40.0))).buffer(1e-9).covers(turned_end)
 
 
 def test_from_a_recoverys_setpoint_near_the_wall_the_way_leads_off_and_round():
     near = (4.0 - 0.45, 0.0, -1.5)
     known = around(wall(0.0))
     places = route(known, near, GOAL)
-    way = LineString([near[:2], *[place[:2] for place in places]])
-    assert way.distance(core(known.patches[0])) >= 0.45 - 0.03
+    trajectory = LineString([near[:2], *[place[:2] for place in places]])
+    assert trajectory.distance(core(known.patches[0])) >= 0.45 - 0.03
     assert not known.block((near, (0.0, 0.0, -1.5))), "straight away from the wall is always free"
 
 
@@ -112,7 +112,7 @@ def test_where_the_fence_is_high_enough_the_way_leads_over_it():
     known = around(wall(-1.0, 0.0, 1.0), fence=room)
     places = route(known, START, GOAL)
     over_m = -places[0][2]
-    assert over_m == pytest.approx(known.patches[0].believed_heights_m()[1] + CLEARANCE_M)
+    assert over_m == pytest.approx(known.patches[0].assumed_heights_m()[1] + CLEARANCE_M)
     assert places[0][:2] == START[:2] and places[-2][:2] == GOAL[:2] and places[-1] == GOAL
     # and not through a ceiling above the start
     assert route(around(wall(-1.0, 0.0, 1.0), ceiling(2.2), fence=room), START, GOAL) is None
@@ -145,62 +145,62 @@ def test_a_route_is_found_soon_also_among_many_patches():
         wall(0.7 * (row % 2) - 3.0 + 1.9 * column, north_m=1.5 + 1.3 * row) for row in range(4) for column in range(4)
     ]
     places = route(around(*patches), START, (7.5, 0.0, -1.5))
-    way = LineString([START[:2], *[place[:2] for place in places]])
-    assert min(way.distance(core(patch)) for patch in patches) >= CLEARANCE_M - SLACK_M
+    trajectory = LineString([START[:2], *[place[:2] for place in places]])
+    assert min(trajectory.distance(core(patch)) for patch in patches) >= CLEARANCE_M - SLACK_M
 
 
 # --- items
 
 
 def test_a_line_that_is_free_is_flown_as_it_is():
-    planned = way_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(3.0)))
-    assert not planned.is_detour and planned.way.distance_m == pytest.approx(7.0)
+    planned = trajectory_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(3.0)))
+    assert not planned.is_detour and planned.trajectory.distance_m == pytest.approx(7.0)
 
 
 def test_a_line_in_whose_way_something_stands_is_led_round_it():
-    planned = way_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(0.0)))
-    assert planned.is_detour and planned.way.target_m == GOAL and 7.0 < planned.way.distance_m < 8.0
+    planned = trajectory_around(GoToItem(position_ned_m=GOAL), START, PACE, around(wall(0.0)))
+    assert planned.is_detour and planned.trajectory.target_m == GOAL and 7.0 < planned.trajectory.distance_m < 8.0
 
 
 def test_a_velocity_is_flown_as_it_is():
     """It asks for a motion: so a wall is felt for."""
     item = VelocityItem(velocity_ned_m_s=(1.0, 0.0, 0.0), duration_s=5.0)
-    assert not way_around(item, START, PACE, around(wall(0.0))).is_detour
+    assert not trajectory_around(item, START, PACE, around(wall(0.0))).is_detour
 
 
 def test_a_paths_point_in_a_wall_is_left_out_but_not_its_last():
     through = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5), (6.0, 0.0, -1.5)))
-    planned = way_around(through, START, PACE, around(wall(0.0)))
-    assert planned.left_out == 1 and planned.way.target_m == (6.0, 0.0, -1.5)
+    planned = trajectory_around(through, START, PACE, around(wall(0.0)))
+    assert planned.left_out == 1 and planned.trajectory.target_m == (6.0, 0.0, -1.5)
     into = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, 0.0, -1.5)))
-    assert way_around(into, START, PACE, around(wall(0.0))).way is None
+    assert trajectory_around(into, START, PACE, around(wall(0.0))).trajectory is None
 
 
 def test_an_orbit_is_flown_round_what_stands_in_it():
     item = OrbitItem(centre_ned_m=(4.0, 3.0, -1.5), radius_m=3.0)
     known = around(wall(0.0, north_m=4.0), fence=Fence(radius_m=12))
-    planned = way_around(item, START, PACE, known)
+    planned = trajectory_around(item, START, PACE, known)
     assert planned.is_detour and planned.left_out >= 1
-    places = [planned.way.at(planned.way.duration_s * n / 400)[0] for n in range(401)]
+    places = [planned.trajectory.at(planned.trajectory.duration_s * n / 400)[0] for n in range(401)]
     assert min(Point(place[:2]).distance(core(known.patches[0])) for place in places) > REACH_M + LEAST_FREE_M
     assert max(place[1] for place in places) > 5.5, "the far side of the circle is flown"
 
 
 def test_home_is_led_round_what_stands_in_the_way():
     planned = home_around((7.0, 0.0, -1.5), ReturnItem(), PACE, around(wall(0.0)))
-    assert planned.is_detour and planned.way.target_m[:2] == (0.0, 0.0)
+    assert planned.is_detour and planned.trajectory.target_m[:2] == (0.0, 0.0)
 
 
 def test_home_below_a_ceiling_leaves_out_the_climb():
     planned = home_around((7.0, 0.0, -1.5), ReturnItem(height_m=2.3), PACE, around(ceiling(2.3, north_m=7.0)))
-    heights = [-planned.way.at(planned.way.duration_s * n / 50)[0][2] for n in range(20)]
+    heights = [-planned.trajectory.at(planned.trajectory.duration_s * n / 50)[0][2] for n in range(20)]
     assert planned.is_detour and max(heights) < 2.3 - REACH_M
 
 
 def test_what_has_been_flown_of_a_path_is_not_flown_again():
     path = PathItem(points_ned_m=((2.0, 1.0, -1.5), (4.0, -1.0, -1.5), (6.0, 0.0, -1.5)))
-    way = CurveProfile((START, *path.points_ned_m), 1.5, 2.0)
-    assert [passed(path, way, way.duration_s * part) for part in (0.1, 0.5, 1.0)] == [0, 1, 3]
+    trajectory = CurveProfile((START, *path.points_ned_m), 1.5, 2.0)
+    assert [passed(path, trajectory, trajectory.duration_s * part) for part in (0.1, 0.5, 1.0)] == [0, 1, 3]
 
 
 # --- touch after touch

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bench.faults.packets import made
 from companion.fence import Fence
 from companion.flight.context import Target
-from companion.flight.envelope import Known, SetpointError, Surroundings, bounded
+from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded
 from companion.mission.policy import Limits
 from companion.mission.trajectory import LineProfile
 from companion.motion.strapdown import GRAVITY_M_S2
@@ -93,7 +93,7 @@ def test_a_lean_is_bounded_by_the_tilt_and_by_gravity():
 def test_kept_off_a_slant_a_lean_that_falls_is_bounded_by_the_tilt_still():
     # Given a roof that slants by 50 degrees close below, and a lean along it that falls as fast as may be
     slant = (-math.sin(math.radians(40.0)), 0.0, -math.cos(math.radians(40.0)))
-    below = Known(Surface(plus(ORIGIN, -1.0, (0.0, 0.0, 1.0)), slant, 0.3))
+    below = KnownSurface(Surface(plus(ORIGIN, -1.0, (0.0, 0.0, 1.0)), slant, 0.3))
     beside = replace(around(), velocity_ned_m_s=(0.0, 0.0, 0.0), known=[below])
     for n, e in ((0.0, 9.7), (-3.0, 9.3), (-6.0, -7.7)):
         target, _ = bounded(lean((n, e, 9.0)), beside, Fence(radius_m=50, max_height_m=4), LIMITS)
@@ -179,7 +179,7 @@ def test_the_stream_is_held_back_and_it_is_told():
     go_to = {"go_to": {"position_ned_m": [6, 0, -1.5], "speed_m_s": 2.0}}
     f = in_mission(go_to, {"hold": {"duration_s": 3}}, limits={"max_speed_m_s": 2.0})
     # as if something in the flight forgot the limit
-    f.companion._core.machine.activity._way = LineProfile((0.0, 0.0, -1.5), (6.0, 0.0, -1.5), 4.0, 4.0)
+    f.companion._core.machine.activity._trajectory = LineProfile((0.0, 0.0, -1.5), (6.0, 0.0, -1.5), 4.0, 4.0)
     f.run_for(2.5)
     places = [(t, m.x) for t, m in f.vehicle.setpoints]
     assert max((b - a) / ((u - t) * 1e-6) for (t, a), (u, b) in itertools.pairwise(places)) == pytest.approx(2, 0.02)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from companion.mission.course import Pace, way_of
+from companion.mission.item_trajectory import SpeedLimits, trajectory_of
 from companion.mission.items import VelocityItem
 from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile
 
@@ -24,9 +24,9 @@ WAYS = {
 
 @pytest.mark.parametrize("name", WAYS)
 def test_velocity_is_the_derivative_of_position_within_the_limits(name):
-    way, dt = WAYS[name], 0.002
-    times = np.arange(0.0, way.duration_s + dt, dt)
-    position, velocity, acceleration = (np.array(part) for part in zip(*map(way.at, times), strict=True))
+    trajectory, dt = WAYS[name], 0.002
+    times = np.arange(0.0, trajectory.duration_s + dt, dt)
+    position, velocity, acceleration = (np.array(part) for part in zip(*map(trajectory.at, times), strict=True))
     assert np.linalg.norm(velocity, axis=1).max() <= (3.0 if name == "hairpin" else 2.0) + 1e-9
     assert np.linalg.norm(acceleration, axis=1).max() <= 2.0 * 1.02
     # within a setpoint's time the table is linear, and at the ends of a ramp the acceleration jumps
@@ -36,13 +36,13 @@ def test_velocity_is_the_derivative_of_position_within_the_limits(name):
     misfit = np.abs(np.diff(velocity, axis=0) / dt - mean).max(axis=1)
     assert np.quantile(misfit, 0.9) < 0.1
     assert np.allclose(velocity[[0, -1]], 0.0, atol=1e-6)
-    assert np.linalg.norm(moved, axis=1).sum() == pytest.approx(way.distance_m, rel=2e-3)
-    assert tuple(position[-1]) == pytest.approx(way.target_m, abs=1e-6)
+    assert np.linalg.norm(moved, axis=1).sum() == pytest.approx(trajectory.distance_m, rel=2e-3)
+    assert tuple(position[-1]) == pytest.approx(trajectory.target_m, abs=1e-6)
 
 
 def test_a_curve_passes_through_its_points_and_does_not_stop_there():
-    way = WAYS["curve"]
-    samples = [way.at(t) for t in np.arange(0.0, way.duration_s, 0.005)]
+    trajectory = WAYS["curve"]
+    samples = [trajectory.at(t) for t in np.arange(0.0, trajectory.duration_s, 0.005)]
     for point in ZIGZAG[1:-1]:
         place, velocity, _ = min(samples, key=lambda sample: math.dist(sample[0], point))
         assert math.dist(place, point) < 0.01
@@ -55,31 +55,35 @@ def test_a_curve_is_a_natural_cubic_spline():
     knots = np.concatenate([[0.0], np.cumsum(np.sqrt(np.linalg.norm(np.diff(points, axis=0), axis=1)))])
     spline = CubicSpline(knots, points, bc_type="natural")
     looked_at = spline(np.linspace(0.0, knots[-1], 20_000))
-    way = CurveProfile(ZIGZAG, 3.0, 2.0)
-    for t in np.linspace(0.0, way.duration_s, 50):
-        assert np.linalg.norm(looked_at - np.array(way.at(t)[0]), axis=1).min() < 1e-3
+    trajectory = CurveProfile(ZIGZAG, 3.0, 2.0)
+    for t in np.linspace(0.0, trajectory.duration_s, 50):
+        assert np.linalg.norm(looked_at - np.array(trajectory.at(t)[0]), axis=1).min() < 1e-3
 
 
 def test_a_curve_is_slow_where_it_bends_and_fast_where_it_does_not():
-    way = WAYS["hairpin"]
-    speeds = [math.hypot(*way.at(t)[1]) for t in np.arange(0.0, way.duration_s, 0.01)]
-    turn = [s for t, s in zip(np.arange(0.0, way.duration_s, 0.01), speeds, strict=True) if way.at(t)[0][0] > 4.95]
+    trajectory = WAYS["hairpin"]
+    speeds = [math.hypot(*trajectory.at(t)[1]) for t in np.arange(0.0, trajectory.duration_s, 0.01)]
+    turn = [
+        s
+        for t, s in zip(np.arange(0.0, trajectory.duration_s, 0.01), speeds, strict=True)
+        if trajectory.at(t)[0][0] > 4.95
+    ]
     assert max(speeds) > 2.0
     assert min(turn) < 0.8
 
 
 def test_a_curve_that_turns_back_on_itself_all_but_stops_there():
-    way = CurveProfile([(3.0, 4.0, -2.5), (1.0, 2.0, -2.0), (3.0, 4.0, -2.5)], 2.0, 2.0)
-    at_s = np.arange(0.0, way.duration_s, 0.005)
-    furthest = max((way.at(t) for t in at_s), key=lambda sample: math.dist(sample[0], (3.0, 4.0, -2.5)))
+    trajectory = CurveProfile([(3.0, 4.0, -2.5), (1.0, 2.0, -2.0), (3.0, 4.0, -2.5)], 2.0, 2.0)
+    at_s = np.arange(0.0, trajectory.duration_s, 0.005)
+    furthest = max((trajectory.at(t) for t in at_s), key=lambda sample: math.dist(sample[0], (3.0, 4.0, -2.5)))
     assert math.hypot(*furthest[1]) < 0.1
-    assert all(math.isfinite(sum(part)) for t in at_s for part in way.at(t))
-    assert tuple(way.at(1e9)[0]) == (3.0, 4.0, -2.5)
+    assert all(math.isfinite(sum(part)) for t in at_s for part in trajectory.at(t))
+    assert tuple(trajectory.at(1e9)[0]) == (3.0, 4.0, -2.5)
 
 
 def test_points_on_one_another_are_one_point():
-    way = CurveProfile([(0.0, 0.0, -1.0), (0.0, 0.0, -1.0), (2.0, 0.0, -1.0)], 1.0, 1.0)
-    assert way.distance_m == pytest.approx(2.0)
+    trajectory = CurveProfile([(0.0, 0.0, -1.0), (0.0, 0.0, -1.0), (2.0, 0.0, -1.0)], 1.0, 1.0)
+    assert trajectory.distance_m == pytest.approx(2.0)
     nowhere = CurveProfile([(1.0, 0.0, -1.0), (1.0, 0.0, -1.0)], 1.0, 1.0)
     assert (nowhere.duration_s, nowhere.at(0.0)[0]) == (0.0, (1.0, 0.0, -1.0))
 
@@ -94,33 +98,33 @@ def test_clockwise_is_seen_from_above():
 @pytest.mark.parametrize(("velocity", "duration_s", "top"), [([1, 0, 0], 3.0, 1.0), ([0, -3, 0], 2.0, 2.0)])
 def test_a_velocity_lasts_its_time_with_its_ramps(velocity, duration_s, top):
     item = VelocityItem(velocity_ned_m_s=velocity, duration_s=duration_s)
-    way = way_of(item, (1.0, 1.0, -2.0), Pace(1.0, 2.0))
-    assert way.duration_s == pytest.approx(duration_s)
-    middle = way.at(0.5 * duration_s)[1]
+    trajectory = trajectory_of(item, (1.0, 1.0, -2.0), SpeedLimits(1.0, 2.0))
+    assert trajectory.duration_s == pytest.approx(duration_s)
+    middle = trajectory.at(0.5 * duration_s)[1]
     assert math.hypot(*middle) == pytest.approx(top, abs=0.01)
     assert np.dot(middle, velocity) > 0.0
 
 
 @pytest.mark.parametrize(
-    "way",
+    "trajectory",
     [
         LineProfile((0.0, 0.0, -2.0), (8.0, 0.0, -2.0), 3.0, 2.0, 1.0),
         CurveProfile(ZIGZAG, 3.0, 2.0, 1.0),
         CircleProfile((3.0, 0.0, -2.0), 2.0, math.pi, 1.5 * math.tau, 2.0, 2.0, 1.0),
-        way_of(
+        trajectory_of(
             VelocityItem(velocity_ned_m_s=(2.0, 0.0, 0.0), duration_s=5.0),
             (0.0, 0.0, -2.0),
-            Pace(1.0, 2.0, speeding_up_m_s2=1.0),
+            SpeedLimits(1.0, 2.0, speeding_up_m_s2=1.0),
         ),
     ],
 )
-def test_the_speed_grows_slower_than_it_falls(way):
-    times = np.arange(0.0, way.duration_s, 0.02)
-    speeds = [math.hypot(*way.at(t)[1]) for t in times]
+def test_the_speed_grows_slower_than_it_falls(trajectory):
+    times = np.arange(0.0, trajectory.duration_s, 0.02)
+    speeds = [math.hypot(*trajectory.at(t)[1]) for t in times]
     changes = np.diff(speeds) / 0.02
     assert changes.max() == pytest.approx(1.0, abs=0.05)
     assert changes.min() < -1.1
-    assert math.dist(way.at(way.duration_s - 1e-6)[0], way.target_m) < 1e-4
+    assert math.dist(trajectory.at(trajectory.duration_s - 1e-6)[0], trajectory.target_m) < 1e-4
 
 
 def test_straight_up_no_speed_leans_the_vehicle():
@@ -131,20 +135,20 @@ def test_straight_up_no_speed_leans_the_vehicle():
 
 
 def test_a_head_wind_takes_its_part_of_the_lean_for_speeding_up():
-    pace = Pace(1.0, 2.0, speeding_up_m_s2=1.0)
+    speeds = SpeedLimits(1.0, 2.0, speeding_up_m_s2=1.0)
     north = (5.0, 0.0, 0.0)
     # Given what a hover leans by against the wind, then it is taken off along the way, and only there
-    assert pace.against((0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(0.7)
-    assert pace.against((-0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(1.0)
-    assert pace.against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.4)
+    assert speeds.against((0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(0.7)
+    assert speeds.against((-0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(1.0)
+    assert speeds.against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.4)
     # and a pace that is slower than that already stays what it is
-    assert Pace(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.2)
-    assert pace.against((1.2, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)
+    assert SpeedLimits(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.2)
+    assert speeds.against((1.2, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("speed_m_s", "tried_m_s"), [(2.0, 0.5), (0.8, 0.3), (0.2, 0.2)])
 def test_another_try_is_slower_but_not_so_slow_that_nobody_notices_the_touch(speed_m_s, tried_m_s):
-    assert Pace(speed_m_s, 2.0, factor=0.25).limits(None, None)[0] == pytest.approx(tried_m_s)
+    assert SpeedLimits(speed_m_s, 2.0, factor=0.25).limits(None, None)[0] == pytest.approx(tried_m_s)
     velocity = VelocityItem(velocity_ned_m_s=(speed_m_s, 0.0, 0.0), duration_s=20.0)
-    way = way_of(velocity, (0.0, 0.0, -2.0), Pace(1.0, 2.0, factor=0.25))
-    assert way.at(10.0)[1][0] == pytest.approx(tried_m_s)
+    trajectory = trajectory_of(velocity, (0.0, 0.0, -2.0), SpeedLimits(1.0, 2.0, factor=0.25))
+    assert trajectory.at(10.0)[1][0] == pytest.approx(tried_m_s)

@@ -140,7 +140,7 @@ def _whole(value: float) -> int:
 
 
 def fits(item: StoredItem, kind: int) -> bool:
-    """Whether the item may stand in a list of that type."""
+    """Whether the item may be in a list of this MAV_MISSION_TYPE."""
     if kind == MissionType.MISSION:
         return item.command not in NOT_IN_A_MISSION
     has_too_few_corners = item.command in FENCE_POLYGONS and item.params[0] < 3

@@ -145,7 +145,7 @@ class Stream:
         self.restart(default_interval_us, now_us)
 
     def restart(self, interval_us: int, now_us: int) -> None:
-        """Begin anew, as a stream that was just created."""
+        """Restart with this interval, as a new stream."""
         self._last_us = now_us
         self.set_interval(interval_us)
 

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from companion.mission.items import ACTIONS
 from rebound_cli.check.command import mission_schema
+from rebound_cli.check.legs import flown_legs
 from rebound_cli.check.picture import after_hits, ends
-from rebound_cli.check.ways import planned_ways
 from rebound_cli.documents import parse_document
 from rebound_cli.figure.ground import draw_obstacles, footprint
 from rebound_cli.inputs import mission_from, world_from
@@ -35,11 +35,11 @@ def validator():
 def planned(text: str):
     document = parse_document(text, "t.yaml")
     world = world_from(document)
-    return planned_ways(mission_from(document, world), world)
+    return flown_legs(mission_from(document, world), world)
 
 
 def test_each_step_has_its_place_in_time():
-    ways = planned("""
+    legs = planned("""
 name: t
 items:
   - takeoff: {height_m: 2}
@@ -49,13 +49,19 @@ items:
   - land:
 """)
     # up at 1 m/s and 1 m/s^2; then 4 m at 2 m/s, speeding up with 1 m/s^2 and braking with 2
-    assert [way.begins_s for way in ways] == [0.0, pytest.approx(3.0), pytest.approx(6.5), pytest.approx(11.5), None]
-    assert [way.length_m for way in ways] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
-    assert ways[-1].ends_s is None, "nobody knows how long the wait is"
+    assert [flown.begins_s for flown in legs] == [
+        0.0,
+        pytest.approx(3.0),
+        pytest.approx(6.5),
+        pytest.approx(11.5),
+        None,
+    ]
+    assert [flown.length_m for flown in legs] == pytest.approx([2.0, 4.0, 0.0, 0.0, 0.0])
+    assert legs[-1].ends_s is None, "nobody knows how long the wait is"
 
 
 def test_what_stands_in_the_way_is_named_with_the_place():
-    ways = planned("""
+    legs = planned("""
 name: t
 items:
   - takeoff: {height_m: 2}
@@ -66,14 +72,14 @@ sim:
   walls: [{name: far wall, point_ned_m: [4, 0, -2], normal_ned: [-1, 0, 0], width_m: 4, height_m: 2}]
   poles: [{name: mast, point_ned_m: [6, 0, -4]}]
 """)
-    assert [way.meets.name if way.meets else None for way in ways] == [None, "far wall", "mast", "mast"]
+    assert [flown.meets.name if flown.meets else None for flown in legs] == [None, "far wall", "mast", "mast"]
     # a reach before the wall
-    assert ways[1].points_ned_m[ways[1].meets.index][0] == pytest.approx(3.8, abs=0.15)
+    assert legs[1].points_ned_m[legs[1].meets.index][0] == pytest.approx(3.8, abs=0.15)
 
 
 def test_what_moves_is_in_the_way_wherever_it_comes_by():
     # Given a cart that comes 10 m north, stops, and goes 6 m east; a way across its own, one behind it, one before it
-    ways = planned("""
+    legs = planned("""
 name: t
 items:
   - takeoff: {height_m: 2}
@@ -94,7 +100,7 @@ sim:
           - {at_s: 15, offset_ned_m: [10, 0, 0]}
           - {at_s: 30, offset_ned_m: [10, 6, 0]}
 """)
-    met = [way.meets and way.meets.moves and way.points_ned_m[way.meets.index] for way in ways]
+    met = [flown.meets and flown.meets.moves and flown.points_ned_m[flown.meets.index] for flown in legs]
     assert met[0] is None and met[3] is None
     # its western side is met on the way east, the end of its way, and its southern side where it stands at first
     assert met[1][1] == pytest.approx(1.5 - 0.2, abs=0.15) and met[2][0] == 0.0
@@ -130,7 +136,7 @@ sim:
     )
     world = world_from(document)
     mission = mission_from(document, world)
-    ((here, there), *_) = after_hits(mission, planned_ways(mission, world))
+    ((here, there), *_) = after_hits(mission, flown_legs(mission, world))
     assert here[0] == pytest.approx(3.8, abs=0.15)
     assert there.tolist() == pytest.approx(here.tolist() if goes_on_at is None else goes_on_at)
 
@@ -147,14 +153,14 @@ def test_a_moving_obstacle_is_drawn_where_it_begins_and_ends_with_its_way_betwee
 
 
 def test_items_that_end_in_one_place_are_named_together_and_once():
-    ways = planned("""
+    legs = planned("""
 name: t
 items:
   - takeoff: {height_m: 2}
   - repeat: {times: 2, items: [{go_to: {position_ned_m: [4, 0, -2]}}, {go_to: {position_ned_m: [0, 0, -2]}}]}
   - land:
 """)
-    assert ends(ways) == {(0.0, 0.0): ["1", "2.2"], (4.0, 0.0): ["2.1"]}
+    assert ends(legs) == {(0.0, 0.0): ["1", "2.2"], (4.0, 0.0): ["2.1"]}
 
 
 def test_obstacles_seen_from_above():

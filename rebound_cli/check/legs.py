@@ -30,7 +30,7 @@ class Meeting:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class FlownLeg:
     """A leg with its place in time. `begins_s` is None once a wait without a known end lies before it."""
 
     leg: Leg
@@ -41,25 +41,25 @@ class Way:
 
     @property
     def length_m(self) -> float:
-        return 0.0 if self.leg.way is None else self.leg.way.distance_m
+        return 0.0 if self.leg.trajectory is None else self.leg.trajectory.distance_m
 
     @property
     def ends_s(self) -> float | None:
         return None if self.begins_s is None or self.leg.lasts_s is None else self.begins_s + self.leg.lasts_s
 
 
-def planned_ways(mission: Mission, world: SimulatedWorld) -> tuple[Way, ...]:
+def flown_legs(mission: Mission, world: SimulatedWorld) -> tuple[FlownLeg, ...]:
     """All steps in order, when nothing is hit."""
     begins_s: float | None = 0.0
-    ways: list[Way] = []
+    legs: list[FlownLeg] = []
     for leg in itinerary(mission):
-        way, fractions, points = leg.way, np.zeros(1), np.array([leg.start_ned_m])
-        if way is not None and way.duration_s > 0.0:
-            fractions = np.linspace(0.0, 1.0, min(_MOST_POINTS, max(2, math.ceil(way.distance_m / _STEP_M))) + 1)
-            points = np.array([way.at(fraction * way.duration_s)[0] for fraction in fractions])
-        ways.append(Way(leg, begins_s, points, fractions, _first_met(points, world.scene, world.airframe)))
-        begins_s = ways[-1].ends_s
-    return tuple(ways)
+        trajectory, fractions, points = leg.trajectory, np.zeros(1), np.array([leg.start_ned_m])
+        if trajectory is not None and trajectory.duration_s > 0.0:
+            fractions = np.linspace(0.0, 1.0, min(_MOST_POINTS, max(2, math.ceil(trajectory.distance_m / _STEP_M))) + 1)
+            points = np.array([trajectory.at(fraction * trajectory.duration_s)[0] for fraction in fractions])
+        legs.append(FlownLeg(leg, begins_s, points, fractions, _first_met(points, world.scene, world.airframe)))
+        begins_s = legs[-1].ends_s
+    return tuple(legs)
 
 
 def _first_met(points_ned_m: Floats, scene: Scene, airframe: Airframe) -> Meeting | None:

@@ -1,4 +1,4 @@
-"""What every step begins with: the vehicle as it was heard, and whether it is off the ground."""
+"""What every step begins with: the vehicle's state from its messages, and whether it is off the ground."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,8 @@ from companion.px4_mode import mode_name
 from companion.reflex.config import HELD_S
 
 
-def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
-    """Bring the vehicle view up to date, ask and answer for the time; why the vehicle is refused, or None."""
+def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str | None:
+    """Update the vehicle's state and the time synchronisation; returns why the vehicle is refused, or None."""
     vehicle, streams = flight.vehicle, flight.streams
     mode, armed, conflicts = vehicle.custom_mode, vehicle.armed, vehicle.conflicts
     vehicle.note_silence(now_us)
@@ -30,7 +30,7 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
             if sample.system_id != vehicle.identity.system_id:
                 continue
             if identify(sample) != vehicle.identity:
-                # Another vehicle under its name: nothing that it says counts.
+                # Another vehicle with the same system ID: its messages do not count.
                 vehicle.conflicts += 1
                 continue
         elif isinstance(sample, messages.Refused):
@@ -45,12 +45,12 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
         elif isinstance(sample, messages.TimeSyncRequest):
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
         elif isinstance(sample, messages.TimeSyncAnswer):
-            flight.round_trip.hear(sample, now_us)
-        vehicle.hear(sample, now_us, own_modes)
+            flight.round_trip.update(sample, now_us)
+        vehicle.update(sample, now_us, own_modes)
         streams.count(type(sample), now_us)
-    _let_ways_go_on(flight, now_us)
+    _advance_trajectory_time(flight, now_us)
     if vehicle.conflicts > conflicts:
-        _tell_conflict(flight, now_us)
+        _report_conflict(flight, now_us)
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
         flight.tell(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
@@ -60,21 +60,21 @@ def hear(flight: FlightContext, samples: Sequence[Sample], now_us: int) -> str |
     return None
 
 
-def _let_ways_go_on(flight: FlightContext, now_us: int) -> None:
-    """After a silence, or a step that came as late, a way goes on where it was: nothing is caught up with."""
-    before_us, heard_us = flight.stepped_us, flight.vehicle.last_position_us
+def _advance_trajectory_time(flight: FlightContext, now_us: int) -> None:
+    """After a silence or a late step a trajectory goes on where it was. It does not catch up."""
+    before_us, position_us = flight.stepped_us, flight.vehicle.last_position_us
     flight.stepped_us = now_us
     longest_us = flight.mission.companion.sight.silence_s * 1e6
     late_us = 0 if before_us is None else max(0, now_us - before_us - round(longest_us))
-    flight.unheard_us = 0 if heard_us == now_us else flight.unheard_us + late_us
-    flight.is_heard = heard_us is not None and now_us - heard_us <= longest_us
-    if before_us is not None and flight.is_heard and now_us - before_us <= longest_us:
-        flight.way_us += now_us - before_us
+    flight.missed_us = 0 if position_us == now_us else flight.missed_us + late_us
+    flight.has_position = position_us is not None and now_us - position_us <= longest_us
+    if before_us is not None and flight.has_position and now_us - before_us <= longest_us:
+        flight.trajectory_us += now_us - before_us
 
 
 def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
-    """On the ground too long a one is a reason not to begin; in the air it is told. COM_OF_LOSS_T is asked for beside
-    it until it comes.
+    """On the ground a long round trip is a reason not to begin; in the air it is reported. COM_OF_LOSS_T is read with
+    it until it is answered.
     """
     asked = flight.round_trip.ask(now_us)
     if asked is None:
@@ -87,21 +87,21 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
         flight.tell(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)
 
 
-def _tell_conflict(flight: FlightContext, now_us: int) -> None:
-    """Once a run: a sender that goes on contradicting the vehicle is no news."""
+def _report_conflict(flight: FlightContext, now_us: int) -> None:
+    """Reported once a run of contradictions."""
     last_us, flight.conflict_us = flight.conflict_us, now_us
     if last_us is None or now_us - last_us >= LASTING_US:
         count = flight.vehicle.conflicts
         flight.tell(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
 
 
-# A vehicle that has come down lower than this, and was not told to, drags itself along the ground: nothing of that is a
-# hit to recover from. Its feet are a tenth of a metre below it, and where it leans they are not what touches.
+# A vehicle below this height without a command to descend drags along the ground: that is no hit to recover from. Its
+# feet are 0.1 m below its centre; when it is tilted, other parts touch.
 SCRAPING_M = 0.1
 
 
 def note_height(flight: FlightContext) -> None:
-    """Whether the vehicle has left the ground behind; a hit that throws it down again does not bring that back."""
+    """Note whether the vehicle has left the ground. A hit that pushes it down again does not undo that."""
     height_m = flight.height_m
     if height_m is not None and height_m >= flight.mission.companion.min_detection_height_m:
         flight.has_climbed = True
@@ -110,16 +110,16 @@ def note_height(flight: FlightContext) -> None:
 
 
 def landed(flight: FlightContext, goes_down: bool) -> messages.LandedState:
-    """What the vehicle says of the ground. Up by its own height, and not on its way down, it has not landed.
+    """The vehicle's landed state. A vehicle that has climbed, and is not sent down, has not landed.
 
-    Who says so may have forged it, and a detector is off on the ground.
+    The report may be forged, and a detector is off on the ground.
     """
     is_up = flight.has_climbed and not goes_down and flight.vehicle.landed is messages.LandedState.ON_GROUND
     return messages.LandedState.UNDEFINED if is_up else flight.vehicle.landed
 
 
 def too_low(flight: FlightContext, goes_down: bool) -> str | None:
-    """Why the height stands against a hit, or None. `goes_down`: the vehicle is to meet the ground."""
+    """Why the vehicle is too low for a hit, or None. `goes_down`: it is sent to the ground."""
     least_m, height_m = flight.mission.companion.min_detection_height_m, flight.height_m
     if flight.has_climbed and not goes_down:
         least_m = min(least_m, SCRAPING_M)

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from companion.flight.leaning import HELD_M_S2, Leaning, lean_of
+from companion.flight.horizontal_force import HELD_M_S2, HorizontalForceMonitor, tilt_acceleration
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
@@ -26,23 +26,23 @@ def leaning_north(acceleration_m_s2):
 
 def watched(seconds, north_m, speed_m_s, lean_m_s2, goal_north_m=1.0):
     """The first time at which something is found in the way, and what; functions of the time."""
-    leaning = Leaning()
+    horizontal_force = HorizontalForceMonitor()
     for step in range(round(seconds / EVERY_S)):
         t = step * EVERY_S
         sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m(t), 0.0, -1.5), (speed_m_s(t), 0.0, 0.0))
-        leaning.feel((0.0, 0.0, -math.hypot(9.80665, lean_m_s2(t))))
-        held = leaning.step(sample, leaning_north(lean_m_s2(t)), (goal_north_m, 0.0, -1.5))
+        horizontal_force.add_imu((0.0, 0.0, -math.hypot(9.80665, lean_m_s2(t))))
+        held = horizontal_force.step(sample, leaning_north(lean_m_s2(t)), (goal_north_m, 0.0, -1.5))
         if held is not None:
             return t, held
     return None
 
 
 def test_the_lean_is_the_acceleration_that_it_gives_in_free_air():
-    assert lean_of((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0))
-    assert lean_of(leaning_north(2.0)) == pytest.approx((2.0, 0.0))
-    assert lean_of(leaning_north(2.0), math.hypot(9.80665, 2.0)) == pytest.approx((2.0, 0.0))
+    assert tilt_acceleration((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0))
+    assert tilt_acceleration(leaning_north(2.0)) == pytest.approx((2.0, 0.0))
+    assert tilt_acceleration(leaning_north(2.0), math.hypot(9.80665, 2.0)) == pytest.approx((2.0, 0.0))
     # Also where the thrust does not carry the vehicle
-    assert lean_of(leaning_north(2.0), 0.8 * math.hypot(9.80665, 2.0)) == pytest.approx((1.6, 0.0))
+    assert tilt_acceleration(leaning_north(2.0), 0.8 * math.hypot(9.80665, 2.0)) == pytest.approx((1.6, 0.0))
 
 
 def test_a_vehicle_that_stands_still_and_leans_more_and_more_is_kept_off_its_goal():
@@ -93,14 +93,14 @@ def test_a_vehicle_that_comes_nearer_is_not_kept_off():
 
 def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new():
     """Given a vehicle found pressing north, when it is sent back south and its lean returns to level."""
-    leaning, found = Leaning(), []
+    horizontal_force, found = HorizontalForceMonitor(), []
     for step in range(200):
         t = step * EVERY_S
         lean = min(0.8 * max(0.0, t - 0.6), 1.8) if not found else max(0.0, 1.8 - 2.0 * (t - found[0]))
         sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, 0.0, -1.5), (0.0, 0.0, 0.0))
-        leaning.feel((0.0, 0.0, -math.hypot(9.80665, lean)))
+        horizontal_force.add_imu((0.0, 0.0, -math.hypot(9.80665, lean)))
         goal = (-0.35 if found else 1.0, 0.0, -1.5)
-        if leaning.step(sample, leaning_north(lean), goal) is not None:
+        if horizontal_force.step(sample, leaning_north(lean), goal) is not None:
             found.append(t)
     assert len(found) == 1
 

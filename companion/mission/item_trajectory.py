@@ -1,4 +1,4 @@
-"""From an item to the way it is flown, round what is known. Mission coordinates, metres."""
+"""From a mission item to its trajectory, round known obstacles. Mission coordinates, metres."""
 
 import math
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from companion.mission import items
 from companion.mission.config import FlightConfig
 from companion.mission.trajectory import Chain, CircleProfile, CurveProfile, LineProfile, Trajectory
 
-# What is left of the speeding up against a strong wind: 4 m/s after ten seconds.
+# Least acceleration against a strong wind: 4 m/s after ten seconds.
 LEAST_SPEEDING_UP_M_S2 = 0.4
-# Another try that is slower than this may touch without being noticed, and push until its time is over.
+# A retry slower than this may touch without a detection, and push until its time-out.
 LEAST_TRY_M_S = 0.3
 
 # Speed, acceleration, and that while the speed grows.
@@ -24,7 +24,7 @@ Limits: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class SpeedLimits:
     """Speed and acceleration of items that state none; `factor` slows down an item that is tried again.
 
     `speeding_up_m_s2` holds for all items.
@@ -36,23 +36,25 @@ class Pace:
     speeding_up_m_s2: float = math.inf
 
     @classmethod
-    def of(cls, config: FlightConfig) -> "Pace":
+    def of(cls, config: FlightConfig) -> "SpeedLimits":
         """With which a mission begins."""
         return cls(config.cruise_speed_m_s, config.cruise_acceleration_m_s2, speeding_up_m_s2=config.speeding_up_m_s2)
 
-    def changed_to(self, item: items.SetSpeedItem) -> "Pace":
+    def changed_to(self, item: items.SetSpeedItem) -> "SpeedLimits":
         acceleration = self.acceleration_m_s2 if item.acceleration_m_s2 is None else item.acceleration_m_s2
         return replace(self, speed_m_s=item.speed_m_s, acceleration_m_s2=acceleration, factor=1.0)
 
-    def against(self, wind_m_s2: tuple[float, float], along: Vector3) -> "Pace":
-        """With what a head wind leaves of the lean for speeding up; `wind_m_s2` is what a hover leans against it by."""
-        way_m = math.hypot(along[0], along[1])
-        head_m_s2 = (wind_m_s2[0] * along[0] + wind_m_s2[1] * along[1]) / way_m if way_m > 0.0 else 0.0
+    def against(self, wind_m_s2: tuple[float, float], along: Vector3) -> "SpeedLimits":
+        """With the acceleration that a head wind leaves; `wind_m_s2`: the horizontal acceleration that balances the
+        wind in hover, north and east.
+        """
+        distance_m = math.hypot(along[0], along[1])
+        head_m_s2 = (wind_m_s2[0] * along[0] + wind_m_s2[1] * along[1]) / distance_m if distance_m > 0.0 else 0.0
         least = min(LEAST_SPEEDING_UP_M_S2, self.speeding_up_m_s2)
         return replace(self, speeding_up_m_s2=max(least, self.speeding_up_m_s2 - max(0.0, head_m_s2)))
 
     def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> Limits:
-        """Speed and acceleration of an item, or else its pace's; how fast it may speed up."""
+        """Speed and acceleration of an item, or else the present ones; and the acceleration while the speed grows."""
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
         acceleration = self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
         return self.slowed_m_s(speed), acceleration, self.speeding_up_m_s2
@@ -69,12 +71,12 @@ def climb(start_m: Vector3, height_m: float, config: FlightConfig) -> LineProfil
 
 
 def stay(place_m: Vector3) -> LineProfile:
-    """A way of no length."""
+    """A trajectory of no length."""
     return LineProfile(place_m, place_m, 1.0, 1.0)
 
 
 def first_leg(item: items.Motion, start_m: Vector3) -> Vector3:
-    """Where the item goes at first; to an orbit's middle, as all directions follow."""
+    """The vector to the item's first point; of an orbit, to its centre, as all directions follow."""
     match item:
         case items.VelocityItem():
             return item.velocity_ned_m_s
@@ -87,11 +89,11 @@ def first_leg(item: items.Motion, start_m: Vector3) -> Vector3:
     return (first[0] - start_m[0], first[1] - start_m[1], first[2] - start_m[2])
 
 
-def way_of(item: items.Motion, start_m: Vector3, pace: Pace) -> Trajectory:
-    """How to fly the item from where the setpoint is."""
+def trajectory_of(item: items.Motion, start_m: Vector3, speeds: SpeedLimits) -> Trajectory:
+    """The item's trajectory from the present setpoint."""
     if isinstance(item, items.VelocityItem):
-        return _with_velocity(item, start_m, pace)
-    limits = pace.limits(item.speed_m_s, item.acceleration_m_s2)
+        return _with_velocity(item, start_m, speeds)
+    limits = speeds.limits(item.speed_m_s, item.acceleration_m_s2)
     match item:
         case items.GoToItem():
             return LineProfile(start_m, item.position_ned_m, *limits)
@@ -101,15 +103,15 @@ def way_of(item: items.Motion, start_m: Vector3, pace: Pace) -> Trajectory:
             return _round(item, start_m, limits)
 
 
-def _with_velocity(item: items.VelocityItem, start_m: Vector3, pace: Pace) -> LineProfile:
+def _with_velocity(item: items.VelocityItem, start_m: Vector3, speeds: SpeedLimits) -> LineProfile:
     """The line that is covered in the time, ramps included."""
     speed = math.hypot(*item.velocity_ned_m_s)
-    _, braking, speeding_up = pace.limits(None, item.acceleration_m_s2)
+    _, braking, speeding_up = speeds.limits(None, item.acceleration_m_s2)
     n, e, d = (component / speed for component in item.velocity_ned_m_s)
     growth = min(braking, speeding_up / math.hypot(n, e)) if (n, e) != (0.0, 0.0) else braking
     # With ramps of top / acceleration at both ends; a time too short for the speed is all ramps.
     ramps_s2_per_m = 0.5 / growth + 0.5 / braking
-    top = min(pace.slowed_m_s(speed), 0.5 * item.duration_s / ramps_s2_per_m)
+    top = min(speeds.slowed_m_s(speed), 0.5 * item.duration_s / ramps_s2_per_m)
     length = top * (item.duration_s - top * ramps_s2_per_m)
     target = (start_m[0] + n * length, start_m[1] + e * length, start_m[2] + d * length)
     return LineProfile(start_m, target, top, braking, speeding_up)
@@ -124,9 +126,9 @@ def _round(item: items.OrbitItem, start_m: Vector3, limits: Limits) -> Chain:
     return Chain((LineProfile(start_m, circle.at(0.0)[0], *limits), circle))
 
 
-def way_home(start_m: Vector3, item: items.ReturnItem, pace: Pace, fence: Fence) -> Chain:
+def trajectory_home(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, fence: Fence) -> Chain:
     """Up first where that is asked for, then straight to above the arming position, never above the fence."""
-    limits = pace.limits(item.speed_m_s, None)
+    limits = speeds.limits(item.speed_m_s, None)
     wanted_m = max(-start_m[2], item.height_m or 0.0)
     down_m = -min(max(wanted_m, fence.min_height_m), fence.max_height_m)
     up = (start_m[0], start_m[1], down_m)
@@ -145,19 +147,19 @@ PASSED_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """A way to fly an item; None where there is none that is known to be free.
+    """A trajectory of an item; None where none is free of known obstacles.
 
-    `is_detour`: another than the item's own. `left_out`: so many of the item's points, which are within what is known.
+    `is_detour`: another than the item's own. `left_out`: how many of the item's points lie in known obstacles.
     """
 
-    way: Trajectory | None
+    trajectory: Trajectory | None
     is_detour: bool = False
     left_out: int = 0
 
 
-def way_around(item: items.Motion, start_m: Vector3, pace: Pace, known: Surroundings) -> Planned:
-    """The item's own way where that is free. A velocity is flown as it is: it asks for a motion, not for a place."""
-    own = way_of(item, start_m, pace)
+def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits, known: Surroundings) -> Planned:
+    """The item's own trajectory where that is free. A velocity item is flown as it is: it has no goal."""
+    own = trajectory_of(item, start_m, speeds)
     if isinstance(item, items.VelocityItem) or not _is_blocked(own, known):
         return Planned(own)
     points = _points_of(item, own)
@@ -170,7 +172,7 @@ def way_around(item: items.Motion, start_m: Vector3, pace: Pace, known: Surround
     # Of a circle any part is worth flying; a line or a path has somewhere to be.
     if len(places) == 1 or (not isinstance(item, items.OrbitItem) and places[-1] != points[-1]):
         return Planned(None)
-    limits = pace.limits(item.speed_m_s, item.acceleration_m_s2)
+    limits = speeds.limits(item.speed_m_s, item.acceleration_m_s2)
     if not isinstance(item, items.GoToItem):
         curve = CurveProfile(places, *limits)
         if not _is_blocked(curve, known) and _is_inside(curve, known):
@@ -178,9 +180,9 @@ def way_around(item: items.Motion, start_m: Vector3, pace: Pace, known: Surround
     return Planned(lines(places, limits), True, left_out)
 
 
-def home_around(start_m: Vector3, item: items.ReturnItem, pace: Pace, known: Surroundings) -> Planned:
-    """Home as the item says; where there is something above, or in the way, round it."""
-    own = way_home(start_m, item, pace, known.fence)
+def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: Surroundings) -> Planned:
+    """Home as the item says; round known obstacles, also above the vehicle."""
+    own = trajectory_home(start_m, item, speeds, known.fence)
     if not _is_blocked(own, known):
         return Planned(own)
     up, across = own.parts
@@ -188,7 +190,7 @@ def home_around(start_m: Vector3, item: items.ReturnItem, pace: Pace, known: Sur
     found = route(known, places[-1], across.target_m)
     if found is None:
         return Planned(None)
-    return Planned(lines([*places, *found], pace.limits(item.speed_m_s, None)), True)
+    return Planned(lines([*places, *found], speeds.limits(item.speed_m_s, None)), True)
 
 
 def lines(places_m: Sequence[Vector3], limits: Limits) -> Chain:
@@ -196,9 +198,9 @@ def lines(places_m: Sequence[Vector3], limits: Limits) -> Chain:
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
 
-def passed(item: items.PathItem, way: Trajectory, elapsed_s: float) -> int:
-    """How many of a path's points lie behind the vehicle: all up to the last one that its way has led through."""
-    flown = looks(way, min(elapsed_s, way.duration_s))
+def passed(item: items.PathItem, trajectory: Trajectory, elapsed_s: float) -> int:
+    """How many of a path's points lie behind the vehicle: all up to the last one that the trajectory passed."""
+    flown = looks(trajectory, min(elapsed_s, trajectory.duration_s))
     numbers = [
         number
         for number, point in enumerate(item.points_ned_m, start=1)
@@ -207,24 +209,24 @@ def passed(item: items.PathItem, way: Trajectory, elapsed_s: float) -> int:
     return max(numbers, default=0)
 
 
-def looks(way: Trajectory, until_s: float) -> list[Vector3]:
-    """Places along a way, near to one another, from its start until a time."""
-    count = max(1, min(MOST_LOOKS, math.ceil(way.distance_m / LOOK_EVERY_M)))
-    return [way.at(until_s * number / count)[0] for number in range(count + 1)]
+def looks(trajectory: Trajectory, until_s: float) -> list[Vector3]:
+    """Points of a trajectory, near to one another, from its start until a time."""
+    count = max(1, min(MOST_LOOKS, math.ceil(trajectory.distance_m / LOOK_EVERY_M)))
+    return [trajectory.at(until_s * number / count)[0] for number in range(count + 1)]
 
 
-def _is_blocked(way: Trajectory, known: Surroundings) -> bool:
+def _is_blocked(trajectory: Trajectory, known: Surroundings) -> bool:
     if not known.patches:
         return False
-    if isinstance(way, Chain):
-        return any(_is_blocked(part, known) for part in way.parts)
-    if isinstance(way, LineProfile):
-        return known.block((way.start_m, way.target_m))
-    return known.block(looks(way, way.duration_s))
+    if isinstance(trajectory, Chain):
+        return any(_is_blocked(part, known) for part in trajectory.parts)
+    if isinstance(trajectory, LineProfile):
+        return known.block((trajectory.start_m, trajectory.target_m))
+    return known.block(looks(trajectory, trajectory.duration_s))
 
 
-def _is_inside(way: Trajectory, known: Surroundings) -> bool:
-    places = looks(way, way.duration_s)
+def _is_inside(trajectory: Trajectory, known: Surroundings) -> bool:
+    places = looks(trajectory, trajectory.duration_s)
     fence = known.fence
     return all(fence.contains(n, e) and fence.min_height_m <= -d <= fence.max_height_m for n, e, d in places)
 

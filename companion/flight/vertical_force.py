@@ -1,32 +1,31 @@
-"""Pressed on what is above: the vehicle asks for more and more thrust, and does not rise.
+"""A sustained force from above: the vehicle commands more and more thrust, and does not rise.
 
-A ceiling met slowly shows in no sample: what presses the vehicle down is as large as what its loops add to the thrust,
-and the accelerometer shows their difference, a hover's. It shows in the thrust that is asked for (ATTITUDE_TARGET) and
-that the accelerometer does not find, while the vehicle stands still below where it is to be.
+A ceiling met slowly shows in no IMU sample: its force cancels the thrust that the loops add. It shows in the commanded
+thrust (ATTITUDE_TARGET) that the accelerometer does not measure, while the vehicle stands still below its setpoint.
 """
 
 from dataclasses import dataclass
 
 from companion.detection.thrust import GAIN_MEMORY_S, KEPT_US, LEAST_FRACTION
-from companion.flight.leaning import BESIDE_M, HELD_M_S2, Held
+from companion.flight.horizontal_force import BESIDE_M, HELD_M_S2, SustainedForce
 from companion.messages import LocalPosition
 
-# For so long it has to stand still: a vehicle that a motor has let down turns round faster, or comes back faster.
+# Time to stand still: a vehicle with a failed motor turns round, or comes back, sooner.
 STILL_US = 1_000_000
-# Still within so much: of a slow return after a motor's loss that is half of what it does in that time.
+# Largest motion of a vehicle that stands still: half of a slow return's after a motor's loss.
 STILL_M = 0.05
-# Shaking of 3 m/s^2, heard at 50 Hz, leaves a tenth of it.
+# Of a vibration of 3 m/s^2, sampled at 50 Hz, a tenth is left.
 SMOOTHING_S = 0.5
 
 
 @dataclass(slots=True)
-class Pressing:
-    """Looked at with each position while setpoints are flown; started again by `forget`. Boot clock."""
+class VerticalForceMonitor:
+    """Updated with each position while setpoints are flown; reset by `forget`. Boot clock."""
 
     fraction: float = 0.0
-    told_us: int = -KEPT_US
+    thrust_us: int = -KEPT_US
     full_m_s2: float = 0.0
-    """What all thrust would give: as found while the vehicle was where it was to be, or on its way up."""
+    """Specific force at full thrust, measured at the setpoint or in a climb."""
     known_s: float = 0.0
     missing_m_s2: float = 0.0
     time_us: int = 0
@@ -36,16 +35,16 @@ class Pressing:
     def forget(self) -> None:
         self.known_s, self.time_us, self.missing_m_s2 = 0.0, 0, 0.0
 
-    def tell(self, time_us: int, fraction: float) -> None:
-        """Take the thrust that is asked for."""
-        self.fraction, self.told_us = fraction, time_us
+    def add_thrust(self, time_us: int, fraction: float) -> None:
+        """Take the commanded thrust, 0 to 1."""
+        self.fraction, self.thrust_us = fraction, time_us
 
-    def step(self, sample: LocalPosition, thrust_m_s2: float, goal_down_m: float) -> Held | None:
-        """Take one sample, what the accelerometer shows of the thrust, and the height as last asked for."""
+    def step(self, sample: LocalPosition, thrust_m_s2: float, goal_down_m: float) -> SustainedForce | None:
+        """Take one position, the measured thrust in m/s^2, and the setpoint's down coordinate in m."""
         now_us, down_m = sample.time_boot_us, sample.position_ned_m[2]
         elapsed_s = min((now_us - self.time_us) * 1e-6, SMOOTHING_S) if self.time_us else 0.0
         self.time_us = now_us
-        if self.fraction < LEAST_FRACTION or now_us - self.told_us > KEPT_US:
+        if self.fraction < LEAST_FRACTION or now_us - self.thrust_us > KEPT_US:
             self.forget()
             return None
         is_below = down_m - goal_down_m > BESIDE_M
@@ -62,4 +61,4 @@ class Pressing:
         if self.missing_m_s2 < HELD_M_S2 or now_us - self.still_since_us < STILL_US:
             return None
         since_us, self.still_since_us = self.still_since_us, now_us
-        return Held((0.0, 0.0, 1.0), self.missing_m_s2, since_us)
+        return SustainedForce((0.0, 0.0, 1.0), self.missing_m_s2, since_us)

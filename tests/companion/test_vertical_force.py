@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from companion.flight.leaning import HELD_M_S2
-from companion.flight.pressing import STILL_US, Pressing
+from companion.flight.horizontal_force import HELD_M_S2
+from companion.flight.vertical_force import STILL_US, VerticalForceMonitor
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
@@ -21,17 +21,17 @@ HOVER, FULL_M_S2 = 0.5, 19.6133
 
 def watched(seconds, height_m, fraction, thrust_m_s2, asked_m=lambda t: 2.0):
     """The first time at which something is found above, and what; functions of the time, 3 s of hovering before it."""
-    pressing = Pressing()
+    vertical_force = VerticalForceMonitor()
     for step in range(-150, round(seconds / EVERY_S)):
         t = step * EVERY_S
         now_us = 10_000_000 + round(t * 1e6)
         if t < 0.0:
             height, thrust, asked = 1.8, FULL_M_S2 * HOVER, 1.8
-            pressing.tell(now_us, HOVER)
+            vertical_force.add_thrust(now_us, HOVER)
         else:
             height, thrust, asked = height_m(t), thrust_m_s2(t), asked_m(t)
-            pressing.tell(now_us, fraction(t))
-        held = pressing.step(LocalPosition(now_us, (0.0, 0.0, -height), (0.0, 0.0, 0.0)), thrust, -asked)
+            vertical_force.add_thrust(now_us, fraction(t))
+        held = vertical_force.step(LocalPosition(now_us, (0.0, 0.0, -height), (0.0, 0.0, 0.0)), thrust, -asked)
         if held is not None:
             return t, held
     return None
@@ -42,7 +42,7 @@ def test_more_and_more_thrust_that_nothing_shows_of_presses_on_what_is_above():
     at_s, held = watched(5.0, lambda t: 1.8, lambda t: HOVER + t / FULL_M_S2, lambda t: FULL_M_S2 * HOVER)
     # Then it is told half a second late, the means' delay, and no sooner than it is known to stand still
     assert at_s == pytest.approx(HELD_M_S2 + 0.5, abs=0.2)
-    assert held.normal_ned == (0.0, 0.0, 1.0) and held.push_m_s2 == pytest.approx(HELD_M_S2, abs=0.1)
+    assert held.normal_ned == (0.0, 0.0, 1.0) and held.force_m_s2 == pytest.approx(HELD_M_S2, abs=0.1)
     assert at_s > STILL_US * 1e-6
 
 
@@ -61,10 +61,10 @@ def test_nothing_is_above_a_vehicle(height_m, fraction, thrust_m_s2):
 
 
 def test_without_the_thrust_asked_for_nothing_is_said():
-    pressing = Pressing()
+    vertical_force = VerticalForceMonitor()
     for step in range(400):
         sample = LocalPosition(step * 20_000, (0.0, 0.0, -1.8), (0.0, 0.0, 0.0))
-        assert pressing.step(sample, 9.8, -2.5) is None
+        assert vertical_force.step(sample, 9.8, -2.5) is None
 
 
 def flown(folder, items, airframe="foldable", **sim):
