@@ -9,7 +9,7 @@ from PIL import Image
 from bench.main import main
 from bench.pictures import command
 from bench.pictures.animation import SLOW_S, SLOWNESS, Frame, frame_times_s
-from bench.reference.stamps import ROOT, stamp_text, stamped_anew, stamps_in
+from bench.stamps import ROOT, stamp_text, stamped_anew, stamps_in
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
