@@ -1,0 +1,12 @@
+"""One worker compiles the simulated vehicle, which takes half a minute; the others begin with what needs none."""
+
+from pathlib import Path
+
+import pytest
+
+_TESTS = Path(__file__).parent
+_COMPILES, _COMPILES_NOTHING = _TESTS / "missions" / "test_confirming.py", _TESTS / "companion"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: (item.path != _COMPILES, _COMPILES_NOTHING not in item.path.parents))
