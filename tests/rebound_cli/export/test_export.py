@@ -231,7 +231,8 @@ def px4_log(log, tail=b"", moved_us=0, turned=lambda rates: rates):
 def merged(flight, tmp_path, content):
     path, out = tmp_path / "px4.ulg", tmp_path / "merged.ulg"
     path.write_bytes(content)
-    merge(*flight, path, out)
+    shown, log = flight
+    merge(shown, log, path, out)
     return out
 
 
