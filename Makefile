@@ -13,7 +13,7 @@ fly: $(READY)
 test: $(READY)
 	$(BIN)/python -m pytest -m "not slow and not realtime"
 
-# What takes long, or runs by the clock.
+# What takes long, such as whole missions, or runs by the clock.
 rest: $(READY)
 	$(BIN)/python -m pytest -m "slow or realtime"
 

@@ -1,23 +1,34 @@
 """Which of the project's modules imports which, wherever in its file; and the picture of it, a box a package."""
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGES = ("companion", "sim_vehicle", "rebound_cli", "bench")
 
 
-def imported_names(path: Path) -> Iterator[str]:
+@functools.cache
+def imported_names(path: Path) -> frozenset[str]:
     """Full names of all that a file imports; of `from a import b` both `a` and `a.b`, which may be a module."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    names: set[str] = set()
+    for node in _statements(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             if node.level:
                 raise ValueError(f"{path} imports relatively")
             package = node.module or ""
-            yield package
-            yield from (f"{package}.{alias.name}" for alias in node.names)
+            names.update((package, *(f"{package}.{alias.name}" for alias in node.names)))
+    return frozenset(names)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All below it, however deep; an expression holds none."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr):
+            yield child
+            yield from _statements(child)
 
 
 def module_imports(root: Path) -> dict[str, set[str]]:

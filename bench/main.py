@@ -12,8 +12,8 @@ from bench.faults.arguments import add_faults
 from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
 from bench.pictures.arguments import add_pictures
-from bench.reference.arguments import add_docs, add_stamps
 from bench.speed.arguments import add_speed
+from rebound_cli.arguments import Commands, runs
 from rebound_cli.main import run
 
 
@@ -36,6 +36,20 @@ def build_parser() -> argparse.ArgumentParser:
     add_faults(commands)
     add_speed(commands)
     add_pictures(commands)
-    add_docs(commands)
-    add_stamps(commands)
+    _add_docs(commands)
+    _add_stamps(commands)
     return parser
+
+
+def _add_docs(commands: Commands) -> None:
+    text = "Models, arguments, state tables and docstrings as the pages of docs/reference."
+    docs = commands.add_parser("docs", help="write the generated pages of the manual", description=text)
+    docs.add_argument("--check", action="store_true", help="write nothing; exit 1 where a page is not up to date")
+    docs.set_defaults(run=runs("bench.reference.command:run_docs"))
+
+
+def _add_stamps(commands: Commands) -> None:
+    text = "Lists figures and tables of the manual that are older than the code they speak of, or bear no stamp."
+    stamps = commands.add_parser("stamps", help="look for figures and tables that are out of date", description=text)
+    stamps.add_argument("--release", action="store_true", help="exit 1 where there is one")
+    stamps.set_defaults(run=runs("bench.stamps:run_stamps"))

@@ -237,14 +237,13 @@ def add_logs(commands: Commands) -> None:
     text = "Flights that `fly --connect` and `guard` have recorded; see docs/how-to/flights.md."
     logs = commands.add_parser("logs", help="recorded flights of real vehicles: list, show, export", description=text)
     whats = logs.add_subparsers(required=True, metavar="WHAT", dest="what")
-    ways = {
-        "list": "every flight, the oldest first",
-        "show": "what happened in a flight",
-        "export": "one file of a flight",
-    }
     listed, shown, exported = (
-        _command(whats, name, f"flights.command:run_{name}", text, f"{text.capitalize()}.")
-        for name, text in ways.items()
+        _command(whats, name, f"{module}.command:run_{name}", text, f"{text.capitalize()}.")
+        for name, module, text in (
+            ("list", "flights", "every flight, the oldest first"),
+            ("show", "flights", "what happened in a flight"),
+            ("export", "export", "one file of a flight"),
+        )
     )
     for parser in (shown, exported):
         _option(parser, "flight", "its name or folder (default: last)", "FLIGHT", nargs="?", default="last")
@@ -329,7 +328,7 @@ def add_plan(commands: Commands) -> None:
 
 def add_replay(commands: Commands) -> None:
     text = "The detector over a .ulg, a .tlog or a run's folder; see docs/how-to/recorded-flights.md."
-    replay = _command(commands, "replay", "replay.command:run_replay", "look for collisions in a recorded flight", text)
+    replay = _command(commands, "replay", "replaying:run_replay", "look for collisions in a recorded flight", text)
     _option(replay, "log", "a .ulg, a .tlog or a run's folder", "LOG", type=Path)
     _option(replay, "--detector", "another detector than the mission's, or than the default", "NAME")
     text = "HIGHRES_IMU as if asked of PX4 for this rate (default: as recorded)"

@@ -21,8 +21,8 @@ from rebound_cli.flights.kept import room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.offering import offer_report
 from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
+from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import Followed
-from rebound_cli.report.listening import Listener
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.signed_connection import open_signed, refused_packets
 from rebound_cli.status import StatusServer, served

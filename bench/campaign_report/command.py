@@ -24,7 +24,7 @@ from bench.random_missions.generator import MissionCase
 from bench.recoveries.command import PART as RECOVERY_PART
 from bench.recoveries.command import write_table
 from bench.recoveries.hits import recoveries_campaign
-from bench.reference.stamps import stamp_text
+from bench.stamps import stamp_text
 from companion.errors import ConfigurationError
 
 DOCUMENT_NAME, RECOVERY_NAME, PICTURE = "campaign.md", "recovery.md", Path("images") / "campaign" / "missions.png"

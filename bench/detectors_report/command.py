@@ -25,7 +25,7 @@ from bench.detectors_report.numbers import Hits
 from bench.detectors_report.reading import HOW_TO_READ
 from bench.marked import checked_text, write_part
 from bench.places import make_folder
-from bench.reference.stamps import stamp_text
+from bench.stamps import stamp_text
 
 DOCUMENT_NAME, PICTURES_FOLDER = "detection.md", Path("images") / "detection"
 PART, TITLE = "detectors", "Detection"

@@ -14,7 +14,7 @@ from bench.faults.seeds import fly_faults, fly_seed
 from bench.faults.table import PART, TITLE, Row, text_of
 from bench.marked import checked_text, write_part
 from bench.processes import ctrl_c_waiting
-from bench.reference.stamps import stamp_text
+from bench.stamps import stamp_text
 from companion.errors import ConfigurationError
 from rebound_cli.console import with_progress
 

@@ -28,7 +28,7 @@ class Row:
 
 
 def text_of(rows: Sequence[Row], under_load: Json | None, stamp: str) -> str:
-    """What stands between the document's marks; `stamp` says what made it (see `bench.reference.stamps`)."""
+    """What stands between the document's marks; `stamp` says what made it (see `bench.stamps`)."""
     flights = sum(len(row.results) for row in rows)
     failing = [row for row in rows if row.failures]
     lines = [

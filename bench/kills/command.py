@@ -8,7 +8,7 @@ from bench.campaign.plan import Campaign, Json
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.kills.killed import KILLED_S, kills_campaign
 from bench.marked import checked_text, write_part
-from bench.reference.stamps import stamp_text
+from bench.stamps import stamp_text
 
 PART, TITLE = "kills", "A companion that is killed around a hit"
 BIN_S = 0.1

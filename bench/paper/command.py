@@ -21,7 +21,7 @@ from bench.paper.study import Study, StudyFindings, concluded
 from bench.paper.table import ClaimRow, rows_text
 from bench.places import make_folder
 from bench.processes import in_processes
-from bench.reference.stamps import stamp_text
+from bench.stamps import stamp_text
 
 STUDIES: tuple[Study, ...] = (
     arm,

@@ -13,8 +13,8 @@ from bench.baselines.config import BaselineMission
 from bench.paper.flights import DETECTOR, GAMMA_S, LAW
 from bench.places import make_place
 from bench.processes import in_processes
-from bench.reference.stamps import stamp_text
 from bench.sensitivity import stop_sensitivity_text
+from bench.stamps import stamp_text
 from rebound_cli.documents import Document, validated
 from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import load_mission_document, with_guards, world_from

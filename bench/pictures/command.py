@@ -8,7 +8,7 @@ from pathlib import Path
 from bench.pictures.animation import write_animation
 from bench.pictures.screens import browser_path, write_screens
 from bench.places import make_folder
-from bench.reference.stamps import ROOT, stamped_anew
+from bench.stamps import ROOT, stamped_anew
 from rebound_cli.main import main as rebound
 from rebound_cli.report.shown_flight import recorded_flight
 from rebound_cli.run_folder import FIGURE_NAME, REPORT_NAME

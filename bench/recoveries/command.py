@@ -9,7 +9,7 @@ from bench.campaign.plan import Campaign, Json
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.marked import checked_text, write_part
 from bench.recoveries.hits import AIRFRAMES, LAWS, SLANTS_DEG, SPEEDS_M_S, RecoveryCase, of, recoveries_campaign
-from bench.reference.stamps import stamp_text
+from bench.stamps import stamp_text
 
 PART = "recoveries"
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.marked import checked_text, write_part
-from bench.reference.stamps import FLOWN, stamp_text
 from bench.speed.budget import Budget, measured_budget
 from bench.speed.calls import calls_an_interval, hold_to
 from bench.speed.flight import fly
 from bench.speed.latency import compared, table
 from bench.speed.parse import median_us, parse_us
 from bench.speed.parts import KERNEL, PARTS, PLANT
+from bench.stamps import FLOWN, stamp_text
 
 PART, LATENCY_PART = "speed", "latency"
 # The standard normal values that an interval draws: six for each of 32 raw samples, nine for the estimate.

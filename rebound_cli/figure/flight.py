@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from companion.mission.model import Mission
 from companion.report import CollisionReport, FlightReport
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches
-from rebound_cli.figure.legend import legend_below
 from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.run_folder import FIGURE_NAME, TLOG_NAME
 from rebound_cli.truth_match import FlightTruth, match_contacts
@@ -272,10 +271,10 @@ class _Picture:
 
 
 def _finish(axis: Any, title: str, across: str, up: str) -> None:
-    """Title, axes with their units, grid, and a legend below the data."""
+    """Title, axes with their units, grid, and a legend below the name of the axis, where it hides nothing."""
     axis.set(title=title, xlabel=across, ylabel=up)
     axis.grid(alpha=0.3)
-    legend_below(axis)
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8, frameon=False)
 
 
 def _mark_moments(axis: Any, hit: _Hit) -> None:

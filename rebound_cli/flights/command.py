@@ -1,13 +1,10 @@
-"""`rebound logs`: the flights on disk."""
+"""`rebound logs list` and `show`: the flights on disk."""
 
 import json
 from argparse import Namespace
-from pathlib import Path
 from typing import Any
 
-from companion.errors import ConfigurationError
 from rebound_cli.console import console_for
-from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
 from rebound_cli.run_folder import EVENTS_NAME, RunFolderError, read_records
 
@@ -39,26 +36,6 @@ def run_show(options: Namespace) -> int:
     console.print(f"{told['name']}: {told['end']}; {told['hits']} hits, {told['size_bytes'] / 1e6:.1f} MB")
     for event in events:
         console.event((event["time_us"] - events[0]["time_us"]) / 1e6, event["kind"], str(event.get("text", "")))
-    return 0
-
-
-def run_export(options: Namespace) -> int:
-    """Raises FlightError, RunFolderError, LogError."""
-    flight, kind = flight_named(runs_folder(options.runs), options.flight), options.format
-    out = options.out or Path(f"{flight.name}.{'tar.gz' if kind == 'archive' else kind}")
-    if kind != "archive":
-        if options.no_position:
-            raise ConfigurationError(
-                f"a .{kind} is little else than places: --no-position goes with the archive alone."
-            )
-        # A drone has neither mcap nor pyulog, and need not have.
-        from rebound_cli.export.writer import write_flight
-
-        write_flight(flight.folder, kind, out)
-    else:
-        with new_archive(out, options.no_position) as archive:
-            add_flight(archive, flight, "")
-    print(f"{flight.name} is in {out}")
     return 0
 
 

@@ -26,8 +26,8 @@ from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
+from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.watching import Findings
-from rebound_cli.report.listening import Listener
 
 
 @dataclass(slots=True)

@@ -12,9 +12,9 @@ from companion.mission.config import CompanionConfig
 from companion.reflex.watch import Watch
 from rebound_cli.logs.log import WANTED, Log, LogError
 from rebound_cli.logs.shaking import Shaking, clipped, shaking
+from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import Recording, Reproduction, reproduce
 from rebound_cli.replay.watching import Finding, Findings, Span, thinned, watch_log
-from rebound_cli.report.listening import Listener
 
 SCHEMA = 1
 

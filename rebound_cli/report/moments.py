@@ -14,8 +14,8 @@ from companion.detection.interface import Evidence, ImpactKind, Phase
 from companion.memory.patch import CLIPPED_ERROR_RAD, ERROR_RAD
 from companion.messages import Vector3
 from rebound_cli.ending import impact_text
+from rebound_cli.replay.listening import Shown, Tested
 from rebound_cli.replay.watching import Finding
-from rebound_cli.report.listening import Shown, Tested
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.truth_match import index_of_hit
 

@@ -18,6 +18,7 @@ from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.flight_log import FlightLog, flight_log_of, read_flight_log
 from rebound_cli.inputs import load_flown
+from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import (
     Followed,
     Recording,
@@ -29,7 +30,6 @@ from rebound_cli.replay.recording import (
 )
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
-from rebound_cli.report.listening import Listener
 from rebound_cli.truth_match import FlightTruth
 from sim_vehicle.scene import Scene
 

@@ -176,6 +176,7 @@ def test_what_a_wall_does_while_nothing_can_show_it_counts_only_where_the_row_sa
     assert not untold["unseen"] and any(text.startswith("fell: ") for text in untold["complaints"])
 
 
+@pytest.mark.slow
 def test_a_killed_companion_leaves_a_vehicle_that_lands_and_a_log() -> None:
     results: dict[str, Json] = {}
     fly_from_one_take_off(8, [FLOWN["SIGKILL in a recovery"]], results.__setitem__)

@@ -27,6 +27,7 @@ def test_so_many_kills_are_drawn_within_the_bounds_and_the_same_each_time():
     }
 
 
+@pytest.mark.slow
 def test_a_brake_that_nobody_ends_does_not_lead_back_to_the_wall():
     """Held, the brake of 0.6 s after the hit led the vehicle back at 1 m/s."""
     case = cases(50, first_seed=1)[4]

@@ -9,7 +9,7 @@ from PIL import Image
 from bench.main import main
 from bench.pictures import command
 from bench.pictures.animation import SLOW_S, SLOWNESS, Frame, frame_times_s
-from bench.reference.stamps import ROOT, stamp_text, stamped_anew, stamps_in
+from bench.stamps import ROOT, stamp_text, stamped_anew, stamps_in
 from rebound_cli.report.shown_flight import recorded_flight
 from tests.rebound_cli.command import WALL, run_here
 
@@ -53,12 +53,14 @@ def red_share(frame):
     return ((red - green > 80) & (red - blue > 80)).mean()
 
 
+@pytest.mark.slow
 def test_arms_turn_red_as_they_fold_and_the_moment_of_detection_stays(flight):
     hit = flight.truth.hits[0]
     before, folded, after = (red_share(Frame(flight, hit, at_s).drawn()) for at_s in (-0.1, 0.025, 1.5))
     assert before == 0.0 and folded > 3.0 * after > 0.0
 
 
+@pytest.mark.slow
 def test_a_command_makes_all_pictures_and_stamps_their_pages(tmp_path, monkeypatch):
     # Given pages with an old stamp of it, and one of another command
     old, other = stamp_text(command.COMMAND, ["bench/pictures"]).replace("+", "+0"), stamp_text("make bumps", ["docs"])

@@ -18,6 +18,7 @@ def calls():
     return calls_an_interval()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["plant", "vehicle", "companion", "log"])
 def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, program):
     # Given the flight of wall.yaml, hit and recovery in it, and what its intervals were last held to
@@ -27,6 +28,7 @@ def test_no_program_calls_5_per_cent_more_functions_an_interval(calls, program):
     assert 0.0 < now <= MOST_MORE * held, f"{now:.1f} calls, held to {held:.1f}: docs/explanation/performance.md"
 
 
+@pytest.mark.slow
 def test_the_count_is_the_same_in_every_flight(calls):
     assert calls_an_interval() == calls
 

@@ -325,6 +325,7 @@ def test_the_vehicles_time_requests_are_answered():
     assert answer.ts1 // 1000 == pytest.approx(f.vehicle.time_us, abs=200_000)
 
 
+@pytest.mark.slow
 def test_a_vehicle_that_never_disarms_is_reported_and_left_alone():
     f = flight()
     f.run_until(lambda: "landing" in f.kinds())

@@ -148,6 +148,7 @@ def test_a_wall_met_at_a_crawl_is_backed_away_from(tmp_path):
     assert flight.report.obstacles
 
 
+@pytest.mark.slow
 def test_a_door_that_comes_slowly_pushes_the_hovering_vehicle_out_of_its_way(tmp_path):
     door = screen(0.6, velocity_ned_m_s=[-0.06, 0, 0], from_s=9.0, until_s=20.0)
     flight, told = flown(tmp_path, [{"hold": {"duration_s": 14}}], walls=door)
@@ -156,6 +157,7 @@ def test_a_door_that_comes_slowly_pushes_the_hovering_vehicle_out_of_its_way(tmp
     assert all(collision.settled_after_s is not None for collision in flight.report.collisions)
 
 
+@pytest.mark.slow
 def test_gusts_of_five_metres_a_second_are_nothing_in_the_way(tmp_path):
     gusts = [
         {"kind": "gust", "between_s": [9 + 4 * k, 12.5 + 4 * k], "velocity_ned_m_s": [-5 * n, 5 * e, 0], "rise_s": rise}
@@ -169,10 +171,15 @@ def test_gusts_of_five_metres_a_second_are_nothing_in_the_way(tmp_path):
 @pytest.mark.parametrize(
     "fault",
     [
-        {"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85},
-        {"kind": "estimator_reset", "at_s": 10, "position_jump_ned_m": [0.8, 0, 0]},
+        pytest.param(
+            {"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85},
+            marks=pytest.mark.slow,
+            id="weak motor",
+        ),
+        pytest.param(
+            {"kind": "estimator_reset", "at_s": 10, "position_jump_ned_m": [0.8, 0, 0]}, id="place that jumps"
+        ),
     ],
-    ids=["weak motor", "place that jumps"],
 )
 def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(tmp_path, fault):
     slow = {"go_to": {"position_ned_m": [1, 0, -1.5], "speed_m_s": 0.3}}
@@ -181,6 +188,7 @@ def test_what_keeps_a_vehicle_off_its_setpoint_is_not_always_in_the_way(tmp_path
     assert told == [] and flight.report.collisions == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_m_s", [0.8, 1.3, 1.5])
 def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(tmp_path, speed_m_s):
     # Given a hovering vehicle, struck by what goes on for two metres more

@@ -252,6 +252,7 @@ def test_a_clock_that_jumps_is_no_silence_of_the_positions():
     assert "no LOCAL_POSITION_NED for 1.0 s, though the link is alive" in " ".join(f.texts())
 
 
+@pytest.mark.slow
 def test_a_recovery_that_is_struck_again_and_again_ends_when_one_hit_s_would():
     f = flight_in("recovering")
     began_us = f.now_us

@@ -102,11 +102,18 @@ def test_a_beam_met_at_a_crawl_is_moved_away_from(tmp_path):
 @pytest.mark.parametrize(
     "fault",
     [
-        {"kind": "gust", "between_s": [10, 20], "velocity_ned_m_s": [0, 0, 5]},
-        {"kind": "battery_sag", "between_s": [10, 12], "voltage_share": 0.95},
-        {"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85},
+        pytest.param(
+            {"kind": "gust", "between_s": [10, 20], "velocity_ned_m_s": [0, 0, 5]},
+            marks=pytest.mark.slow,
+            id="wind from above",
+        ),
+        pytest.param(
+            {"kind": "battery_sag", "between_s": [10, 12], "voltage_share": 0.95},
+            marks=pytest.mark.slow,
+            id="weak battery",
+        ),
+        pytest.param({"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85}, id="weak motor"),
     ],
-    ids=["wind from above", "weak battery", "weak motor"],
 )
 def test_what_keeps_a_vehicle_down_is_not_always_above_it(tmp_path, fault):
     slow = {"go_to": {"position_ned_m": [0, 0, -2], "speed_m_s": 0.2}}

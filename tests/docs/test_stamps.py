@@ -2,8 +2,8 @@
 
 import pytest
 
+from bench import stamps
 from bench.main import main
-from bench.reference import stamps
 
 PAGE = "# Bumps\n\n## Hits\n\n{stamp}\n\n![hits](hits.png)\n"
 

@@ -115,6 +115,7 @@ def test_a_hit_in_a_mission_is_given_back_to_hold_by_default():
     assert len(air.told("detection")) == 1
 
 
+@pytest.mark.slow
 def test_a_mission_that_goes_on_into_the_same_wall_ends_in_hold_after_the_hits_allowed():
     air = Air(GuardConfig(then="previous", max_hits=2))
     air.take_off()

@@ -20,6 +20,7 @@ def links(air: Air | AttachedAir) -> list[str]:
     return [event.text for event in air.events if event.kind == "link"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("attached", [False, True])
 def test_a_vehicle_that_restarts_between_flights_is_asked_for_its_streams_again_and_guarded(attached):
     # Given a guard that stands by; the last thing it saw was a contact, in which the vehicle lost its power
@@ -63,6 +64,7 @@ def test_a_guard_that_waits_begins_where_nobody_is_or_a_vehicle_without_a_positi
     air.until(lambda: air.state is State.STANDING_BY, 10.0)
 
 
+@pytest.mark.slow
 def test_a_vehicle_without_a_position_after_its_restart_is_asked_until_it_has_one(monkeypatch):
     air = AttachedAir()
     air.until(lambda: air.state is State.STANDING_BY, 10.0)

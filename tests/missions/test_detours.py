@@ -5,7 +5,7 @@ import pytest
 from companion.memory.surroundings import LEAST_FREE_M
 from tests.missions.detours import Wall, fly_detour
 
-pytestmark = pytest.mark.flight
+pytestmark = [pytest.mark.flight, pytest.mark.slow]
 
 REACH_M = 0.2
 

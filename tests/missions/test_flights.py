@@ -11,7 +11,7 @@ from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.truth_match import match_contacts
 from tests.missions.test_missions import CONTACT_REACH_M, NAMES, WITHOUT_OBSTACLES, load
 
-pytestmark = pytest.mark.flight
+pytestmark = [pytest.mark.flight, pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")

@@ -1,15 +1,12 @@
 """The pilot chooses a mode at any instant of a recovery, on the simulated vehicle: from then on he alone has it."""
 
-import json
-import os
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, POSCTL
-from tests.missions.test_confirming import Air
+from tests.missions.test_confirming import Air, in_a_child
 
 pytestmark = pytest.mark.flight
 
@@ -20,25 +17,6 @@ REPORTED_WITHIN = 125 + 2
 # A heartbeat alone pauses the setpoints; the next report ends the flight.
 WATCHED = REPORTED_WITHIN + 125
 SET_MODE, ARM = 176, 400
-
-
-def in_a_child(work: Callable[[], Any]) -> Any:
-    """What becomes of this instant, in a copy of the process: a simulated vehicle cannot be copied alone."""
-    reads, writes = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(reads)
-        try:
-            found = work()
-        except BaseException as error:
-            found = {"error": repr(error)}
-        os.write(writes, json.dumps(found).encode())
-        os._exit(0)
-    os.close(writes)
-    with os.fdopen(reads) as pipe:
-        text = pipe.read()
-    os.waitpid(child, 0)
-    return json.loads(text)
 
 
 def messages_in(packets: bytes) -> list[Any]:
@@ -71,9 +49,9 @@ def taken_over(air: Air, mode: int) -> dict[str, Any]:
     ("mode", "name", "every", "also"),
     [
         (POSCTL, "POSCTL", 37, []),
-        (AUTO_LOITER, "AUTO.LOITER", 101, []),
+        pytest.param(AUTO_LOITER, "AUTO.LOITER", 101, [], marks=pytest.mark.slow),
         # After the recovery the mission lands, too, and may do so before a second message says what the pilot chose.
-        (AUTO_LAND, "AUTO.LAND", 101, ["landing"]),
+        pytest.param(AUTO_LAND, "AUTO.LAND", 101, ["landing"], marks=pytest.mark.slow),
     ],
 )
 def test_a_pilots_mode_at_any_instant_of_a_recovery_is_followed_by_no_setpoint(mode, name, every, also):

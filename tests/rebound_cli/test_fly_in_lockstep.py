@@ -85,7 +85,7 @@ def test_the_usual_tools_read_the_log(wall_flight):
     assert {"HIGHRES_IMU", "COMMAND_ACK", "COMMAND_LONG", "SET_POSITION_TARGET_LOCAL_NED"} <= kinds
 
 
-def test_a_run_folder_can_be_flown_again_to_the_byte(wall_flight, tmp_path):
+def test_a_run_folder_can_be_flown_again_to_the_byte(wall_flight, without_pictures, tmp_path):
     folder, _ = wall_flight
     # When the resolved mission of a flight is flown
     again = run_here("fly", folder / "resolved.yaml", "--lockstep", "--json", "--out", tmp_path / "again")

@@ -20,6 +20,7 @@ def fly(*arguments):
     return main(["fly", str(WALL), "--lockstep", "--set", TO_WALL, "--set", NARROW, *QUICK, *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_what_one_flight_finds_the_next_one_flies_round(tmp_path, capsys):
     # Given a flight that goes home after its hit
     first, second = tmp_path / "first", tmp_path / "second"

@@ -80,6 +80,7 @@ def test_every_failure_has_its_seed_its_cause_and_the_command_that_flies_it_agai
     assert len(found) == 4
 
 
+@pytest.mark.slow
 def test_what_a_record_holds_is_text_and_the_page_needs_nothing_else(tmp_path):
     # Given a record whose texts would be elements and scripts
     page = opened(tmp_path, record_of(tmp_path, "<b>new</b>", failing=[3]))
@@ -88,6 +89,7 @@ def test_what_a_record_holds_is_text_and_the_page_needs_nothing_else(tmp_path):
     assert "<b>new</b>" in (tmp_path / "page.html").read_text().replace("&lt;", "<").replace("&gt;", ">")
 
 
+@pytest.mark.slow
 def test_the_worst_hits_are_named_by_their_seeds(tmp_path):
     # Given a record in which the hit of one mission overshoots most, and another's rests nearest to what it hit
     record = record_of(tmp_path, "new", missions=9)
@@ -101,6 +103,7 @@ def test_the_worst_hits_are_named_by_their_seeds(tmp_path):
     assert nearest[1] == "10.0 cm" and nearest[-1] == "python -m bench campaign --only 3 --airframe rigid"
 
 
+@pytest.mark.slow
 def test_two_versions_are_compared_mission_by_mission(tmp_path):
     # Given a version in which seed 3 fails as before, seed 4 newly, and seed 2 no more
     old = record_of(tmp_path / "old", "old", failing=[2, 3])
@@ -113,12 +116,14 @@ def test_two_versions_are_compared_mission_by_mission(tmp_path):
     assert endings[2] == endings[5] == "60.00 %"
 
 
+@pytest.mark.slow
 def test_a_mission_that_is_no_more_flown_is_not_called_mended(tmp_path):
     old = record_of(tmp_path / "old", "old", missions=6, failing=[6])
     page = opened(tmp_path, record_of(tmp_path / "new", "new"), "--against", old)
     assert {row[6] for row in failures(page).values()} == {"not flown now"}
 
 
+@pytest.mark.slow
 def test_hits_stand_in_the_panel_of_their_airframe_and_speed_at_their_bearing(tmp_path):
     # Given two-metre-a-second hits of five seeds, seen, and one version's in which none was
     seen = pages.read_version(record_of(tmp_path / "new", "new"))
@@ -136,6 +141,7 @@ def test_hits_stand_in_the_panel_of_their_airframe_and_speed_at_their_bearing(tm
     assert counts == [0, 5, 0, 0, 0, 5, 0, 0] or counts[:7] == [0, 5, 0, 0, 0, 5, 0]
 
 
+@pytest.mark.slow
 def test_a_campaign_that_goes_on_can_be_looked_at(tmp_path):
     # Given a record whose last line is being written
     record = record_of(tmp_path, "new", failing=[3])
@@ -161,6 +167,7 @@ def test_another_file_is_refused_in_a_sentence(tmp_path, capsys, text, words):
     assert words in capsys.readouterr().err and not record.with_suffix(".html").exists()
 
 
+@pytest.mark.slow
 def test_the_newest_record_is_shown_beside_itself(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["campaign", "page"]) == 1

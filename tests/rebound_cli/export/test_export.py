@@ -17,8 +17,9 @@ from pyulog import ULog
 
 from companion.messages import GlobalPosition, ImuSample, LocalPosition
 from rebound_cli.export.foxglove import write_mcap
+from rebound_cli.export.merging import merge
 from rebound_cli.export.ulog import Row, boot_us, with_rows
-from rebound_cli.logs.log import Heard
+from rebound_cli.logs.log import Heard, LogError
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
 from rebound_cli.report.shown_flight import recorded_flight
@@ -44,6 +45,11 @@ def exported(wall_flight, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def topics(exported):
+    return read_mcap((exported / "wall.mcap").read_bytes())
+
+
 def read_mcap(content):
     """Each message by its topic; one of each kind is held against the schema that the file itself gives it."""
     topics, seen = {}, set()
@@ -66,9 +72,8 @@ def mcap_of(flight, log):
 # --- MCAP -------------------------------------------------------------------------------------------------------
 
 
-def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(exported, flight):
+def test_foxglove_gets_its_own_schemas_and_all_that_was_heard_and_decided(topics, flight):
     shown, log = flight
-    topics = read_mcap((exported / "wall.mcap").read_bytes())
     schemas = {topic: rows[0][0] for topic, rows in topics.items()}
     assert schemas["/pose"] == schemas["/truth"] == "foxglove.PoseInFrame"
     assert schemas["/scene"] == "foxglove.SceneUpdate" and schemas["/log"] == "foxglove.Log"
@@ -223,17 +228,20 @@ def px4_log(log, tail=b"", moved_us=0, turned=lambda rates: rates):
     return ulog({"sensor_combined": (fields, rows)}, started_us=rows[0][0]) + text + tail
 
 
-def merged(wall_flight, tmp_path, content):
-    path = tmp_path / "px4.ulg"
+def merged(flight, tmp_path, content):
+    path, out = tmp_path / "px4.ulg", tmp_path / "merged.ulg"
     path.write_bytes(content)
-    code = main(["replay", str(wall_flight[0]), "--merge", str(path), "--out", str(tmp_path / "out")])
-    return code, tmp_path / "out" / "px4-merged.ulg"
+    shown, log = flight
+    merge(shown, log, path, out)
+    return out
 
 
 def test_a_runs_events_are_put_into_px4s_own_log_by_its_clock(wall_flight, flight, tmp_path, capsys):
     shown, log = flight
-    code, path = merged(wall_flight, tmp_path, px4_log(log))
-    assert code == 0
+    (tmp_path / "px4.ulg").write_bytes(px4_log(log))
+    words = ["replay", str(wall_flight[0]), "--merge", str(tmp_path / "px4.ulg"), "--out", str(tmp_path)]
+    assert main(words) == 0
+    path = tmp_path / "px4-merged.ulg"
     assert "100.0 % of their angular rates, and fits best moved by +0.0 ms" in capsys.readouterr().out
     found = ULog(str(path))
     # PX4's own is untouched, and the hit stands at the sample that showed it
@@ -244,23 +252,20 @@ def test_a_runs_events_are_put_into_px4s_own_log_by_its_clock(wall_flight, fligh
     assert said[f"[rebound] {hit['text']}"] == hit["data"]["sample_time_boot_us"]
     assert found.get_dataset("rebound_hit").data["timestamp"][0] == hit["data"]["sample_time_boot_us"]
     # A second run's go in beside the first one's
-    path.rename(tmp_path / "px4.ulg")
-    assert main(["replay", str(wall_flight[0]), "--merge", str(tmp_path / "px4.ulg"), "--out", str(path.parent)]) == 0
-    assert len(ULog(str(path)).get_dataset("rebound_hit", 1).data["timestamp"]) == 1
+    again = merged(flight, tmp_path, path.read_bytes())
+    assert len(ULog(str(again)).get_dataset("rebound_hit", 1).data["timestamp"]) == 1
 
 
-def test_a_log_that_power_ended_takes_them_before_its_cut(wall_flight, flight, tmp_path):
+def test_a_log_that_power_ended_takes_them_before_its_cut(flight, tmp_path):
     # Given a log of the first half whose last message is cut off
     _, log = flight
     half = replace(log, heard=log.heard[: len(log.heard) // 3])
-    code, path = merged(wall_flight, tmp_path, px4_log(half, tail=message("D", bytes(40))[:20]))
-    assert code == 0
-    found = ULog(str(path))
+    found = ULog(str(merged(flight, tmp_path, px4_log(half, tail=message("D", bytes(40))[:20]))))
     assert len(found.get_dataset("sensor_combined").data["timestamp"]) == len(half.imu())
     assert any("landed and disarmed" in one.message for one in found.logged_messages)
 
 
-def test_what_px4_appended_after_a_crash_is_found_again(wall_flight, flight, tmp_path):
+def test_what_px4_appended_after_a_crash_is_found_again(flight, tmp_path):
     # Given a log whose head says where, after a fault, PX4 has added to it
     _, log = flight
     content = bytearray(px4_log(log))
@@ -268,8 +273,7 @@ def test_what_px4_appended_after_a_crash_is_found_again(wall_flight, flight, tmp
     head = 16 + 3
     content[head + 8] = 1
     struct.pack_into("<Q", content, head + 16, len(content))
-    code, path = merged(wall_flight, tmp_path, bytes(content) + added)
-    assert code == 0
+    path = merged(flight, tmp_path, bytes(content) + added)
     (offset,) = struct.unpack_from("<Q", path.read_bytes(), head + 16)
     assert path.read_bytes()[offset : offset + len(added)] == added
     assert "hardfault" in [one.message for one in ULog(str(path)).logged_messages]
@@ -284,11 +288,10 @@ def test_what_px4_appended_after_a_crash_is_found_again(wall_flight, flight, tmp
         ({"moved_us": 3_600_000_000}, "by PX4's clock since boot"),
     ],
 )
-def test_what_is_not_of_one_flight_is_refused(wall_flight, flight, tmp_path, capsys, change, words):
-    code, path = merged(wall_flight, tmp_path, px4_log(flight[1], **change))
-    assert code == 1 and not path.exists()
-    error = capsys.readouterr().err
-    assert "are not of one flight" in error and words in error
+def test_what_is_not_of_one_flight_is_refused(flight, tmp_path, change, words):
+    with pytest.raises(LogError, match="are not of one flight") as refused:
+        merged(flight, tmp_path, px4_log(flight[1], **change))
+    assert words in str(refused.value) and not (tmp_path / "merged.ulg").exists()
 
 
 def test_only_a_runs_folder_has_events_to_merge(exported, tmp_path, capsys):
@@ -316,9 +319,8 @@ def values_of(data):
         yield from (one for value in data for one in values_of(value))
 
 
-def test_every_path_of_foxgloves_layout_is_in_the_file(exported):
+def test_every_path_of_foxgloves_layout_is_in_the_file(topics):
     layout = json.loads((ROOT / "examples" / "foxglove-layout.json").read_text())
-    topics = read_mcap((exported / "wall.mcap").read_bytes())
     paths = list(values_of(layout["configById"]))
     assert len(paths) > 10
     for path in paths:

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from companion.detection.interface import Phase
 from companion.mission.config import CompanionConfig
+from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import read_recording, reproduce
 from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report.content import content
-from rebound_cli.report.listening import Listener
 from rebound_cli.report.moments import moments_of
 from rebound_cli.report.shown_flight import replayed_flight
 from tests.rebound_cli.replay.flying import HIT_US, flight

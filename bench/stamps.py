@@ -19,7 +19,7 @@ from pathlib import Path
 
 from rebound_cli import __version__
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "docs")
 _STAMP = re.compile(
     r"Measured\s+by\s+`(?P<command>[^`]+)`\s+on\s+version\s+(?P<version>[\w.+-]+)\s+of\s+"

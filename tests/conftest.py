@@ -1,0 +1,18 @@
+"""One worker compiles the simulated vehicle, which takes half a minute; the others begin with what needs none."""
+
+import gc
+from pathlib import Path
+
+import pytest
+
+_TESTS = Path(__file__).parent
+_COMPILES, _COMPILES_NOTHING = _TESTS / "missions" / "test_confirming.py", _TESTS / "companion"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: (item.path != _COMPILES, _COMPILES_NOTHING not in item.path.parents))
+
+
+def pytest_collection_finish() -> None:
+    # What thousands of tests import is no garbage: looking through it again and again takes a tenth of the time.
+    gc.freeze()
