@@ -13,6 +13,7 @@ from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
 from bench.pictures.arguments import add_pictures
 from bench.reference.arguments import add_docs, add_stamps
+from bench.soak.arguments import add_soak
 from bench.speed.arguments import add_speed
 from rebound_cli.main import run
 
@@ -35,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_kills(commands)
     add_faults(commands)
     add_speed(commands)
+    add_soak(commands)
     add_pictures(commands)
     add_docs(commands)
     add_stamps(commands)
