@@ -84,7 +84,9 @@ def run_fly(options: Namespace) -> int:
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
         ring = None if is_simulated else room_for(folder, options.out, mission.companion.disk)
-        recorder = FlightRecorder(folder, None if options.lockstep else Background("log"), ring and ring.make_room)
+        recorder = FlightRecorder(
+            folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
+        )
         with Interrupts() as interrupts:
             followed = Followed(Listener()) if options.lockstep else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)

@@ -56,7 +56,7 @@ def _recorded(
     run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
     run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
     ring = room_for(folder, out, config.companion.disk)
-    recorder = FlightRecorder(folder, Background("log"), ring and ring.make_room)
+    recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
     guard = Guard(config)
     try:
         with (
