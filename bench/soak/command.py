@@ -268,3 +268,5 @@ def _flown_again(runs: Path) -> Iterator[str]:
     flights = kept_flights(runs)
     same = [reproduce(read_recording(flight.folder)).first_difference is None for flight in flights]
     yield f"| records that decide the same again | {sum(same)} of {len(flights)} |"
+    kept = sum(hits_in(flight.event_lines()) for flight in flights)
+    yield f"| hits in the records that are left on the disk | {kept} |"
