@@ -1,6 +1,5 @@
 """The arguments of `bench soak`."""
 
-import sys
 from pathlib import Path
 
 from rebound_cli.arguments import Commands, count, runs
@@ -17,7 +16,7 @@ def add_soak(commands: Commands) -> None:
     soak.add_argument("--loss", type=float, default=0.05, metavar="SHARE", help="of the packets (default 0.05)")
     soak.add_argument("--folder", type=Path, required=True, metavar="DIR", help="where the service records its flights")
     soak.add_argument(
-        "--python", default=sys.executable, help="whose packages the guard has, e.g. .venv-wheel/drone/bin/python"
+        "--python", metavar="PATH", help="of the environment that the guard has, such as a drone's (default: this one)"
     )
     note = Path("bench/notes/soak.md")
     soak.add_argument("--out", type=Path, default=note, metavar="FILE", help="default: %(default)s")

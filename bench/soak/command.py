@@ -6,6 +6,7 @@ import shutil
 import socket
 import statistics
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -206,7 +207,8 @@ def run_soak(options: Namespace) -> int:
         systemd.start()
         environment = {"NOTIFY_SOCKET": str(sockets / "notify"), "WATCHDOG_USEC": str(round(WATCHDOG_S * 1e6))}
         environment |= {"RUNTIME_DIRECTORY": str(sockets), "PYTHONPATH": str(ROOT)}
-        command = [options.python, "-P", "-m", "rebound_cli", "guard", "--wait", "--connect", cable.url]
+        python = options.python or sys.executable
+        command = [python, "-P", "-m", "rebound_cli", "guard", "--wait", "--connect", cable.url]
         command += ["--set", f"companion.disk.max_use_mb={BUDGET_MB}"]
         # As journald's it is on another disk.
         said = stack.enter_context(options.folder.with_suffix(".journal").open("w"))
@@ -231,7 +233,7 @@ def run_soak(options: Namespace) -> int:
 def table(minutes: Sequence[Minute], systemd: Systemd, trouble: Sequence[str], options: Namespace) -> Iterator[str]:
     """What stands between the note's marks, the flights themselves apart."""
     command = f"python -m bench soak --minutes {options.minutes} --loss {options.loss:g} --folder {options.folder} "
-    command += f"--python {options.python}"
+    command += f"--python {options.python or 'python'}"
     resident_mb = [minute.resident_kb / 1e3 for minute in minutes]
     again_s = [minute.reconnected_s for minute in minutes if minute.reconnected_s is not None]
     busy_s = minutes[-1].cpu_s - minutes[0].cpu_s
