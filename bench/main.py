@@ -12,6 +12,7 @@ from bench.faults.arguments import add_faults
 from bench.kills.arguments import add_kills
 from bench.paper.arguments import add_paper
 from bench.pictures.arguments import add_pictures
+from bench.soak.arguments import add_soak
 from bench.speed.arguments import add_speed
 from rebound_cli.arguments import Commands, runs
 from rebound_cli.main import run
@@ -35,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_kills(commands)
     add_faults(commands)
     add_speed(commands)
+    add_soak(commands)
     add_pictures(commands)
     _add_docs(commands)
     _add_stamps(commands)

@@ -17,7 +17,7 @@ from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion, prepare_vehicle
 from rebound_cli.console import Console, console_for
 from rebound_cli.ending import ending_text
-from rebound_cli.flights.kept import room_for
+from rebound_cli.flights.kept import make_room_for_next, room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.offering import offer_report
 from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
@@ -78,11 +78,15 @@ def run_fly(options: Namespace) -> int:
         connection = None if is_simulated else open_signed(options, mission.companion.link.wait)
         if is_simulated and options.sim == "px4":
             connection = udp_in("0.0.0.0", PX4_COMPANION_PORT + options.instance)
+        if not is_simulated:
+            make_room_for_next(options.out, mission.companion.disk)
         folder = run_folder.create_run_folder(options.out, mission.name)
         _write_inputs(folder, options.mission, mission, world)
         # In lockstep the vehicle waits for the disk as for everything else.
-        make_room = None if is_simulated else room_for(folder, options.out, mission.companion.disk)
-        recorder = FlightRecorder(folder, None if options.lockstep else Background("log"), make_room)
+        ring = None if is_simulated else room_for(folder, options.out, mission.companion.disk)
+        recorder = FlightRecorder(
+            folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
+        )
         with Interrupts() as interrupts:
             followed = Followed(Listener()) if options.lockstep else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)

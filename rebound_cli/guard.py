@@ -1,18 +1,22 @@
 """`rebound guard` on a real connection and the real clock: until Ctrl-C, SIGTERM, or nothing to guard."""
 
 from argparse import Namespace
+from contextlib import closing
 from dataclasses import asdict
+from pathlib import Path
 
 from companion.errors import ReboundError
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.shell.clock import Clock
+from companion.shell.connection import Connection
+from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.compiling import prepare_companion
-from rebound_cli.console import console_for
+from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Document, apply_overrides, load_document, validated
-from rebound_cli.flights.kept import room_for
+from rebound_cli.flights.kept import make_room_for_next, room_for
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.offering import offer_report
 from rebound_cli.realtime import Loop, watched
@@ -29,42 +33,60 @@ def run_guard(options: Namespace) -> int:
         prepare_companion(console, config.companion)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
         connection = open_signed(options, config.companion.link.wait)
-        folder = run_folder.create_run_folder(options.out, "guard")
-        run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
-        run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
-        recorder = FlightRecorder(folder, Background("log"), room_for(folder, options.out, config.companion.disk))
-        guard = Guard(config)
-        try:
-            with (
-                served(console.print, command="guard", folder=str(folder.resolve())) as server,
-                watched(folder, config.companion.operator.computer_status) as computer,
-                Interrupts() as interrupts,
-            ):
-                clock = Clock()
-                started_us = clock.now_us()
-                loop = Loop(guard, connection, clock, recorder, console, interrupts, server, computer)
-                loop.run(lambda _, result: console.events(result.events, started_us))
-        finally:
-            connection.close()
-            recorder.close()
-            hits = [asdict(collision) for collision in guard.collisions()]
-            summary = {
-                "outcome": guard.outcome,
-                "collisions": hits,
-                "left_alone": guard.left_alone(),
-                "round_trip_ms": guard.round_trip().summary(),
-                **asdict(connection.counts),
-                "refused_packets": refused_packets(connection),
-            }
-            run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
-        left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
-        console.print(f"{guard.outcome}; {len(hits)} hits{left_alone}; log in {folder}")
-        offer_report(folder, console)
+        manager = service_manager()
+        with closing(connection), Interrupts() as interrupts:
+            while not (outcome := _recorded(config, options.out, connection, console, interrupts, manager)):
+                pass
         if interrupts.reason is None:
-            raise ReboundError(
-                guard.outcome[:1].upper() + guard.outcome[1:] + ("" if guard.outcome.endswith("?") else ".")
-            )
+            raise ReboundError(outcome[:1].upper() + outcome[1:] + ("" if outcome.endswith("?") else "."))
         return 0
+
+
+def _recorded(
+    config: GuardConfig,
+    out: Path | None,
+    connection: Connection,
+    console: Console,
+    interrupts: Interrupts,
+    manager: ServiceManager | None,
+) -> str:
+    """One folder: until the end, which is returned, or, then empty, until it is long and the vehicle disarmed."""
+    make_room_for_next(out, config.companion.disk)
+    folder = run_folder.create_run_folder(out, "guard")
+    run_folder.write_yaml(folder / run_folder.GUARD_NAME, config.model_dump(mode="json", exclude_none=True))
+    run_folder.write_json(folder / run_folder.VERSIONS_NAME, run_folder.versions())
+    ring = room_for(folder, out, config.companion.disk)
+    recorder = FlightRecorder(folder, Background("log"), ring.make_room if ring else None)
+    guard = Guard(config)
+    try:
+        with (
+            served(console.print, command="guard", folder=str(folder.resolve())) as server,
+            watched(folder, config.companion.operator.computer_status) as computer,
+        ):
+            clock = Clock()
+            started_us = clock.now_us()
+            loop = Loop(guard, connection, clock, recorder, console, interrupts, server, computer, manager=manager)
+            loop.run(
+                lambda _, result: console.events(result.events, started_us),
+                lambda: ring is not None and ring.is_long and guard.armed is False and interrupts.reason is None,
+            )
+    finally:
+        recorder.close()
+        hits = [asdict(collision) for collision in guard.collisions()]
+        summary = {
+            "outcome": guard.outcome or "goes on in the next folder",
+            "collisions": hits,
+            "left_alone": guard.left_alone(),
+            "round_trip_ms": guard.round_trip().summary(),
+            **asdict(connection.counts),
+            "refused_packets": refused_packets(connection),
+        }
+        run_folder.write_json(folder / run_folder.SUMMARY_NAME, summary)
+    left_alone = f", {guard.left_alone()} left to the program that flies" if guard.left_alone() else ""
+    console.print(f"{summary['outcome']}; {len(hits)} hits{left_alone}; log in {folder}")
+    if guard.outcome:
+        offer_report(folder, console)
+    return guard.outcome
 
 
 def guard_config(options: Namespace) -> GuardConfig:

@@ -152,7 +152,7 @@ class Loop:
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False
 
-    def run(self, beside: Callable[[int, StepResult], None]) -> None:
+    def run(self, beside: Callable[[int, StepResult], None], is_over: Callable[[], bool] = lambda: False) -> None:
         """After the first interrupt it finishes by itself. `beside` is what happens besides with each step.
 
         The state is shown on the console and told over the status socket. Whatever is raised in all this hands the
@@ -161,7 +161,7 @@ class Loop:
         started_us = self.clock.now_us()
         with undisturbed() as allow_collecting:
             try:
-                while not self.stepped.finished:
+                while not (self.stepped.finished or is_over()):
                     now_us, result = self.exchange()
                     allow_collecting(self.stepped.armed is False)
                     beside(now_us, result)

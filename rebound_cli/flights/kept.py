@@ -9,7 +9,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +36,8 @@ _FREE_BYTES = 300 * _MIB
 # With less than this PX4's logger records nothing (logger/util.cpp). Here packets end; events, the summary and the
 # time stamps of signatures still find room.
 LAST_BYTES = 10 * _MIB
+# journald's SystemMaxFileSize: an eighth of the budget a file, so that seven older ones stay (journald.conf(5)).
+_FLIGHTS_A_BUDGET = 8
 # At PX4's fastest streams packets are some 125 kB a second: a little more than a megabyte by then.
 LOOK_EVERY_US = 10_000_000
 # Renamed to this before it is removed: a power cut leaves no half of a flight behind under its name.
@@ -169,6 +171,8 @@ class Ring:
         self._others_bytes: int | None = None  # what the others take: they do not change
         self._hits: dict[Path, bool] = {}
         self._has_room = True
+        self.is_long = False
+        """By the last look: of a vehicle at rest another record should begin, so that this one may go some day."""
 
     def make_room(self, now_us: int) -> None:
         """For the packets of the present flight. Raises OSError where nothing can go and the disk is nearly full."""
@@ -187,10 +191,12 @@ class Ring:
             for folder in self._runs.glob(f"{_GOING}*"):
                 shutil.rmtree(folder, ignore_errors=True)
             self._others_bytes = sum(flight.size_bytes for flight in self._others())
-        to_go = limits.to_go(self._others_bytes + size_of(self._present), disk.free)
+        present_bytes = size_of(self._present) if self._present.exists() else 0
+        to_go = limits.to_go(self._others_bytes + present_bytes, disk.free)
         if to_go > 0:
             self._remove(to_go)
         self._has_room = shutil.disk_usage(self._runs).free >= min(LAST_BYTES, limits.keep_free)
+        self.is_long = self._has_room and present_bytes > max(limits.max_use // _FLIGHTS_A_BUDGET, LAST_BYTES)
 
     def _others(self) -> list[KeptFlight]:
         return [flight for flight in kept_flights(self._runs) if flight.folder != self._present]
@@ -208,6 +214,13 @@ class Ring:
                 self._others_bytes -= flight.size_bytes
 
 
-def room_for(folder: Path, out: Path | None, config: DiskConfig) -> Callable[[int], None] | None:
-    """What a recorder asks before it writes packets; nothing where a person has named the folder, and keeps it."""
-    return Ring(folder, config).make_room if out is None else None
+def make_room_for_next(out: Path | None, config: DiskConfig) -> None:
+    """Before a flight's folder is made: on a disk that others have filled the oldest flights go for it."""
+    if out is None:
+        with suppress(OSError):
+            Ring(run_folder.RUNS_FOLDER / "next", config).make_room(LOOK_EVERY_US)
+
+
+def room_for(folder: Path, out: Path | None, config: DiskConfig) -> Ring | None:
+    """Whose `make_room` a recorder asks before packets; None where a person has named the folder, and keeps it."""
+    return Ring(folder, config) if out is None else None

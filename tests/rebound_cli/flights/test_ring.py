@@ -1,5 +1,6 @@
 """Which flights go when room is short: tried on folders that look like flights, and on a recorder that writes one."""
 
+import contextlib
 import errno
 import fcntl
 import os
@@ -10,7 +11,16 @@ import pytest
 from companion.mission.config import DiskConfig
 from rebound_cli.background import Background
 from rebound_cli.flights import kept as ring
-from rebound_cli.flights.kept import LAST_BYTES, LOOK_EVERY_US, Limits, Ring, kept_flights, limits_of, room_for
+from rebound_cli.flights.kept import (
+    LAST_BYTES,
+    LOOK_EVERY_US,
+    Limits,
+    Ring,
+    kept_flights,
+    limits_of,
+    make_room_for_next,
+    room_for,
+)
 from rebound_cli.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
 
@@ -104,6 +114,28 @@ def test_the_budget_counts_the_present_flight_as_it_grows(tmp_path, disk):
     kept.make_room(EPOCH_US + LOOK_EVERY_US)
     # Then the oldest has gone
     assert names(tmp_path) == ["20260102T000000Z-guard", PRESENT]
+
+
+@pytest.mark.parametrize(
+    ("taken", "free", "is_long"),
+    # Of a budget of 160 MB an eighth; with less room than the last 10 MiB there is none for another record.
+    [(20 * MB - 3 * BLOCK, GIB, False), (20 * MB + BLOCK, GIB, True), (20 * MB + BLOCK, LAST_BYTES - 1, False)],
+)
+def test_a_record_is_long_when_it_takes_an_eighth_of_the_budget(tmp_path, disk, taken, free, is_long):
+    present = pretend(tmp_path, PRESENT, taken)
+    disk(tmp_path, free)
+    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 160}))
+    with contextlib.suppress(OSError):
+        kept.make_room(EPOCH_US)
+    assert kept.is_long is is_long
+
+
+def test_a_record_of_less_than_the_last_room_is_not_long_however_small_the_budget(tmp_path, disk):
+    present = pretend(tmp_path, PRESENT, LAST_BYTES - 2 * BLOCK)
+    disk(tmp_path, GIB)
+    kept = Ring(present, DiskConfig.model_validate({"max_use_mb": 0}))
+    kept.make_room(EPOCH_US)
+    assert not kept.is_long
 
 
 def test_nothing_is_removed_that_is_not_a_flight_of_a_vehicle_which_we_have_named(tmp_path, disk):
@@ -206,6 +238,20 @@ def test_a_folder_that_cannot_be_removed_does_not_end_the_flight(tmp_path, disk,
     # When a MB too much is there, then the next one goes
     Ring(present, DiskConfig.model_validate({"max_use_mb": 1.1})).make_room(EPOCH_US)
     assert names(tmp_path) == ["20260101T000000Z-guard", PRESENT]
+
+
+def test_room_is_made_before_a_flight_has_a_folder(tmp_path, disk, monkeypatch):
+    """A service whose disk others had filled could not begin, and guarded nothing, beside flights that may go."""
+    # Given two flights of 1 MB, and 50 MB to be left free, of which 1 MB is missing
+    monkeypatch.setattr(ring.run_folder, "RUNS_FOLDER", tmp_path)
+    for day in (1, 2):
+        pretend(tmp_path, f"2026010{day}T000000Z-guard", MB)
+    disk(tmp_path, 49 * MB)
+    make_room_for_next(None, DiskConfig.model_validate({"keep_free_mb": 50}))
+    assert names(tmp_path) == ["20260102T000000Z-guard"]
+    # And where nothing was flown yet there is nothing to do
+    monkeypatch.setattr(ring.run_folder, "RUNS_FOLDER", tmp_path / "none")
+    make_room_for_next(None, DiskConfig())
 
 
 def test_a_folder_that_a_person_names_is_looked_after_by_that_person(tmp_path):

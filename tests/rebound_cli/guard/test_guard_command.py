@@ -2,15 +2,22 @@
 
 import contextlib
 import json
+import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
 
 import pytest
 import yaml
+from pymavlink import mavutil
 
 from companion.guard.config import GuardConfig
+from rebound_cli import run_folder
+from rebound_cli.flights import kept
+from rebound_cli.guard import run_guard
+from rebound_cli.main import build_parser
 from rebound_cli.status import ask
 from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
@@ -104,3 +111,45 @@ def test_as_a_service_it_watches_until_it_is_told_to_end(tmp_path, monkeypatch):
     written = GuardConfig.model_validate(yaml.safe_load((tmp_path / "guard.yaml").read_text()))
     assert written.then == "previous"
     assert written.companion.streams.window_s == 0.5
+
+
+def test_a_vehicle_at_rest_fills_one_record_after_the_other_and_one_that_is_armed_a_single_one(
+    rebound_vehicle, tmp_path, monkeypatch
+):
+    """A vehicle that stood on a bench for a day filled the disk with one record, which the ring never removes."""
+    # Given records that are long after 100 kB, some seconds, and are looked at each half second
+    runs = tmp_path / "runs"
+    monkeypatch.setattr(run_folder, "RUNS_FOLDER", runs)
+    monkeypatch.setattr(kept, "LAST_BYTES", 100_000)
+    monkeypatch.setattr(kept, "LOOK_EVERY_US", 500_000)
+    words = ("guard", "--connect", rebound_vehicle.tcp_address, "--set", "companion.disk.max_use_mb=0.8", *QUICK)
+    while_armed = []
+
+    def pilot():
+        try:
+            # When the vehicle stands for two records, and then flies for as long as two more
+            rebound_vehicle.wait_until(lambda _: len(kept.kept_flights(runs)) == 3, within_s=60)
+            radio = mavutil.mavlink_connection(rebound_vehicle.mavutil_address)
+            radio.wait_heartbeat(timeout=10)
+            radio.arducopter_arm()
+            radio.set_mode("TAKEOFF")
+            rebound_vehicle.wait_until(lambda truth: truth.mode == "Hold" and truth.height_m > 2, within_s=20)
+            flown = kept.kept_flights(runs)[-1].folder
+            radio.close()
+            rebound_vehicle.wait_until(lambda _: kept.size_of(flown) > 300_000, within_s=60)
+            while_armed.append(kept.kept_flights(runs)[-1].folder == flown)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    thread = threading.Thread(target=pilot)
+    thread.start()
+    # Then the guard goes on from record to record on the ground, and ends in the one that it flew in
+    assert run_guard(build_parser().parse_args(words)) == 0
+    thread.join()
+    assert while_armed == [True]
+    *earlier, last = [flight.folder for flight in kept.kept_flights(runs)]
+    outcomes = [json.loads((folder / "summary.json").read_text())["outcome"] for folder in (*earlier, last)]
+    assert set(outcomes[:-1]) == {"goes on in the next folder"} and "terminate" in outcomes[-1]
+    assert [event["kind"] for event in events_of(last)].count("watching") == 1
+    for folder in (*earlier, last):
+        assert_comes_again(folder)

@@ -1,0 +1,1 @@
+"""The guard as a service for hours, by the clock."""
