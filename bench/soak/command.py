@@ -19,8 +19,8 @@ from typing import Any
 
 from bench.faults.packets import ARM, COMMAND, GROUND_STATION, SET_MODE, made
 from bench.marked import checked_text, write_part
-from bench.reference.stamps import FLOWN, ROOT, stamp_text
 from bench.soak.cable import Cable
+from bench.stamps import FLOWN, ROOT, stamp_text
 from companion.mavlink.packet import message_id_of
 from rebound_cli.flights.kept import hits_in, kept_flights
 from rebound_cli.replay.recording import read_recording, reproduce
