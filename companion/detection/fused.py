@@ -240,5 +240,7 @@ class FusedDetector:
         if jump.no_motor_turns(time_us, config.rate_step_rad_s):
             # Two signs, half as clear, and the thrust has not turned for long.
             noise_m_s, room = 0.5 * noise_m_s, 0.0
+        if jump.is_slow:
+            least = config.velocity_step_slow_m_s
         room += jump.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
         return caution * max(least, noise_m_s) + room

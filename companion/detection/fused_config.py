@@ -8,7 +8,6 @@ class FusedConfig(Written):
 
     retired = frozenset(
         {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
-        | {"velocity_step_slow_m_s"}
     )
 
     side_threshold_m_s2: Positive = 1.75
@@ -28,6 +27,8 @@ class FusedConfig(Written):
     """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
     times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
     clipping leaves the estimate 0.16."""
+    velocity_step_slow_m_s: Positive = 0.7
+    """The same of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz."""
     velocity_step_turned_m_s: Positive = 0.07
     """The same beside a rate jump. With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by
     2 rad/s changes its velocity by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s."""

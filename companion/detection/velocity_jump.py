@@ -21,6 +21,8 @@ COMPARED = 3
 # Velocities further apart leave more to a sum of samples that sees a quarter of the time, and to a filter's own
 # corrections: at 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
+# 10 Hz with the jitter of a log; further apart they are no measure.
+LONGEST_SLOW_STEP_US = 130_000
 # A spread of fewer steps than this is a guess: two thirds of a second at 30 Hz.
 TRUSTED = 20
 # Steps that the spread remembers, and that a rising one does: 3 s and a third of a second at 30 Hz.
@@ -51,6 +53,8 @@ class VelocityJump:
     rate_step_rad_s: float = 0.0
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
+    is_slow: bool = False
+    """Whether velocities come further apart than `LONGEST_STEP_US`."""
     since_us: int = 0
     """Velocities before this are no measure."""
     before_us: int = 0
@@ -87,8 +91,9 @@ class VelocityJump:
             # To the last digit: nothing is estimated now, and what comes after is a new beginning.
             self.since_us = times[-1]
         apart_us = [b - a for a, b in pairwise(times)]
-        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_STEP_US:
+        if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_SLOW_STEP_US:
             return None
+        self.is_slow = max(apart_us) > LONGEST_STEP_US
         *before, residual = (less_sum(fix) for fix in recent[1:])
         # In the mean since the velocity before: what shakes is gone from it.
         *led, acceleration = (

@@ -40,6 +40,7 @@ class Flight:
         self.heard = scene.pop("heard", (LocalPosition, Odometry, Attitude, AttitudeTarget))
         self.situation = scene.pop("situation", lambda t: IN_FLIGHT)
         self.lost = scene.pop("lost", lambda t: False)
+        self.slower = scene.pop("slower", 1)  # velocities come so much more seldom
         self.late_us = scene.pop("late_us", 0)  # the velocities are those of so long ago
         assert not scene
         self.rng = random.Random(seed)
@@ -63,12 +64,12 @@ class Flight:
                     sum(f[axis] for f in window) / len(window) + self.rng.gauss(0.0, self.noise) for axis in (0, 1, 2)
                 ]
                 yield t, ImuSample(t, tuple(mean), self.rates(t))
-            if t % 20_000 == 0:
+            if t % (20_000 * self.slower) == 0:
                 yield t, LocalPosition(t, (0.0, 0.0, -5.0), seen)
             if t % 20_000 == 0:
                 yield t, Attitude(t, (1.0, 0.0, 0.0, 0.0))
                 yield t, AttitudeTarget(t, HOVER_FRACTION * lift / GRAVITY)
-            if t % 32_000 == 0:
+            if t % (32_000 * self.slower) == 0:
                 yield t, Odometry(t, (0.0, 0.0, -5.0), seen, resets)
 
     def fly(self, until_us=4_000_000, **config):
@@ -148,6 +149,13 @@ def test_of_a_stiff_hit_between_the_samples_what_clipping_leaves_in_the_velocity
     """Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that."""
     jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
     impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump).fly(until_us=3_200_000)
+    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
+
+
+@pytest.mark.parametrize(("step_m_s", "hits"), [(1.5, 1), (0.6, 0)])
+def test_velocities_ten_times_a_second_show_a_large_step_that_no_sample_showed(step_m_s, hits):
+    jump = (3_002_000, (step_m_s, 0.0, 0.0), 0)
+    impacts = Flight(imu_every_us=20_000, slower=3, jump=jump).fly()
     assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
 
 
