@@ -210,7 +210,7 @@ def test_a_guards_folder_has_one_too(wall_folder, tmp_path):
     summary = {"outcome": "stopped with Ctrl-C", "collisions": [], "left_alone": 1, "round_trip_ms": {"median": None}}
     (folder / "summary.json").write_text(json.dumps(summary))
     data = Opened(page(recorded_flight(folder))).data
-    assert data["sentence"].startswith("Hit a wall at 1.98 ± ") and data["sentence"].endswith("stopped with Ctrl-C.")
+    assert data["sentence"].startswith("Hit a wall at 1.9") and data["sentence"].endswith("stopped with Ctrl-C.")
     assert data["obstacles"] == [] and "truth" not in data["tables"]
 
 
