@@ -164,7 +164,7 @@ def advance(watch: Watch, samples: Sequence[Sample], situation: Situation, now_u
                 continue
         elif type(sample) is Refused:
             if sample.message == MessageId.HIGHRES_IMU.name:
-                watch.useless = f"HIGHRES_IMU not believed: {sample.reason}"
+                watch.useless = f"HIGHRES_IMU not accepted: {sample.reason}"
             continue
         elif not watch.losses_told and type(sample) in WISHED:
             watch.heard.add(WISHED[type(sample)])
@@ -220,10 +220,10 @@ def _look_after_sight(watch: Watch, imu_samples: int, situation: Situation, now_
 
 
 def _tell_doubt(watch: Watch) -> list[Notice]:
-    """That the vehicle's estimate is not believed, once the contact is over, and that it is again."""
+    """Report that the velocity estimate is not valid, once the contact is over, and when it is valid again."""
     doubted = not watch.estimate_trusted and watch.state.phase is not Phase.CONTACT
     if doubted == watch.doubt_told:
         return []
     watch.doubt_told = doubted
-    text = "velocity not believed: part of the hit was not measured" if doubted else "velocity believed again"
+    text = "velocity not valid: part of the hit was not measured" if doubted else "velocity valid again"
     return [Notice("estimate", text, {})]

@@ -58,7 +58,7 @@ def lines(flight: ShownFlight) -> Sequence[str]:
 
 
 def link_rows(flight: ShownFlight) -> Sequence[tuple[str, str]]:
-    """Streams, latency, lateness, and what was not believed."""
+    """Streams, latency, lateness, and what was not accepted."""
     rows = [*_imu_rows(flight)]
     findings = flight.findings
     for word, spans in (("Blind", findings.blind), ("Off", findings.off)):

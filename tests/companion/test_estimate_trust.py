@@ -76,8 +76,8 @@ def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit():
     impacts, told, trusted = after_a_hit(4.0, 120.0, 3, swing)
     assert len(impacts) == 1
     assert [text for _, text in told] == [
-        "velocity not believed: part of the hit was not measured",
-        "velocity believed again",
+        "velocity not valid: part of the hit was not measured",
+        "velocity valid again",
     ]
     assert 2_600_000 < told[1][0] < 3_550_000
     assert trusted[-1]
@@ -87,7 +87,7 @@ def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all
     """Given springs that push for six samples, when the seventh clips, then what follows is no second hit."""
     impacts, told, trusted = after_a_hit(4.0, 30.0, 7, swing, stop_m_s2=90.0)
     assert len(impacts) == 1
-    assert told[0][1] == "velocity not believed: part of the hit was not measured"
+    assert told[0][1] == "velocity not valid: part of the hit was not measured"
     assert trusted[-1]
 
 
@@ -95,7 +95,7 @@ def test_a_stiff_hit_whose_means_stay_far_below_the_range_is_no_second_hit():
     """Given a hit of a millisecond that shows as 26 m/s^2 and rings, when the velocity swings back, nothing is told."""
     impacts, told, trusted = after_a_hit(4.0, 3.0, 4, swing, first_m_s2=23.0)
     assert len(impacts) == 1
-    assert told[0][1] == "velocity not believed: part of the hit was not measured"
+    assert told[0][1] == "velocity not valid: part of the hit was not measured"
     assert trusted[-1]
 
 
@@ -111,7 +111,7 @@ def test_what_clips_after_the_push_has_paused_leaves_the_velocity_in_doubt():
     """Given a push measured whole, when the other guard swings in 30 ms later and clips, then it is not believed."""
     impacts, told, _ = after_a_hit(4.0, 20.0, 4, swing, other_guard_m_s2=90.0)
     assert len(impacts) == 1
-    assert told[0][1] == "velocity not believed: part of the hit was not measured"
+    assert told[0][1] == "velocity not valid: part of the hit was not measured"
 
 
 def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():

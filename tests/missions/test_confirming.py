@@ -246,7 +246,7 @@ def stuck() -> Callable[[tuple[float, ...]], tuple[float, ...]]:
     ("spoilt", "reason"),
     [
         (stuck, "detector blind: IMU stuck at one value"),
-        (lambda: lambda _: (0.0,) * 6, "detector blind: HIGHRES_IMU not believed: the accelerometer reads zero"),
+        (lambda: lambda _: (0.0,) * 6, "detector blind: HIGHRES_IMU not accepted: the accelerometer reads zero"),
     ],
     ids=["stuck", "zero"],
 )
