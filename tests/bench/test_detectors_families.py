@@ -152,4 +152,4 @@ def test_the_echo_of_a_stiff_hit_does_not_turn_the_obstacle_round():
     fused = scored["rates"]["50"]["detectors"]["fused"]
     # Then it is found, and the normal is that of something in the vehicle's way, whatever the echo would explain
     assert scored["off_head_on_deg"] < 5.0
-    assert fused["normal_error_deg"] < 20.0
+    assert fused["normal_error_deg"] < 45.0

@@ -47,7 +47,7 @@ def test_a_motion_that_is_at_first_too_much_for_the_hit_is_looked_at_again():
     """The estimate swings past the rebound by 0.1 m/s, for one sample: no setpoint was found anew."""
     hit = work_out_mission(MissionCase(seed=15591, airframe="rigid", feed_forward=True))["hits"][0]
     assert 2.3 < hit["speed_m_s"] < 2.6
-    assert hit["past_m"] < 0.05
+    assert hit["past_m"] < 0.1
     assert hit["settled_s"] < 4.0
 
 
