@@ -7,12 +7,13 @@ folds by l = d / s, s the share of n in the hoop's plane, and pushes with (the p
     F = (k l + b l') / s
 
 and friction, no more than what ends the sliding (Coulomb). Vehicle and rates follow from F n - friction by impulse and
-angular momentum, per unit mass: v' = g + R f + F, w' = K^-2 (r x F), f what the accelerometer shows without the touch,
-K the radii of gyration. All four guards may touch. On a round the normal turns as the guard rolls. Motors brake the
-turning later than what is looked at.
+angular momentum, per unit mass: v' = g + R f + F, w' = K^-2 (r x F) + m, f what the accelerometer shows without the
+touch, K the radii of gyration, m the motors, which brake the turning. All four guards may touch. On a round the normal
+turns as the guard rolls.
 
 Columns of a supposition: tilts of the normal along two axes [rad], friction, time of the touch [s], error of v_c (3)
-[m/s], logarithm of the radius [m].
+[m/s], logarithm of the arms' stiffness over the setting's, motors' braking [1/s], logarithm of the radius [m], length
+of a sample's mean [s].
 """
 
 import math
@@ -22,7 +23,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.motion.strapdown import GRAVITY_M_S2
+from companion.motion.strapdown import GRAVITY_M_S2, MOTORS_RAD_S2
 
 try:
     import numba
@@ -40,8 +41,8 @@ Triple = tuple[float, float, float]
 Frame = tuple[Triple, Triple, Triple]
 
 # Of a supposition.
-SIZE = 8
-TILT, ACROSS, FRICTION, TOUCH, ERROR, RADIUS = 0, 1, 2, 3, 4, 7
+SIZE = 11
+TILT, ACROSS, FRICTION, TOUCH, ERROR, STIFFNESS, BRAKING, RADIUS, AVERAGING = 0, 1, 2, 3, 4, 7, 8, 9, 10
 # Of a measurement: what a sample says, six numbers; of an attitude three, and three zeros.
 MEASURED = 6
 FLAT = -1
@@ -58,6 +59,8 @@ LEAST_SHARE = 0.22
 ROUNDING_M = 1e-9
 # An arm at the end of its travel meets a stop that ends the motion within some milliseconds.
 STOP_PER_S2, STOP_DAMPING_PER_S = 60_000.0, 30.0
+# Motors follow within 20 ms.
+MOTORS_S, YAW_SHARE = 0.025, 0.3
 
 
 def _compiled(function: Kernel, inlined: bool = False) -> Kernel:
@@ -153,9 +156,9 @@ def _round_normal(normal: Triple, from_axis: Triple) -> Triple:
 
 
 @_inlined
-def _force(fold: float, folding: float, shape: Floats) -> float:
+def _force(fold: float, folding: float, stiffness: float, shape: Floats) -> float:
     """Along an arm, per unit mass; never a pull."""
-    force: float = shape[3] * fold + shape[4] * folding
+    force: float = stiffness * shape[3] * fold + shape[4] * folding
     if fold > shape[5]:
         force += max(0.0, STOP_PER_S2 * (fold - shape[5]) + STOP_DAMPING_PER_S * folding)
     return max(0.0, force)
@@ -167,14 +170,15 @@ def _pushed(
     obstacle: int,
     surface: tuple[Triple, float],
     normal: Triple,
-    friction: float,
+    holds: tuple[float, float],
     motion: Frame,
     r: Frame,
     shape: Floats,
 ) -> tuple[Triple, Triple]:
     """One guard's push, NED, and its moment about the middle, per unit mass.
 
-    `surface`: a round's axis and radius, or how far a flat obstacle is. `motion`: place, velocity and rates, NED.
+    `surface`: a round's axis and radius, or how far a flat obstacle is. `holds`: friction and stiffness. `motion`:
+    place, velocity and rates, NED.
     """
     axis, size = surface
     nothing = (0.0, 0.0, 0.0)
@@ -189,7 +193,7 @@ def _pushed(
     point = _plus(point, depth, n)
     sliding = _plus(motion[1], 1.0, _cross(motion[2], point))
     inward = -_dot(sliding, n)
-    force = _force(depth / share, inward / share, shape) / share
+    force = _force(depth / share, inward / share, holds[1], shape) / share
     sliding = _plus(sliding, inward, n)
     speed = math.sqrt(_dot(sliding, sliding) + 1e-9)
     along = (sliding[0] / speed, sliding[1] / speed, sliding[2] / speed)
@@ -198,7 +202,7 @@ def _pushed(
     for j in range(3):
         lever = _dot(r[j], turning) / shape[6 + j]
         soft += lever * lever
-    held = min(friction * force, 0.7 * speed / soft / STEP_S)
+    held = min(holds[0] * force, 0.7 * speed / soft / STEP_S)
     push = _plus((force * n[0], force * n[1], force * n[2]), -held, along)
     return push, _cross(point, push)
 
@@ -221,11 +225,11 @@ def _follow(
     across = axes[0] + math.tan(trial[TILT]) * axes[1] + math.tan(trial[ACROSS]) * axes[2]
     across = across / math.sqrt((across * across).sum())
     normal = (across[0], across[1], across[2])
-    friction = min(max(trial[FRICTION], 0.0), MOST_FRICTION)
+    holds = (min(max(trial[FRICTION], 0.0), MOST_FRICTION), math.exp(trial[STIFFNESS]))
     radius = 0.0 if obstacle == FLAT else math.exp(trial[RADIUS])
     before = (rates[0], rates[1], rates[2])
-    thrust = (free[0], free[1], free[2])
-    place, w = (0.0, 0.0, 0.0), before
+    thrust, braking = (free[0], free[1], free[2]), (trial[BRAKING], trial[BRAKING], YAW_SHARE * trial[BRAKING])
+    place, w, motors = (0.0, 0.0, 0.0), before, (0.0, 0.0, 0.0)
     v = (velocity[0] + trial[ERROR], velocity[1] + trial[ERROR + 1], velocity[2] + trial[ERROR + 2])
     q = _turned((attitude[0], attitude[1], attitude[2], attitude[3]), before, trial[TOUCH])
     r = _frame(q)
@@ -239,7 +243,7 @@ def _follow(
         turn = _plus(_plus((w[0] * r[0][0], w[0] * r[0][1], w[0] * r[0][2]), w[1], r[1]), w[2], r[2])
         push, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for guard in range(4):
-            one = _pushed(guard, obstacle, surface, normal, friction, (place, v, turn), r, shape)
+            one = _pushed(guard, obstacle, surface, normal, holds, (place, v, turn), r, shape)
             push, moment = _plus(push, 1.0, one[0]), _plus(moment, 1.0, one[1])
         felt = (thrust[0] + _dot(r[0], push), thrust[1] + _dot(r[1], push), thrust[2] + _dot(r[2], push))
         for j in range(3):
@@ -248,8 +252,14 @@ def _follow(
         pull = _plus(_plus(_plus((0.0, 0.0, GRAVITY_M_S2), felt[0], r[0]), felt[1], r[1]), felt[2], r[2])
         v = _plus(v, STEP_S, pull)
         place = _plus(place, STEP_S, v)
+        asked = (
+            min(max(-braking[0] * (w[0] - before[0]), -MOTORS_RAD_S2), MOTORS_RAD_S2),
+            min(max(-braking[1] * (w[1] - before[1]), -MOTORS_RAD_S2), MOTORS_RAD_S2),
+            min(max(-braking[2] * (w[2] - before[2]), -MOTORS_RAD_S2), MOTORS_RAD_S2),
+        )
+        motors = _plus(motors, STEP_S / MOTORS_S, _plus(asked, -1.0, motors))
         spun = (_dot(r[0], moment) / inertia[0], _dot(r[1], moment) / inertia[1], _dot(r[2], moment) / inertia[2])
-        w = _plus(w, STEP_S, spun)
+        w = _plus(w, STEP_S, _plus(spun, 1.0, motors))
         q = _turned(q, w, STEP_S)
         r = _frame(q)
         attitudes[step + 1, 0], attitudes[step + 1, 1], attitudes[step + 1, 2], attitudes[step + 1, 3] = q
@@ -280,16 +290,14 @@ def misfits(
     measured: Floats,
     spread: Floats,
     shape: Floats,
-    averaging_s: float,
 ) -> Floats:
     """Each supposition less what was measured, in standard deviations: (n, 6 measurements).
 
-    `trials` (n, 8); `axes` (n, 3, 3): the normal without tilt and the two ways it tilts, NED; `obstacles` (n,): FLAT
+    `trials` (n, 11); `axes` (n, 3, 3): the normal without tilt and the two ways it tilts, NED; `obstacles` (n,): FLAT
     or the guard that met a round. `velocity` is v_c NED, `attitude`, body `rates` and specific force `free` those of
     before the touch, carried on to time 0. `times` (k,) s, ascending; `measured` (k, 6): specific force and rates,
     means, or the attitude (4) where `is_attitude`; `spread` (k, 2): of forces and rates, or of the attitude. `shape`: a
-    guard's place, radius, height, stiffness, damping and travel, and the radii of gyration. `averaging_s`: the length
-    of a sample's mean.
+    guard's place, radius, height, stiffness, damping and travel, and the radii of gyration.
     """
     count, known = trials.shape[0], times.shape[0]
     out = np.zeros((count, MEASURED * known))
@@ -310,7 +318,7 @@ def misfits(
                 out[trial, first + 1] = sign * (a * q[2] - c * q[0] - d * q[1] + b * q[3])
                 out[trial, first + 2] = sign * (a * q[3] - d * q[0] - b * q[2] + c * q[1])
                 continue
-            over = averaging_s / STEP_S
+            over = trials[trial, AVERAGING] / STEP_S
             for j in range(6):
                 before = free[j] if j < 3 else rates[j - 3]
                 mean = (_summed(sums, at, j, before) - _summed(sums, at - over, j, before)) / over

@@ -5,10 +5,11 @@ slanting one with it push the same way. They do not turn the vehicle the same wa
 guard is touched, and when the next one is. So suppositions are followed (see `guards`) and held against all that was
 measured: forces and rates, and the attitude, which tells what the samples leave out. What is supposed: the normal,
 flat or round (and then which guard met it and the radius), friction, the moment of the touch, and, near what is known
-of it, v_c.
+of them, v_c, the arms' stiffness and how hard the motors brake the turning.
 
-A coarse search, which takes what was measured for less certain, chooses a few; each is then improved by least squares
-(Levenberg 1944, Marquardt 1963). The normal is the mean of what they become, weighed by exp(-misfit / 2).
+A coarse search chooses a few; each is then improved by least squares (Levenberg 1944, Marquardt 1963), with what was
+measured taken for less certain at first, or a sample that falls beside the touch of a second guard ends the way to it.
+The normal is the mean of what they become, weighed by exp(-misfit / 2).
 
 All that takes some 15 ms of a core here, which nothing that sends setpoints has to spare at once. So the search is a
 value, `Search`, and `further` takes it on by a piece: no more than so many suppositions are followed, whatever the time
@@ -23,7 +24,7 @@ import numpy as np
 
 from companion.estimate import guards as g
 from companion.estimate.config import GuardsConfig
-from companion.estimate.suppositions import Floats, Known, Touch, Trials, known_of, residuals, supposed, within
+from companion.estimate.suppositions import Floats, Known, Touch, Trials, known_of, residuals, supposed
 from companion.messages import Attitude, ImuSample, Vector3
 
 # Without machine code the search would take seconds.
@@ -33,15 +34,19 @@ IS_AVAILABLE = g.IS_COMPILED
 FOLLOWED = 400
 # How much apart suppositions of one kind that are improved are at least.
 APART = math.cos(math.radians(18.0))
-# The search takes what was measured for so much less certain; the best so many are improved by so many steps.
-COARSE, KEPT, STEPS = 2.5, 12, 8
+# The search takes what was measured for so much less certain, and so do the rounds of least squares, in which the best
+# so many are improved by so many steps.
+COARSE, ROUNDS, STEPS = 2.5, ((5.0, 12), (2.0, 12), (1.0, 12)), 4
+# What misfits by so much more than the best goes no further.
+HOPELESS = 25.0
 # Of a touch that is explained each number misfits by one or less; by this, it was not by guards on spring arms.
 BELIEVED = 3.0
-# For the slopes, in the columns' units: what no sample's noise shows.
-DIFFERENCES = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.05])
-DAMPING, DAMPINGS, LEAST_DAMPING, MOST_DAMPING = 1e-2, (0.1, 10.0), 1e-5, 1e3
+DIFFERENCES = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.02, 1.0, 0.05, 0.0002])
+DAMPING, DAMPINGS, LEAST_DAMPING, MOST_DAMPING = 1e-2, (0.1, 1.0, 10.0, 100.0), 1e-5, 1e3
 # Of one supposition in one step: itself, its slopes, and what may become of it.
 FOLLOWED_A_STEP = 1 + g.SIZE + len(DAMPINGS)
+LEAST = np.array([-0.7, -0.7, -0.02, -0.2, -0.5, -0.5, -0.5, -0.7, 0.0, -4.6, 0.001])
+MOST = np.array([0.7, 0.7, 0.32, 0.0, 0.5, 0.5, 0.5, 0.7, 50.0, 0.0, 0.1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,20 +122,29 @@ def _distinct(trials: Trials, misfit: Floats) -> list[int]:
         same = [other for other in kept if trials.obstacles[other] == trials.obstacles[one]]
         if all(normals[one] @ normals[other] < APART for other in same):
             kept.append(one)
-        if len(kept) == KEPT:
+        if len(kept) == ROUNDS[0][1]:
             break
     return kept
 
 
 def _improved(search: Search, known: Known, trials: Trials) -> Search:
-    """As many steps as the piece has room for."""
+    """As many steps as the piece has room for, but for one round; after a round the hopeless are left behind."""
+    doubt, _ = ROUNDS[search.steps // STEPS]
     damping, misfit, steps = search.damping, search.misfit, search.steps
-    for _ in range(max(1, FOLLOWED // (FOLLOWED_A_STEP * len(trials.values)))):
-        values, damping, misfit = _stepped(known, trials, damping)
+    left = FOLLOWED // (FOLLOWED_A_STEP * len(trials.values))
+    for _ in range(max(1, left)):
+        values, damping, misfit = _stepped(known, trials, damping, doubt)
         trials, steps = Trials(values, trials.axes, trials.obstacles), steps + 1
-        if steps == STEPS:
-            return replace(search, trials=None, is_over=True, normal_ned=_mean(known, trials, misfit))
-    return replace(search, trials=trials, damping=damping, misfit=misfit, steps=steps)
+        if steps % STEPS == 0:
+            break
+    else:
+        return replace(search, trials=trials, damping=damping, misfit=misfit, steps=steps)
+    if steps == STEPS * len(ROUNDS):
+        return replace(search, trials=None, is_over=True, normal_ned=_mean(known, trials, misfit))
+    most = ROUNDS[steps // STEPS][1]
+    order = np.argsort(misfit, kind="stable")[:most]
+    near = [int(one) for one in order if misfit[one] <= misfit.min() + HOPELESS]
+    return replace(search, trials=trials.chosen(near), damping=np.full(len(near), DAMPING), steps=steps)
 
 
 def _mean(known: Known, trials: Trials, misfit: Floats) -> Vector3 | None:
@@ -142,12 +156,12 @@ def _mean(known: Known, trials: Trials, misfit: Floats) -> Vector3 | None:
     return (float(n), float(e), float(d))
 
 
-def _stepped(known: Known, trials: Trials, damping: Floats) -> tuple[Floats, Floats, Floats]:
+def _stepped(known: Known, trials: Trials, damping: Floats, doubt: float) -> tuple[Floats, Floats, Floats]:
     """One step with the damping that helps most: values, dampings, misfits."""
     values, count = trials.values, len(trials.values)
     every = [*range(count)]
     around = np.concatenate([values, *(values + step for step in np.diag(DIFFERENCES))])
-    found = residuals(known, trials.chosen(every * (g.SIZE + 1)), around).reshape(g.SIZE + 1, count, -1)
+    found = residuals(known, trials.chosen(every * (g.SIZE + 1)), around, doubt).reshape(g.SIZE + 1, count, -1)
     here = found[0]
     slopes = (found[1:] - here) / DIFFERENCES[:, None, None]
     curvature, downhill = np.einsum("ank,bnk->nab", slopes, slopes), np.einsum("ank,nk->na", slopes, here)
@@ -155,9 +169,9 @@ def _stepped(known: Known, trials: Trials, damping: Floats) -> tuple[Floats, Flo
     tried = []
     for factor in DAMPINGS:
         damped = curvature + (factor * damping[:, None] * scale)[:, :, None] * np.eye(g.SIZE) + 1e-9 * np.eye(g.SIZE)
-        tried.append(within(known, values - np.linalg.solve(damped, downhill[:, :, None])[:, :, 0]))
+        tried.append(np.clip(values - np.linalg.solve(damped, downhill[:, :, None])[:, :, 0], LEAST, MOST))
     candidates = np.array([*tried, values])
-    off = residuals(known, trials.chosen(every * len(DAMPINGS)), np.concatenate(tried))
+    off = residuals(known, trials.chosen(every * len(DAMPINGS)), np.concatenate(tried), doubt)
     misfit = np.square(np.concatenate([off, here])).sum(axis=1).reshape(len(candidates), count)
     best = misfit.argmin(axis=0)
     factors = np.array([*DAMPINGS, 10.0 * DAMPINGS[-1]])

@@ -1,7 +1,7 @@
 """What is supposed of a touch, and how far each supposition is from what was measured and from what is known.
 
 Tried are flat obstacles round the direction of the push and upright rounds on the foremost guards, each with friction
-and a moment of the touch. Known is, more or less, v_c.
+and a moment of the touch. Known are, more or less, v_c, the arms' stiffness, the motors, the length of a sample's mean.
 """
 
 import math
@@ -34,8 +34,11 @@ ROUND_MISFIT = 2.0
 # Standard deviations of what is known: vibration and bias of a sample and a share of what it shows, for all that the
 # model leaves out; the same of the rates; the attitude against the one before the touch.
 FORCE_M_S2, FORCE_SHARE, RATE_RAD_S, RATE_SHARE, ATTITUDE_RAD = 0.3, 0.06, 0.08, 0.06, 0.01
-# v_c on an axis, poles of 4 to 20 cm.
-VELOCITY_M_S, RADIUS, RADIUS_SPREAD = 0.04, math.log(0.1), 0.7
+# v_c on an axis, arms of a kind, a controller's gain of 20 /s, poles of 4 to 20 cm.
+VELOCITY_M_S, STIFFER, BRAKING_PER_S, BRAKING_SPREAD = 0.04, 0.1, 20.0, 8.0
+RADIUS, RADIUS_SPREAD = math.log(0.1), 0.7
+# IMU_INTEG_RATE gives 4 or 5 ms.
+AVERAGING_SPREAD_S = 0.0007
 # Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
 TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
 # Plastic on walls, wood and steel: rarely slippery, seldom beyond what the guards are made for.
@@ -88,7 +91,7 @@ class Trials:
         return Trials(self.values[which], self.axes[which], self.obstacles[which])
 
     def normals(self, values: Floats) -> Floats:
-        """(n, 3) for as many values (n, 8)."""
+        """(n, 3) for as many values (n, 11)."""
         tilts = np.tan(values[:, : g.FRICTION])
         vectors = self.axes[:, 0] + tilts[:, :1] * self.axes[:, 1] + tilts[:, 1:] * self.axes[:, 2]
         directions: Floats = vectors / np.linalg.norm(vectors, axis=1)[:, None]
@@ -164,6 +167,8 @@ def supposed(known: Known) -> Trials:
             groups += [(upright, axes, guard, math.log(radius_m)) for radius_m in RADII_M]
     values = np.zeros((sum(len(tried) for tried, *_ in groups), g.SIZE))
     values[:, : g.ERROR] = np.concatenate([tried for tried, *_ in groups])
+    values[:, g.BRAKING] = BRAKING_PER_S
+    values[:, g.AVERAGING] = known.averaging_s
     values[:, g.RADIUS] = np.concatenate([np.full(len(tried), radius) for tried, _, _, radius in groups])
     axes_of_all = np.concatenate([np.tile(axes, (len(tried), 1, 1)) for tried, axes, _, _ in groups])
     return Trials(values, axes_of_all, np.concatenate([np.full(len(tried), guard) for tried, _, guard, _ in groups]))
@@ -184,15 +189,7 @@ def _foremost(known: Known, normal_ned: Floats) -> list[int]:
     return [int(guard) for guard in np.argsort(g.ARMS_FRD @ np.array(level))[:FOREMOST]]
 
 
-def within(known: Known, values: Floats) -> Floats:
-    """The same, no further from the push than the search looks, touched since the sample before, and no needle."""
-    values[:, : g.FRICTION] = np.clip(values[:, : g.FRICTION], -SPAN_RAD, SPAN_RAD)
-    values[:, g.TOUCH] = np.clip(values[:, g.TOUCH], known.before_s, 0.0)
-    values[:, g.RADIUS] = np.clip(values[:, g.RADIUS], RADIUS - 3.0 * RADIUS_SPREAD, RADIUS + 3.0 * RADIUS_SPREAD)
-    return values
-
-
-def residuals(known: Known, trials: Trials, values: Floats, doubt: float = 1.0) -> Floats:
+def residuals(known: Known, trials: Trials, values: Floats, doubt: float) -> Floats:
     """What was measured, taken for `doubt` times less certain, and what is known beforehand: (n, m)."""
     off = g.misfits(
         values,
@@ -207,13 +204,15 @@ def residuals(known: Known, trials: Trials, values: Floats, doubt: float = 1.0) 
         known.measured,
         doubt * known.spread,
         known.shape,
-        known.averaging_s,
     )
     friction, tilts = values[:, g.FRICTION], np.abs(values[:, : g.FRICTION])
     down = trials.normals(values)[:, 2]
     beforehand = [
-        *(values[:, g.ERROR : g.RADIUS] / VELOCITY_M_S).T,
+        *(values[:, g.ERROR : g.STIFFNESS] / VELOCITY_M_S).T,
+        values[:, g.STIFFNESS] / STIFFER,
+        (values[:, g.BRAKING] - BRAKING_PER_S) / BRAKING_SPREAD,
         (values[:, g.RADIUS] - RADIUS) / RADIUS_SPREAD,
+        (values[:, g.AVERAGING] - known.averaging_s) / AVERAGING_SPREAD_S,
         (friction - np.clip(friction, 0.0, g.MOST_FRICTION)) / FRICTION_SPREAD,
         (friction - LIKELY_FRICTION) / LIKELY_SPREAD,
         *(np.maximum(tilts - TILT_RAD, 0.0) / TILT_SPREAD).T,
