@@ -12,6 +12,7 @@ from companion.estimate import guards, normal
 from companion.estimate.approach import Approach
 from companion.estimate.config import EstimateConfig, GuardsConfig
 from companion.estimate.facing import whole_normal
+from companion.estimate.impact import ImpactEstimator
 from companion.estimate.normal import normal_of
 from companion.estimate.push import Push
 from companion.estimate.suppositions import Touch
@@ -60,6 +61,45 @@ def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
     wrong = [VelocityFix(f.time_boot_us, f.velocity_ned_m_s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) for f in fixes(1)]
     assert velocity_at(wrong) is None
     assert velocity_at([]) is None
+
+
+@pytest.mark.parametrize("late_us", [0, 100_000, 290_000])
+def test_a_hit_that_is_told_late_has_the_velocity_from_before_it(late_us):
+    # Given velocities that go on after the contact, 3 m/s off
+    approach = Approach(CONFIG)
+    for fix in fixes(2):
+        approach.take(fix)
+    for t_us in range(CONTACT_US + 20_000, CONTACT_US + late_us, 20_000):
+        approach.take(VelocityFix(t_us, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    velocity, _ = approach.velocity_at(CONTACT_US, (0.0, 0.0, 0.0))
+    assert velocity[0] == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("jumps", "velocity_m_s"),
+    [
+        ({}, 2.0),
+        # A jump that the estimator counts itself, and a contact: what was before is no measure any more
+        ({"reset_counter": 1}, 5.0),
+        ({"touched_us": CONTACT_US - 900_000}, 5.0),
+    ],
+)
+def test_v_c_is_found_from_velocities_that_belong_together(jumps, velocity_m_s):
+    # Given a vehicle at 2 m/s that tells 5 m/s in its last 0.8 s
+    estimator = ImpactEstimator(CONFIG)
+    estimator.hear(Attitude(0, LEVEL, (0.0, 0.0, 0.0)))
+    for t_us in range(CONTACT_US - 4_000_000, CONTACT_US, 4_000):
+        estimator.hear(ImuSample(t_us, (0.0, 0.0, -9.80665), (0.0, 0.0, 0.0)))
+        estimator.hear(Attitude(t_us, LEVEL, (0.0, 0.0, 0.0)))
+        is_last = t_us > CONTACT_US - 800_000
+        if t_us == jumps.get("touched_us"):
+            estimator._touched(t_us)
+        if t_us % 20_000 == 0:
+            told, count = (5.0, jumps.get("reset_counter", 0)) if is_last and jumps else (2.0, 0)
+            estimator.hear(Odometry(t_us, (0.0, 0.0, 0.0), (told, 0.0, 0.0), count))
+    found = estimator._velocity(CONTACT_US)
+    assert found is not None
+    assert found[0][0] == pytest.approx(velocity_m_s, abs=0.05)
 
 
 GUARDS = GuardsConfig(travel_m=0.03)
