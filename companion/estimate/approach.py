@@ -50,9 +50,10 @@ BIAS = Slope(0.08, 0.05, 100_000, 1.5)
 # Of the acceleration nothing is known at first but the vehicle's limits, about 0.3 g; that of half a second ago says
 # nothing about now, and 25 velocities are enough.
 LIMITS_M_S2, ALONE_US = 3.0, 500_000
-# A hit that velocities show is told up to 0.3 s later: of four spacings before one is from before it.
+# So many filters are kept, the oldest of 0.4 s ago. The first velocity that shows a hit comes up to 0.17 s after it:
+# velocities are at most 0.13 s apart (see `velocity_jump`) and 0.04 s late.
 LOOKED_BACK = 5
-# The NIS is the mean of so many velocities, 5 s.
+# The NIS is the mean over so many velocities, 5 s: the bias is learnt in seconds.
 JUDGED_BY = 50
 
 

@@ -27,8 +27,8 @@ REST_US = 150_000
 CLIPPING_TOLD_US = 2_100_000
 # A detector that waited for no more than this many samples still knows what the contact did to the present one.
 LATE_SAMPLES = 3
-# Sums kept to look back: the rates' step that a velocity showed was up to 0.12 s ago, at 400 Hz.
-SUMS_KEPT = 64
+# Sums kept to look back: the first velocity that shows a hit comes up to 0.17 s after it (see `approach`), at 400 Hz.
+SUMS_KEPT = 80
 # Of these one is from before a contact, at up to 250 Hz.
 ATTITUDES_KEPT = 16
 # What the detector leaves open or takes for soft is not classified anew.

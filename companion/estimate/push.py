@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from companion.estimate.suppositions import LOOKED_AT_US, Touch
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned, turned
+from companion.motion.strapdown import ZERO
 
 # Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
 CONTIGUOUS = 1.5
@@ -21,7 +22,6 @@ SHORT = 2
 LASTING_SHARE = 1.0 / 3.0
 # What is sent in one loop of the link comes in any order, with time stamps some milliseconds apart.
 LATE_US = 3_000
-NONE: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -45,13 +45,13 @@ class Push:
     told_boot_us: int = 0
     """Of the latest sample or attitude."""
     first_boot_us: int = 0
-    rates_frd_rad_s: Vector3 = NONE
-    first_rates_frd_rad_s: Vector3 = NONE
-    impulse_ned_m_s: Vector3 = NONE
-    unconfirmed_ned_m_s: Vector3 = NONE
+    rates_frd_rad_s: Vector3 = ZERO
+    first_rates_frd_rad_s: Vector3 = ZERO
+    impulse_ned_m_s: Vector3 = ZERO
+    unconfirmed_ned_m_s: Vector3 = ZERO
     shown: list[ImuSample] = field(default_factory=list)
     """Those of the first hundredths of a second, until one may have clipped; all of them where the first one may."""
-    last_ned_m_s2: Vector3 = NONE
+    last_ned_m_s2: Vector3 = ZERO
     peak_m_s2: float = 0.0
     loud_frd_m_s2: list[Vector3] = field(default_factory=list)
     """The contact's force in its loud samples."""
@@ -127,7 +127,7 @@ class Push:
         size_m_s2 = math.hypot(*force_frd_m_s2)
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
-        self.unconfirmed_ned_m_s = (0.0, 0.0, 0.0)
+        self.unconfirmed_ned_m_s = ZERO
         self.loud_frd_m_s2.append(force_frd_m_s2)
         self.loud_boot_us = now_us
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
@@ -148,7 +148,7 @@ class Push:
     @property
     def is_whole(self) -> bool:
         """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
-        x, y, z = max(self.loud_frd_m_s2, key=lambda force: math.hypot(*force), default=NONE)
+        x, y, z = max(self.loud_frd_m_s2, key=lambda force: math.hypot(*force), default=ZERO)
         least = LASTING_SHARE * (x * x + y * y + z * z)
         lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.loud_frd_m_s2)
         return not self.clipped_late and lasting > SHORT

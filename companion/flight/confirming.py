@@ -26,7 +26,7 @@ DECIDED_US = 150_000
 LATE_US = 40_000
 # What the velocity was is taken from as long before; the estimate's own slow errors are the smaller the shorter it is.
 BEFORE_US = DECIDED_US
-# No hit that matters leaves less than this: twice what noise alone departs by now and then.
+# No hit that matters leaves less than this; noise alone departs by 0.1 m/s now and then.
 HIT_LEAVES_M_S = 0.15
 # Three standard deviations: what the velocity cannot tell from its own noise does not speak against a hit.
 SURE = 3.0

@@ -90,8 +90,6 @@ class Recover:
         north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
         a, b, c = safe_to_hold(asked, self._leant.velocity_ned_m_s)
         a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
-        # Once it hangs, until it does not lean on it any more.
-        self._hangs = self._presses(LEANS_M_S2 if self._hangs else HANGS_M_S2)
         falls = self._is_level and self._may_fall and self._hangs
         is_free = falls or (self._is_level and not self._is_known)
         if is_free:
@@ -156,6 +154,8 @@ class Recover:
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.tell(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
+        # Once it hangs, until it does not lean on it any more.
+        self._hangs = self._presses(LEANS_M_S2 if self._hangs else HANGS_M_S2)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._first_hit_us > timeout_s * 1e6:
             record.is_over = True

@@ -33,10 +33,10 @@ def asked(
     attitude: Attitude | None = None,
     is_whole: bool = False,
     told_off: bool = False,
-    leant_deg: float | None = None,
+    leant_deg: tuple[float, ...] = (),
 ) -> Target:
-    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much; before, by another
-    angle."""
+    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much; before, by other
+    angles."""
     mission = Mission.model_validate(MISSION)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
@@ -48,17 +48,15 @@ def asked(
     )
     recover, flight.vehicle.attitude = Recover(flight, 0), attitude
     reckoning.tell(is_whole, HIT_US)
-    reckoning.lean_m_s2 = leans_m_s2(lean_deg)
     sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
     recover.step(flight, Inputs(positions=[sample]), SINCE_US)
     if told_off:
         reckoning.off_m, reckoning._missing_m_s = OFF_M, OFF_M_S
         flight.collisions[0].level_leans_m_s2 = LEVEL_LEANS_M_S2
-    if leant_deg is not None:
-        now, reckoning.lean_m_s2 = reckoning.lean_m_s2, leans_m_s2(leant_deg)
-        recover.target(SINCE_US)
-        reckoning.lean_m_s2 = now
+    for each_deg in (*leant_deg, lean_deg):
+        reckoning.lean_m_s2 = leans_m_s2(each_deg)
+        recover.step(flight, Inputs(), SINCE_US)
     target = recover.target(SINCE_US)
     assert target is not None
     return target
@@ -86,10 +84,11 @@ def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, fa
 
 
 @pytest.mark.parametrize(
-    ("leant_deg", "lean_deg", "hangs"), [(30.0, 15.0, True), (30.0, 5.0, False), (15.0, 19.0, False)]
+    ("leant_deg", "lean_deg", "hangs"),
+    [((30.0,), 15.0, True), ((30.0,), 5.0, False), ((15.0,), 19.0, False), ((30.0, -10.0), 15.0, False)],
 )
-def test_a_vehicle_that_hangs_lets_go_until_it_does_not_lean_on_it_any_more(leant_deg, lean_deg, hangs):
-    target = asked(lean_deg, leant_deg=leant_deg)
+def test_a_vehicle_hangs_until_it_does_not_lean_on_the_obstacle_any_more(leant_deg, lean_deg, hangs):
+    target = asked(lean_deg, is_whole=True, leant_deg=leant_deg)
     assert target.acceleration_ned_m_s2 is not None
     assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is hangs
 
