@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Generic, TypeVar
 
 from companion.core import Core, FlightCore
+from companion.flight.obstacle_map import all_known
 from companion.flight.plan import plan_text
-from companion.flight.remembering import all_known
 from companion.flight.states import State
 from companion.mavlink.decode import Decoder
 from companion.mavlink.encode import Encoder
@@ -89,7 +89,7 @@ class Stepped(ABC, Generic[CoreT]):
     def note(self, kind: str, text: str) -> None:
         """An event of the program around this one, told with the next step's; nothing before the first."""
         if self._core is not None:
-            self._core.flight.tell(self._core.now_us, kind, text)
+            self._core.flight.report(self._core.now_us, kind, text)
 
     def tell_computer(self, computer: ComputerStatus) -> None:
         """Take this computer's load, sent to the ground station with the next step. Nothing is sent before the first

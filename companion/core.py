@@ -17,8 +17,8 @@ from companion.flight.damage import note_motors
 from companion.flight.detecting import collisions, follow_contact
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.machine import Machine, StateMachine
+from companion.flight.obstacle_map import known_surfaces
 from companion.flight.operator import Texts, status_text, values
-from companion.flight.remembering import known_surfaces
 from companion.flight.states import FINAL_STATES, State
 from companion.flight.vehicle_update import landed, note_height, too_low, update_vehicle
 from companion.link.streams import StreamMonitor
@@ -27,7 +27,7 @@ from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outg
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.px4_mode import mode_name
-from companion.reflex.watch import Watch, start_watch
+from companion.reflex.monitor import CollisionMonitor, start_monitor
 from companion.report import CollisionReport, Event, Status
 
 # MAVLink's heartbeat microservice: once a second.
@@ -59,8 +59,8 @@ MachineT = TypeVar("MachineT", bound=StateMachine)
 class Core(ABC, Generic[FlightT, MachineT]):
     """All that is remembered between steps, and what a flight's step and a guard's have in common."""
 
-    def __init__(self, flight: FlightT, machine: MachineT, watch: Watch, now_us: int) -> None:
-        self.flight, self.machine, self.watch = flight, machine, watch
+    def __init__(self, flight: FlightT, machine: MachineT, monitor: CollisionMonitor, now_us: int) -> None:
+        self.flight, self.machine, self.monitor = flight, machine, monitor
         self.started_at_us = self.now_us = now_us
         self._heartbeat_due_us = self._setpoint_due_us = self._values_due_us = now_us
         self.stop_reason: str | None = None
@@ -117,15 +117,15 @@ class Core(ABC, Generic[FlightT, MachineT]):
 
         Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
         """
-        flight, watch = self.flight, self.watch
+        flight, monitor = self.flight, self.monitor
         try:
             samples, refusal = self._hear(samples, now_us)
             note_height(flight)
-            impacts = () if flight.fault else collisions(flight, watch, samples, self.situation(), now_us)
+            impacts = () if flight.fault else collisions(flight, monitor, samples, self.situation(), now_us)
             acks = [sample for sample in samples if isinstance(sample, CommandAck)]
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
-            follow_contact(flight, self.watch)
+            follow_contact(flight, self.monitor)
             note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)
@@ -164,7 +164,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if not flight.vehicle.is_mode_known:
             return
         try:
-            target = self.machine.activity.target(now_us)
+            target = self.machine.handler.target(now_us)
             if target is None:
                 return
             # What leads the way of one that others fly is the vehicle's own place, wherever they fly it.
@@ -202,7 +202,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         if operator.values_hz and now_us >= self._values_due_us and not self.machine.finished:
             self._values_due_us = now_us + round(1e6 / operator.values_hz)
             latest = flight.collisions[-1] if flight.collisions else None
-            flight.outbox += values(self.machine.state, self.watch, latest, hits, now_us - self.started_at_us)
+            flight.outbox += values(self.machine.state, self.monitor, latest, hits, now_us - self.started_at_us)
 
     def next_deadline_us(self) -> int:
         """When the next step is due if nothing arrives."""
@@ -219,7 +219,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             armed=vehicle.armed is True,
             position_ned_m=None if latest is None else latest.position_ned_m,
             speed_m_s=None if latest is None else math.hypot(*latest.velocity_ned_m_s),
-            detector=self.watch.describe(),
+            detector=self.monitor.describe(),
             round_trip_us=self.flight.round_trip.present_us,
         )
 
@@ -232,10 +232,10 @@ class FlightCore(Core[FlightContext, Machine]):
     """Of one flight of a mission."""
 
     def __init__(self, mission: Mission, now_us: int) -> None:
-        watch = start_watch(mission.companion, now_us)
-        streams = StreamMonitor(mission.companion.streams, tuple(watch.detector.losses))
+        monitor = start_monitor(mission.companion, now_us)
+        streams = StreamMonitor(mission.companion.streams, tuple(monitor.detector.losses))
         flight = FlightContext(mission, Vehicle(), streams)
-        super().__init__(flight, Machine(flight, Connect(now_us)), watch, now_us)
+        super().__init__(flight, Machine(flight, Connect(now_us)), monitor, now_us)
 
     @property
     def _is_active(self) -> bool:
@@ -260,7 +260,7 @@ class FlightCore(Core[FlightContext, Machine]):
         jump_m = math.dist(self.resets.shift_ned_m, before)
         if jump_m > 0.0:
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"
-            self.flight.tell(now_us, "estimate", text, jump_m=round(jump_m, 3))
+            self.flight.report(now_us, "estimate", text, jump_m=round(jump_m, 3))
         return super()._hear(samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
@@ -307,8 +307,8 @@ class Limiter:
         if reason != self.limited_by and now_us - self.told_us >= LEAST_BETWEEN_LIMITS_US:
             self.limited_by, self.told_us = reason, now_us
             text = f"setpoint held back: {reason}" if reason else "setpoint free again"
-            flight.tell(now_us, "envelope", text, reason=reason)
+            flight.report(now_us, "envelope", text, reason=reason)
         self.last = target
         # A place that is not asked for is no step from it to the next.
-        self.last_ned_m, self.last_us = None if target.leans_only else target.position_ned_m, now_us
+        self.last_ned_m, self.last_us = None if target.acceleration_only else target.position_ned_m, now_us
         return target

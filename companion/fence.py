@@ -8,7 +8,7 @@ import shapely
 from pydantic import Field, model_validator
 from shapely import LineString, Point, Polygon
 
-from companion.written import NotNegative, Number, PositionNed, Positive, Written
+from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel
 
 NorthEast = tuple[Number, Number]
 
@@ -18,7 +18,7 @@ DEFAULT_RADIUS_M = 15.0
 LEAST_EDGE_M = 0.01
 
 
-class Fence(Written):
+class Fence(StrictModel):
     """A cylinder around the arming position, a polygon of (north, east) corners, or both; with a floor and a top.
 
     The floor is for the flight between take-off and landing.

@@ -298,7 +298,7 @@ class SendCommand(Outgoing):
 class PositionSetpoint(Outgoing):
     """Setpoint in the vehicle's local NED; a None part is left to the vehicle.
 
-    `leans_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
+    `acceleration_only`: north and east are asked for by the acceleration alone, whatever place and velocity are given;
     `is_height_free`: down by velocity and acceleration, whatever height is given.
     """
 
@@ -307,7 +307,7 @@ class PositionSetpoint(Outgoing):
     yaw_rad: float | None
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
-    leans_only: bool = False
+    acceleration_only: bool = False
     is_height_free: bool = False
 
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from companion.estimate.facing import normal_by
-from companion.estimate.push import unit
+from companion.estimate.contact_force import unit
+from companion.estimate.facing import plausible_normal
 from companion.reflex.planner import REST
 
 Arguments = tuple[Any, ...]
@@ -47,7 +47,12 @@ RULES = (
         _DETECTION + "velocity_jump:VelocityJump.step_m_s",
         _says(None),
     ),
-    Rule("hand", "a soft force on a hovering vehicle waits", _DETECTION + "soft:SoftTouch.may_be_hand", _says(False)),
+    Rule(
+        "hand",
+        "a soft force on a hovering vehicle waits",
+        _DETECTION + "soft_contact:SoftContact.may_be_hand",
+        _says(False),
+    ),
     Rule(
         "turning drag",
         "a turning vehicle needs more force for a hit",
@@ -64,15 +69,37 @@ RULES = (
     Rule("pressing", "thrust that lifts nothing is a hit", _VERTICAL + "step", _says(None)),
     Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
-    Rule("attitude by rates", "no clipped attitude", _ESTIMATE + "trust:Trust.is_attitude_right", _says(True)),
-    Rule("trust", "no velocity jump while an estimate swings", _ESTIMATE + "trust:Trust.is_trusted", _says(True)),
-    Rule("agreed normal", "the normal by the change of velocity", _FLIGHT + "recovering:agreed_normal", _argument(0)),
-    Rule("half way", "the first normal half way to the way back", _REFLEX + "reckoning:half_way", _argument(0)),
-    Rule("comes after", "what comes after the vehicle is behind it", _FLIGHT + "recovering:_comes_after", _says(None)),
+    Rule(
+        "attitude by rates",
+        "no clipped attitude",
+        _ESTIMATE + "validity:VelocityValidity.is_attitude_valid",
+        _says(True),
+    ),
+    Rule(
+        "trust",
+        "no velocity jump while an estimate swings",
+        _ESTIMATE + "validity:VelocityValidity.is_valid",
+        _says(True),
+    ),
+    Rule(
+        "agreed normal", "the normal by the change of velocity", _FLIGHT + "recovering:consistent_normal", _argument(0)
+    ),
+    Rule(
+        "half way",
+        "the first normal half way to the way back",
+        _REFLEX + "motion_estimator:blended_normal",
+        _argument(0),
+    ),
+    Rule(
+        "comes after",
+        "what comes after the vehicle is behind it",
+        _FLIGHT + "recovering:_struck_from_behind",
+        _says(None),
+    ),
     Rule(
         "pressing on",
         "accelerations alone for one that leans on",
-        _FLIGHT + "recovering:Recover._presses",
+        _FLIGHT + "recovering:Recover._tilts_into_surface",
         _says(False),
     ),
     Rule("kept off", "no acceleration into what is near", _REFLEX + "planner:kept_off", _argument(0)),
@@ -81,25 +108,25 @@ RULES = (
     Rule(
         "known rest",
         "what is missing still is known and asked for",
-        _REFLEX + "reckoning:Bank.off",
+        _REFLEX + "motion_estimator:FilterBank.errors",
         _says((REST, REST)),
     ),
     Rule(
         "velocity by places",
         "no velocity that the places deny",
-        _REFLEX + "reckoning:_beside",
+        _REFLEX + "motion_estimator:_rate_error",
         _says(REST),
     ),
     Rule("spinning", "gentle steering while it spins", _FLIGHT + "recovering:Recover._is_spinning", _says(False)),
-    Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:normal_by", _argument(1)),
+    Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:plausible_normal", _argument(1)),
     Rule(
         "blurred push",
         "the last normal half way to the way back",
-        _ESTIMATE + "facing:whole_normal",
-        lambda arguments, found: normal_by(
+        _ESTIMATE + "facing:final_normal",
+        lambda arguments, found: plausible_normal(
             arguments[0], arguments[1] or unit(arguments[0].impulse_ned_m_s), arguments[2]
         ),
     ),
-    Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "remembering:remembered_surfaces", _says([])),
-    Rule("climb", "brakes a climb", _REFLEX + "planner:height_held", _says(0.0)),
+    Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "obstacle_map:remembered_surfaces", _says([])),
+    Rule("climb", "brakes a climb", _REFLEX + "planner:height_feedback", _says(0.0)),
 )

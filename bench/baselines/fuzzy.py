@@ -34,7 +34,7 @@ from companion.detection.interface import DetectorState, Impact, Situation
 from companion.messages import Attitude, ImuSample, MessageId, Quaternion, Sample, Vector3
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import GRAVITY_M_S2, LEVEL
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 # Trapezoids: where each begins to rise, is whole, begins to fall, is nothing again.
 SETS: dict[str, tuple[float, float, float, float]] = {
@@ -85,7 +85,7 @@ OUTPUTS = 201
 MOST = {"A": 10.0, "I": 90.0, "G": 180.0, "W": 15.0}
 
 
-class FuzzyConfig(Written):
+class FuzzyConfig(StrictModel):
     """Settings of the detector `fuzzy`, as in its authors' program."""
 
     threshold_m_s2: Positive = 9.81

@@ -29,10 +29,10 @@ from companion.detection.interface import DetectorState, Impact, Situation
 from companion.detection.thrust import ThrustGain
 from companion.messages import AttitudeTarget, ImuSample, MessageId, Sample, Vector3
 from companion.motion.strapdown import ZERO
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 
-class HybridConfig(Written):
+class HybridConfig(StrictModel):
     """Settings of the detector `hybrid`."""
 
     # Wind and the thrust's lag of 20 ms make up to 4 m/s^2 on a vehicle that manoeuvres.
@@ -74,7 +74,7 @@ class HybridDetector:
 
     def step(self, state: HybridState, sample: Sample, situation: Situation) -> tuple[HybridState, Impact | None]:
         if isinstance(sample, AttitudeTarget):
-            state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
+            state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         if not isinstance(sample, ImuSample):
             return state, None
         now_us, before_us = sample.time_boot_us, state.last_sample_boot_us

@@ -16,11 +16,11 @@ from typing import ClassVar
 from bench.baselines.noise import NoiseFloor
 from companion.detection.interface import DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample, Vector3
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 from rebound_cli.logs.shaking import MEMORY_US
 
 
-class LateralConfig(Written):
+class LateralConfig(StrictModel):
     """Settings of the detector `lateral`."""
 
     # Above the noise of a quiet vehicle: the simulated HIGHRES_IMU's 0.25 m/s^2 RMS per axis stays below 1.5 at

@@ -36,7 +36,7 @@ from companion.messages import (
 )
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import GRAVITY_M_S2, LEVEL, ZERO
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 # Drag changes within a second; the model's error in seconds.
 MEAN_MEMORY_S = 1.0
@@ -44,7 +44,7 @@ MEAN_MEMORY_S = 1.0
 LONGEST_STEP_S = 0.25
 
 
-class MomentumConfig(Written):
+class MomentumConfig(StrictModel):
     """Settings of the detector `momentum`."""
 
     # A velocity that is wrong by 0.03 m/s makes K times that, 0.6 m/s^2; manoeuvres with a thrust that is told 20 ms
@@ -89,7 +89,7 @@ class MomentumDetector:
             case Attitude():
                 state.attitude_wxyz = sample.attitude_wxyz
             case AttitudeTarget():
-                state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
+                state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
             case LocalPosition():
                 return state, self._observe(state, sample, situation)
             case _:

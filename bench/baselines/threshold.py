@@ -20,10 +20,10 @@ from bench.baselines.contact import judge
 from companion.detection.interface import DetectorState, Impact, Situation
 from companion.messages import ImuSample, MessageId, Sample, Vector3
 from companion.motion.strapdown import GRAVITY_M_S2, ZERO
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 
-class ThresholdConfig(Written):
+class ThresholdConfig(StrictModel):
     """Settings of the detector `threshold`, as in its authors' program."""
 
     threshold_m_s2: Positive = 20.0

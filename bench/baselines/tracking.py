@@ -24,7 +24,7 @@ from companion.detection.interface import DetectorState, Impact, Situation
 from companion.messages import Attitude, LocalPosition, MessageId, Quaternion, Sample
 from companion.motion.rotation import ned_to_body
 from companion.motion.strapdown import LEVEL
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 # The lag follows the speed within a second; velocities before that belong to another part of the path.
 MEAN_MEMORY_S = 1.0
@@ -32,7 +32,7 @@ MEAN_MEMORY_S = 1.0
 JUMP_M = 0.5
 
 
-class TrackingConfig(Written):
+class TrackingConfig(StrictModel):
     """Settings of the detector `tracking`."""
 
     # PX4 follows a setpoint that speeds up by 2 m/s^2 to 0.2 m; a good position is good to 0.01 m.

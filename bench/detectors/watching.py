@@ -12,7 +12,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.link.streams import wanted_streams
 from companion.messages import MessageId
 from companion.mission.config import CompanionConfig
-from companion.reflex.watch import advance, start_watch
+from companion.reflex.monitor import advance, start_monitor
 
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.
 ASKED_HZ = {50: 50.0, 100: 100.0, 246: 250.0}
@@ -86,12 +86,12 @@ def watch_all(
     config: CompanionConfig, heard: Sequence[HeardStep], situations: Sequence[Situation]
 ) -> tuple[list[Found], list[ImpactEstimate], int]:
     """Collisions reported, touches that were reported as none, and how often the detector said it was blind."""
-    watch = start_watch(config, heard[0].time_boot_us)
+    monitor = start_monitor(config, heard[0].time_boot_us)
     found: list[Found] = []
     touches: list[ImpactEstimate] = []
     blind = 0
     for step in heard:
-        seen = advance(watch, step.samples, situations[step.index], step.time_boot_us)
+        seen = advance(monitor, step.samples, situations[step.index], step.time_boot_us)
         for estimate in seen.impacts:
             if estimate.impact.is_collision:
                 found.append(Found(step.time_boot_us, estimate, estimate))
@@ -102,6 +102,6 @@ def watch_all(
                 if entry.first.impact is final.impact:
                     entry.final = final
         blind += sum("blind" in notice.text for notice in seen.notices)
-    if found and watch.estimate is not None and watch.estimate.impact is found[-1].first.impact:
-        found[-1].final = watch.estimate
+    if found and monitor.estimate is not None and monitor.estimate.impact is found[-1].first.impact:
+        found[-1].final = monitor.estimate
     return found, touches, blind

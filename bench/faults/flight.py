@@ -55,7 +55,7 @@ STANDS_M = 0.03
 TO_THE_GROUND = 1
 # A flight decided again costs as much as flown: only the first of each row is.
 DECIDED_AGAIN = 1
-HIDDEN_SHARE = 0.001
+CLIPPED_PART = 0.001
 
 
 class Noting(FlightRecorder):
@@ -306,7 +306,7 @@ class _Flight:
             late_s = self.killed_at_s - (stamps[-1] - EPOCH_US) * 1e-6
             return [f"log lost: the last {late_s:.1f} s"] if late_s > 0.6 else []
         # Noise that looks like a header may hide the packet after it from who reads the file.
-        if abs(len(stamps) - self.recorder.counted) > self.recorder.counted * HIDDEN_SHARE:
+        if abs(len(stamps) - self.recorder.counted) > self.recorder.counted * CLIPPED_PART:
             return [f"log lost: {self.recorder.counted - len(stamps)} of {self.recorder.counted} packets"]
         if self.number < DECIDED_AGAIN and not self.fault_text and self._is_reproducible():
             difference = reproduce(read_recording(self.recorder.folder)).first_difference

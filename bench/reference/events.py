@@ -82,7 +82,7 @@ def data_keys() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for path in sorted((ROOT / "companion").rglob("*.py")):
         for call in _calls(ast.parse(path.read_text(encoding="utf-8"))):
-            at = {"tell": 1, "Notice": 0}[_name(call)]
+            at = {"report": 1, "Notice": 0}[_name(call)]
             kind = call.args[at] if len(call.args) > at else None
             if isinstance(kind, ast.Constant) and isinstance(kind.value, str):
                 keys = found.setdefault(kind.value, [])
@@ -92,7 +92,7 @@ def data_keys() -> dict[str, list[str]]:
 
 def _calls(tree: ast.AST) -> Iterator[ast.Call]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and _name(node) in ("tell", "Notice"):
+        if isinstance(node, ast.Call) and _name(node) in ("report", "Notice"):
             yield node
 
 

@@ -19,12 +19,12 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from companion.detection.classify import kind_of
-from companion.detection.floor import SETTLED_US
+from companion.detection.force_noise import SETTLED_US
 from companion.detection.force_signs import CLEAR, pushes_on, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.detection.sight import BLIND_M_S2
+from companion.detection.stream_health import MOST_THRESHOLD_M_S2
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.rotation import body_to_ned, ned_to_body
@@ -71,7 +71,7 @@ class FusedDetector:
         if isinstance(sample, LocalPosition | Odometry):
             return state, self._velocity(state, sample, situation)
         if isinstance(sample, AttitudeTarget):
-            state.thrust.tell(sample.time_boot_us, sample.thrust_fraction)
+            state.thrust.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         return state, None
 
     # --- force ------------------------------------------------------------------------------------------------
@@ -168,7 +168,7 @@ class FusedDetector:
             kind = ImpactKind.CONTACT
         elif is_doubtful:
             is_first = soft.looked_at_us(now_us, free_until_us) == 0
-            if is_first or s.threshold_m_s2 > BLIND_M_S2 or not pushes_on(s, force):
+            if is_first or s.threshold_m_s2 > MOST_THRESHOLD_M_S2 or not pushes_on(s, force):
                 return None
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
@@ -206,7 +206,7 @@ class FusedDetector:
         if inertial is None or not inertial.has_new_fix:
             return None
         step = jump.step_m_s(inertial.fixes)
-        rests = time_us - s.last_loud_boot_us < self._rest_us or not situation.estimate_trusted
+        rests = time_us - s.last_loud_boot_us < self._rest_us or not situation.estimate_valid
         if s.phase is Phase.CONTACT or rests:
             jump.since_us = time_us
             return None
@@ -224,7 +224,7 @@ class FusedDetector:
         force = ned_to_body(inertial.strapdown.attitude_wxyz, push)
         s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
         confidence = min(1.0, 0.5 * size / least)
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.AFTERMATH, confidence)
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, confidence)
 
     def _least_jump_m_s(self, s: FusedState, time_us: int, spread_m_s: float, counts_resets: bool) -> float:
         """What a jump must reach; more where the velocity may jump by itself."""

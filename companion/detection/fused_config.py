@@ -1,9 +1,9 @@
 """Settings of the detector `fused`, each with its reason."""
 
-from companion.written import NotNegative, Positive, Written
+from companion.strict_model import NotNegative, Positive, StrictModel
 
 
-class FusedConfig(Written):
+class FusedConfig(StrictModel):
     """Settings of the detector `fused`."""
 
     retired = frozenset(

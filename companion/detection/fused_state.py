@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from companion.detection.floor import Floor
+from companion.detection.force_noise import ForceNoise
 from companion.detection.interface import DetectorState
-from companion.detection.soft import SoftTouch
+from companion.detection.soft_contact import SoftContact
 from companion.detection.thrust import ThrustGain
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Vector3
@@ -14,7 +14,7 @@ from companion.messages import Vector3
 class FusedState(DetectorState):
     """Changed in place by `FusedDetector.step`."""
 
-    floor: Floor = field(default_factory=Floor)
+    floor: ForceNoise = field(default_factory=ForceNoise)
     thrust: ThrustGain = field(default_factory=ThrustGain)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
@@ -22,4 +22,4 @@ class FusedState(DetectorState):
     contact_began_boot_us: int = 0
     hit_boot_us: int | None = None
     """Of the latest impact that was no hand's."""
-    soft: SoftTouch = field(default_factory=SoftTouch)
+    soft: SoftContact = field(default_factory=SoftContact)

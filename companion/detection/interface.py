@@ -43,7 +43,7 @@ class Evidence(Enum):
     """By what an impact was found."""
 
     FORCE = "force"  # a sample's averaging window held the contact's own force
-    AFTERMATH = "aftermath"  # the contact fell between the samples; what followed it showed
+    VELOCITY_JUMP = "aftermath"  # the contact fell between the samples; what followed it showed
 
 
 class Situation(NamedTuple):
@@ -51,7 +51,7 @@ class Situation(NamedTuple):
 
     `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
     one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
-    to, so that touching it is no surprise. The watch fills in the last two. `estimate_trusted`: False while the
+    to, so that touching it is no surprise. The watch fills in the last two. `estimate_valid`: False while the
     vehicle's velocity cannot be believed, because its accelerometer did not show the whole of a hit. `inertial` has
     heard the sample already.
     """
@@ -62,7 +62,7 @@ class Situation(NamedTuple):
     height_m: float | None = None
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
-    estimate_trusted: bool = True
+    estimate_valid: bool = True
     inertial: Inertial | None = None
 
     @property

@@ -12,7 +12,7 @@ LEAST_FRACTION = 0.1
 # The thrust asked for is what the motors make a few of their lags (20 ms) later; older than this it is history.
 KEPT_US = 300_000
 # A gain is trusted when it was learnt over this long in the air.
-TRUSTED_S = 0.5
+LEAST_LEARNT_S = 0.5
 # Between two messages 20 to 50 ms apart the thrust asked for changes by no more than this share of the greatest.
 CHANGE = 0.3
 # Batteries, ground effect and a mean that is not yet settled: the gain is good to this.
@@ -24,16 +24,16 @@ class ThrustGain:
     """Specific force at full thrust, learnt as -f_z over the thrust asked for. Changed only by its methods."""
 
     fraction: float = 0.0
-    told_boot_us: int = -KEPT_US
+    fraction_boot_us: int = -KEPT_US
     full_m_s2: float = 0.0
     known_s: float = 0.0
 
-    def tell(self, time_us: int, fraction: float) -> None:
-        self.fraction, self.told_boot_us = fraction, time_us
+    def set_fraction(self, time_us: int, fraction: float) -> None:
+        self.fraction, self.fraction_boot_us = fraction, time_us
 
     def learn(self, time_us: int, f_z: float, elapsed_s: float) -> None:
         """Take the z axis of one sample of a vehicle in the air that nothing touches."""
-        if self.fraction < LEAST_FRACTION or time_us - self.told_boot_us > KEPT_US:
+        if self.fraction < LEAST_FRACTION or time_us - self.fraction_boot_us > KEPT_US:
             return
         known_s = self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
         if known_s > 0.0:
@@ -41,12 +41,12 @@ class ThrustGain:
 
     def most_m_s2(self, time_us: int) -> float:
         """The hardest push up that thrust can explain now."""
-        if self.known_s < TRUSTED_S or time_us - self.told_boot_us > KEPT_US:
+        if self.known_s < LEAST_LEARNT_S or time_us - self.fraction_boot_us > KEPT_US:
             return STRONGEST_M_S2
         return MARGIN * self.full_m_s2 * min(1.0, self.fraction + CHANGE)
 
     def expected_m_s2(self, time_us: int, mean_m_s2: float) -> float:
         """f_z of a vehicle that nothing touches: by the thrust asked for, else its recent mean."""
-        if self.known_s < TRUSTED_S or time_us - self.told_boot_us > KEPT_US:
+        if self.known_s < LEAST_LEARNT_S or time_us - self.fraction_boot_us > KEPT_US:
             return mean_m_s2
         return -self.full_m_s2 * self.fraction

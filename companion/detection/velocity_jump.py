@@ -24,7 +24,7 @@ LONGEST_STEP_US = 75_000
 # 10 Hz with the jitter of a log; further apart they are no measure.
 LONGEST_SLOW_STEP_US = 130_000
 # A spread of fewer steps than this is a guess: two thirds of a second at 30 Hz.
-TRUSTED = 20
+LEAST_STEPS = 20
 # Steps that the spread remembers, and that a rising one does: 3 s and a third of a second at 30 Hz.
 MEMORY, RISE = 100, 10
 # Of each sample in the share of the time that is not seen: ten samples are half a second at the slowest useful rate.
@@ -124,7 +124,7 @@ class VelocityJump:
     @property
     def spread_m_s(self) -> float:
         """Of a quiet vehicle's steps, each axis; without bound until enough are known."""
-        return math.sqrt(self.variance_m2_s2) if self.known >= TRUSTED else math.inf
+        return math.sqrt(self.variance_m2_s2) if self.known >= LEAST_STEPS else math.inf
 
     def unseen_m_s(self, shaking_m_s2: float, thrust_change_m_s2: float) -> float:
         """What vibration of this spread may add to the velocity without the samples showing it, and by how much a

@@ -4,10 +4,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from companion.written import NotNegative, Positive, Written
+from companion.strict_model import NotNegative, Positive, StrictModel
 
 
-class GuardsConfig(Written):
+class GuardsConfig(StrictModel):
     """Where the vehicle's guards are and how a push turns it: from the direction of a push and the turning it makes
     follows where the vehicle was touched. The defaults are the paper's vehicle, arms out and without their springs."""
 
@@ -27,7 +27,7 @@ class GuardsConfig(Written):
     """Radii of gyration about body x, y, z: roots of inertia over mass, 0.0034, 0.0034, 0.0053 kg m^2 for 1.112 kg."""
 
 
-class EstimateConfig(Written):
+class EstimateConfig(StrictModel):
     """Numbers of the estimate of a collision."""
 
     inertial: bool = True

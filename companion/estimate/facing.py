@@ -2,7 +2,7 @@
 
 import math
 
-from companion.estimate.push import Push, unit
+from companion.estimate.contact_force import ContactForce, unit
 from companion.messages import Vector3
 
 # An obstacle's own motion may come from any side; a vehicle faster than this ran into it.
@@ -14,28 +14,28 @@ GLANCING = 0.26
 FAINT_M_S2 = 3.0
 
 
-def whole_normal(push: Push, found_ned: Vector3 | None, velocity_ned_m_s: Vector3) -> Vector3:
+def final_normal(contact: ContactForce, found_ned: Vector3 | None, velocity_ned_m_s: Vector3) -> Vector3:
     """When the contact is over: as a search found it or it pushed; half way to the way back where that is blurred."""
-    normal, back = found_ned or unit(push.impulse_ned_m_s), _back(velocity_ned_m_s)
-    if not push.is_blurred or _is_along(normal, back):
-        return normal_by(push, normal, velocity_ned_m_s)
+    normal, back = found_ned or unit(contact.impulse_ned_m_s), _opposite(velocity_ned_m_s)
+    if not contact.is_blurred or _is_grazing(normal, back):
+        return plausible_normal(contact, normal, velocity_ned_m_s)
     return unit((normal[0] + back[0], normal[1] + back[1], normal[2] + back[2]))
 
 
-def normal_by(push: Push | None, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+def plausible_normal(contact: ContactForce | None, normal_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
     """The normal; the way back where a push went along the obstacle that clipped, each axis by itself, or that fell
     between the samples."""
-    back = _back(velocity_ned_m_s)
-    is_lost = push is None or push.clipped or push.peak_m_s2 < FAINT_M_S2
-    return back if is_lost and _is_along(normal_ned, back) else normal_ned
+    back = _opposite(velocity_ned_m_s)
+    is_lost = contact is None or contact.clipped or contact.peak_m_s2 < FAINT_M_S2
+    return back if is_lost and _is_grazing(normal_ned, back) else normal_ned
 
 
-def _back(velocity_ned_m_s: Vector3) -> Vector3:
+def _opposite(velocity_ned_m_s: Vector3) -> Vector3:
     """Where the vehicle came from, which is known to be free; zero for one that hardly moved."""
     v = velocity_ned_m_s
     return unit((-v[0], -v[1], -v[2])) if math.hypot(*v) > APPROACH_M_S else (0.0, 0.0, 0.0)
 
 
-def _is_along(normal_ned: Vector3, back_ned: Vector3) -> bool:
+def _is_grazing(normal_ned: Vector3, back_ned: Vector3) -> bool:
     """Whether a vehicle that came from there would have met an obstacle with that normal along its surface."""
     return back_ned != (0.0, 0.0, 0.0) and sum(n * b for n, b in zip(normal_ned, back_ned, strict=True)) < GLANCING

@@ -209,7 +209,7 @@ def _pushed(
 
 @_compiled
 def _follow(
-    trial: Floats,
+    hypothesis: Floats,
     axes: Floats,
     obstacle: int,
     velocity: Floats,
@@ -222,21 +222,24 @@ def _follow(
     attitudes: Floats,
 ) -> int:
     """Sums (steps, 6) of specific force and rates, body FRD, and attitudes (steps, 4) from the touch on; how many."""
-    across = axes[0] + math.tan(trial[TILT]) * axes[1] + math.tan(trial[ACROSS]) * axes[2]
+    across = axes[0] + math.tan(hypothesis[TILT]) * axes[1] + math.tan(hypothesis[ACROSS]) * axes[2]
     across = across / math.sqrt((across * across).sum())
     normal = (across[0], across[1], across[2])
-    holds = (min(max(trial[FRICTION], 0.0), MOST_FRICTION), math.exp(trial[STIFFNESS]))
-    radius = 0.0 if obstacle == FLAT else math.exp(trial[RADIUS])
+    holds = (min(max(hypothesis[FRICTION], 0.0), MOST_FRICTION), math.exp(hypothesis[STIFFNESS]))
+    radius = 0.0 if obstacle == FLAT else math.exp(hypothesis[RADIUS])
     before = (rates[0], rates[1], rates[2])
-    thrust, braking = (free[0], free[1], free[2]), (trial[BRAKING], trial[BRAKING], YAW_SHARE * trial[BRAKING])
+    thrust, braking = (
+        (free[0], free[1], free[2]),
+        (hypothesis[BRAKING], hypothesis[BRAKING], YAW_SHARE * hypothesis[BRAKING]),
+    )
     place, w, motors = (0.0, 0.0, 0.0), before, (0.0, 0.0, 0.0)
-    v = (velocity[0] + trial[ERROR], velocity[1] + trial[ERROR + 1], velocity[2] + trial[ERROR + 2])
-    q = _turned((attitude[0], attitude[1], attitude[2], attitude[3]), before, trial[TOUCH])
+    v = (velocity[0] + hypothesis[ERROR], velocity[1] + hypothesis[ERROR + 1], velocity[2] + hypothesis[ERROR + 2])
+    q = _turned((attitude[0], attitude[1], attitude[2], attitude[3]), before, hypothesis[TOUCH])
     r = _frame(q)
     far, axis = _first_reach(obstacle, normal, r, shape, radius)
     surface = (axis, radius - far)
     inertia = (shape[6] * shape[6], shape[7] * shape[7], shape[8] * shape[8])
-    steps: int = min(int((times[-1] - trial[TOUCH]) / STEP_S) + 2, sums.shape[0] - 1)
+    steps: int = min(int((times[-1] - hypothesis[TOUCH]) / STEP_S) + 2, sums.shape[0] - 1)
     sums[0] = 0.0
     attitudes[0, 0], attitudes[0, 1], attitudes[0, 2], attitudes[0, 3] = q
     for step in range(steps):
@@ -277,8 +280,8 @@ def _summed(sums: Floats, at: float, entry: int, before: float) -> float:
 
 
 @_compiled
-def misfits(
-    trials: Floats,
+def weighted_residuals(
+    hypotheses: Floats,
     axes: Floats,
     obstacles: Ints,
     velocity: Floats,
@@ -293,34 +296,44 @@ def misfits(
 ) -> Floats:
     """Each supposition less what was measured, in standard deviations: (n, 6 measurements).
 
-    `trials` (n, 11); `axes` (n, 3, 3): the normal without tilt and the two ways it tilts, NED; `obstacles` (n,): FLAT
-    or the guard that met a round. `velocity` is v_c NED, `attitude`, body `rates` and specific force `free` those of
-    before the touch, carried on to time 0. `times` (k,) s, ascending; `measured` (k, 6): specific force and rates,
-    means, or the attitude (4) where `is_attitude`; `spread` (k, 2): of forces and rates, or of the attitude. `shape`: a
-    guard's place, radius, height, stiffness, damping and travel, and the radii of gyration.
+    `hypotheses` (n, 11); `axes` (n, 3, 3): the normal without tilt and its two directions of tilt, NED; `obstacles`
+    (n,): FLAT or the guard that met a round. `velocity` is v_c NED, `attitude`, body `rates` and specific force `free`
+    those of before the touch, carried on to time 0. `times` (k,) s, ascending; `measured` (k, 6): specific force and
+    rates, means, or the attitude (4) where `is_attitude`; `spread` (k, 2): of forces and rates, or of the attitude.
+    `shape`: a guard's place, radius, height, stiffness, damping and travel, and the radii of gyration.
     """
-    count, known = trials.shape[0], times.shape[0]
+    count, known = hypotheses.shape[0], times.shape[0]
     out = np.zeros((count, MEASURED * known))
-    most = int((times[-1] - trials[:, TOUCH].min()) / STEP_S) + 4
+    most = int((times[-1] - hypotheses[:, TOUCH].min()) / STEP_S) + 4
     sums, attitudes = np.zeros((most, 6)), np.zeros((most, 4))
-    for trial in range(count):
+    for hypothesis in range(count):
         steps = _follow(
-            trials[trial], axes[trial], obstacles[trial], velocity, attitude, rates, free, times, shape, sums, attitudes
+            hypotheses[hypothesis],
+            axes[hypothesis],
+            obstacles[hypothesis],
+            velocity,
+            attitude,
+            rates,
+            free,
+            times,
+            shape,
+            sums,
+            attitudes,
         )
         for k in range(known):
-            at, first = (times[k] - trials[trial, TOUCH]) / STEP_S, MEASURED * k
+            at, first = (times[k] - hypotheses[hypothesis, TOUCH]) / STEP_S, MEASURED * k
             at = min(at, float(steps))
             if is_attitude[k]:
                 q = attitudes[round(max(at, 0.0))]
                 a, b, c, d = measured[k, 0], measured[k, 1], measured[k, 2], measured[k, 3]
                 sign = 2.0 / spread[k, 0] * (1.0 if a * q[0] + b * q[1] + c * q[2] + d * q[3] > 0.0 else -1.0)
-                out[trial, first] = sign * (a * q[1] - b * q[0] - c * q[3] + d * q[2])
-                out[trial, first + 1] = sign * (a * q[2] - c * q[0] - d * q[1] + b * q[3])
-                out[trial, first + 2] = sign * (a * q[3] - d * q[0] - b * q[2] + c * q[1])
+                out[hypothesis, first] = sign * (a * q[1] - b * q[0] - c * q[3] + d * q[2])
+                out[hypothesis, first + 1] = sign * (a * q[2] - c * q[0] - d * q[1] + b * q[3])
+                out[hypothesis, first + 2] = sign * (a * q[3] - d * q[0] - b * q[2] + c * q[1])
                 continue
-            over = trials[trial, AVERAGING] / STEP_S
+            over = hypotheses[hypothesis, AVERAGING] / STEP_S
             for j in range(6):
                 before = free[j] if j < 3 else rates[j - 3]
                 mean = (_summed(sums, at, j, before) - _summed(sums, at - over, j, before)) / over
-                out[trial, first + j] = (mean - measured[k, j]) / spread[k, 0 if j < 3 else 1]
+                out[hypothesis, first + j] = (mean - measured[k, j]) / spread[k, 0 if j < 3 else 1]
     return out

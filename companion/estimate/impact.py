@@ -9,10 +9,10 @@ from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.estimate.approach import ALONE_US, Approach, position_at, velocity_alone
 from companion.estimate.config import EstimateConfig
-from companion.estimate.facing import normal_by, whole_normal
-from companion.estimate.normal import IS_AVAILABLE, Search, begin, further
-from companion.estimate.push import Push, unit
-from companion.estimate.trust import Trust
+from companion.estimate.contact_force import ContactForce, unit
+from companion.estimate.facing import final_normal, plausible_normal
+from companion.estimate.normal import IS_AVAILABLE, Search, advance_search, begin_search
+from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
 from companion.motion.inertial import Inertial, VelocityFix
@@ -73,14 +73,14 @@ class ImpactEstimator:
     inertial: Inertial = field(default_factory=Inertial)
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
-    trust: Trust = field(default_factory=Trust)
+    validity: VelocityValidity = field(default_factory=VelocityValidity)
     approach: Approach = field(init=False)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
-    push: Push | None = None
+    contact: ContactForce | None = None
     search: Search | None = None
-    seek: Callable[[Search], Search] = further  # what takes the search on with each message
+    run_search: Callable[[Search], Search] = advance_search  # what takes the search on with each message
     is_over: bool = False
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
@@ -94,13 +94,13 @@ class ImpactEstimator:
         """Whether a touch is fitted for its normal: where arms fold, and the extra [fit] is installed."""
         return self.config.fits_arms and IS_AVAILABLE
 
-    def hear(self, sample: Sample) -> None:
+    def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
         if isinstance(sample, ImuSample):
             now_us, strapdown = sample.time_boot_us, self.inertial.strapdown
             if not self.inertial.imu(sample):
                 self.sums.clear()
-            self.trust.age(now_us)
+            self.validity.age(now_us)
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
             self.earlier_imu, self.imu = self.imu, sample
         elif isinstance(sample, LocalPosition | Odometry):
@@ -108,19 +108,19 @@ class ImpactEstimator:
                 self.history.add(sample)
             self.inertial.velocity(sample)
             if self.inertial.has_new_fix:
-                self.trust.hear(self.inertial.fixes, self.inertial.strapdown.level_leans_m_s2)
+                self.validity.update(self.inertial.fixes, self.inertial.strapdown.level_acceleration_m_s2)
                 self._approach(self.inertial.fixes)
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
-            self.inertial.attitude(sample, self.trust.is_attitude_right(sample.time_boot_us))
+            self.inertial.attitude(sample, self.validity.is_attitude_valid(sample.time_boot_us))
             self.attitudes.append(sample)
-            if self.push is not None:
-                self.push.hear(sample)
+            if self.contact is not None:
+                self.contact.update(sample)
         else:
             return
-        if self.push is not None:
-            self._seek(self.push)
+        if self.contact is not None:
+            self._advance_search(self.contact)
 
     def _approach(self, fixes: Sequence[VelocityFix]) -> None:
         """The newest velocity, unless the latest contact's swing may be in it. After a jump the first begins anew."""
@@ -129,29 +129,29 @@ class ImpactEstimator:
         if self.contact_ended_boot_us is None or fixes[-1].time_boot_us > self.contact_ended_boot_us + REST_US:
             self.approach.take(fixes[-1])
 
-    def _touched(self, boot_us: int) -> None:
+    def _note_contact(self, boot_us: int) -> None:
         """The contact lasts: v_c of a next one is found from what follows."""
         if boot_us != self.contact_ended_boot_us:
             self.contact_ended_boot_us, self.approach = boot_us, Approach(self.config)
 
-    def _seek(self, push: Push) -> None:
+    def _advance_search(self, contact: ContactForce) -> None:
         """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
         estimate, search, config = self.estimate, self.search, self.config
         if estimate is None or not self.fits_normal:
             return
         if search is None:
-            if push.is_heard or self.is_over:
+            if contact.is_complete or self.is_over:
                 velocity, averaging_s = estimate.velocity_ned_m_s, config.imu_averaging_interval_s
-                self.search = begin(push.touch, velocity, config.guards, averaging_s)
+                self.search = begin_search(contact.touch, velocity, config.guards, averaging_s)
         elif not search.is_over:
-            self.search = self.seek(search)
+            self.search = self.run_search(search)
             if self.search.is_over:
-                self.estimate = replace(estimate, normal_ned=self._normal(push, estimate.velocity_ned_m_s))
+                self.estimate = replace(estimate, normal_ned=self._normal(contact, estimate.velocity_ned_m_s))
 
     @property
-    def _seeks(self) -> bool:
+    def _is_searching(self) -> bool:
         """Whether the normal is still to come."""
-        is_wanted = self.push is not None and self.fits_normal
+        is_wanted = self.contact is not None and self.fits_normal
         return is_wanted and (self.search is None or not self.search.is_over)
 
     def _clipped(self, sample: Vibration) -> None:
@@ -171,10 +171,10 @@ class ImpactEstimator:
         force_ned = body_to_ned(self.inertial.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
-        self.push = self._begin_push(impact) if impact.evidence is Evidence.FORCE else None
+        self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
         self.search, self.is_over = None, False
-        self._touched(sample_us)
-        self.trust.doubt(sample_us)
+        self._note_contact(sample_us)
+        self.validity.invalidate(sample_us)
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
             time_boot_us=(free_until_us + sample_us) // 2,
@@ -182,7 +182,7 @@ class ImpactEstimator:
             position_ned_m=place,
             velocity_ned_m_s=velocity,
             velocity_error_m_s=error_m_s,
-            normal_ned=normal_by(self.push, unit(force_ned), velocity),
+            normal_ned=plausible_normal(self.contact, unit(force_ned), velocity),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
@@ -194,7 +194,7 @@ class ImpactEstimator:
         )
         return estimate
 
-    def _begin_push(self, impact: Impact) -> Push | None:
+    def _begin_contact_force(self, impact: Impact) -> ContactForce | None:
         """The contact's course, its first sample taken; None for one that was reported late, its course unseen."""
         sample = self.imu
         if sample is None or len(self.sums) < 2:
@@ -205,7 +205,7 @@ class ImpactEstimator:
             return None
         f, force, w = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
         behind_s = (sample.time_boot_us - self.inertial.strapdown.attitude_boot_us) * 1e-6
-        push = Push(
+        contact = ContactForce(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
             attitude_wxyz=turned(self.inertial.strapdown.attitude_wxyz, w, behind_s if abs(behind_s) < 0.1 else 0.0),
             averaging_us=averaging_us,
@@ -214,62 +214,62 @@ class ImpactEstimator:
             earlier=self.earlier_imu,
             attitudes=list(self.attitudes),
         )
-        push.add(sample, True)
-        return push
+        contact.add(sample, True)
+        return contact
 
     def follow(self, state: DetectorState) -> ImpactEstimate | None:
         """After each IMU sample: its share in the present contact; once, the final estimate, when that is over and the
         normal has been found."""
-        estimate, push, sample = self.estimate, self.push, self.imu
+        estimate, contact, sample = self.estimate, self.contact, self.imu
         if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
         if not self.is_over:
-            self._touched(state.last_loud_boot_us)
+            self._note_contact(state.last_loud_boot_us)
             self.is_over = state.phase is not Phase.CONTACT
-            if push is not None and sample.time_boot_us > push.time_boot_us:
+            if contact is not None and sample.time_boot_us > contact.time_boot_us:
                 loud = state.last_loud_boot_us == sample.time_boot_us
-                push.add(sample, loud)
+                contact.add(sample, loud)
                 # Anew with each sample: arms may meet their stop, and clip, long after a touch that could be measured.
-                self.trust.judge(push.is_whole, sample.time_boot_us)
+                self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
                 if loud or self.is_over:
-                    self.estimate = self._refined(estimate, push)
-        return self.close() if self.is_over and not self._seeks else None
+                    self.estimate = self._refined(estimate, contact)
+        return self.close() if self.is_over and not self._is_searching else None
 
     def close(self) -> ImpactEstimate | None:
         """The final estimate, where the contact is over and it was not told yet: another hit does not wait, and what is
         left of the search is done at once."""
         if self.estimate is None or self.estimate.is_final or not self.is_over:
             return None
-        while self.push is not None and self._seeks:
-            self._seek(self.push)
+        while self.contact is not None and self._is_searching:
+            self._advance_search(self.contact)
         self.estimate = replace(self.estimate, is_final=True)
         return self.estimate
 
-    def _normal(self, push: Push, velocity_ned_m_s: Vector3) -> Vector3:
+    def _normal(self, contact: ContactForce, velocity_ned_m_s: Vector3) -> Vector3:
         found = None if self.search is None else self.search.normal_ned
-        explains_alone = found is not None and not push.clipped_at_once
+        explains_alone = found is not None and not contact.clipped_at_once
         if self.is_over and not explains_alone:
-            return whole_normal(push, found, velocity_ned_m_s)
+            return final_normal(contact, found, velocity_ned_m_s)
         # What explains forces and turning before anything clipped is not averaged with the way back.
-        return normal_by(push, found or unit(push.impulse_ned_m_s), velocity_ned_m_s)
+        return plausible_normal(contact, found or unit(contact.impulse_ned_m_s), velocity_ned_m_s)
 
-    def _refined(self, estimate: ImpactEstimate, push: Push) -> ImpactEstimate:
-        velocity, impulse = estimate.velocity_ned_m_s, push.impulse_ned_m_s
+    def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
+        velocity, impulse = estimate.velocity_ned_m_s, contact.impulse_ned_m_s
         begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
-        if push.begun_boot_us is not None:
-            begun_us, error_us = push.begun_boot_us, push.averaging_us // 4
+        if contact.begun_boot_us is not None:
+            begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
         kind = estimate.kind
         if self.situation is not None and estimate.impact.kind not in AS_DETECTED:
-            kind = kind_of(impulse, velocity, push.turn_rad_s(), self.situation)
+            kind = kind_of(impulse, velocity, contact.turn_rad_s(), self.situation)
         return replace(
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal_ned=self._normal(push, velocity),
-            peak_specific_force_m_s2=push.peak_m_s2,
+            normal_ned=self._normal(contact, velocity),
+            peak_specific_force_m_s2=contact.peak_m_s2,
             impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
-            is_lower_bound=push.is_lower_bound,
-            may_be_clipped=push.may_be_clipped,
+            is_lower_bound=contact.is_lower_bound,
+            may_be_clipped=contact.may_be_clipped,
             kind=kind,
         )
 

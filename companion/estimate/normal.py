@@ -12,8 +12,8 @@ measured taken for less certain at first, or a sample that falls beside the touc
 The normal is the mean of what they become, weighed by exp(-misfit / 2).
 
 All that takes some 15 ms of a core here, which nothing that sends setpoints has to spare at once. So the search is a
-value, `Search`, and `further` takes it on by a piece: no more than so many suppositions are followed, whatever the time
-that takes, so that the same messages give the same normal at the same message in flight, in lockstep and in a replay.
+value, `Search`, and `advance_search` takes it on by a piece: no more than so many hypotheses are simulated, whatever
+the time that takes. So the same messages give the same normal at the same message in flight, lockstep and replay.
 """
 
 import math
@@ -24,38 +24,46 @@ import numpy as np
 
 from companion.estimate import guards as g
 from companion.estimate.config import GuardsConfig
-from companion.estimate.suppositions import Floats, Known, Touch, Trials, known_of, residuals, supposed
+from companion.estimate.hypotheses import (
+    Floats,
+    Hypotheses,
+    Measurement,
+    Touch,
+    initial_hypotheses,
+    measurement_of,
+    residuals,
+)
 from companion.messages import Attitude, ImuSample, Vector3
 
 # Without machine code the search would take seconds.
 IS_AVAILABLE = g.IS_COMPILED
 # Suppositions that are followed in one piece of work: two milliseconds here. Nine messages are then enough, and the
 # normal is there before the recovery asks for it (flight.recovering), also where two hundred come in a second.
-FOLLOWED = 400
+HYPOTHESES_A_PIECE = 400
 # How much apart suppositions of one kind that are improved are at least.
-APART = math.cos(math.radians(18.0))
+APART_COSINE = math.cos(math.radians(18.0))
 # The search takes what was measured for so much less certain, and so do the rounds of least squares, in which the best
 # so many are improved by so many steps.
 COARSE, ROUNDS, STEPS = 2.5, ((5.0, 12), (2.0, 12), (1.0, 12)), 4
 # What misfits by so much more than the best goes no further.
-HOPELESS = 25.0
+MOST_CHI_SQUARED_ABOVE_BEST = 25.0
 # Of a touch that is explained each number misfits by one or less; by this, it was not by guards on spring arms.
-BELIEVED = 3.0
-DIFFERENCES = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.02, 1.0, 0.05, 0.0002])
+MOST_REDUCED_CHI_SQUARED = 3.0
+DIFFERENCE_STEPS = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.02, 1.0, 0.05, 0.0002])
 DAMPING, DAMPINGS, LEAST_DAMPING, MOST_DAMPING = 1e-2, (0.1, 1.0, 10.0, 100.0), 1e-5, 1e3
 # Of one supposition in one step: itself, its slopes, and what may become of it.
-FOLLOWED_A_STEP = 1 + g.SIZE + len(DAMPINGS)
-LEAST = np.array([-0.7, -0.7, -0.02, -0.2, -0.5, -0.5, -0.5, -0.7, 0.0, -4.6, 0.001])
-MOST = np.array([0.7, 0.7, 0.32, 0.0, 0.5, 0.5, 0.5, 0.7, 50.0, 0.0, 0.1])
+HYPOTHESES_A_STEP = 1 + g.SIZE + len(DAMPINGS)
+LOWER_BOUNDS = np.array([-0.7, -0.7, -0.02, -0.2, -0.5, -0.5, -0.5, -0.7, 0.0, -4.6, 0.001])
+UPPER_BOUNDS = np.array([0.7, 0.7, 0.32, 0.0, 0.5, 0.5, 0.5, 0.7, 50.0, 0.0, 0.1])
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """How far the search for one touch's normal has come; see `further`."""
+    """How far the search for one touch's normal has come; see `advance_search`."""
 
-    known: Known | None
-    trials: Trials | None
-    misfit: Floats
+    measurement: Measurement | None
+    hypotheses: Hypotheses | None
+    chi_squared: Floats
     """Of the suppositions that have been looked at."""
     damping: Floats
     steps: int = -1
@@ -65,30 +73,30 @@ class Search:
     """Unit vector out of the obstacle; None where too little is known of the touch or nothing explains it."""
 
 
-def begin(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Search:
+def begin_search(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Search:
     """A search of which nothing is done; `velocity_ned_m_s` is v_c."""
-    known = known_of(touch, velocity_ned_m_s, guards, averaging_s)
+    measurement = measurement_of(touch, velocity_ned_m_s, guards, averaging_s)
     nothing = np.zeros(0)
-    if known is None:
+    if measurement is None:
         return Search(None, None, nothing, nothing, is_over=True)
-    return Search(known, supposed(known), nothing, nothing)
+    return Search(measurement, initial_hypotheses(measurement), nothing, nothing)
 
 
-def further(search: Search) -> Search:
+def advance_search(search: Search) -> Search:
     """The same search by one piece of work further; itself where it is over."""
-    known, trials = search.known, search.trials
-    if search.is_over or known is None or trials is None:
+    measurement, hypotheses = search.measurement, search.hypotheses
+    if search.is_over or measurement is None or hypotheses is None:
         return search
     if search.steps < 0:
-        return _looked(search, known, trials)
-    return _improved(search, known, trials)
+        return _scored(search, measurement, hypotheses)
+    return _refined(search, measurement, hypotheses)
 
 
 def normal_of(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Vector3 | None:
     """What the search comes to, all at once."""
-    search = begin(touch, velocity_ned_m_s, guards, averaging_s)
+    search = begin_search(touch, velocity_ned_m_s, guards, averaging_s)
     while not search.is_over:
-        search = further(search)
+        search = advance_search(search)
     return search.normal_ned
 
 
@@ -102,81 +110,87 @@ def prepare() -> None:
     normal_of(touch, (1.0, 0.0, 0.0), GuardsConfig(), 0.004)
 
 
-def _looked(search: Search, known: Known, trials: Trials) -> Search:
+def _scored(search: Search, measurement: Measurement, hypotheses: Hypotheses) -> Search:
     """The next of the suppositions; after the last of them the best are left."""
-    begun, count = search.misfit.size, len(trials.values)
-    part = trials.chosen(range(begun, min(begun + FOLLOWED, count)))
-    found = np.square(residuals(known, part, part.values, COARSE)).sum(axis=1)
-    misfit = np.concatenate([search.misfit, found])
-    if misfit.size < count:
-        return replace(search, misfit=misfit)
-    kept = trials.chosen(_distinct(trials, misfit))
-    return replace(search, trials=kept, damping=np.full(len(kept.values), DAMPING), steps=0)
+    begun, count = search.chi_squared.size, len(hypotheses.values)
+    part = hypotheses.chosen(range(begun, min(begun + HYPOTHESES_A_PIECE, count)))
+    found = np.square(residuals(measurement, part, part.values, COARSE)).sum(axis=1)
+    chi_squared = np.concatenate([search.chi_squared, found])
+    if chi_squared.size < count:
+        return replace(search, chi_squared=chi_squared)
+    kept = hypotheses.chosen(_distinct(hypotheses, chi_squared))
+    return replace(search, hypotheses=kept, damping=np.full(len(kept.values), DAMPING), steps=0)
 
 
-def _distinct(trials: Trials, misfit: Floats) -> list[int]:
+def _distinct(hypotheses: Hypotheses, chi_squared: Floats) -> list[int]:
     """The few that fit best, each of another kind or with another normal than the better ones."""
-    normals = trials.normals(trials.values)
+    normals = hypotheses.normals(hypotheses.values)
     kept: list[int] = []
-    for one in np.argsort(misfit, kind="stable").tolist():
-        same = [other for other in kept if trials.obstacles[other] == trials.obstacles[one]]
-        if all(normals[one] @ normals[other] < APART for other in same):
+    for one in np.argsort(chi_squared, kind="stable").tolist():
+        same = [other for other in kept if hypotheses.obstacles[other] == hypotheses.obstacles[one]]
+        if all(normals[one] @ normals[other] < APART_COSINE for other in same):
             kept.append(one)
         if len(kept) == ROUNDS[0][1]:
             break
     return kept
 
 
-def _improved(search: Search, known: Known, trials: Trials) -> Search:
+def _refined(search: Search, measurement: Measurement, hypotheses: Hypotheses) -> Search:
     """As many steps as the piece has room for, but for one round; after a round the hopeless are left behind."""
-    doubt, _ = ROUNDS[search.steps // STEPS]
-    damping, misfit, steps = search.damping, search.misfit, search.steps
-    left = FOLLOWED // (FOLLOWED_A_STEP * len(trials.values))
+    sigma_factor, _ = ROUNDS[search.steps // STEPS]
+    damping, chi_squared, steps = search.damping, search.chi_squared, search.steps
+    left = HYPOTHESES_A_PIECE // (HYPOTHESES_A_STEP * len(hypotheses.values))
     for _ in range(max(1, left)):
-        values, damping, misfit = _stepped(known, trials, damping, doubt)
-        trials, steps = Trials(values, trials.axes, trials.obstacles), steps + 1
+        values, damping, chi_squared = _levenberg_marquardt_step(measurement, hypotheses, damping, sigma_factor)
+        hypotheses, steps = Hypotheses(values, hypotheses.axes, hypotheses.obstacles), steps + 1
         if steps % STEPS == 0:
             break
     else:
-        return replace(search, trials=trials, damping=damping, misfit=misfit, steps=steps)
+        return replace(search, hypotheses=hypotheses, damping=damping, chi_squared=chi_squared, steps=steps)
     if steps == STEPS * len(ROUNDS):
-        return replace(search, trials=None, is_over=True, normal_ned=_mean(known, trials, misfit))
+        return replace(search, hypotheses=None, is_over=True, normal_ned=_mean(measurement, hypotheses, chi_squared))
     most = ROUNDS[steps // STEPS][1]
-    order = np.argsort(misfit, kind="stable")[:most]
-    near = [int(one) for one in order if misfit[one] <= misfit.min() + HOPELESS]
-    return replace(search, trials=trials.chosen(near), damping=np.full(len(near), DAMPING), steps=steps)
+    order = np.argsort(chi_squared, kind="stable")[:most]
+    near = [int(one) for one in order if chi_squared[one] <= chi_squared.min() + MOST_CHI_SQUARED_ABOVE_BEST]
+    return replace(search, hypotheses=hypotheses.chosen(near), damping=np.full(len(near), DAMPING), steps=steps)
 
 
-def _mean(known: Known, trials: Trials, misfit: Floats) -> Vector3 | None:
+def _mean(measurement: Measurement, hypotheses: Hypotheses, chi_squared: Floats) -> Vector3 | None:
     """Weighed by how likely each is."""
-    if misfit.min() > BELIEVED * known.measured.size:
+    if chi_squared.min() > MOST_REDUCED_CHI_SQUARED * measurement.measured.size:
         return None
-    mean = np.exp(0.5 * (misfit.min() - misfit)) @ trials.normals(trials.values)
+    mean = np.exp(0.5 * (chi_squared.min() - chi_squared)) @ hypotheses.normals(hypotheses.values)
     n, e, d = mean / np.linalg.norm(mean)
     return (float(n), float(e), float(d))
 
 
-def _stepped(known: Known, trials: Trials, damping: Floats, doubt: float) -> tuple[Floats, Floats, Floats]:
+def _levenberg_marquardt_step(
+    measurement: Measurement, hypotheses: Hypotheses, damping: Floats, sigma_factor: float
+) -> tuple[Floats, Floats, Floats]:
     """One step with the damping that helps most: values, dampings, misfits."""
-    values, count = trials.values, len(trials.values)
+    values, count = hypotheses.values, len(hypotheses.values)
     every = [*range(count)]
-    around = np.concatenate([values, *(values + step for step in np.diag(DIFFERENCES))])
-    found = residuals(known, trials.chosen(every * (g.SIZE + 1)), around, doubt).reshape(g.SIZE + 1, count, -1)
+    around = np.concatenate([values, *(values + step for step in np.diag(DIFFERENCE_STEPS))])
+    found = residuals(measurement, hypotheses.chosen(every * (g.SIZE + 1)), around, sigma_factor).reshape(
+        g.SIZE + 1, count, -1
+    )
     here = found[0]
-    slopes = (found[1:] - here) / DIFFERENCES[:, None, None]
+    slopes = (found[1:] - here) / DIFFERENCE_STEPS[:, None, None]
     curvature, downhill = np.einsum("ank,bnk->nab", slopes, slopes), np.einsum("ank,nk->na", slopes, here)
     scale = np.einsum("naa->na", curvature) + 1e-9
     tried = []
     for factor in DAMPINGS:
         damped = curvature + (factor * damping[:, None] * scale)[:, :, None] * np.eye(g.SIZE) + 1e-9 * np.eye(g.SIZE)
-        tried.append(np.clip(values - np.linalg.solve(damped, downhill[:, :, None])[:, :, 0], LEAST, MOST))
+        tried.append(
+            np.clip(values - np.linalg.solve(damped, downhill[:, :, None])[:, :, 0], LOWER_BOUNDS, UPPER_BOUNDS)
+        )
     candidates = np.array([*tried, values])
-    off = residuals(known, trials.chosen(every * len(DAMPINGS)), np.concatenate(tried), doubt)
-    misfit = np.square(np.concatenate([off, here])).sum(axis=1).reshape(len(candidates), count)
-    best = misfit.argmin(axis=0)
+    off = residuals(measurement, hypotheses.chosen(every * len(DAMPINGS)), np.concatenate(tried), sigma_factor)
+    chi_squared = np.square(np.concatenate([off, here])).sum(axis=1).reshape(len(candidates), count)
+    best = chi_squared.argmin(axis=0)
     factors = np.array([*DAMPINGS, 10.0 * DAMPINGS[-1]])
     return (
         candidates[best, every],
         np.clip(damping * factors[best], LEAST_DAMPING, MOST_DAMPING),
-        misfit[best, every],
+        chi_squared[best, every],
     )

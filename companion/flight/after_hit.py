@@ -1,6 +1,6 @@
 """The mission's policy for hits: decided at each hit, acted on when the vehicle has settled."""
 
-from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Move, Target
+from companion.flight.context import AfterRecovery, BeforeHit, FlightContext, Target, Transition
 from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.policy import OnCollision
@@ -38,7 +38,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
     flight.step_index = flight.tally.index + (1 if is_left else 0)
     if reason:
-        flight.tell(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)
+        flight.report(now_us, "policy", f"{reason}; after the recovery: {then}", then=then)
 
 
 def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str, str]:
@@ -61,10 +61,10 @@ def lands_anyway(flight: FlightContext) -> bool:
     return flight.is_landing and len(flight.collisions) >= flight.mission.on_collision.max_hits
 
 
-def afterwards(flight: FlightContext) -> Move:
+def afterwards(flight: FlightContext) -> Transition:
     """What was decided, as a move."""
     after = flight.after_recovery
-    return Move(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)
+    return Transition(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)
 
 
 # What goes on after a hit that was none.
@@ -86,7 +86,7 @@ def note_before(flight: FlightContext, state: State) -> None:
         flight.before_hit = BeforeHit(state, flight.step_index, tally.hits, tally.pace_factor, flight.after_recovery)
 
 
-def take_back(flight: FlightContext, now_us: int) -> Move | None:
+def take_back(flight: FlightContext, now_us: int) -> Transition | None:
     """The newest hit was none: it is forgotten, and what it interrupted goes on from here. None within a recovery that
     another hit began."""
     before, latest = flight.before_hit, flight.vehicle.history.latest()
@@ -95,9 +95,9 @@ def take_back(flight: FlightContext, now_us: int) -> Move | None:
     flight.collisions.pop()
     flight.unconfirmed += 1
     text = "not a hit: one message showed it, and nothing else did; going on"
-    flight.tell(now_us, "unconfirmed", text, count=flight.unconfirmed)
+    flight.report(now_us, "unconfirmed", text, count=flight.unconfirmed)
     flight.tally.hits, flight.tally.pace_factor = before.step_hits, before.pace_factor
     flight.step_index = max(before.step_index, 1) if before.state is State.TAKEOFF else before.step_index
     flight.after_recovery = before.after_recovery
     flight.target = Target(latest.position_ned_m, flight.yaw_rad)
-    return Move(_GOES_ON[before.state])
+    return Transition(_GOES_ON[before.state])

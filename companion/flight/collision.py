@@ -7,14 +7,14 @@ from itertools import takewhile
 
 from companion.detection.interface import DetectorState
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
-from companion.flight.confirming import DECIDED_US, Claim, Leap
+from companion.flight.confirmation import DECIDED_US, ForceHypothesis, VelocityJumpHypothesis
 from companion.messages import LocalPosition, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix
 from companion.motion.strapdown import Strapdown
 from companion.reflex.halfspace import away_from
 from companion.reflex.laws import Contact
-from companion.reflex.reckoning import Reckoning
+from companion.reflex.motion_estimator import MotionEstimator
 from companion.report import CollisionReport
 
 # The estimate lags a few tens of milliseconds behind the end of the contact; later than this the speed back is
@@ -45,37 +45,39 @@ class CollisionRecord:
     normal_ned: Vector3
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
-    reckoning: Reckoning
+    estimator: MotionEstimator
     is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
-    claim: Claim | Leap | None = None  # of the first sample or velocity, until something else shows the hit, too
+    hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = (
+        None  # of the first sample or velocity, until something else shows the hit, too
+    )
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     estimated_down_m_s: float = 0.0  # by the vehicle's own estimate at this moment, be it right or wrong
-    level_leans_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
+    level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
     def follow_motion(self, strapdown: Strapdown) -> None:
         """What accelerometer and gyroscopes show with each sample."""
-        if isinstance(self.claim, Claim):
-            self.claim.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
-        self.level_leans_m_s2 = strapdown.level_leans_m_s2
+        if isinstance(self.hypothesis, ForceHypothesis):
+            self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
+        self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
-        self.reckoning.imu(strapdown)
+        self.estimator.imu(strapdown)
 
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
     ) -> None:
         """While the contact lasts: its largest force, its end, and the newest estimate of the normal."""
         self.fixes = fixes
-        claim = self.claim
-        is_turned = isinstance(claim, Claim) and claim.is_turned
-        if claim is not None and (is_turned or self._is_seen_again(state, claim)):
-            self.claim = None
+        hypothesis = self.hypothesis
+        is_turned = isinstance(hypothesis, ForceHypothesis) and hypothesis.is_turned
+        if hypothesis is not None and (is_turned or self._is_seen_again(state, hypothesis)):
+            self.hypothesis = None
         if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
             return
         if estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
@@ -84,21 +86,21 @@ class CollisionRecord:
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         if not self.is_behind:
             self.normal_ned = away_from(estimate.normal_ned)
-        self.reckoning.tell(not estimate.may_be_clipped, self.contact_ended_boot_us)
+        self.estimator.note_contact(not estimate.may_be_clipped, self.contact_ended_boot_us)
         self.is_clipped = estimate.is_lower_bound
 
-    def _is_seen_again(self, state: DetectorState, claim: Claim | Leap) -> bool:
+    def _is_seen_again(self, state: DetectorState, hypothesis: ForceHypothesis | VelocityJumpHypothesis) -> bool:
         """Another sample of the contact's force has come."""
-        return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > claim.time_boot_us
+        return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > hypothesis.time_boot_us
 
-    def is_contradicted(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
+    def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether, once that is decided, nothing but its first sample shows this hit."""
-        if self.claim is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
+        if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
-        claim, self.claim = self.claim, None
-        if claim.is_contradicted(self.fixes):
+        hypothesis, self.hypothesis = self.hypothesis, None
+        if hypothesis.is_rejected(self.fixes):
             return True
-        return isinstance(claim, Leap) and claim.stays_in_place(places, position_noise_m)
+        return isinstance(hypothesis, VelocityJumpHypothesis) and hypothesis.stays_in_place(places, position_noise_m)
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """While the vehicle recovers: how far past the setpoint, how fast back."""

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
-from companion.flight.context import FlightContext, Inputs, Move, Silent
+from companion.flight.context import FlightContext, Inputs, NoSetpoint, Transition
 from companion.flight.ending import battery_complaint
 from companion.flight.plan import plan_text
 from companion.flight.states import Trigger
@@ -13,7 +13,7 @@ from companion.messages import LandedState, MessageId, RequestMessage, VehicleCo
 MoveT = TypeVar("MoveT")
 
 
-class Meet(Silent, ABC, Generic[MoveT]):
+class Meet(NoSetpoint, ABC, Generic[MoveT]):
     """Wait for the vehicle, ask for the streams, measure them, judge; of a flight and of a guard."""
 
     def __init__(self, now_us: int) -> None:
@@ -44,12 +44,12 @@ class Meet(Silent, ABC, Generic[MoveT]):
             if not companion.link.wait:
                 return self._refused(f"{text}; is the address right?")
             self._is_told = True
-            flight.tell(now_us, "link", f"{text}: waiting for it")
+            flight.report(now_us, "link", f"{text}: waiting for it")
             return None
         if self._requests is None:
             self._requests, flight.was_silent, self._is_told = iter(self._commands(flight)), False, False
             text = f"connected to a PX4 {identity.vehicle_type}, system {identity.system_id}"
-            flight.tell(now_us, "connected", text, system_id=identity.system_id)
+            flight.report(now_us, "connected", text, system_id=identity.system_id)
         if self._measuring_since_us is None:
             self._ask(flight, self._requests, inputs, now_us)
             return None
@@ -74,46 +74,46 @@ class Meet(Silent, ABC, Generic[MoveT]):
         """What is missing may come: a vehicle that has just started has no position."""
         if not self._is_told:
             self._is_told = True
-            flight.tell(now_us, "link", text)
+            flight.report(now_us, "link", text)
         self._requests, self._measuring_since_us = iter(self._commands(flight)), None
 
     def _report_streams(self, flight: FlightContext, now_us: int) -> None:
         rates = flight.streams.rates_hz()
         text = ", ".join(f"{name} {rate_hz:.1f}" for name, rate_hz in rates.items())
         window_s = flight.mission.companion.streams.window_s
-        flight.tell(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
+        flight.report(now_us, "streams", f"streams in Hz over {window_s:g} s: {text}", **rates)
 
 
-class Connect(Meet[Move]):
+class Connect(Meet[Transition]):
     """On the ground, with a vehicle that nobody flies."""
 
-    def _refused(self, text: str) -> Move:
-        return Move(Trigger.REFUSED, text)
+    def _refused(self, text: str) -> Transition:
+        return Transition(Trigger.REFUSED, text)
 
-    def _judge(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _judge(self, flight: FlightContext, now_us: int) -> Transition | None:
         too_slow = flight.streams.too_slow()
         if too_slow is not None and flight.mission.companion.link.wait:
             self._ask_again(flight, f"not ready by now: {too_slow}", now_us)
             return None
         self._report_streams(flight, now_us)
         complaint = too_slow or ground_check(flight)
-        return Move(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
+        return Transition(Trigger.VEHICLE_READY) if complaint is None else self._refused(complaint)
 
 
-class Ready(Silent):
+class Ready(NoSetpoint):
     """Show the plan; nothing happens until it is confirmed."""
 
     def __init__(self) -> None:
         self._shown = False
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if not self._shown:
             self._shown = True
-            flight.tell(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
+            flight.report(now_us, "plan", f"plan ready: {flight.mission.name}", plan=plan_text(flight))
         if flight.is_silent(now_us) or not flight.plan_confirmed:
             return None
         complaint = ground_check(flight)
-        return Move(Trigger.REFUSED, complaint) if complaint is not None else Move(Trigger.PLAN_CONFIRMED)
+        return Transition(Trigger.REFUSED, complaint) if complaint is not None else Transition(Trigger.PLAN_CONFIRMED)
 
 
 def ground_check(flight: FlightContext) -> str | None:

@@ -20,7 +20,7 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
-from companion.reflex.planner import Moving
+from companion.reflex.planner import MotionState
 from companion.report import Event, JsonValue, Outcome
 
 
@@ -28,18 +28,18 @@ from companion.report import Event, JsonValue, Outcome
 class Target:
     """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
 
-    `leans_only`: the acceleration alone is asked for, as the vehicle is wrong about its place and velocity; and of the
-    height only velocity and acceleration, where `is_height_free`. `expected`: its motion instead, as far as known, with
-    the acceleration that it has where it takes itself for level.
+    `acceleration_only`: only the acceleration is a setpoint, because the vehicle's position and velocity estimates are
+    wrong. `is_height_free`: the height has velocity and acceleration setpoints, and no position. `expected`: its motion
+    as far as known, with the acceleration that it has where it takes itself for level.
     """
 
     position_ned_m: Vector3
     yaw_rad: float | None
     velocity_ned_m_s: Vector3 | None = None
     acceleration_ned_m_s2: Vector3 | None = None
-    leans_only: bool = False
+    acceleration_only: bool = False
     is_height_free: bool = False
-    expected: Moving | None = None
+    expected: MotionState | None = None
 
     def at_rest(self) -> "Target":
         """Its place alone, which is safe to hold for as long as nobody says more."""
@@ -53,13 +53,13 @@ class Target:
             self.yaw_rad,
             self.velocity_ned_m_s,
             self.acceleration_ned_m_s2,
-            self.leans_only,
+            self.acceleration_only,
             self.is_height_free,
         )
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class Transition:
     """A trigger with its story. `hand_over`: give the vehicle to hold or land before going."""
 
     trigger: Trigger
@@ -207,7 +207,7 @@ class FlightContext:
             return Target(place_ned_m, yaw_rad)
         return Target(place_ned_m, yaw_rad, velocity_ned_m_s, acceleration_ned_m_s2)
 
-    def tell(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
+    def report(self, now_us: int, kind: str, text: str, **data: JsonValue) -> None:
         """Add a line to the timeline."""
         self.events.append(Event(now_us, kind, text, data))
 
@@ -261,7 +261,7 @@ class FlightContext:
         if send is not None:
             self.outbox.append(send)
         if outcome is not None and not outcome.succeeded:
-            self.tell(now_us, "command", outcome.text)
+            self.report(now_us, "command", outcome.text)
         return outcome
 
     def local_ned_m(self, mission_ned_m: Vector3) -> Vector3:
@@ -276,10 +276,10 @@ class FlightContext:
         return (p[0] - o[0], p[1] - o[1], p[2] - o[2])
 
 
-class Activity(Protocol):
+class StateHandler(Protocol):
     """What the flight does in a state; made anew each time the state is entered."""
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         """Do what is due now; a Move when the state is over."""
         ...
 
@@ -288,7 +288,7 @@ class Activity(Protocol):
         ...
 
 
-class Silent:
+class NoSetpoint:
     """Of a state in which no setpoint is sent."""
 
     def target(self, now_us: int) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from companion.flight.context import FlightContext, Move
+from companion.flight.context import FlightContext, Transition
 from companion.flight.states import Trigger
 from companion.messages import LandedState, MotorOutputs, Sample
 from companion.motion.motors import MotorWatch
@@ -28,12 +28,12 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
             if damage is not None:
                 data = {"motor": damage.motor, "harder": round(damage.harder, 3), "confidence": damage.confidence}
                 wanted = flight.mission.on_damage
-                flight.tell(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
+                flight.report(now_us, "damage", damage.text + ("" if wanted == "tell" else f"; then: {wanted}"), **data)
 
 
-def after_damage(flight: FlightContext) -> Move | None:
+def after_damage(flight: FlightContext) -> Transition | None:
     """The transition that the mission wants for a damaged vehicle."""
     damage, wanted = flight.motors.damage, flight.mission.on_damage
     if damage is None or wanted == "tell":
         return None
-    return Move(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)
+    return Transition(Trigger.LAND_DUE if wanted == "land" else Trigger.RETURN_DUE, damage.text)

@@ -9,23 +9,27 @@ from companion.flight.horizontal_force import SustainedForce
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 from companion.motion.history import REBOOT_US
 from companion.motion.rotation import ned_to_body
-from companion.reflex import watch
-from companion.reflex.watch import Watch
+from companion.reflex import monitor
+from companion.reflex.monitor import CollisionMonitor
 
 
 def collisions(
-    flight: FlightContext, watching: Watch, samples: Sequence[Sample], situation: Situation, now_us: int
+    flight: FlightContext,
+    collision_monitor: CollisionMonitor,
+    samples: Sequence[Sample],
+    situation: Situation,
+    now_us: int,
 ) -> list[ImpactEstimate]:
     """The impacts of this step that are collisions."""
-    seen = watch.advance(watching, samples, situation, now_us)
-    if (watching.blind_reason is None) is not (flight.no_data_since_us is None):
-        flight.no_data_since_us = None if watching.blind_reason is None else now_us
-    for notice in seen.notices:
-        flight.tell(now_us, notice.kind, notice.text, **notice.data)
-    for estimate in seen.impacts:
+    result = monitor.advance(collision_monitor, samples, situation, now_us)
+    if (collision_monitor.no_data_reason is None) is not (flight.no_data_since_us is None):
+        flight.no_data_since_us = None if collision_monitor.no_data_reason is None else now_us
+    for notice in result.notices:
+        flight.report(now_us, notice.kind, notice.text, **notice.data)
+    for estimate in result.impacts:
         if not estimate.impact.is_collision:
             _report_contact(flight, estimate, now_us)
-    found = [estimate for estimate in seen.impacts if estimate.impact.is_collision]
+    found = [estimate for estimate in result.impacts if estimate.impact.is_collision]
     held = None if found else _sustained_force(flight, samples, situation, now_us)
     return found if held is None else [held]
 
@@ -39,7 +43,7 @@ def _sustained_force(
     flown_to = situation.setpoint_position_ned_m
     # Half a second without a position is no tilt that lasted half a second.
     is_off = situation.off_reason is not None or situation.descent_commanded or not flight.has_position
-    if is_off or flown_to is None or target is None or target.leans_only or attitude is None:
+    if is_off or flown_to is None or target is None or target.acceleration_only or attitude is None:
         horizontal.forget()
         vertical.forget()
         return None
@@ -91,14 +95,14 @@ def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample:
     lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
     does = "leant" if held.normal_ned[2] == 0.0 else "pressed up"
     text = f"something is in the way: {does} on it for {lasted_s:.1f} s, by {held.force_m_s2:.1f} m/s^2 more"
-    flight.tell(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
+    flight.report(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
 
 
-def follow_contact(flight: FlightContext, watching: Watch) -> None:
+def follow_contact(flight: FlightContext, collision_monitor: CollisionMonitor) -> None:
     """Update the latest collision's record while the contact lasts."""
     if flight.collisions:
-        record, inertial = flight.collisions[-1], watching.estimator.inertial
-        record.follow_contact(watching.state, watching.estimate, inertial.fixes)
+        record, inertial = flight.collisions[-1], collision_monitor.estimator.inertial
+        record.follow_contact(collision_monitor.state, collision_monitor.estimate, inertial.fixes)
         record.follow_motion(inertial.strapdown)
 
 
@@ -106,4 +110,4 @@ def _report_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int
     """Report a contact that is no collision."""
     kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
     text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
-    flight.tell(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
+    flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)

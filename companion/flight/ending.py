@@ -3,7 +3,7 @@
 import math
 from enum import Enum
 
-from companion.flight.context import FlightContext, Inputs, Move, Silent, Target
+from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target, Transition
 from companion.flight.states import State, Trigger
 from companion.link.commands import ACK_TIMEOUT_US, ATTEMPTS
 from companion.link.vehicle import ModeReport
@@ -21,15 +21,15 @@ LINK_RESTORED = "the vehicle was silent: its streams are asked for again"
 DISARM_NEWS_US = 1_500_000
 
 
-def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Move | None:
+def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) -> Transition | None:
     """The first reason to end, the pilot's before all others."""
     lost = _control_lost(flight, state, now_us)
     if lost is not None:
         return lost
     if inputs.refusal is not None:
-        return Move(Trigger.REFUSED, inputs.refusal)
+        return Transition(Trigger.REFUSED, inputs.refusal)
     if inputs.stop_reason is not None:
-        return Move(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
+        return Transition(Trigger.INTERRUPTED, inputs.stop_reason, hand_over=state not in ON_THE_GROUND)
     silent = _link_silent(flight, state, now_us)
     if silent is not None or state not in ON_SETPOINTS:
         return silent
@@ -37,13 +37,13 @@ def early_end(flight: FlightContext, state: State, inputs: Inputs, now_us: int) 
     # The mission's own conditions are looked at with each new position, so that a silent link is not one of them.
     if reason is None and inputs.positions and flight.armed_at_us is not None:
         reason = _abort_reason(flight, state, inputs.positions[-1].position_ned_m, now_us)
-    return None if reason is None else Move(Trigger.INTERRUPTED, reason, hand_over=True)
+    return None if reason is None else Transition(Trigger.INTERRUPTED, reason, hand_over=True)
 
 
-def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | None:
+def _control_lost(flight: FlightContext, state: State, now_us: int) -> Transition | None:
     vehicle = flight.vehicle
     if flight.armed_at_us is not None and vehicle.armed is False and state in ON_SETPOINTS:
-        return Move(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
+        return Transition(Trigger.CONTROL_LOST, "the vehicle was disarmed, and not by the companion")
     if flight.expected_mode is None or vehicle.mode is None:
         return None
     holder = who_decided(vehicle.mode, flight.expected_mode, flight.command_client.requested_mode)
@@ -54,8 +54,8 @@ def _control_lost(flight: FlightContext, state: State, now_us: int) -> Move | No
         return None
     mode = mode_name(vehicle.mode.custom_mode)
     if holder is Holder.FAILSAFE:
-        return Move(Trigger.CONTROL_LOST, f"a failsafe of the vehicle took over in {mode}; setpoints stopped")
-    return Move(Trigger.CONTROL_LOST, f"the pilot took over in {mode}; setpoints stopped")
+        return Transition(Trigger.CONTROL_LOST, f"a failsafe of the vehicle took over in {mode}; setpoints stopped")
+    return Transition(Trigger.CONTROL_LOST, f"the pilot took over in {mode}; setpoints stopped")
 
 
 def _may_be_down(flight: FlightContext, now_us: int) -> bool:
@@ -73,26 +73,26 @@ def _may_be_down(flight: FlightContext, now_us: int) -> bool:
     return now_us - flight.foreign_mode_since_us <= DISARM_NEWS_US
 
 
-def _link_silent(flight: FlightContext, state: State, now_us: int) -> Move | None:
+def _link_silent(flight: FlightContext, state: State, now_us: int) -> Transition | None:
     link = flight.mission.companion.link
     if flight.vehicle.identity is None:
         return None
     silent_s = flight.silent_s(now_us)
     if state in ON_THE_GROUND:
         if silent_s > link.patience_s:
-            return Move(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
+            return Transition(Trigger.REFUSED, f"the vehicle has been silent for {silent_s:.1f} s")
         flight.note_silence(now_us)
         if flight.is_silent(now_us) or not flight.was_silent:
             return None
-        flight.tell(now_us, "link", LINK_RESTORED)
-        return Move(Trigger.LINK_RESTORED)
+        flight.report(now_us, "link", LINK_RESTORED)
+        return Transition(Trigger.LINK_RESTORED)
     text = silent_link(flight, now_us)
     if text is None:
         return None
     # A vehicle that has been told to land is already doing what is safe.
     landing = state is State.LANDING and flight.expected_mode == AUTO_LAND
-    flight.tell(now_us, "link", text, silent_s=round(silent_s, 3))
-    return Move(Trigger.INTERRUPTED, text, hand_over=not landing)
+    flight.report(now_us, "link", text, silent_s=round(silent_s, 3))
+    return Transition(Trigger.INTERRUPTED, text, hand_over=not landing)
 
 
 def silent_link(flight: FlightContext, now_us: int) -> str | None:
@@ -164,7 +164,7 @@ def who_decided(report: ModeReport, expected_mode: int, requested_mode: int | No
 LONGEST_US = 2 * ATTEMPTS * ACK_TIMEOUT_US
 
 
-class Released(Silent):
+class Released(NoSetpoint):
     """Nothing more to do: somebody else has the vehicle, or it was never taken."""
 
     finished = True
@@ -198,7 +198,7 @@ class HandOver:
     def target(self, now_us: int) -> Target | None:
         return None if self.finished or now_us - self._began_us >= LONGEST_US else self._target
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self.finished:
             return None
         if self._taken_by_another(flight, now_us):
@@ -219,11 +219,11 @@ class HandOver:
         if outcome is None:
             return None
         if outcome.succeeded:
-            flight.tell(now_us, "mode", f"handed over to {mode_name(self._mode)}")
+            flight.report(now_us, "mode", f"handed over to {mode_name(self._mode)}")
         elif outcome.refused and self._mode == AUTO_LOITER:
             # PX4 holds only with a global position; without one (motion capture alone) it still lands.
             self._mode = AUTO_LAND
-            flight.tell(now_us, "mode", "the vehicle does not hold: asking it to land")
+            flight.report(now_us, "mode", "the vehicle does not hold: asking it to land")
             flight.command_client.begin(SetMode(self._mode))
             return None
         self._finish(flight)
@@ -236,7 +236,7 @@ class HandOver:
         holder = who_decided(report, self._previous_mode, self._mode)
         if holder is Holder.COMPANION:
             return False
-        flight.tell(now_us, "mode", f"{holder.value} took over in {mode_name(report.custom_mode)}")
+        flight.report(now_us, "mode", f"{holder.value} took over in {mode_name(report.custom_mode)}")
         return True
 
     def _finish(self, flight: FlightContext) -> None:

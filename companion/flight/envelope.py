@@ -28,7 +28,7 @@ from companion.reflex.config import (
     VELOCITY_PER_S,
 )
 from companion.reflex.halfspace import Surface, plus, split
-from companion.reflex.planner import REST, Moving
+from companion.reflex.planner import REST, MotionState
 
 LOSS_PARAMETER = "COM_OF_LOSS_T"
 # PX4's gains of north, east and down.
@@ -95,7 +95,7 @@ def touched(place_ned_m: Vector3, normal_ned: Vector3) -> Surface:
     return Surface(place_ned_m, normal_ned, LEAST_FREE_M)
 
 
-def held_path(target: Target, motion: Moving) -> list[Vector3]:
+def held_path(target: Target, motion: MotionState) -> list[Vector3]:
     """Places that a vehicle which moves so passes, the present one first, the last where it stops.
 
     The motion's own acceleration comes to that of a lean.
@@ -107,12 +107,12 @@ def held_path(target: Target, motion: Moving) -> list[Vector3]:
     return [(n, e, d) for n, e, d in zip(*axes, strict=True)]
 
 
-def _asked(target: Target, motion: Moving, axis: int) -> tuple[float | None, float | None, float]:
+def _asked(target: Target, motion: MotionState, axis: int) -> tuple[float | None, float | None, float]:
     """Place, velocity and acceleration on one axis; None where it is not asked for."""
     velocity, acceleration = target.velocity_ned_m_s, target.acceleration_ned_m_s2
     a_s = 0.0 if acceleration is None else acceleration[axis]
     v_s = None if velocity is None else velocity[axis]
-    if not target.leans_only:
+    if not target.acceleration_only:
         return target.position_ned_m[axis], v_s, a_s
     if axis < 2:
         return None, None, a_s + motion.acceleration_ned_m_s2[axis]
@@ -208,14 +208,14 @@ def is_finite(target: Target) -> bool:
 
 def _with_place(target: Target, around: Surroundings, fence: Fence, limits: Limits, reasons: list[str]) -> Target:
     """The place within the step and the fence. What of it is not asked for, as of a lean, is left alone."""
-    if target.leans_only and target.is_height_free:
+    if target.acceleration_only and target.is_height_free:
         return target
     place, vehicle = target.position_ned_m, around.vehicle_ned_m
-    if target.leans_only and vehicle is not None:
+    if target.acceleration_only and vehicle is not None:
         # Only the height is asked for.
         place = (vehicle[0], vehicle[1], place[2])
     asked = place
-    if around.last_ned_m is not None and not target.leans_only:
+    if around.last_ned_m is not None and not target.acceleration_only:
         most_m = limits.max_speed_m_s * around.since_last_s + _ROUNDING_M
         place, is_fast = _within_step(place, around.last_ned_m, most_m)
         reasons += [f"moves faster than {limits.max_speed_m_s:g} m/s"] if is_fast else []
@@ -224,13 +224,13 @@ def _with_place(target: Target, around: Surroundings, fence: Fence, limits: Limi
         reasons += [f"more than {limits.max_step_m:g} m from the vehicle"] if is_far else []
     if around.origin_ned_m is not None:
         inside = _within_fence(place, around.origin_ned_m, fence, around.has_floor)
-        if target.leans_only:
+        if target.acceleration_only:
             inside = (place[0], place[1], inside[2])
         reasons += ["outside the fence"] if math.dist(inside, place) > _ROUNDING_M else []
         place = inside if math.dist(inside, place) > _ROUNDING_M else place
     if place == asked:
         return target
-    if target.leans_only:
+    if target.acceleration_only:
         return replace(target, position_ned_m=(*target.position_ned_m[:2], place[2]))
     return Target(place, target.yaw_rad)
 
@@ -243,7 +243,7 @@ def _with_velocity(target: Target, limits: Limits, reasons: list[str]) -> Target
     reasons.append(f"velocity above {most_m_s:g} m/s")
     scale = most_m_s / math.hypot(*velocity)
     n, e, d = velocity
-    acceleration = target.acceleration_ned_m_s2 if target.leans_only else None
+    acceleration = target.acceleration_ned_m_s2 if target.acceleration_only else None
     return replace(target, velocity_ned_m_s=(n * scale, e * scale, d * scale), acceleration_ned_m_s2=acceleration)
 
 
@@ -271,7 +271,7 @@ def _with_path(target: Target, around: Surroundings, fence: Fence, reasons: list
         return target
     if target.velocity_ned_m_s is None and target.acceleration_ned_m_s2 is None:
         return target
-    motions = [Moving(around.vehicle_ned_m, around.velocity_ned_m_s)]
+    motions = [MotionState(around.vehicle_ned_m, around.velocity_ned_m_s)]
     if target.expected is not None:
         # The vehicle is wrong about its motion, and what is expected is no more than that: places and velocities of
         # both count. So does a tilt that the vehicle is right about by then.
@@ -293,10 +293,10 @@ def _with_path(target: Target, around: Surroundings, fence: Fence, reasons: list
             target = _off(target, surface, free_m)
     if target is asked:
         return asked
-    if not target.leans_only:
+    if not target.acceleration_only:
         # Of a lean, which every brake is after a clipped hit, it would be told in every flight.
         reasons.append("leads too near to what is known, or out of the fence")
-    still = _less(target, None, 1.0) if target.leans_only else target.at_rest()
+    still = _less(target, None, 1.0) if target.acceleration_only else target.at_rest()
     return max(target, still, asked, key=free_m)
 
 

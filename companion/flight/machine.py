@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar
 
-from companion.flight import expecting
+from companion.flight import expectations
 from companion.flight.after_hit import decide, lands_anyway, note_before
 from companion.flight.connecting import Connect, Ready
-from companion.flight.context import Activity, FlightContext, Inputs, Move
+from companion.flight.context import FlightContext, Inputs, StateHandler, Transition
 from companion.flight.ending import ON_THE_GROUND, HandOver, Released, early_end
+from companion.flight.obstacle_map import remember
 from companion.flight.progress import FlyHome, FlyItems, HoldAfterRecovery
 from companion.flight.recovering import Recover, record_collision
-from companion.flight.remembering import remember
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 from companion.flight.takeoff_and_landing import Land, TakeBack, TakeOff
 from companion.mission.items import TakeoffItem
@@ -26,7 +26,7 @@ class StateMachine(ABC):
     program: ClassVar[str]
     flight: FlightContext
     state: Enum
-    activity: Any
+    handler: Any
 
     @property
     @abstractmethod
@@ -60,19 +60,21 @@ class StateMachine(ABC):
 
         Whether that is a move.
         """
-        flight, before = self.flight, self.activity
+        flight, before = self.flight, self.handler
         place = traceback.extract_tb(error.__traceback__)[-1]
         text = f"fault of the {self.program}, please report it: {type(error).__name__} in {place.name}: {error}"
-        flight.tell(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
+        flight.report(now_us, "fault", text, traceback="".join(traceback.format_exception(error)))
         if flight.fault or self._gives_away:
             self._release(text)
         flight.fault = text
         try:
             self._give_away(text, now_us)
         except Exception as second:
-            flight.tell(now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second)))
+            flight.report(
+                now_us, "fault", f"and again: {second}", traceback="".join(traceback.format_exception(second))
+            )
             self._release(text)
-        return self.activity is not before
+        return self.handler is not before
 
 
 @dataclass
@@ -81,54 +83,54 @@ class Machine(StateMachine):
 
     program = "companion"
     flight: FlightContext
-    activity: Activity
+    handler: StateHandler
     state: State = State.CONNECT
 
     @property
     def finished(self) -> bool:
-        handing_over = isinstance(self.activity, HandOver) and not self.activity.finished
+        handing_over = isinstance(self.handler, HandOver) and not self.handler.finished
         return self.state in FINAL_STATES and not handing_over
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
-        before = self.activity
+        before = self.handler
         if self.state not in FINAL_STATES:
             self._take(early_end(self.flight, self.state, inputs, now_us), now_us)
         for estimate in inputs.impacts:
             if TABLE.moves(self.state, Trigger.COLLISION) and not lands_anyway(self.flight):
-                if isinstance(self.activity, FlyItems):
-                    self.activity.interrupt(now_us)
+                if isinstance(self.handler, FlyItems):
+                    self.handler.interrupt(now_us)
                 note_before(self.flight, self.state)
                 record_collision(self.flight, estimate, now_us)
                 decide(self.flight, self.state, now_us)
-                self._take(Move(Trigger.COLLISION), now_us)
-        move = self.activity.step(self.flight, inputs, now_us)
-        while move is not None:
-            self._take(move, now_us)
+                self._take(Transition(Trigger.COLLISION), now_us)
+        transition = self.handler.step(self.flight, inputs, now_us)
+        while transition is not None:
+            self._take(transition, now_us)
             # The answers and positions of this step belong to the state that asked for them.
-            move = self.activity.step(self.flight, Inputs(), now_us)
+            transition = self.handler.step(self.flight, Inputs(), now_us)
         if self.flight.expectations:
-            expecting.review(self.flight, now_us)
-        return self.activity is not before
+            expectations.review(self.flight, now_us)
+        return self.handler is not before
 
     @property
     def _gives_away(self) -> bool:
         return self.state in FINAL_STATES
 
     def _give_away(self, text: str, now_us: int) -> None:
-        self._take(Move(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
+        self._take(Transition(Trigger.INTERRUPTED, text, hand_over=self.state not in ON_THE_GROUND), now_us)
 
     def _release(self, text: str) -> None:
-        self.activity = Released()
+        self.handler = Released()
         if self.state not in FINAL_STATES or self.flight.outcome is None:
             self.state, self.flight.outcome, self.flight.reason = State.ABORTED, "failed", text
 
-    def _take(self, move: Move | None, now_us: int) -> None:
-        if move is None or not TABLE.moves(self.state, move.trigger):
+    def _take(self, transition: Transition | None, now_us: int) -> None:
+        if transition is None or not TABLE.moves(self.state, transition.trigger):
             return
-        previous, self.state = self.state, TABLE.next_state(self.state, move.trigger)
-        self.activity = self._begin(previous, move, now_us)
+        previous, self.state = self.state, TABLE.next_state(self.state, transition.trigger)
+        self.handler = self._begin(previous, transition, now_us)
 
-    def _begin(self, previous: State, move: Move, now_us: int) -> Activity:
+    def _begin(self, previous: State, transition: Transition, now_us: int) -> StateHandler:
         flight = self.flight
         if previous is State.RECOVERING:
             # Of a hit that has just come nothing is known yet but its first sample.
@@ -160,27 +162,29 @@ class Machine(StateMachine):
             case State.DONE:
                 return self._done(now_us)
             case State.ABORTED:
-                return self._aborted(move, now_us)
+                return self._aborted(transition, now_us)
 
-    def _done(self, now_us: int) -> Activity:
+    def _done(self, now_us: int) -> StateHandler:
         flight = self.flight
-        expecting.close(flight, now_us)
-        failure = expecting.failure(flight)
+        expectations.close(flight, now_us)
+        failure = expectations.failure(flight)
         left = "" if flight.step.name in ("land", "return") else f"; not flown from item {flight.step.label} on"
         flight.outcome = "completed" if failure is None else "failed"
         flight.reason = failure or f"landed and disarmed{left}"
         text = f"done: landed and disarmed, {_hits(len(flight.collisions))}{left}"
-        flight.tell(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
+        flight.report(now_us, "done", text, outcome=flight.outcome, reason=flight.reason)
         return Released()
 
-    def _aborted(self, move: Move, now_us: int) -> Activity:
+    def _aborted(self, transition: Transition, now_us: int) -> StateHandler:
         flight = self.flight
-        flight.outcome = "failed" if move.trigger is Trigger.REFUSED or flight.fault else "aborted"
-        flight.reason = move.text
-        expecting.close(flight, now_us)
-        text = f"{flight.outcome}: {move.text}"
-        flight.tell(now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index)
-        return HandOver(flight, now_us) if move.hand_over else Released()
+        flight.outcome = "failed" if transition.trigger is Trigger.REFUSED or flight.fault else "aborted"
+        flight.reason = transition.text
+        expectations.close(flight, now_us)
+        text = f"{flight.outcome}: {transition.text}"
+        flight.report(
+            now_us, "aborted", text, outcome=flight.outcome, reason=flight.reason, next_step=flight.step.index
+        )
+        return HandOver(flight, now_us) if transition.hand_over else Released()
 
 
 def _hits(count: int) -> str:

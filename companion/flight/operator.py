@@ -12,7 +12,7 @@ from enum import Enum
 from companion.detection.interface import Phase
 from companion.flight.collision import CollisionRecord
 from companion.messages import DebugVector, NamedValue, Severity, StatusText
-from companion.reflex.watch import Watch
+from companion.reflex.monitor import CollisionMonitor
 from companion.report import Event, JsonValue
 
 # Numbers for plots.
@@ -90,14 +90,14 @@ def status_text(event: Event, mission: str, hits: int) -> StatusText | None:
 
 
 def values(
-    state: Enum, watch: Watch, latest: CollisionRecord | None, hits: int, time_us: int
+    state: Enum, monitor: CollisionMonitor, latest: CollisionRecord | None, hits: int, time_us: int
 ) -> list[NamedValue | DebugVector]:
     """The detector's numbers: phase, threshold and the latest hit's; and the state's, its place among all states."""
-    phase = _PHASE_NUMBER[watch.state.phase] if watch.blind_reason is None else _NO_DATA
+    phase = _PHASE_NUMBER[monitor.state.phase] if monitor.no_data_reason is None else _NO_DATA
     sent: list[NamedValue | DebugVector] = [
         NamedValue(time_us, "rb_state", float(list(type(state)).index(state))),
         NamedValue(time_us, "rb_phase", phase),
-        NamedValue(time_us, "rb_thresh", watch.state.threshold_m_s2),
+        NamedValue(time_us, "rb_thresh", monitor.state.threshold_m_s2),
         NamedValue(time_us, "rb_hits", float(hits)),
     ]
     if latest is not None:

@@ -5,7 +5,7 @@ import math
 from companion.fence import Fence
 from companion.flight.context import FlightContext, as_text
 from companion.flight.envelope import unattended_text
-from companion.flight.expecting import describe
+from companion.flight.expectations import describe
 from companion.memory.stored import ObstaclesConfig
 from companion.memory.stored import describe as describe_patch
 from companion.mission import items

@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass, replace
 
-from companion.flight import expecting
-from companion.flight.context import FlightContext, Inputs, Move, StepTally, Target
+from companion.flight import expectations
+from companion.flight.context import FlightContext, Inputs, StepTally, Target, Transition
 from companion.flight.damage import after_damage
+from companion.flight.obstacle_map import surroundings
 from companion.flight.plan import describe_item
-from companion.flight.remembering import surroundings
 from companion.flight.states import Trigger
 from companion.messages import Vector3
 from companion.mission import items
@@ -92,9 +92,9 @@ class FlyItems(_OnTrajectory):
         again = "" if factor == 1.0 else f", at {factor:.0%} of the speed, {LEAST_TRY_M_S:g} m/s at least"
         text = f"item {step.label} of {len(flight.mission.items)}: {describe_item(self._action)}{again}"
         number = int(step.label.partition(" ")[0].partition(".")[0])
-        flight.tell(now_us, "item", text, number=number, name=step.name, step=step.index)
+        flight.report(now_us, "item", text, number=number, name=step.name, step=step.index)
         if isinstance(self._action, items.ExpectItem):
-            expecting.begin(flight, step.label, self._action, now_us)
+            expectations.begin(flight, step.label, self._action, now_us)
         elif isinstance(self._action, items.Motion):
             self._plan(self._action, start, now_us)
 
@@ -113,13 +113,13 @@ class FlyItems(_OnTrajectory):
             flight.unreachable.append(flight.step.label)
             policy = flight.mission.obstacles.on_unreachable
             text = f"item {flight.step.label} out of reach: {self._out_of_reach}; then: {policy}"
-            flight.tell(now_us, "unreachable", text, item=flight.step.label, then=policy)
+            flight.report(now_us, "unreachable", text, item=flight.step.label, then=policy)
             return
         self._trajectory = planned.trajectory
         if planned.is_detour:
             left_out = f", {planned.left_out} points left out" if planned.left_out else ""
             text = f"round what is known: {planned.trajectory.distance_m:.1f} m{left_out}"
-            flight.tell(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
+            flight.report(now_us, "detour", text, distance_m=planned.trajectory.distance_m, left_out=planned.left_out)
 
     def interrupt(self, now_us: int) -> None:
         """A hit ends the present trajectory: note which points of a path were passed."""
@@ -130,19 +130,19 @@ class FlyItems(_OnTrajectory):
     def _turned(self, motion: Motion, now_us: int) -> float | None:
         return self._heading.turn(motion[0], motion[1], now_us)
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if (hurt := after_damage(flight)) is not None:
             return hurt
         while True:
             if isinstance(self._action, items.ReturnItem):
                 flight.returning_as = self._action
-                return Move(Trigger.RETURN_DUE)
+                return Transition(Trigger.RETURN_DUE)
             if isinstance(self._action, items.LandItem):
-                return Move(Trigger.LAND_DUE)
+                return Transition(Trigger.LAND_DUE)
             if self._out_of_reach:
                 trigger = _TRIGGERS.get(flight.mission.obstacles.on_unreachable)
                 if trigger is not None:
-                    return Move(trigger, self._out_of_reach, hand_over=trigger is Trigger.INTERRUPTED)
+                    return Transition(trigger, self._out_of_reach, hand_over=trigger is Trigger.INTERRUPTED)
             elif not self._is_done(flight, now_us):
                 return self._overdue(flight, now_us)
             self._leave(flight, now_us)
@@ -195,20 +195,20 @@ class FlyItems(_OnTrajectory):
             self._heading.turn(self._trajectory.target_m, (0.0, 0.0, 0.0), now_us)
         return self._heading.is_reached
 
-    def _overdue(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _overdue(self, flight: FlightContext, now_us: int) -> Transition | None:
         item, began_us = flight.step.item, flight.tally.began_us
         assert began_us is not None
         if item.timeout_s is not None and now_us - began_us > item.timeout_s * 1e6:
             text = f"not done within {item.timeout_s:g} s: {describe_item(self._action)}"
-            flight.tell(now_us, "timeout", f"item {flight.step.label} {text}; then: {item.on_timeout}")
+            flight.report(now_us, "timeout", f"item {flight.step.label} {text}; then: {item.on_timeout}")
             if item.on_timeout == "continue":
                 self._leave(flight, now_us)
                 return self.step(flight, Inputs(), now_us)
             trigger = _TRIGGERS[item.on_timeout]
-            return Move(trigger, text, hand_over=trigger is Trigger.INTERRUPTED)
+            return Transition(trigger, text, hand_over=trigger is Trigger.INTERRUPTED)
         patience_s = flight.mission.companion.flight.arrival_timeout_s
         if self._over_since_us is not None and now_us - self._over_since_us > patience_s * 1e6:
-            return Move(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, f"not arrived: {describe_item(self._action)}", hand_over=True)
         return None
 
 
@@ -219,13 +219,13 @@ class HoldAfterRecovery:
         hold_s = flight.after_recovery.hold_s
         self._until_us = now_us + round(hold_s * 1e6)
         self._target = flight.target
-        flight.tell(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
+        flight.report(now_us, "hold", f"holding for {hold_s:g} s", hold_s=hold_s)
 
     def target(self, now_us: int) -> Target | None:
         return self._target
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
-        return Move(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
+        return Transition(Trigger.HOLD_ENDED) if now_us >= self._until_us else None
 
 
 # Below PX4's MC_YAWRATE_MAX (200 deg/s) and its MPC_YAWRAUTO_MAX (45 deg/s): the vehicle can follow.
@@ -305,20 +305,20 @@ class FlyHome(_OnTrajectory):
         self._trajectory: Trajectory = planned.trajectory or stay(start)
         if self._is_cut_off:
             flight.unreachable.append("home")
-            flight.tell(now_us, "unreachable", "home out of reach: no way round what is known; landing here")
+            flight.report(now_us, "unreachable", "home out of reach: no way round what is known; landing here")
             return
         round_it = " round what is known" if planned.is_detour else ""
         text = f"returning over {self._trajectory.distance_m:.1f} m{round_it}"
-        flight.tell(now_us, "return", text, distance_m=self._trajectory.distance_m)
+        flight.report(now_us, "return", text, distance_m=self._trajectory.distance_m)
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if self._is_cut_off or (flight.motors.damage is not None and flight.mission.on_damage == "land"):
-            return Move(Trigger.LAND_DUE)
+            return Transition(Trigger.LAND_DUE)
         overdue_s = self._elapsed_s - self._trajectory.duration_s
         if overdue_s < 0.0:
             return None
         if self._arrived():
-            return Move(Trigger.HOME_REACHED)
+            return Transition(Trigger.HOME_REACHED)
         if overdue_s > flight.mission.companion.flight.arrival_timeout_s:
-            return Move(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, "not arrived at home", hand_over=True)
         return None

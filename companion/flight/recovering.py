@@ -7,34 +7,34 @@ from dataclasses import replace
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import CollisionRecord, in_one_recovery
-from companion.flight.confirming import Claim, Leap, claim_of
-from companion.flight.context import FlightContext, Inputs, Move, Target, as_text
-from companion.flight.remembering import remembered_surfaces
-from companion.flight.telling import tell_detection
+from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
+from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
+from companion.flight.detection_event import report_detection
+from companion.flight.obstacle_map import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
 from companion.motion.rotation import body_to_ned
 from companion.motion.settling import SettlingMonitor
 from companion.reflex.config import (
-    AGREEING,
+    ACCELERATION_GAIN,
+    AGREEMENT_COSINE,
     BEHIND_M,
-    DAMPED,
-    FALLS_M_S2,
-    HANGS_M_S2,
-    KNOWN_US,
-    LEANS_M_S2,
+    CONTACT_LINGERS_US,
+    DESCENT_M_S2,
+    HANGING_TILT_M_S2,
+    LEAST_VELOCITY_CHANGE_M_S,
     LEAVING_M_S,
     LEFT_BELOW_M,
-    LEFT_US,
-    SLID_OFF_M_S,
+    MOTION_KNOWN_US,
+    NO_CONTACT_APPROACH_M_S,
+    PRESSING_TILT_M_S2,
     SPINNING_RAD_S,
     STOPPING_M_S2,
-    TELLING_M_S,
-    TOUCHES_M,
+    TOUCH_TOLERANCE_M,
 )
-from companion.reflex.halfspace import Envelope, Room, Surface, away_from, plus, split
+from companion.reflex.halfspace import FenceBounds, FreeSpace, Surface, away_from, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
-from companion.reflex.planner import REST, Limits, Moving, Plan, height_held, kept_off, plan, safe_to_hold
-from companion.reflex.reckoning import Reckoning, half_way
+from companion.reflex.motion_estimator import MotionEstimator, blended_normal
+from companion.reflex.planner import REST, Limits, MotionState, Plan, height_feedback, kept_off, plan, safe_to_hold
 
 
 class Recover:
@@ -63,40 +63,45 @@ class Recover:
         if not self._law.follows:
             return Target(self._record.setpoint_ned_m, self._yaw_rad)
         elapsed_s = 1e-6 * (now_us - self._plan_began_us)
-        is_steady = self._is_known and not self._is_spinning and not self._presses()
-        return self._planned(elapsed_s) if is_steady else self._leaning(elapsed_s)
+        is_steady = self._is_known and not self._is_spinning and not self._tilts_into_surface()
+        return self._by_plan(elapsed_s) if is_steady else self._by_acceleration(elapsed_s)
 
-    def _planned(self, elapsed_s: float) -> Target:
+    def _by_plan(self, elapsed_s: float) -> Target:
         """Place, velocity and acceleration, by which PX4's own loops follow the plan."""
-        record, reckoning, goal = self._record, self._record.reckoning, self._record.setpoint_ned_m
-        motion = Moving(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
+        record, estimator, goal = self._record, self._record.estimator, self._record.setpoint_ned_m
+        motion = MotionState(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
         a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
         if self._is_level:
             (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
-            motion, c = Moving((n, e, goal[2]), (u, v, 0.0)), self._height_m_s2(1.0)
+            motion, c = MotionState((n, e, goal[2]), (u, v, 0.0)), self._height_m_s2(1.0)
         # PX4 takes place, velocity and tilt for what it tells: as much is asked for beside the plan's.
-        place = plus(motion.position_ned_m, 1.0, reckoning.off_m)
-        velocity = plus(motion.velocity_ned_m_s, 1.0, reckoning.off_m_s)
-        return Target(place, self._yaw_rad, velocity, plus((DAMPED * a, DAMPED * b, c), -1.0, record.level_leans_m_s2))
+        place = plus(motion.position_ned_m, 1.0, estimator.position_error_m)
+        velocity = plus(motion.velocity_ned_m_s, 1.0, estimator.velocity_error_m_s)
+        return Target(
+            place,
+            self._yaw_rad,
+            velocity,
+            plus((ACCELERATION_GAIN * a, ACCELERATION_GAIN * b, c), -1.0, record.level_acceleration_m_s2),
+        )
 
-    def _leaning(self, elapsed_s: float) -> Target:
+    def _by_acceleration(self, elapsed_s: float) -> Target:
         """Accelerations alone: PX4's loops know nothing right of the motion, or would do harm to this one."""
         goal, record, state = self._record.setpoint_ned_m, self._record, self._state()
-        if self._plan is not None and not self._presses():
-            asked = self._plan.led_back(elapsed_s, state)
+        if self._plan is not None and not self._tilts_into_surface():
+            asked = self._plan.with_feedback(elapsed_s, state)
         else:
             limits = self._limits.spinning(self._spin_rad_s)
             asked = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
-        north, east = (0.0, 0.0) if self._presses() else record.reckoning.wind_m_s2
-        a, b, c = safe_to_hold(asked, self._leant.velocity_ned_m_s)
+        north, east = (0.0, 0.0) if self._tilts_into_surface() else record.estimator.wind_m_s2
+        a, b, c = safe_to_hold(asked, self._tilted_motion.velocity_ned_m_s)
         a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
         falls = self._is_level and self._may_fall and self._hangs
         is_free = falls or (self._is_level and not self._is_known)
         if is_free:
-            c = FALLS_M_S2 if falls else self._height_m_s2(2.0)
+            c = DESCENT_M_S2 if falls else self._height_m_s2(2.0)
         # As it takes itself to move, which leaves PX4's own loop nothing to add to what is asked for up and down.
         velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
-        expected = Moving(state.position_ned_m, state.velocity_ned_m_s, record.level_leans_m_s2)
+        expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
         return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
 
     @property
@@ -106,61 +111,61 @@ class Recover:
 
     def _height_m_s2(self, loops: float) -> float:
         record, most_m_s2 = self._record, self._config.vertical_acceleration_m_s2
-        spread_m_s, told_m_s = record.reckoning.spread_m_s[2], record.estimated_down_m_s
-        return height_held(self._state(), spread_m_s, told_m_s, record.setpoint_ned_m[2], loops, most_m_s2)
+        spread_m_s, told_m_s = record.estimator.spread_m_s[2], record.estimated_down_m_s
+        return height_feedback(self._state(), spread_m_s, told_m_s, record.setpoint_ned_m[2], loops, most_m_s2)
 
     def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
-        spread = self._record.reckoning.spread_m_s
+        spread = self._record.estimator.spread_m_s
         surfaces = [replace(self._surfaces[0], comes_m_s=self._comes_m_s), *self._surfaces[1:]]
-        return kept_off(acceleration_ned_m_s2, self._leant, spread, surfaces, self._limits)
+        return kept_off(acceleration_ned_m_s2, self._tilted_motion, spread, surfaces, self._limits)
 
     @property
-    def _leant(self) -> Moving:
+    def _tilted_motion(self) -> MotionState:
         """The motion that there is, with the acceleration that the lean is about to give."""
-        return replace(self._record.reckoning.motion, acceleration_ned_m_s2=self._record.reckoning.lean_m_s2)
+        return replace(self._record.estimator.motion, acceleration_ned_m_s2=self._record.estimator.tilt_m_s2)
 
-    def _presses(self, least_m_s2: float = LEANS_M_S2) -> bool:
+    def _tilts_into_surface(self, least_m_s2: float = PRESSING_TILT_M_S2) -> bool:
         """Whether the vehicle leans into a surface that it touches.
 
         What PX4's loops add to that against a wind, or have added up against the surface itself, is not to be had.
         """
         return any(
-            -BEHIND_M <= surface.off_m(self._leant.position_ned_m) < TOUCHES_M
-            and split(self._leant.acceleration_ned_m_s2, surface.normal_ned)[0] < -least_m_s2
+            -BEHIND_M <= surface.off_m(self._tilted_motion.position_ned_m) < TOUCH_TOLERANCE_M
+            and split(self._tilted_motion.acceleration_ned_m_s2, surface.normal_ned)[0] < -least_m_s2
             for surface in self._surfaces
         )
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         record, attitude = self._record, flight.vehicle.attitude
         if attitude is not None and attitude.angular_velocity_frd_rad_s is not None:
             self._spin_rad_s = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)[2]
         self._may_fall = _has_room_below(flight)
         for sample in inputs.positions:
             noise_m = flight.mission.companion.estimate.position_noise_m
-            if record.is_contradicted(sample.time_boot_us, flight.vehicle.history, noise_m):
-                move = take_back(flight, now_us)
-                if move is not None:
-                    return move
-            record.reckoning.hear(sample)
+            if record.is_rejected(sample.time_boot_us, flight.vehicle.history, noise_m):
+                transition = take_back(flight, now_us)
+                if transition is not None:
+                    return transition
+            record.estimator.update(sample)
             is_known = self._knows(sample.time_boot_us)
             self._follow(flight, sample, now_us)
             if not is_known:
                 continue
-            right = record.reckoning.put_right(sample)
+            right = record.estimator.corrected(sample)
             record.follow_recovery(right)
             since_us = self._monitor.settled_since(right)
             if since_us is not None and not self._is_spinning:
                 record.settled_at_boot_us, record.is_over = since_us, True
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
-                flight.tell(now_us, "recovered", record.recovered_text(), **figures)
+                flight.report(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
         # Once it hangs, until it does not lean on it any more.
-        self._hangs = self._presses(LEANS_M_S2 if self._hangs else HANGS_M_S2)
+        self._hangs = self._tilts_into_surface(PRESSING_TILT_M_S2 if self._hangs else HANGING_TILT_M_S2)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._first_hit_us > timeout_s * 1e6:
             record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
-            flight.tell(now_us, "recovered", text, settled_after_s=None)
+            flight.report(now_us, "recovered", text, settled_after_s=None)
             return self._leave(flight)
         return None
 
@@ -168,7 +173,7 @@ class Recover:
     def _is_spinning(self) -> bool:
         return self._law.follows and abs(self._spin_rad_s) > SPINNING_RAD_S
 
-    def _leave(self, flight: FlightContext) -> Move:
+    def _leave(self, flight: FlightContext) -> Transition:
         """What follows begins at rest at the setpoint."""
         flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
         return afterwards(flight)
@@ -179,16 +184,16 @@ class Recover:
             return True
         record = self._record
         since_us = time_boot_us - record.sample_time_boot_us
-        self._is_known = record.reckoning.is_right and since_us >= KNOWN_US
+        self._is_known = record.estimator.has_converged and since_us >= MOTION_KNOWN_US
         if self._is_known:
-            v, w = record.contact.velocity_ned_m_s, record.reckoning.motion.velocity_ned_m_s
-            self._agreed = agreed_normal(record.normal_ned, v, w)
+            v, w = record.contact.velocity_ned_m_s, record.estimator.motion.velocity_ned_m_s
+            self._agreed = consistent_normal(record.normal_ned, v, w)
         return self._is_known
 
-    def _state(self) -> Moving:
+    def _state(self) -> MotionState:
         """The present motion as a plan begins with it: towards what pushes still is never asked for, and a lean counts
         as far as a plan may ask for it. Level where the height is held by itself."""
-        motion, normal = self._record.reckoning.motion, self._contact.normal_ned
+        motion, normal = self._record.estimator.motion, self._contact.normal_ned
         velocity, acceleration, place = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2, motion.position_ned_m
         if self._is_spinning:
             acceleration = REST  # what a gyroscope leans to is not where it will lean next
@@ -198,7 +203,7 @@ class Recover:
         size, most_m_s2 = math.hypot(*acceleration), self._limits.acceleration_m_s2
         if size > most_m_s2:
             acceleration = plus(REST, most_m_s2 / size, acceleration)
-        return Moving(place, velocity, acceleration)
+        return MotionState(place, velocity, acceleration)
 
     def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
         """Goal and plan as they follow from what is known by now; the plan alone where the vehicle is not on it."""
@@ -224,16 +229,16 @@ class Recover:
         A vehicle that leaves no faster than it is asked to is pushed by nothing, however it shakes.
         """
         record, contact = self._record, self._contact
-        motion = record.reckoning.motion
+        motion = record.estimator.motion
         off_m_s = split(motion.velocity_ned_m_s, contact.normal_ned)[0]
-        is_touched = sample.time_boot_us - record.contact_ended_boot_us < LEFT_US
-        is_pushed = self._is_known and split(record.reckoning.push_m_s2, contact.normal_ned)[0] > LEANS_M_S2
+        is_touched = sample.time_boot_us - record.contact_ended_boot_us < CONTACT_LINGERS_US
+        is_pushed = self._is_known and split(record.estimator.external_m_s2, contact.normal_ned)[0] > PRESSING_TILT_M_S2
         asked_m_s = 0.0
         if self._is_known and self._plan is not None:
             asked_m_s = split(self._plan.at(elapsed_s).velocity_ned_m_s, contact.normal_ned)[0]
         is_carried = (is_touched or is_pushed) and off_m_s - asked_m_s > LEAVING_M_S
         self._comes_m_s = off_m_s if is_carried else 0.0
-        has_left = self._has_left or off_m_s > 0.0 or off_m_s < -SLID_OFF_M_S
+        has_left = self._has_left or off_m_s > 0.0 or off_m_s < -NO_CONTACT_APPROACH_M_S
         self._has_left = has_left and not (is_touched or is_carried)
         place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
         # Before its motion is known, what a vehicle still touches is where it is: frames and arms give way.
@@ -242,7 +247,7 @@ class Recover:
             place = motion.position_ned_m
         self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
 
-    def _aim(self, flight: FlightContext, state: Moving, now_us: int) -> None:
+    def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
         """The recovery setpoint anew."""
         record, before = self._record, self._record.setpoint_ned_m
         limits = self._limits.spinning(self._spin_rad_s)
@@ -253,7 +258,7 @@ class Recover:
             record.overshoot_m = 0.0  # that past the setpoint expected is none
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
-            flight.tell(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+            flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
 
 
 def _has_room_below(flight: FlightContext) -> bool:
@@ -265,7 +270,7 @@ def _has_room_below(flight: FlightContext) -> bool:
     return height_m > LEFT_BELOW_M + 0.5 * down_m_s**2 / STOPPING_M_S2
 
 
-def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
+def consistent_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
     """The normal by the push, or by what it did to the velocity where the two do not agree; level as the push's is.
 
     The push of a contact of a millisecond is one sample, shaken and clipped; the change of velocity is all of it.
@@ -273,7 +278,7 @@ def agreed_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: V
     n, e, d = plus(after_ned_m_s, -1.0, before_ned_m_s)
     change = (n, e, d if pushed_ned[2] != 0.0 else 0.0)
     moved = away_from(change)
-    if math.hypot(*change) < TELLING_M_S or split(pushed_ned, moved)[0] > AGREEING:
+    if math.hypot(*change) < LEAST_VELOCITY_CHANGE_M_S or split(pushed_ned, moved)[0] > AGREEMENT_COSINE:
         return pushed_ned
     return moved
 
@@ -284,16 +289,16 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     normal = away_from(estimate.normal_ned)
     place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
     before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
-    behind = None if before is None else _comes_after(flight, before, impact.specific_force_frd_m_s2, velocity)
+    behind = None if before is None else _struck_from_behind(flight, before, impact.specific_force_frd_m_s2, velocity)
     normal = behind or normal
-    believed, earlier = normal, None
+    contact_normal, earlier = normal, None
     if law.follows:
-        if before is not None and not (before.reckoning.is_right or before.reckoning.is_whole):
+        if before is not None and not (before.estimator.has_converged or before.estimator.is_fully_measured):
             # Place and velocity now are as wrong as the estimate.
-            earlier = before.reckoning
-            place, velocity = before.reckoning.motion.position_ned_m, before.reckoning.motion.velocity_ned_m_s
-        believed = behind or half_way(normal, velocity)
-    contact = Contact(estimate.time_boot_us, place, velocity, believed)
+            earlier = before.estimator
+            place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
+        contact_normal = behind or blended_normal(normal, velocity)
+    contact = Contact(estimate.time_boot_us, place, velocity, contact_normal)
     expected = contact.rebound(mission.recovery.restitution)
     limits = Limits(mission.recovery.acceleration_m_s2)
     record = CollisionRecord(
@@ -305,16 +310,16 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         normal_ned=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
-        reckoning=Reckoning(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, earlier),
+        estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, earlier),
         is_behind=behind is not None,
-        claim=_claim(flight, estimate),
+        hypothesis=_hypothesis(flight, estimate),
     )
-    record.reckoning.tell(estimate.is_final and not estimate.may_be_clipped, impact.sample_time_boot_us)
+    record.estimator.note_contact(estimate.is_final and not estimate.may_be_clipped, impact.sample_time_boot_us)
     flight.collisions.append(record)
-    tell_detection(flight, record, now_us)
+    report_detection(flight, record, now_us)
 
 
-def _comes_after(
+def _struck_from_behind(
     flight: FlightContext, before: CollisionRecord, push_frd_m_s2: Vector3, velocity_ned_m_s: Vector3
 ) -> Vector3 | None:
     """The normal of the hit before, where what was hit has come after a vehicle that still recovers from it.
@@ -325,16 +330,16 @@ def _comes_after(
         return None
     normal, push = before.contact.normal_ned, body_to_ned(flight.vehicle.attitude.attitude_wxyz, push_frd_m_s2)
     leaves_m_s, pushed_m_s2 = split(velocity_ned_m_s, normal)[0], split(push, normal)[0]
-    return normal if leaves_m_s > LEAVING_M_S and pushed_m_s2 > AGREEING * math.hypot(*push) else None
+    return normal if leaves_m_s > LEAVING_M_S and pushed_m_s2 > AGREEMENT_COSINE * math.hypot(*push) else None
 
 
-def _claim(flight: FlightContext, estimate: ImpactEstimate) -> Claim | Leap | None:
+def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
     """What the first sample says alone; None where that is not known, or the vehicle recovers from another hit."""
     attitude = flight.vehicle.attitude
     if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
         return None
     force_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
-    return claim_of(estimate, force_ned, flight.mission.companion.estimate.imu_averaging_interval_s)
+    return hypothesis_of(estimate, force_ned, flight.mission.companion.estimate.imu_averaging_interval_s)
 
 
 def _law(flight: FlightContext) -> Law:
@@ -342,12 +347,12 @@ def _law(flight: FlightContext) -> Law:
 
 
 def _setpoint(
-    flight: FlightContext, contact: Contact, motion: Moving, limits: Limits, surfaces: Sequence[Surface]
+    flight: FlightContext, contact: Contact, motion: MotionState, limits: Limits, surfaces: Sequence[Surface]
 ) -> Vector3:
     """The law's goal, as what is around lets it be."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
     goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion, limits)
-    room = Room(Envelope(flight.origin_ned_m, flight.mission.fence), surfaces[1:])
+    room = FreeSpace(FenceBounds(flight.origin_ned_m, flight.mission.fence), surfaces[1:])
     return room.goal(contact.position_ned_m, contact.normal_ned, goal)
 
 

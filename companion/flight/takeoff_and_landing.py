@@ -2,7 +2,7 @@
 
 import math
 
-from companion.flight.context import Activity, FlightContext, Inputs, Move, Target, as_text
+from companion.flight.context import FlightContext, Inputs, StateHandler, Target, Transition, as_text
 from companion.flight.states import Trigger
 from companion.messages import SetArmed, SetMode, Vector3
 from companion.mission.items import TakeoffItem
@@ -38,7 +38,7 @@ class TakeOff:
         flight.yaw_rad = yaw_rad(attitude.attitude_wxyz) if attitude is not None else None
         self._yaw_rad = flight.yaw_rad
         self._ground_ned_m = mean_position(flight)
-        flight.tell(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
+        flight.report(now_us, "takeoff", f"streaming setpoints for take-off to {item.height_m:g} m")
 
     def target(self, now_us: int) -> Target | None:
         if self._profile is None:
@@ -46,10 +46,10 @@ class TakeOff:
         position, velocity, acceleration = self._profile.at(self._climbing_s)
         return self._flight.on_trajectory(position, self._yaw_rad, velocity, acceleration)
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         return self._now(flight, inputs, now_us)
 
-    def _lead(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def _lead(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if now_us - self._started_us >= flight.mission.companion.flight.setpoint_lead_s * 1e6:
             self._now = self._switch
             flight.expected_mode = flight.vehicle.custom_mode
@@ -57,24 +57,24 @@ class TakeOff:
             return self._switch(flight, Inputs(), now_us)
         return None
 
-    def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def _switch(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
         if outcome is None:
             return None
         if not outcome.succeeded:
-            return Move(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"no OFFBOARD: {outcome.text}", hand_over=True)
         flight.expected_mode = OFFBOARD
         self._now = self._arm
         flight.arming_requested = True
         flight.command_client.begin(SetArmed(True))
         return self._arm(flight, Inputs(), now_us)
 
-    def _arm(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def _arm(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         outcome = flight.command_outcome(inputs, flight.vehicle.armed is True, now_us)
         if outcome is None:
             return None
         if not outcome.succeeded:
-            return Move(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
+            return Transition(Trigger.REFUSED, f"not armed: {outcome.text}", hand_over=True)
         self._now = self._climb
         self._started_us = flight.armed_at_us = now_us
         self._climbed_until_us = flight.trajectory_us
@@ -87,10 +87,10 @@ class TakeOff:
         top = (n, e, d - self._item.height_m)
         self._profile = LineProfile(self._ground_ned_m, top, limits.takeoff_speed_m_s, limits.takeoff_acceleration_m_s2)
         text = f"armed at {as_text(self._ground_ned_m)}, climbing to {self._item.height_m:g} m"
-        flight.tell(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
+        flight.report(now_us, "armed", text, origin_ned_m=flight.origin_ned_m, time_boot_us=latest.time_boot_us)
         return None
 
-    def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def _climb(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         profile, latest = self._profile, flight.vehicle.history.latest()
         assert profile is not None
         limits = flight.mission.companion.flight
@@ -99,9 +99,9 @@ class TakeOff:
         self._climbed_until_us = flight.trajectory_us
         is_up = latest is not None and math.dist(latest.position_ned_m, profile.target_m) <= limits.acceptance_radius_m
         if is_up and self._climbing_s >= profile.duration_s:
-            return Move(Trigger.TAKEN_OFF)
+            return Transition(Trigger.TAKEN_OFF)
         if (now_us - self._started_us) * 1e-6 > profile.duration_s + limits.arrival_timeout_s:
-            return Move(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)
+            return Transition(Trigger.INTERRUPTED, "the take-off height was not reached in time", hand_over=True)
         return None
 
 
@@ -117,7 +117,7 @@ def origin_of(flight: FlightContext, ground_ned_m: Vector3, boot_us: int, now_us
     drift_us = abs(boot_us - resume.armed_boot_us - passed_us)
     same_frame = drift_us <= BOOT_CLOCK_DRIFT * passed_us + BOOT_CLOCK_SLACK_US
     which = "the first flight's arming position" if same_frame else "this arming position: the vehicle was restarted"
-    flight.tell(now_us, "resume", f"coordinates count from {which}")
+    flight.report(now_us, "resume", f"coordinates count from {which}")
     return resume.origin_ned_m if same_frame else ground_ned_m
 
 
@@ -148,21 +148,21 @@ class Land:
     def target(self, now_us: int) -> Target | None:
         return None if self._landing else self._target
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if flight.vehicle.armed is False:
-            return Move(Trigger.DISARMED)
+            return Transition(Trigger.DISARMED)
         if not self._landing:
             outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == AUTO_LAND, now_us)
             if outcome is None:
                 return None
             if not outcome.succeeded:
-                return Move(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
+                return Transition(Trigger.INTERRUPTED, f"no landing: {outcome.text}", hand_over=True)
             self._landing = True
             flight.expected_mode = AUTO_LAND
-            flight.tell(now_us, "landing", "landing here")
+            flight.report(now_us, "landing", "landing here")
         if now_us - self._started_us > LANDING_TIMEOUT_US:
             seconds = LANDING_TIMEOUT_US // 1_000_000
-            return Move(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land")
+            return Transition(Trigger.INTERRUPTED, f"not disarmed {seconds} s after the order to land")
         return None
 
 
@@ -176,7 +176,7 @@ class TakeBack:
     A vehicle that does not take the mode goes on landing by itself, and is left to it.
     """
 
-    def __init__(self, flight: FlightContext, recovery: Activity, now_us: int) -> None:
+    def __init__(self, flight: FlightContext, recovery: StateHandler, now_us: int) -> None:
         self._recovery = recovery
         self._is_taken = False
         # Of a second hit the first one's request may be on its way.
@@ -188,14 +188,14 @@ class TakeBack:
     def target(self, now_us: int) -> Target | None:
         return self._recovery.target(now_us)
 
-    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         if not self._is_taken and now_us >= self._ask_us:
             if not self._is_asked:
                 self._is_asked = True
                 flight.command_client.begin(SetMode(OFFBOARD))
             outcome = flight.command_outcome(inputs, flight.vehicle.custom_mode == OFFBOARD, now_us)
             if outcome is not None and not outcome.succeeded:
-                return Move(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
+                return Transition(Trigger.INTERRUPTED, f"no recovery from a hit in the landing: {outcome.text}")
             if outcome is not None:
                 self._is_taken, flight.expected_mode = True, OFFBOARD
         return self._recovery.step(flight, inputs, now_us)

@@ -36,11 +36,11 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
         elif isinstance(sample, messages.Refused):
             text = flight.refusals.add(sample, now_us)
             if text is not None:
-                flight.tell(now_us, "implausible", text, message=sample.message)
+                flight.report(now_us, "implausible", text, message=sample.message)
             continue
         elif isinstance(sample, messages.Parameter) and sample.name == LOSS_PARAMETER:
             if flight.loss_s is None and sample.value > HELD_S:
-                flight.tell(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
+                flight.report(now_us, "unattended", longer_loss_text(sample.value), loss_s=sample.value)
             flight.loss_s = sample.value
         elif isinstance(sample, messages.TimeSyncRequest):
             flight.outbox.append(messages.TimeSyncReply(sample.vehicle_time_ns, now_us * 1000))
@@ -52,9 +52,9 @@ def update_vehicle(flight: FlightContext, samples: Sequence[Sample], now_us: int
     if vehicle.conflicts > conflicts:
         _report_conflict(flight, now_us)
     if vehicle.custom_mode != mode and vehicle.custom_mode is not None:
-        flight.tell(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
+        flight.report(now_us, "mode", f"mode {mode_name(vehicle.custom_mode)}", custom_mode=vehicle.custom_mode)
     if vehicle.armed is False and armed:
-        flight.tell(now_us, "disarmed", "disarmed")
+        flight.report(now_us, "disarmed", "disarmed")
     if vehicle.identity is not None:
         _measure_round_trip(flight, now_us)
     return None
@@ -84,7 +84,7 @@ def _measure_round_trip(flight: FlightContext, now_us: int) -> None:
         flight.outbox.append(messages.ReadParameter(LOSS_PARAMETER))
     text = flight.round_trip.alarm() if flight.vehicle.armed else None
     if text is not None:
-        flight.tell(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)
+        flight.report(now_us, "round_trip", text, round_trip_us=flight.round_trip.present_us)
 
 
 def _report_conflict(flight: FlightContext, now_us: int) -> None:
@@ -92,7 +92,7 @@ def _report_conflict(flight: FlightContext, now_us: int) -> None:
     last_us, flight.conflict_us = flight.conflict_us, now_us
     if last_us is None or now_us - last_us >= LASTING_US:
         count = flight.vehicle.conflicts
-        flight.tell(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
+        flight.report(now_us, "implausible", "conflicting mode reports: one was not confirmed", conflicts=count)
 
 
 # A vehicle below this height without a command to descend drags along the ground: that is no hit to recover from. Its

@@ -11,7 +11,7 @@ from companion.mission.model import KnownRecovery, Mission
 from companion.mission.policy import Limits
 from companion.px4_mode import MODE_NAMES
 from companion.reflex.config import RecoveryConfig
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 # Modes in which PX4 itself holds a position or a height. Not AUTO.LAND: its end is a hit on the ground. Not the modes
 # that a pilot flies by attitude: there the stick is the only brake, and it is not to be taken away unasked.
@@ -21,7 +21,7 @@ DEFAULT_MODES = (
 )
 
 
-class GuardConfig(Written):
+class GuardConfig(StrictModel):
     """The file of `rebound guard --config`; a mission's parts of the same name mean the same."""
 
     modes: Annotated[tuple[str, ...], Field(min_length=1)] = DEFAULT_MODES

@@ -11,7 +11,7 @@ from companion.messages import GlobalPosition, Sticks, Vector3
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class GuardTransition:
     """A trigger with its story, "" where the state's own events tell it."""
 
     trigger: Trigger
@@ -40,10 +40,10 @@ class GuardContext(FlightContext):
     sent_ned_m: deque[tuple[int, Vector3 | None]] = field(default_factory=lambda: deque(maxlen=64))
 
 
-class Activity(Protocol):
+class GuardStateHandler(Protocol):
     """What the guard does in a state; made anew each time the state is entered."""
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         """Do what is due now; a Move when the state is over."""
         ...
 

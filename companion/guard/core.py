@@ -12,17 +12,17 @@ from companion.guard.watching import Connect, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import GlobalPosition, PositionTarget, Sample, Sticks
-from companion.reflex.watch import start_watch
+from companion.reflex.monitor import start_monitor
 
 
 class GuardCore(Core[GuardContext, GuardMachine]):
     """`keeps_others_out`: see GuardContext."""
 
     def __init__(self, config: GuardConfig, keeps_others_out: bool, now_us: int) -> None:
-        watch = start_watch(config.companion, now_us)
-        streams = StreamMonitor(config.companion.streams, tuple(watch.detector.losses))
+        monitor = start_monitor(config.companion, now_us)
+        streams = StreamMonitor(config.companion.streams, tuple(monitor.detector.losses))
         guard = GuardContext(config.as_mission(), Vehicle(), streams, config=config, keeps_others_out=keeps_others_out)
-        super().__init__(guard, GuardMachine(guard, Connect(now_us)), watch, now_us)
+        super().__init__(guard, GuardMachine(guard, Connect(now_us)), monitor, now_us)
         self.is_enabled = False  # asked for, and not yet taken up
 
     @property
@@ -68,9 +68,9 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         moved = super()._act(samples, inputs, now_us)
         if moved and self.machine.state is State.CONNECTING:
             # What was seen of a vehicle that was restarted, perhaps by a hit, says nothing of the one that it is now.
-            seek, self.watch = self.watch.estimator.seek, start_watch(guard.config.companion, now_us)
-            self.watch.estimator.seek = seek
+            run_search, self.monitor = self.monitor.estimator.run_search, start_monitor(guard.config.companion, now_us)
+            self.monitor.estimator.run_search = run_search
         return moved
 
     def _note_sent(self, target: Target, now_us: int) -> None:
-        self.flight.sent_ned_m.append((now_us, None if target.leans_only else target.position_ned_m))
+        self.flight.sent_ned_m.append((now_us, None if target.acceleration_only else target.position_ned_m))

@@ -4,7 +4,7 @@ import math
 
 from companion.flight.context import Inputs, Target
 from companion.flight.recovering import Recover
-from companion.guard.context import GuardContext, Move
+from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
 from companion.messages import GlobalPosition, PositionTarget, Reposition, SetMode, Vector3
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, POSCTL, mode_name
@@ -43,20 +43,22 @@ class TakeOver:
     def target(self, now_us: int) -> Target | None:
         return self.recover.target(now_us)
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         is_seen = guard.vehicle.custom_mode == OFFBOARD
         outcome = guard.command_outcome(inputs, is_seen, now_us)
         took_ms = (now_us - self._began_us) / 1e3
         if is_seen:
             guard.expected_mode = OFFBOARD
             text = "OFFBOARD already, the program's setpoints kept out" if outcome is None else "OFFBOARD confirmed"
-            guard.tell(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
-            return Move(Trigger.CONFIRMED)
+            guard.report(now_us, "confirmed", f"{text} after {took_ms:.0f} ms", after_ms=took_ms)
+            return GuardTransition(Trigger.CONFIRMED)
         recovered(guard, self.recover, inputs, now_us)
         if outcome is not None:
-            return Move(Trigger.NOT_CONFIRMED, outcome.text)
+            return GuardTransition(Trigger.NOT_CONFIRMED, outcome.text)
         if took_ms > guard.config.confirm_within_s * 1e3:
-            return Move(Trigger.NOT_CONFIRMED, f"OFFBOARD not seen within {guard.config.confirm_within_s:g} s")
+            return GuardTransition(
+                Trigger.NOT_CONFIRMED, f"OFFBOARD not seen within {guard.config.confirm_within_s:g} s"
+            )
         return None
 
 
@@ -71,14 +73,16 @@ class Recovering:
     def target(self, now_us: int) -> Target | None:
         return self._recover.target(now_us)
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         # In a mode that somebody else has commanded PX4 flies to its own places.
         if now_us - self._began_us > ECHO_STALE_US and guard.vehicle.is_mode_known:
             self._foreign += sum(is_foreign(guard, echo, now_us) for echo in inputs.echoes)
         if self._foreign >= CROSSED_TIMES:
             guard.program_elsewhere = True
-            return Move(Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own")
-        return Move(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
+            return GuardTransition(
+                Trigger.CROSSED, "another program's setpoints reach the vehicle, on a link of its own"
+            )
+        return GuardTransition(Trigger.SETTLED) if recovered(guard, self._recover, inputs, now_us) else None
 
 
 def recovered(guard: GuardContext, recover: Recover, inputs: Inputs, now_us: int) -> bool:
@@ -175,7 +179,7 @@ class GiveBack:
         if guard.vehicle.custom_mode != self.wish:
             guard.command_client.begin(SetMode(self.wish))
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if self._aside is not None and not self._aside.is_over:
             self._aside.step(guard, inputs, now_us)
             if not self._aside.is_over:
@@ -194,13 +198,13 @@ class GiveBack:
         if is_seen:
             took_ms = (now_us - self._began_us) / 1e3
             text = f"given back to {mode_name(self.wish)} after {took_ms:.0f} ms"
-            guard.tell(now_us, "given_back", text, mode=mode_name(self.wish), after_ms=took_ms)
-            return Move(Trigger.GIVEN_BACK)
+            guard.report(now_us, "given_back", text, mode=mode_name(self.wish), after_ms=took_ms)
+            return GuardTransition(Trigger.GIVEN_BACK)
         if outcome is None:
             return None
         self._wishes.pop(0)
         if not self._wishes:
-            return Move(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
+            return GuardTransition(Trigger.CONTROL_LOST, "the vehicle takes no mode; setpoints stopped")
         self._ask(guard)
         # The answers of this step were to the mode before.
         return self.step(guard, Inputs(positions=inputs.positions), now_us)
@@ -227,11 +231,11 @@ class StandDown:
     def target(self, now_us: int) -> Target | None:
         return self._target
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if self._target is not None:
             is_seen = guard.vehicle.custom_mode != OFFBOARD
             outcome = guard.command_outcome(inputs, is_seen, now_us)
             if outcome is not None or now_us > self._until_us:
                 self._target = None
                 guard.command_client.cancel()
-        return Move(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None
+        return GuardTransition(Trigger.ENABLED, "enabled again") if inputs.is_enabled else None

@@ -9,10 +9,10 @@ from companion.flight.ending import LINK_RESTORED, Holder, Released, silent_link
 from companion.flight.machine import StateMachine
 from companion.flight.recovering import Recover, record_collision
 from companion.flight.states import State as FlightState
-from companion.guard.context import Activity, GuardContext, Move
+from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
 from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.guard.watching import Connect, StandBy, Watch
+from companion.guard.watching import CollisionMonitor, Connect, StandBy
 from companion.messages import Sticks
 from companion.motion.rotation import yaw_rad
 from companion.px4_mode import OFFBOARD, mode_name
@@ -52,49 +52,49 @@ class GuardMachine(StateMachine):
 
     program = "guard"
     flight: GuardContext
-    activity: Activity
+    handler: GuardStateHandler
     state: State = State.CONNECTING
     outcome: str = ""  # why it ended
 
     @property
     def holds(self) -> bool:
-        return self.state in HOLDING or (isinstance(self.activity, StandDown) and self.activity.hands_over)
+        return self.state in HOLDING or (isinstance(self.handler, StandDown) and self.handler.hands_over)
 
     @property
     def finished(self) -> bool:
         return self.state is State.ENDED
 
     def step(self, inputs: Inputs, now_us: int) -> bool:
-        before = self.activity
+        before = self.handler
         self._take(self._from_outside(inputs, now_us), now_us)
         for estimate in inputs.impacts:
             trigger = self._trigger_of_hit()
             if trigger is Trigger.HIT_BESIDE_PROGRAM and self.flight.config.beside_program == "tell":
                 self.flight.left_alone += 1
                 text = f"hit at {math.hypot(*estimate.velocity_ned_m_s):.2f} m/s left to the program that flies"
-                self.flight.tell(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
+                self.flight.report(now_us, "left_alone", text, impact_velocity_ned_m_s=estimate.velocity_ned_m_s)
             elif TABLE.moves(self.state, trigger):
                 self._remember_hit(now_us)
                 is_first = self.state is State.WATCHING
                 note_before(self.flight, FlightState.MISSION if is_first else FlightState.RECOVERING)
                 record_collision(self.flight, estimate, now_us)
-                self._take(Move(trigger), now_us)
-        move = self.activity.step(self.flight, inputs, now_us)
-        while move is not None and TABLE.moves(self.state, move.trigger):
-            self._take(move, now_us)
+                self._take(GuardTransition(trigger), now_us)
+        transition = self.handler.step(self.flight, inputs, now_us)
+        while transition is not None and TABLE.moves(self.state, transition.trigger):
+            self._take(transition, now_us)
             # The answers and positions of this step belong to the state that asked for them.
-            move = self.activity.step(self.flight, Inputs(), now_us)
-        return self.activity is not before
+            transition = self.handler.step(self.flight, Inputs(), now_us)
+        return self.handler is not before
 
     @property
     def _gives_away(self) -> bool:
         return self.state is State.GIVING_BACK
 
     def _give_away(self, text: str, now_us: int) -> None:
-        self._take(Move(Trigger.STOPPED, text), now_us)
+        self._take(GuardTransition(Trigger.STOPPED, text), now_us)
 
     def _release(self, text: str) -> None:
-        self.state, self.activity, self.outcome = State.ENDED, Released(), text
+        self.state, self.handler, self.outcome = State.ENDED, Released(), text
 
     def _trigger_of_hit(self) -> Trigger:
         """A program on another link goes on sending, in whatever mode; two streams would fight for the vehicle."""
@@ -114,24 +114,24 @@ class GuardMachine(StateMachine):
         attitude = guard.vehicle.attitude
         guard.yaw_rad = None if attitude is None else yaw_rad(attitude.attitude_wxyz)
 
-    def _from_outside(self, inputs: Inputs, now_us: int) -> Move | None:
+    def _from_outside(self, inputs: Inputs, now_us: int) -> GuardTransition | None:
         """What ends a state whatever is being done in it; the pilot's before all others, but for a disarm."""
         guard = self.flight
         guard.note_silence(now_us)
         if guard.vehicle.armed is False and TABLE.moves(self.state, Trigger.DISARMED):
-            return Move(Trigger.DISARMED, "disarmed")
+            return GuardTransition(Trigger.DISARMED, "disarmed")
         if self.state in HOLDING:
             lost = self._taken_by_another(inputs) or silent_link(guard, now_us)
             if lost is not None:
-                return Move(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
+                return GuardTransition(Trigger.CONTROL_LOST, f"{lost}; the guard lets go and stands down")
         if inputs.refusal is not None:
-            return Move(Trigger.REFUSED, inputs.refusal)
+            return GuardTransition(Trigger.REFUSED, inputs.refusal)
         if inputs.stop_reason is not None and TABLE.moves(self.state, Trigger.STOPPED):
-            return Move(Trigger.STOPPED, inputs.stop_reason)
+            return GuardTransition(Trigger.STOPPED, inputs.stop_reason)
         if self.state not in HOLDING:
             return self._link_restored(now_us)
         silent = silent_position(guard)
-        return None if silent is None else Move(Trigger.POSITION_SILENT, silent)
+        return None if silent is None else GuardTransition(Trigger.POSITION_SILENT, silent)
 
     def _taken_by_another(self, inputs: Inputs) -> str | None:
         guard = self.flight
@@ -144,34 +144,34 @@ class GuardMachine(StateMachine):
             # Late: it was asked for, and given up.
             guard.expected_mode = expected = OFFBOARD
         requested = guard.command_client.requested_mode
-        if isinstance(self.activity, GiveBack):
-            requested = self.activity.wish
+        if isinstance(self.handler, GiveBack):
+            requested = self.handler.wish
         holder = who_decided(report, expected, requested)
         if holder is Holder.COMPANION:
             return None
         who = "a failsafe of the vehicle" if holder is Holder.FAILSAFE else "the pilot or a program"
         return f"{who} took over in {mode_name(report.custom_mode)}"
 
-    def _link_restored(self, now_us: int) -> Move | None:
+    def _link_restored(self, now_us: int) -> GuardTransition | None:
         """What was restarted stands, or is being met; what flies has not forgotten what it was asked for."""
         guard = self.flight
         may_be_restarted = self.state is State.CONNECTING or guard.vehicle.armed is False
         if not may_be_restarted or guard.is_silent(now_us) or not guard.was_silent:
             return None
-        return Move(Trigger.STREAMS_GONE, LINK_RESTORED)
+        return GuardTransition(Trigger.STREAMS_GONE, LINK_RESTORED)
 
-    def _take(self, move: Move | None, now_us: int) -> None:
-        if move is None or not TABLE.moves(self.state, move.trigger):
+    def _take(self, transition: GuardTransition | None, now_us: int) -> None:
+        if transition is None or not TABLE.moves(self.state, transition.trigger):
             return
-        self.state = TABLE.next_state(self.state, move.trigger)
+        self.state = TABLE.next_state(self.state, transition.trigger)
         guard = self.flight
-        if move.text:
-            guard.tell(now_us, _KINDS.get(move.trigger, "guard"), move.text)
-        if move.trigger in _TO_HOLD:
-            guard.then_hold = move.text or move.trigger.value
-        self.activity = self._begin(move, now_us)
+        if transition.text:
+            guard.report(now_us, _KINDS.get(transition.trigger, "guard"), transition.text)
+        if transition.trigger in _TO_HOLD:
+            guard.then_hold = transition.text or transition.trigger.value
+        self.handler = self._begin(transition, now_us)
 
-    def _begin(self, move: Move, now_us: int) -> Activity:
+    def _begin(self, transition: GuardTransition, now_us: int) -> GuardStateHandler:
         guard = self.flight
         if self.state not in HOLDING:
             guard.command_client.cancel()
@@ -184,26 +184,26 @@ class GuardMachine(StateMachine):
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:
-                return Watch(guard, now_us)
+                return CollisionMonitor(guard, now_us)
             case State.TAKING_OVER:
                 mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
-                guard.tell(now_us, "take_over", f"taking over from {mode}", mode=mode)
+                guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)
                 guard.command_client.cancel()
                 return TakeOver(guard, Recover(guard, now_us), now_us)
             case State.RECOVERING:
-                if move.trigger is Trigger.HIT:
+                if transition.trigger is Trigger.HIT:
                     return Recovering(Recover(guard, now_us), now_us)
-                assert isinstance(self.activity, TakeOver), "the table leads here from there alone"
-                return Recovering(self.activity.recover, now_us)
+                assert isinstance(self.handler, TakeOver), "the table leads here from there alone"
+                return Recovering(self.handler.recover, now_us)
             case State.GIVING_BACK:
                 limit = guard.config.max_hits
                 if guard.hits >= limit and not guard.then_hold:
                     guard.then_hold = f"hit {guard.hits} of at most {limit}"
-                return GiveBack(guard, move.trigger in _BESIDE_PROGRAM, now_us)
+                return GiveBack(guard, transition.trigger in _BESIDE_PROGRAM, now_us)
             case State.STOOD_DOWN:
-                return StandDown(guard, move.text.startswith(STICKS), now_us)
+                return StandDown(guard, transition.text.startswith(STICKS), now_us)
             case State.ENDED:
-                self.outcome = move.text
+                self.outcome = transition.text
                 return Released()
 
 

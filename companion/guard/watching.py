@@ -1,9 +1,9 @@
 """States connecting, standing by and watching: nothing is commanded, at most it is made ready to be."""
 
 from companion.flight.connecting import Meet
-from companion.flight.context import FlightContext, Inputs, Silent, Target
+from companion.flight.context import FlightContext, Inputs, NoSetpoint, Target
 from companion.flight.envelope import unattended_text
-from companion.guard.context import GuardContext, Move
+from companion.guard.context import GuardContext, GuardTransition
 from companion.guard.states import Trigger
 from companion.messages import LandedState, MessageId, SetMessageInterval, VehicleCommand
 from companion.px4_mode import OFFBOARD, mode_name
@@ -35,7 +35,7 @@ def why_not(guard: GuardContext) -> str | None:
     return None if guard.origin_ned_m is not None else "no position yet"
 
 
-class Connect(Meet[Move]):
+class Connect(Meet[GuardTransition]):
     """The vehicle may be flying.
 
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.
@@ -52,43 +52,43 @@ class Connect(Meet[Move]):
             SetMessageInterval(MessageId.MANUAL_CONTROL, round(1e6 / STICKS_HZ)),
         ]
 
-    def _refused(self, text: str) -> Move:
-        return Move(Trigger.REFUSED, text)
+    def _refused(self, text: str) -> GuardTransition:
+        return GuardTransition(Trigger.REFUSED, text)
 
-    def _judge(self, flight: FlightContext, now_us: int) -> Move | None:
+    def _judge(self, flight: FlightContext, now_us: int) -> GuardTransition | None:
         complaint = flight.streams.too_slow() or flight.round_trip.complaint()
         if complaint is not None and (flight.mission.companion.link.wait or not self._is_first):
             self._ask_again(flight, f"not guarded by now: {complaint}", now_us)
             return None
         self._report_streams(flight, now_us)
-        flight.tell(now_us, "unattended", unattended_text(flight.mission.limits.max_speed_m_s))
-        return Move(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
+        flight.report(now_us, "unattended", unattended_text(flight.mission.limits.max_speed_m_s))
+        return GuardTransition(Trigger.CONNECTED) if complaint is None else self._refused(complaint)
 
 
-class StandBy(Silent):
+class StandBy(NoSetpoint):
     """Nothing to guard; the reason is reported when it changes."""
 
     def __init__(self) -> None:
         self._told: str | None = None
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         vehicle = guard.vehicle
         position_us = vehicle.last_position_us
         if position_us is not None and vehicle.last_received_us - position_us > STREAMS_GONE_US:
-            return Move(Trigger.STREAMS_GONE, "streams ended, asking for them again")
+            return GuardTransition(Trigger.STREAMS_GONE, "streams ended, asking for them again")
         reason = why_not(guard)
         if reason is None and guard.round_trip.complaint() is not None:
             reason = "the round trip to the vehicle takes too long"
         if reason is None:
             assert vehicle.custom_mode is not None
-            return Move(Trigger.WORTH_GUARDING, f"watching {mode_name(vehicle.custom_mode)}")
+            return GuardTransition(Trigger.WORTH_GUARDING, f"watching {mode_name(vehicle.custom_mode)}")
         if reason != self._told:
             self._told = reason
-            guard.tell(now_us, "standing_by", f"standing by: {reason}", reason=reason)
+            guard.report(now_us, "standing_by", f"standing by: {reason}", reason=reason)
         return None
 
 
-class Watch:
+class CollisionMonitor:
     """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:
@@ -105,8 +105,8 @@ class Watch:
             return None
         return Target(latest.position_ned_m, None)
 
-    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> Move | None:
+    def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
         if guard.vehicle.custom_mode == OFFBOARD and not guard.keeps_others_out:
             guard.program_elsewhere = True
         reason = why_not(guard)
-        return None if reason is None else Move(Trigger.NOT_TO_GUARD, reason)
+        return None if reason is None else GuardTransition(Trigger.NOT_TO_GUARD, reason)

@@ -158,7 +158,7 @@ class Encoder:
             type_mask |= IGNORE_ACCELERATION
             acceleration = (NAN, NAN, NAN)
         place = setpoint.position_ned_m
-        if setpoint.leans_only:
+        if setpoint.acceleration_only:
             type_mask |= IGNORE_NORTH_AND_EAST
             place, velocity = (NAN, NAN, place[2]), (NAN, NAN, velocity[2])
         if setpoint.is_height_free:

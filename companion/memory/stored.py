@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from companion.memory.patch import REACHES_M, Patch
 from companion.reflex.config import STEEP
 from companion.reflex.halfspace import away_from
-from companion.written import NotNegative, PositionNed, Positive, Written
+from companion.strict_model import NotNegative, PositionNed, Positive, StrictModel
 
 OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]
 
@@ -17,7 +17,7 @@ OnUnreachable: TypeAlias = Literal["land", "return", "continue", "abort"]
 _DIGITS = 4
 
 
-class KnownPatch(Written):
+class KnownPatch(StrictModel):
     """A surface: where it was touched, and the direction out of it. NED from the arming position, metres."""
 
     touches_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1)]
@@ -47,14 +47,14 @@ class KnownPatch(Written):
         )
 
 
-class ObstacleFile(Written):
+class ObstacleFile(StrictModel):
     """The whole of an `obstacles.json`."""
 
     patches: tuple[KnownPatch, ...]
     """One for each surface."""
 
 
-class ObstaclesConfig(Written):
+class ObstaclesConfig(StrictModel):
     """The mission's `obstacles:` part: what is known beforehand, and what follows where that leaves no way."""
 
     file: Annotated[str, Field(min_length=1)] | None = None

@@ -6,13 +6,13 @@ from typing import Annotated
 from pydantic import Field
 
 from companion.motion.settling import SettledConfig
-from companion.reflex.watch import WatchConfig
-from companion.written import NotNegative, Positive, Written
+from companion.reflex.monitor import CollisionMonitorConfig
+from companion.strict_model import NotNegative, Positive, StrictModel
 
 Rate = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1000.0)]
 
 
-class StreamsConfig(Written):
+class StreamsConfig(StrictModel):
     """Rates asked for, and the least measured rates with which a flight begins, in Hz."""
 
     highres_imu_hz: Rate = 250.0
@@ -42,7 +42,7 @@ class StreamsConfig(Written):
     """A tenth of a second of turning at 1 rad/s is 6 degrees."""
 
 
-class LinkConfig(Written):
+class LinkConfig(StrictModel):
     """Patience with the other end."""
 
     heartbeat_wait_s: Positive = 10.0
@@ -61,7 +61,7 @@ class LinkConfig(Written):
         return math.inf if self.wait else self.heartbeat_wait_s
 
 
-class FlightConfig(Written):
+class FlightConfig(StrictModel):
     """How the flight itself is flown."""
 
     setpoint_hz: Annotated[Rate, Field(ge=20.0)] = 50.0
@@ -88,7 +88,7 @@ class FlightConfig(Written):
     """Time allowed to arrive after the profile has ended: a wind or a drag it did not know of."""
 
 
-class OperatorConfig(Written):
+class OperatorConfig(StrictModel):
     """What a ground station is told; nothing of it is needed to fly."""
 
     status_texts: bool = True
@@ -99,7 +99,7 @@ class OperatorConfig(Written):
     """CPU, temperature, memory and disk of this computer once a second, as ONBOARD_COMPUTER_STATUS. Real vehicles."""
 
 
-class DiskConfig(Written):
+class DiskConfig(StrictModel):
     """How much of the disk recorded flights of real vehicles may take; the oldest go first, those with a hit last."""
 
     max_use_mb: NotNegative | None = None
@@ -109,7 +109,7 @@ class DiskConfig(Written):
     """Megabytes that are left free. Unset: 300 MiB, or a tenth of a smaller file system, as PX4's logger leaves."""
 
 
-class CompanionConfig(WatchConfig):
+class CompanionConfig(CollisionMonitorConfig):
     """All settings of the companion."""
 
     min_detection_height_m: NotNegative = 0.5

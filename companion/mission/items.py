@@ -10,12 +10,12 @@ from typing import Annotated, Literal, Self, TypeAlias
 from pydantic import ConfigDict, Field, model_validator
 
 from companion.mission.policy import OnCollision, OnTimeout
-from companion.written import NotNegative, Number, PositionNed, Positive, Written, with_bare_keys
+from companion.strict_model import NotNegative, Number, PositionNed, Positive, StrictModel, with_bare_keys
 
 Count = Annotated[int, Field(strict=True, ge=0)]
 
 
-class ExpectHit(Written):
+class ExpectHit(StrictModel):
     """From here on, a hit is detected within the time; with a speed before the contact within the bounds given."""
 
     within_s: Positive
@@ -26,14 +26,14 @@ class ExpectHit(Written):
     """Of the vehicle just before the hit."""
 
 
-class ExpectNoHit(Written):
+class ExpectNoHit(StrictModel):
     """From here on no hit is detected, for the time or until the end of the flight."""
 
     for_s: Positive | None = None
     """Without it until the end of the flight."""
 
 
-class ExpectHits(Written):
+class ExpectHits(StrictModel):
     """How many hits there have been until here."""
 
     exactly: Count | None = None
@@ -50,7 +50,7 @@ class ExpectHits(Written):
         return self
 
 
-class ExpectRecovered(Written):
+class ExpectRecovered(StrictModel):
     """Until here there was a hit, and the latest one has been recovered from."""
 
     within_s: Positive | None = None
@@ -59,7 +59,7 @@ class ExpectRecovered(Written):
     """Largest overshoot past the recovery setpoint."""
 
 
-class ExpectPosition(Written):
+class ExpectPosition(StrictModel):
     """The vehicle is here now."""
 
     ned_m: PositionNed
@@ -68,7 +68,7 @@ class ExpectPosition(Written):
     """Distance to it at most."""
 
 
-class ExpectHeight(Written):
+class ExpectHeight(StrictModel):
     """The vehicle's height above the arming position now."""
 
     min_m: NotNegative | None = None
@@ -83,14 +83,14 @@ class ExpectHeight(Written):
         return self
 
 
-class ExpectSpeed(Written):
+class ExpectSpeed(StrictModel):
     """The vehicle's speed now."""
 
     max_m_s: Positive
     """At most."""
 
 
-class ExpectFlightTime(Written):
+class ExpectFlightTime(StrictModel):
     """Time since arming, now."""
 
     at_most_s: Positive
@@ -109,7 +109,7 @@ Check: TypeAlias = (
 )
 
 
-class ExpectItem(Written):
+class ExpectItem(StrictModel):
     """A map with exactly one key. One that is not met makes the flight's outcome `failed`; the flight goes on."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
@@ -153,14 +153,14 @@ Acceleration = Annotated[Positive, Field(le=MAX_ACCELERATION_M_S2)]
 Yaw = Annotated[Number, Field(ge=-360.0, le=360.0)]
 
 
-class TakeoffItem(Written):
+class TakeoffItem(StrictModel):
     """Climb straight up to a height above the arming position."""
 
     height_m: Positive
     """Above the arming position."""
 
 
-class GoToItem(Written):
+class GoToItem(StrictModel):
     """Fly a straight line; without `yaw_deg` (clockwise from north) the heading stays as it is."""
 
     position_ned_m: PositionNed
@@ -173,7 +173,7 @@ class GoToItem(Written):
     """Heading, clockwise from north."""
 
 
-class VelocityItem(Written):
+class VelocityItem(StrictModel):
     """Fly with a velocity for a time, from rest to rest; the setpoint moves on, so that wind does not add to it."""
 
     velocity_ned_m_s: PositionNed
@@ -193,7 +193,7 @@ class VelocityItem(Written):
         return self
 
 
-class PathItem(Written):
+class PathItem(StrictModel):
     """Fly a smooth curve through all the points without stopping, as fast as speed and acceleration allow."""
 
     points_ned_m: Annotated[tuple[PositionNed, ...], Field(min_length=1, max_length=200)]
@@ -206,7 +206,7 @@ class PathItem(Written):
     """Heading, clockwise from north, or along the path."""
 
 
-class OrbitItem(Written):
+class OrbitItem(StrictModel):
     """Fly to the nearest point of a circle, then round it; the vehicle looks at the centre unless told otherwise."""
 
     centre_ned_m: PositionNed
@@ -225,14 +225,14 @@ class OrbitItem(Written):
     """Heading, clockwise from north, or towards the centre, or along the path."""
 
 
-class HoldItem(Written):
+class HoldItem(StrictModel):
     """Stay where the vehicle is."""
 
     duration_s: Positive
     """From the end of the item before."""
 
 
-class SteadyCondition(Written):
+class SteadyCondition(StrictModel):
     """The vehicle rests at its setpoint."""
 
     within_m: Positive = 0.2
@@ -243,7 +243,7 @@ class SteadyCondition(Written):
     """How long both must hold."""
 
 
-class WaitForItem(Written):
+class WaitForItem(StrictModel):
     """Hold until a condition is met; give exactly one. `timeout_s` beside the item limits the wait."""
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
@@ -264,7 +264,7 @@ class WaitForItem(Written):
         return self
 
 
-class SetSpeedItem(Written):
+class SetSpeedItem(StrictModel):
     """Speed and acceleration of all later items that state none of their own."""
 
     speed_m_s: Speed
@@ -273,7 +273,7 @@ class SetSpeedItem(Written):
     """Of the items after this one."""
 
 
-class SetYawItem(Written):
+class SetYawItem(StrictModel):
     """Turn on the spot, in the shorter direction."""
 
     yaw_deg: Yaw
@@ -282,7 +282,7 @@ class SetYawItem(Written):
     """PX4's own limit is MC_YAWRATE_MAX."""
 
 
-class ReturnItem(Written):
+class ReturnItem(StrictModel):
     """Fly home and land: up to `height_m` first if the vehicle is lower, a straight line to above the start, land."""
 
     height_m: Positive | None = None
@@ -291,7 +291,7 @@ class ReturnItem(Written):
     """Of the way home."""
 
 
-class LandItem(Written):
+class LandItem(StrictModel):
     """Land where the vehicle is; the flight is complete when the vehicle has disarmed itself."""
 
 
@@ -310,7 +310,7 @@ ACTIONS = (
 )
 
 
-class RepeatItem(Written):
+class RepeatItem(StrictModel):
     """Fly the items one after the other, `times` times."""
 
     times: Annotated[int, Field(strict=True, ge=1, le=1000)]
@@ -319,7 +319,7 @@ class RepeatItem(Written):
     """What is repeated."""
 
 
-class MissionItem(Written):
+class MissionItem(StrictModel):
     """One step: a map with exactly one action, and beside it what shall be different for this item."""
 
     model_config = ConfigDict(

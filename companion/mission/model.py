@@ -23,7 +23,7 @@ from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, O
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.laws import RECOVERY_LAWS, check_known_law
-from companion.written import Written
+from companion.strict_model import StrictModel
 
 
 def _known_law(recovery: RecoveryConfig) -> RecoveryConfig:
@@ -34,7 +34,7 @@ def _known_law(recovery: RecoveryConfig) -> RecoveryConfig:
 KnownRecovery = Annotated[RecoveryConfig, AfterValidator(_known_law)]
 
 
-class Mission(Written):
+class Mission(StrictModel):
     """A whole mission file. `sim` belongs to the simulated vehicle and is ignored in a real flight."""
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9._-]+$")]

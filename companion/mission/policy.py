@@ -4,14 +4,14 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from companion.written import NotNegative, PositionNed, Positive, Written
+from companion.strict_model import NotNegative, PositionNed, Positive, StrictModel
 
 Handover: TypeAlias = Literal["hold", "land"]
 OnDamage: TypeAlias = Literal["tell", "land", "return"]
 OnTimeout: TypeAlias = Literal["abort", "continue", "return", "land"]
 
 
-class OnCollision(Written):
+class OnCollision(StrictModel):
     """After the recovery. `max_hits` counts the hits of the flight; in an item's own policy, those of the item."""
 
     then: Literal["hold", "continue", "retry", "detour", "return", "land"] = "hold"
@@ -28,7 +28,7 @@ class OnCollision(Written):
     """abort: hand the vehicle over as `on_interrupt` says."""
 
 
-class AbortWhen(Written):
+class AbortWhen(StrictModel):
     """Conditions that end the mission wherever it is; the vehicle is then handed over as `on_interrupt` says."""
 
     outside_fence_by_m: Positive | None = 1.0
@@ -47,7 +47,7 @@ class AbortWhen(Written):
     """After the recovery from a hit this hard: the airframe wants to be looked at."""
 
 
-class Limits(Written):
+class Limits(StrictModel):
     """What no setpoint exceeds, whatever asks for it; see also the fence."""
 
     max_speed_m_s: Annotated[Positive, Field(le=20.0)] = 12.0
@@ -59,7 +59,7 @@ class Limits(Written):
     """Of what a setpoint's acceleration asks for sideways: PX4's own MPC_TILTMAX_AIR."""
 
 
-class Resume(Written):
+class Resume(StrictModel):
     """Where an interrupted flight of this mission is taken up again; `rebound fly --resume RUN` writes it.
 
     The first flight's arming position is the zero of the coordinates for as long as the vehicle has not been

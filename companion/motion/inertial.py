@@ -51,9 +51,9 @@ class Inertial:
             self.fixes.clear()
         return whole
 
-    def attitude(self, sample: Attitude, is_right: bool = True) -> None:
+    def attitude(self, sample: Attitude, is_valid: bool = True) -> None:
         """Take one attitude; see `Strapdown`."""
-        self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, is_right)
+        self.strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz, is_valid)
 
     def velocity(self, sample: LocalPosition | Odometry) -> None:
         """Take one velocity."""

@@ -1,10 +1,10 @@
 """Has the vehicle come to rest at a place?"""
 
 from companion.messages import LocalPosition, Vector3
-from companion.written import NotNegative, Positive, Written
+from companion.strict_model import NotNegative, Positive, StrictModel
 
 
-class SettledConfig(Written):
+class SettledConfig(StrictModel):
     """When a recovery has ended."""
 
     distance_m: Positive = 0.10

@@ -37,23 +37,23 @@ class Strapdown:
     A filter that puts a velocity right takes part of its error for a tilt. Gyroscopes do not. Of 2.4 m/s that a real
     PX4 had missed it made 4 degrees, for more than a second (bench/notes/px4.md).
     """
-    level_leans_m_s2: Vector3 = ZERO
+    level_acceleration_m_s2: Vector3 = ZERO
     """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; zero while that is right."""
 
-    def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_right: bool = True) -> None:
+    def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_valid: bool = True) -> None:
         behind_s = 1e-6 * (self.time_boot_us - self.attitude_boot_us)
-        if is_right or (self.by_rates_wxyz is None and behind_s > ATTITUDE_KEPT_S):
+        if is_valid or (self.by_rates_wxyz is None and behind_s > ATTITUDE_KEPT_S):
             # Right, or too long ago that one was: rates of one moment lead nowhere from there.
-            self.by_rates_wxyz, self.level_leans_m_s2 = None, ZERO
+            self.by_rates_wxyz, self.level_acceleration_m_s2 = None, ZERO
         else:
             if self.by_rates_wxyz is None:
                 self.by_rates_wxyz = turned(self.attitude_wxyz, self.rates_frd_rad_s, behind_s)
-            right_wxyz = turned(self.by_rates_wxyz, self.rates_frd_rad_s, 1e-6 * (time_us - self.time_boot_us))
-            n, e, d = body_to_ned(right_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
+            valid_wxyz = turned(self.by_rates_wxyz, self.rates_frd_rad_s, 1e-6 * (time_us - self.time_boot_us))
+            n, e, d = body_to_ned(valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
             if -d < MOST_WRONG:
-                self.by_rates_wxyz, self.level_leans_m_s2 = None, ZERO
+                self.by_rates_wxyz, self.level_acceleration_m_s2 = None, ZERO
             else:
-                self.level_leans_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
+                self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
         self.attitude_wxyz, self.attitude_boot_us = attitude_wxyz, time_us
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> bool:
@@ -89,7 +89,7 @@ class Strapdown:
         return whole
 
     @property
-    def right_wxyz(self) -> Quaternion:
+    def valid_wxyz(self) -> Quaternion:
         """The attitude by which the sum goes on."""
         return self.by_rates_wxyz or self.attitude_wxyz
 

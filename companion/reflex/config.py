@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from companion.written import NotNegative, Positive, Written
+from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- the plan
 # Lag of the thrust's direction behind the acceleration asked for: twice over an attitude loop of 12 rad/s, critically
@@ -16,17 +16,17 @@ ATTITUDE_RAD_S = 12.0
 # A shorter way is over before a vehicle of that bandwidth has leant both ways.
 SHORTEST_S = 1.25
 # Braking before a surface asks for all there is; in less than the vehicle takes to lean there is nothing to be gained.
-HARDEST_S = 0.2
+SHORTEST_BRAKING_S = 0.2
 # Of the limit: a lean of 31 degrees instead of 17, rather than into a surface.
-HARDER = 2.0
+HARD_BRAKING = 2.0
 # Arms give way by so much, and an estimate wavers by it.
-TOUCHES_M = 0.05
+TOUCH_TOLERANCE_M = 0.05
 # Cosine of 60 degrees: a goal further aside is not run past but turned to, which brakes cannot hasten.
-AHEAD = 0.5
+AHEAD_COSINE = 0.5
 # Durations are tried in steps of a twentieth, which is less than the lag is known to.
-STEP = 1.05
+DURATION_STEP = 1.05
 # PX4's velocity loop takes back a share of the acceleration that it measures: MPC_XY_VEL_D_ACC, 0.2 at most.
-DAMPED = 1.1
+ACCELERATION_GAIN = 1.1
 # PX4's MPC_Z_VEL_P_ACC: what its own loop does against a climb, 1/s. As much again is asked for beside it.
 CLIMB_GAIN_PER_S = 4.0
 # PX4's MPC_Z_P, and level MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
@@ -35,12 +35,12 @@ HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
 OFF_PLAN_M_S = 0.45
 OFF_PLAN_M = 0.3
 # A lean of 9 degrees: arms that press on a wall carry a vehicle that leans by 15, from 22 on it is tipped over.
-LEANS_M_S2 = 1.5
+PRESSING_TILT_M_S2 = 1.5
 # A lean of 20 degrees into what is touched. Thrust T at a lean a presses with T sin(a), and the motors turn the vehicle
 # back with at most a tenth of a metre times T: from 48 degrees on no thrust does; below that a small one does.
-HANGS_M_S2 = 3.6
+HANGING_TILT_M_S2 = 3.6
 # Down, half of gravity: leaves thrust to steer with.
-FALLS_M_S2 = 4.9
+DESCENT_M_S2 = 4.9
 # What a fall is stopped with, hovering at 78 % of the thrust and not yet level, and what is to be left of the height.
 STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 # rad/s. From here on a lean that lags by LEAD_S points half a right angle and more beside what PX4's own loops ask for.
@@ -60,7 +60,7 @@ NORMAL_SINE = 0.17
 STEEP = 0.7
 # Cosine between two normals below which surfaces face each other, as in a corridor: away from one is towards the
 # other, and where there is not room enough for both distances the middle is kept. Walls of a corner are at 0.
-FACING_EACH_OTHER = -0.5
+FACING_COSINE = -0.5
 # Where the vehicle is, is free: behind a surface by more than an estimate's drift and a touch's depth, the surface is
 # not where it was thought to be.
 BEHIND_M = 0.2
@@ -73,20 +73,20 @@ SMOOTHED_S = 0.05
 # The vehicle's estimate beside the accelerometer's sum: its noise lasts longer, its delay is shorter.
 CORRECTED_S = 0.1
 # Cosine of 60 degrees: further over no thrust carries the vehicle.
-MOST_LEANT = 0.5
+LEAST_UPRIGHT_COSINE = 0.5
 # Wind and drag: slower than the steering, faster than the drift they cause.
 WIND_S = 1.0
 # What pushes on: slower than a lean follows, faster than it tips the vehicle.
-PUSHES_S = 0.2
+EXTERNAL_FORCE_S = 0.2
 # A contact pushes still, or what it did is not yet in the estimate, for so long after its last push.
-LEFT_US = 50_000
+CONTACT_LINGERS_US = 50_000
 # Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
-KNOWN_US = 80_000
+MOTION_KNOWN_US = 80_000
 # How an estimate is put right after a clipped hit. By motion capture a real PX4 took 0.16 s, 4.7 rad/s and a damping of
 # 0.67, by GPS 0.13 s, 2.4 rad/s and 0.69 (bench/notes/px4.md); others are up to twice as late, and twice as fast.
-PUT_RIGHT_AFTER_S = (0.04, 0.1, 0.16, 0.22)
-PUT_RIGHT_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
-PUT_RIGHT_DAMPING = (0.5, 0.67, 0.85)
+CORRECTION_DELAY_S = (0.04, 0.1, 0.16, 0.22)
+CORRECTION_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
+CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 # A part of what is missing is taken for a tilt, and goes as slowly as that: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
 # Of what was hidden, the share by which velocity and, in seconds, place of those hits differ from that, RMS over 3 s.
@@ -96,26 +96,26 @@ DRIFT_M2_S3 = 0.03
 # Of where the hit was.
 PLACE_SPREAD_M = 0.1
 # Right is what is known to be wrong by no more than four times a good velocity's noise.
-RIGHT_M_S = 0.15
+CONVERGED_M_S = 0.15
 # A velocity that is told is held against the places that are told over this time: their noise of 0.02 m makes 0.04 m/s
 # of it. What is more than twice RIGHT_M_S is a place that jumped.
-COMPARED_S, MOST_OFF_M_S = 0.5, 0.3
+COMPARED_S, MOST_VELOCITY_ERROR_M_S = 0.5, 0.3
 # Spreads of the velocity after a hit about the one expected: of the speed into the obstacle (frames give back 0.2 to
 # 0.9 of it, and the normal is good to 20 degrees), of the speed by friction, and upwards (0.6 m/s at 5 m/s).
-REBOUND_SPREAD, FRICTION_SPREAD, THROWN_SHARE, LEAST_SPREAD_M_S = 0.26, 0.1, 0.12, 0.1
+RESTITUTION_SPREAD, FRICTION_SPREAD, VERTICAL_SPREAD, LEAST_SPREAD_M_S = 0.26, 0.1, 0.12, 0.1
 # Of what a hit changes, clipping hides anything from none to all.
-HIDDEN_SHARE = 0.5
+CLIPPED_PART = 0.5
 # What still leans on an obstacle, too softly to be felt, comes nearer by less: arms give way by 5 cm.
-SLID_OFF_M_S = 0.3
+NO_CONTACT_APPROACH_M_S = 0.3
 # A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
-TELLING_M_S = 1.0
+LEAST_VELOCITY_CHANGE_M_S = 1.0
 # Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
-AGREEING = 0.87
+AGREEMENT_COSINE = 0.87
 # Six times the noise of a good estimate.
 LEAVING_M_S = 0.2
 
 
-class RecoveryConfig(Written):
+class RecoveryConfig(StrictModel):
     """The mission's `recovery:` part; `gamma` in seconds, one number or one for each horizontal axis."""
 
     law: str = "adaptive"

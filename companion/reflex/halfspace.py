@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from companion.fence import Fence
 from companion.messages import Vector3
-from companion.reflex.config import BEHIND_M, FACING_EACH_OTHER, ROUNDS, STEEP
+from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS, STEEP
 
 
 def away_from(normal_ned: Vector3) -> Vector3:
@@ -53,7 +53,7 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True)
-class Envelope:
+class FenceBounds:
     """The mission's fence, placed at the arming position; local NED, metres."""
 
     origin_ned_m: Vector3
@@ -73,10 +73,10 @@ class Envelope:
 
 
 @dataclass(frozen=True, slots=True)
-class Room:
+class FreeSpace:
     """A fence and the surfaces known besides the one just hit."""
 
-    envelope: Envelope
+    envelope: FenceBounds
     surfaces: Sequence[Surface] = ()
 
     def goal(self, contact_ned_m: Vector3, normal_ned: Vector3, goal_ned_m: Vector3) -> Vector3:
@@ -96,7 +96,7 @@ def _clear_of(surface: Surface, contact: Vector3, normal: Vector3, goal: Vector3
     if room_m < -BEHIND_M:
         return goal
     cosine = sum(a * b for a, b in zip(normal, surface.normal_ned, strict=True))
-    if cosine < FACING_EACH_OTHER:
+    if cosine < FACING_COSINE:
         wanted_m = min(wanted_m, 0.5 * max(0.0, room_m))
     short_m = wanted_m - surface.off_m(goal)
     return goal if short_m <= 0.0 else plus(goal, short_m, surface.normal_ned)

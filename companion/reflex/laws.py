@@ -21,9 +21,9 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.reflex.config import NORMAL_SINE, STEP, RecoveryConfig
+from companion.reflex.config import DURATION_STEP, NORMAL_SINE, RecoveryConfig
 from companion.reflex.halfspace import plus, split
-from companion.reflex.planner import Limits, Moving, Plan
+from companion.reflex.planner import Limits, MotionState, Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +38,11 @@ class Contact:
     velocity_ned_m_s: Vector3
     normal_ned: Vector3
 
-    def rebound(self, restitution: float) -> Moving:
+    def rebound(self, restitution: float) -> MotionState:
         """The motion after it, as far as that can be known before it has been measured."""
         into_m_s, tangential = split(self.velocity_ned_m_s, self.normal_ned)
         back_m_s = max(into_m_s, -restitution * into_m_s)
-        return Moving(self.position_ned_m, plus(tangential, back_m_s, self.normal_ned))
+        return MotionState(self.position_ned_m, plus(tangential, back_m_s, self.normal_ned))
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,25 +50,25 @@ class Law:
     """`follows`: goal and plan are found anew as more is known of the contact. `plans`: else the goal is asked for at
     once, from the first moment on."""
 
-    goal_ned_m: Callable[[RecoveryConfig, Contact, Moving, Limits], Vector3]
+    goal_ned_m: Callable[[RecoveryConfig, Contact, MotionState, Limits], Vector3]
     follows: bool
     plans: bool
 
 
-def _paper(config: RecoveryConfig, contact: Contact, motion: Moving, limits: Limits) -> Vector3:
+def _paper(config: RecoveryConfig, contact: Contact, motion: MotionState, limits: Limits) -> Vector3:
     (gamma_1_s, gamma_2_s), (x_1, x_2, x_3) = config.gamma_per_axis, contact.position_ned_m
     v_c1, v_c2, _ = contact.velocity_ned_m_s
     return (x_1 - gamma_1_s * v_c1, x_2 - gamma_2_s * v_c2, x_3)
 
 
-def _normal(config: RecoveryConfig, contact: Contact, motion: Moving, limits: Limits) -> Vector3:
+def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState, limits: Limits) -> Vector3:
     gamma_s = config.gamma_per_axis[0]
     along_m_s, tangential = split(contact.velocity_ned_m_s, contact.normal_ned)
     goal = plus(contact.position_ned_m, gamma_s * abs(along_m_s), contact.normal_ned)
     return plus(goal, gamma_s, (tangential[0], tangential[1], 0.0)) if config.tangential == "kept" else goal
 
 
-def _adaptive(config: RecoveryConfig, contact: Contact, motion: Moving, limits: Limits) -> Vector3:
+def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState, limits: Limits) -> Vector3:
     normal, x = contact.normal_ned, motion.position_ned_m
     off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
     off_m = split(plus(x, -1.0, contact.position_ned_m), normal)[0]
@@ -85,7 +85,7 @@ def _adaptive(config: RecoveryConfig, contact: Contact, motion: Moving, limits: 
         goal = plus(plus(goal, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)
         if Plan(motion, goal, duration_s).most_m_s2() <= limits.acceleration_m_s2:
             break
-        duration_s *= STEP
+        duration_s *= DURATION_STEP
     if config.tangential == "kept":
         goal = plus(goal, config.gamma_per_axis[0], tangential)
     return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.reflex.config import (
-    AHEAD,
+    AHEAD_COSINE,
     ATTITUDE_RAD_S,
     BEHIND_M,
     CLIMB_GAIN_PER_S,
-    HARDER,
-    HARDEST_S,
+    DURATION_STEP,
+    HARD_BRAKING,
     HEIGHT_PER_S,
     HELD_S,
     HELD_TO_M_S,
@@ -27,9 +27,9 @@ from companion.reflex.config import (
     OFF_PLAN_M,
     OFF_PLAN_M_S,
     PLACE_PER_S,
+    SHORTEST_BRAKING_S,
     SHORTEST_S,
-    STEP,
-    TOUCHES_M,
+    TOUCH_TOLERANCE_M,
     VELOCITY_PER_S,
 )
 from companion.reflex.halfspace import Surface, plus, split
@@ -40,7 +40,7 @@ _LOOKED_AT = (0.21, 0.3, 0.4, 0.5, 0.6, 0.7, 0.79)
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class MotionState:
     """Where the vehicle is and how it moves, local NED; the acceleration where nothing but its own thrust makes it."""
 
     position_ned_m: Vector3
@@ -64,17 +64,17 @@ class Limits:
 class Plan:
     """From a motion to rest at the goal within a duration."""
 
-    start: Moving
+    start: MotionState
     goal_ned_m: Vector3
     duration_s: float
 
-    def at(self, elapsed_s: float, lead_s: float = LEAD_S) -> Moving:
+    def at(self, elapsed_s: float, lead_s: float = LEAD_S) -> MotionState:
         """The motion after so long, with the acceleration of a little later, as thrust follows late."""
         if elapsed_s >= self.duration_s:
-            return Moving(self.goal_ned_m, REST)
+            return MotionState(self.goal_ned_m, REST)
         s = max(0.0, elapsed_s) / self.duration_s
         (x, u, a), (y, v, b), (z, w, c) = self._axes(s, min(1.0, s + lead_s / self.duration_s))
-        return Moving((x, y, z), (u, v, w), (a, b, c))
+        return MotionState((x, y, z), (u, v, w), (a, b, c))
 
     def _axes(self, s: float, ahead: float) -> list[tuple[float, float, float]]:
         start, total_s = self.start, self.duration_s
@@ -89,18 +89,18 @@ class Plan:
 
     def enters(self, surface: Surface) -> bool:
         """Whether it goes into the surface; where it begins or ends behind it, nothing is in the way."""
-        if min(surface.off_m(self.start.position_ned_m), surface.off_m(self.goal_ned_m)) < -TOUCHES_M:
+        if min(surface.off_m(self.start.position_ned_m), surface.off_m(self.goal_ned_m)) < -TOUCH_TOLERANCE_M:
             return False
-        return any(surface.off_m(self.at(s * self.duration_s).position_ned_m) < -TOUCHES_M for s in _LOOKED_AT)
+        return any(surface.off_m(self.at(s * self.duration_s).position_ned_m) < -TOUCH_TOLERANCE_M for s in _LOOKED_AT)
 
-    def led_back(self, elapsed_s: float, motion: Moving) -> Vector3:
+    def with_feedback(self, elapsed_s: float, motion: MotionState) -> Vector3:
         """The plan's acceleration, and what PX4's loops would add for a vehicle that is beside it."""
         planned = self.at(elapsed_s)
         slower = plus(planned.velocity_ned_m_s, -1.0, motion.velocity_ned_m_s)
         short = plus(planned.position_ned_m, -1.0, motion.position_ned_m)
         return plus(planned.acceleration_ned_m_s2, VELOCITY_PER_S, plus(slower, PLACE_PER_S, short))
 
-    def holds(self, elapsed_s: float, motion: Moving) -> bool:
+    def holds(self, elapsed_s: float, motion: MotionState) -> bool:
         """Whether the vehicle is where it is to be by now, as far as PX4's loops bring it there."""
         planned = self.at(elapsed_s)
         off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
@@ -120,32 +120,34 @@ def _axis(
     return x, v / total_s, (a + lean * (1.0 - ahead) * (1.0 - 3.0 * ahead)) / total_s**2
 
 
-def plan(state: Moving, goal_ned_m: Vector3, surfaces: Sequence[Surface], limits: Limits) -> Plan:
+def plan(state: MotionState, goal_ned_m: Vector3, surfaces: Sequence[Surface], limits: Limits) -> Plan:
     """The shortest plan within the limits; with harder brakes where it would run past its goal or into a surface."""
     found = Plan(state, goal_ned_m, limits.shortest_s)
     longest_s = _longest_s(state, goal_ned_m)
     while found.duration_s < longest_s and found.most_m_s2() > limits.acceleration_m_s2:
-        found = Plan(state, goal_ned_m, found.duration_s * STEP)
+        found = Plan(state, goal_ned_m, found.duration_s * DURATION_STEP)
     found = Plan(state, goal_ned_m, min(found.duration_s, longest_s))
     harder = found
-    while harder.most_m_s2() <= HARDER * limits.acceleration_m_s2 and any(harder.enters(each) for each in surfaces):
-        found, harder = harder, Plan(state, goal_ned_m, harder.duration_s / STEP)
+    while harder.most_m_s2() <= HARD_BRAKING * limits.acceleration_m_s2 and any(
+        harder.enters(each) for each in surfaces
+    ):
+        found, harder = harder, Plan(state, goal_ned_m, harder.duration_s / DURATION_STEP)
     return found
 
 
-def _longest_s(state: Moving, goal_ned_m: Vector3) -> float:
+def _longest_s(state: MotionState, goal_ned_m: Vector3) -> float:
     """e >= 0 along the velocity keeps the speed above zero: longer, and the plan would run past a goal ahead."""
     n, e, d = (goal - start for goal, start in zip(goal_ned_m, state.position_ned_m, strict=True))
     (u, v, w), (a, b, c) = state.velocity_ned_m_s, state.acceleration_ned_m_s2
     ahead, speed2 = n * u + e * v + d * w, u * u + v * v + w * w
-    if ahead <= AHEAD * math.sqrt(speed2 * (n * n + e * e + d * d)):
+    if ahead <= AHEAD_COSINE * math.sqrt(speed2 * (n * n + e * e + d * d)):
         return math.inf
     stops2 = 0.25 * speed2**2 + ahead * (a * u + b * v + c * w) / 3.0
-    return max(HARDEST_S, 2.0 * ahead / (0.5 * speed2 + math.sqrt(stops2))) if stops2 >= 0.0 else math.inf
+    return max(SHORTEST_BRAKING_S, 2.0 * ahead / (0.5 * speed2 + math.sqrt(stops2))) if stops2 >= 0.0 else math.inf
 
 
 def kept_off(
-    acceleration_ned_m_s2: Vector3, state: Moving, spread_m_s: Vector3, surfaces: Sequence[Surface], limits: Limits
+    acceleration_ned_m_s2: Vector3, state: MotionState, spread_m_s: Vector3, surfaces: Sequence[Surface], limits: Limits
 ) -> Vector3:
     """Without what leads into a surface nearer than its clearance; `state` with the acceleration of its lean.
 
@@ -157,7 +159,7 @@ def kept_off(
     for surface in surfaces:
         if not -BEHIND_M <= surface.off_m(state.position_ned_m) < surface.distance_m:
             continue
-        normal, most_m_s2 = surface.normal_ned, HARDER * limits.acceleration_m_s2
+        normal, most_m_s2 = surface.normal_ned, HARD_BRAKING * limits.acceleration_m_s2
         leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * LEAD_S, state.acceleration_ned_m_s2), normal)[0]
         leaving_m_s -= surface.comes_m_s
         least_m_s2 = min(-leaving_m_s / LEAD_S, most_m_s2)
@@ -180,8 +182,8 @@ def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> V
     return (share * a, share * b, c)
 
 
-def height_held(
-    state: Moving, spread_m_s: float, told_m_s: float, down_m: float, loops: float, most_m_s2: float
+def height_feedback(
+    state: MotionState, spread_m_s: float, told_m_s: float, down_m: float, loops: float, most_m_s2: float
 ) -> float:
     """What brings the vehicle back to a height, down positive: so many times what PX4's own loops ask for.
 

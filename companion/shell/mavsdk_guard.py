@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
-from companion.estimate.normal import Search, further
+from companion.estimate.normal import Search, advance_search
 from companion.guard.attached import SETPOINTS, AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
@@ -210,7 +210,7 @@ class CollisionGuard:
         """On the guard's own thread, which nobody waits for meanwhile. A fault is one of the step that asks for it."""
         found: Search | Exception
         try:
-            found = further(search)
+            found = advance_search(search)
         except Exception as error:
             found = error
         with self._changed:

@@ -12,7 +12,7 @@ from companion.detection.force_signs import side_threshold_m_s2, vertical_thresh
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
-from companion.reflex.watch import Watch
+from companion.reflex.monitor import CollisionMonitor
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ class Listener:
     tested: list[Tested] = field(default_factory=list)
     shown: dict[int, Shown] = field(default_factory=dict)
 
-    def listen(self, watch: Watch) -> None:
+    def listen(self, monitor: CollisionMonitor) -> None:
         """To this watch, from now on."""
-        listened_to = _ListenedTo(watch.detector, getattr(watch.config, watch.config.detector), self)
-        watch.detector = cast(Detector[Any], listened_to)
+        listened_to = _ListenedTo(monitor.detector, getattr(monitor.config, monitor.config.detector), self)
+        monitor.detector = cast(Detector[Any], listened_to)
 
 
 class _ListenedTo:

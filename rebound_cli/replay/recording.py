@@ -20,7 +20,7 @@ from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import ComputerStatus
 from companion.mission.model import Mission
-from companion.reflex.watch import Watch
+from companion.reflex.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
 from rebound_cli import run_folder
 from rebound_cli.documents import validated
@@ -139,7 +139,7 @@ class Followed:
     def __init__(self, listener: Listener | None = None) -> None:
         self.listener, self.findings = listener, Findings()
         self.started_at_us = self.ended_at_us = 0
-        self._watch: Watch | None = None
+        self._watch: CollisionMonitor | None = None
 
     def step(self, stepped: Companion | Guard, received: bytes, now_us: int) -> StepResult:
         """The companion's own."""
@@ -147,15 +147,15 @@ class Followed:
         known = Situation(off_reason="connect") if stepped.core is None else stepped.core.situation()
         result = stepped.step(received, now_us)
         assert stepped.core is not None, "the first step begins it"
-        watch = stepped.core.watch
-        if watch is not self._watch and self.listener is not None:
-            self.listener.listen(watch)
-        self._watch = watch
+        monitor = stepped.core.monitor
+        if monitor is not self._watch and self.listener is not None:
+            self.listener.listen(monitor)
+        self._watch = monitor
         for event in result.events:
             self.findings.tell(event.time_us, event.text)
         # A step in which nothing came or went is in no recording.
         if received or result.sent_frames:
-            self.findings.note(watch, known, now_us)
+            self.findings.note(monitor, known, now_us)
             self.started_at_us, self.ended_at_us = self.started_at_us or now_us, now_us
         return result
 

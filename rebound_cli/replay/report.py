@@ -9,7 +9,7 @@ from typing import Any
 from companion.detection.interface import Evidence, ImpactKind
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
-from companion.reflex.watch import Watch
+from companion.reflex.monitor import CollisionMonitor
 from rebound_cli.logs.log import WANTED, Log, LogError
 from rebound_cli.logs.shaking import Shaking, clipped, shaking
 from rebound_cli.replay.listening import Listener
@@ -22,7 +22,7 @@ _WIDTH = 110
 
 _HOW = {
     Evidence.FORCE: "the contact's own force",
-    Evidence.AFTERMATH: "what followed a contact between the samples",
+    Evidence.VELOCITY_JUMP: "what followed a contact between the samples",
 }
 
 
@@ -45,7 +45,7 @@ class Replay:
 
 
 def replay_log(
-    log: Log, config: CompanionConfig, rate_hz: float | None, listen: Callable[[Watch], None] | None = None
+    log: Log, config: CompanionConfig, rate_hz: float | None, listen: Callable[[CollisionMonitor], None] | None = None
 ) -> Replay:
     """The detector over the log. Raises LogError when the rate leaves nothing."""
     recorded_hz = shaking(log).rate_hz

@@ -11,7 +11,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.link.vehicle import OLD_NEWS_US
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND, mode_name
-from companion.reflex.watch import Watch, advance, start_watch
+from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from rebound_cli.logs.log import Demand, Heard, Log
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
@@ -164,14 +164,14 @@ class Findings:
         """Touches that are no collisions: landings, hands."""
         return [finding for finding in self.impacts if not finding.is_collision]
 
-    def note(self, watch: Watch, situation: Situation, at_us: int) -> None:
+    def note(self, monitor: CollisionMonitor, situation: Situation, at_us: int) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
-        estimate, off = watch.estimate, situation.off_reason
+        estimate, off = monitor.estimate, situation.off_reason
         if estimate is not None:
             if not self.impacts or self.impacts[-1].first.impact is not estimate.impact:
-                self.impacts.append(Finding(at_us, watch.state.threshold_m_s2, situation, estimate, estimate))
+                self.impacts.append(Finding(at_us, monitor.state.threshold_m_s2, situation, estimate, estimate))
             self.impacts[-1].final = estimate
-        self._note_span("blind", watch.blind_reason, at_us)
+        self._note_span("blind", monitor.no_data_reason, at_us)
         if off != self._open.get("off", (0, None))[1]:
             self._note_span("off", None, at_us)
         self._note_span("off", off, at_us)
@@ -179,7 +179,7 @@ class Findings:
         self._noted_us = at_us
         if situation.armed and situation.landed_state is not messages.LandedState.ON_GROUND:
             self.flown_us += elapsed_us
-            self.watched_us += elapsed_us if off is None and watch.blind_reason is None else 0
+            self.watched_us += elapsed_us if off is None and monitor.no_data_reason is None else 0
 
     def _note_span(self, name: str, reason: str | None, at_us: int) -> None:
         """A span lasts as long as there is a reason and goes by its first: a blind detector's changes its figures."""
@@ -201,7 +201,7 @@ def watch_log(
     log: Log,
     config: CompanionConfig,
     rate_hz: float | None = None,
-    listen: Callable[[Watch], None] | None = None,
+    listen: Callable[[CollisionMonitor], None] | None = None,
 ) -> Findings:
     """Everything heard, in its order; `rate_hz` is what HIGHRES_IMU is asked for, None for what was recorded.
 
@@ -211,14 +211,14 @@ def watch_log(
     circumstances, findings = Circumstances(), Findings()
     # A log begins with old news of every topic: until the first IMU sample nobody was on the watch.
     start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
-    watch = start_watch(config, start_us)
+    monitor = start_monitor(config, start_us)
     if listen is not None:
-        listen(watch)
+        listen(monitor)
 
     def step(samples: Sequence[messages.Sample], now_us: int) -> None:
-        for notice in advance(watch, samples, circumstances.situation, now_us).notices:
+        for notice in advance(monitor, samples, circumstances.situation, now_us).notices:
             findings.tell(now_us, notice.text)
-        findings.note(watch, circumstances.situation, now_us)
+        findings.note(monitor, circumstances.situation, now_us)
 
     for at_us, group in groupby(heard, key=lambda item: max(item.at_us, start_us)):
         last_poll_us = min(at_us, last_us + _MOST_POLLS * POLL_INTERVAL_US)

@@ -140,7 +140,7 @@ def _signs(shown: Shown, evidence: Evidence) -> Iterator[str]:
     if tested is not None and not math.isnan(tested.side_m_s2):
         yield _side_text(tested)
         yield _thrust_text(tested)
-    if evidence is Evidence.AFTERMATH:
+    if evidence is Evidence.VELOCITY_JUMP:
         yield "Its velocity jumped by what the accelerometer did not show: the contact fell between the samples."
 
 

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 
 from companion.errors import AddressError
 from companion.shell.addresses import serial_device
-from companion.written import Written
+from companion.strict_model import StrictModel
 from rebound_cli import exit_codes
 from rebound_cli.flights.kept import SERVICE_RUNS
 
@@ -50,7 +50,7 @@ def _address(url: str) -> str:
 Plain = Annotated[str, Field(strict=True, min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
-class ServiceSettings(Written):
+class ServiceSettings(StrictModel):
     """/etc/rebound/service.yaml; a key that a new version brings is optional."""
 
     run: Literal["guard", "mission"] = "guard"

@@ -24,7 +24,7 @@ from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import is_run_folder
 from rebound_cli.replay.watching import Findings, watch_log
 from rebound_cli.run_folder import SUMMARY_NAME, TLOG_NAME
-from rebound_cli.tune.hits import SPEEDS_M_S, Sight, hit_moments, sight
+from rebound_cli.tune.hits import SPEEDS_M_S, StreamHealth, hit_moments, sight
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
 SCHEMA = 1
@@ -91,7 +91,7 @@ class Tuning:
     detector: str
     flights: Sequence[Healthy]
     margins: Sequence[Margin]
-    sights: Sequence[Sight]
+    sights: Sequence[StreamHealth]
     advice: Advice
 
 

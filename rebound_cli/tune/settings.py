@@ -15,7 +15,7 @@ from typing import Any
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.watching import watch_log
-from rebound_cli.tune.hits import Sight
+from rebound_cli.tune.hits import StreamHealth
 
 # What settings of a detector are compared with the flight, by the words in their names.
 _COMPARED = re.compile(r"threshold|factor|step")
@@ -80,7 +80,9 @@ def _false_alarms(logs: Sequence[Log], config: CompanionConfig) -> int:
     return sum(len(watch_log(log, config).collisions) for log in logs)
 
 
-def advise(logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin], sights: Sequence[Sight]) -> Advice:
+def advise(
+    logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin], sights: Sequence[StreamHealth]
+) -> Advice:
     """Thresholds with a reserve over these flights, never below where they started."""
     raised = _raised(logs, start, found)
     given = _leaves(start.model_dump(mode="json", exclude_unset=True))
@@ -126,7 +128,7 @@ def _averaging(logs: Sequence[Log], start: CompanionConfig) -> tuple[float, str]
     return math.ceil(max(known) / 100) / 1e4, "99 of 100 IMU samples are means over this time or less"
 
 
-def _least_rate(sights: Sequence[Sight], start: CompanionConfig) -> tuple[float, str]:
+def _least_rate(sights: Sequence[StreamHealth], start: CompanionConfig) -> tuple[float, str]:
     name, seen = sights[0].airframe, f"all hits from {WANTED_M_S:g} m/s on"
     rates = [s.rate_hz for s in sights if s.airframe == name and (s.certain_from_m_s or math.inf) <= WANTED_M_S]
     if not rates:

@@ -10,7 +10,7 @@ from companion.detection.interface import Situation
 from companion.detection.registry import BASELINES, DETECTORS
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.reflex.halfspace import plus
-from companion.reflex.watch import advance, start_watch
+from companion.reflex.monitor import advance, start_monitor
 
 TICK_US = 4_000
 HIT_US = 4_000_000
@@ -20,7 +20,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=6_000_000, off=None):
     """North at 2 m/s behind a setpoint that goes on; pushed by `push(t)`, m/s^2."""
-    watch = start_watch(BaselineConfig(detector=detector), 0)
+    monitor = start_monitor(BaselineConfig(detector=detector), 0)
     velocity, position, impacts = (2.0, 0.0, 0.0), (0.0, 0.0, -3.0), []
     for t in range(TICK_US, until_us, TICK_US):
         p, thrust = push(t), lift(t)
@@ -41,7 +41,7 @@ def fly(detector, push=lambda t: (0.0, 0.0, 0.0), lift=lambda t: 9.81, until_us=
             height_m=3.0,
             setpoint_position_ned_m=(2.0 * t * 1e-6, 0.0, -3.0),
         )
-        impacts += advance(watch, samples, situation, t).impacts
+        impacts += advance(monitor, samples, situation, t).impacts
     return impacts
 
 

@@ -15,10 +15,10 @@ import time
 from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Situation
 from companion.estimate.config import GuardsConfig
-from companion.estimate.normal import begin, further
-from companion.estimate.suppositions import Touch
+from companion.estimate.hypotheses import Touch
+from companion.estimate.normal import advance_search, begin_search
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
-from companion.reflex.watch import advance, start_watch
+from companion.reflex.monitor import advance, start_monitor
 
 INTERVAL_US = 4_000
 SAMPLES = 20_000
@@ -48,10 +48,10 @@ def flight(with_others: bool) -> list[tuple[int, list[Sample]]]:
 
 
 def microseconds(name: str, steps: list[tuple[int, list[Sample]]]) -> float:
-    watch = start_watch(BaselineConfig(detector=name), 0)
+    monitor = start_monitor(BaselineConfig(detector=name), 0)
     begun = time.perf_counter()
     for t, samples in steps:
-        advance(watch, samples, IN_FLIGHT, t)
+        advance(monitor, samples, IN_FLIGHT, t)
     return 1e6 * (time.perf_counter() - begun) / len(steps)
 
 
@@ -65,11 +65,13 @@ def pieces_us(interval_us: int) -> list[float]:
         samples.append(ImuSample(t, force, (0.0, 0.0, 0.5 + 120.0 * since_s)))
         attitudes.append(Attitude(t, (1.0, 0.0, 0.0, 30.0 * since_s**2), (0.0, 0.0, 120.0 * since_s)))
     begun = time.process_time()
-    search = begin(Touch((0.0, 0.0, -9.81), samples, attitudes), (2.0, 0.0, 0.0), GuardsConfig(travel_m=0.03), 0.005)
+    search = begin_search(
+        Touch((0.0, 0.0, -9.81), samples, attitudes), (2.0, 0.0, 0.0), GuardsConfig(travel_m=0.03), 0.005
+    )
     pieces = [time.process_time() - begun]
     while not search.is_over:
         begun = time.process_time()
-        search = further(search)
+        search = advance_search(search)
         pieces.append(time.process_time() - begun)
     return [1e6 * piece for piece in pieces]
 

@@ -194,11 +194,11 @@ class FakeVehicle:
         command = [0.0, 0.0, 0.0]
         if self.armed and self.mode == OFFBOARD and self.target is not None:
             t = self.target
-            leans_only = t.type_mask & 0x007
-            ahead = self.position if leans_only else [t.x, t.y, t.z]
+            acceleration_only = t.type_mask & 0x007
+            ahead = self.position if acceleration_only else [t.x, t.y, t.z]
             forward = [0.0, 0.0, 0.0] if t.type_mask & 0x038 else [t.vx, t.vy, t.vz]
             command = [forward[i] + 2.0 * (ahead[i] - self.position[i]) for i in range(3)]
-            if leans_only:
+            if acceleration_only:
                 command = [v + a / 6.0 for v, a in zip(self.velocity, [t.afx, t.afy, t.afz], strict=True)]
             if self.landed == 1 and ahead[2] > self.start_ned_m[2] - 0.05:
                 command = [0.0, 0.0, 0.0]  # feet do not slide

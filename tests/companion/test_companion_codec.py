@@ -371,11 +371,13 @@ def test_each_reader_picks_the_fields_that_pymavlink_reads(reader, kept):
 
 def test_a_setpoint_that_leans_only_asks_for_the_acceleration_alone():
     lean = (0.5, -0.5, 0.25)
-    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, leans_only=True))
+    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, acceleration_only=True))
     assert m.type_mask == 0x81B
     assert all(math.isnan(value) for value in (m.x, m.y, m.vx, m.vy))
     assert (m.z, m.vz, m.afx, m.afy, m.afz, m.yaw) == (-3.0, 0.5, *lean, 1.0)
-    m = sent(PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, leans_only=True, is_height_free=True))
+    m = sent(
+        PositionSetpoint(0, (1.0, 2.0, -3.0), 1.0, (1.0, 0.0, 0.5), lean, acceleration_only=True, is_height_free=True)
+    )
     assert m.type_mask == 0x81F
     assert all(math.isnan(value) for value in (m.x, m.y, m.z, m.vx, m.vy)) and m.vz == 0.5
 

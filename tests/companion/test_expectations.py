@@ -4,7 +4,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from companion.flight.context import Expectation
-from companion.flight.expecting import review
+from companion.flight.expectations import review
 from companion.mission.items import ExpectItem
 from tests.companion.fake_vehicle import FakeVehicle, Flight, flight
 
@@ -88,6 +88,6 @@ def test_a_hit_that_is_heard_of_late_came_late():
         wish.met = None
         hit = SimpleNamespace(impact_speed_m_s=2.0, detected_at_us=hit_at_us)
         record = SimpleNamespace(report=lambda hit=hit: hit)
-        flight: Any = SimpleNamespace(expectations=[wish], collisions=[record], tell=lambda *a, **b: None)
+        flight: Any = SimpleNamespace(expectations=[wish], collisions=[record], report=lambda *a, **b: None)
         review(flight, 5_050_000)
         assert wish.met is met

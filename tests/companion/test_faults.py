@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import development as mav
 
 from companion.flight.context import Target
 from companion.flight.progress import FlyItems
-from companion.reflex import watch
+from companion.reflex import monitor
 from tests.companion.fake_vehicle import LOITER, Flight, flight
 
 
@@ -27,7 +27,7 @@ def in_mission() -> Flight:
     return f
 
 
-@pytest.mark.parametrize(("place", "name"), [(FlyItems, "step"), (FlyItems, "target"), (watch, "advance")])
+@pytest.mark.parametrize(("place", "name"), [(FlyItems, "step"), (FlyItems, "target"), (monitor, "advance")])
 def test_whatever_breaks_in_the_air_the_vehicle_is_handed_over(monkeypatch, place, name):
     f = in_mission()
     broken_at_us = f.now_us
@@ -63,7 +63,7 @@ def test_what_breaks_on_the_way_out_hands_the_vehicle_over_by_setpoints_that_are
     safe = f.setpoints_since(0)[-1][1]
     monkeypatch.setattr(place, does)
     broken_at_us = f.now_us
-    f.companion.core.flight.tell(f.now_us, "policy", "something to tell")
+    f.companion.core.flight.report(f.now_us, "policy", "something to tell")
     f.run_to_end(3.0)
 
     assert f.companion.report().outcome == "failed"
@@ -83,7 +83,7 @@ def test_a_fault_on_the_ground_arms_nothing(monkeypatch):
     f = flight(confirmed=False)
     f.run_until(f.companion.plan_is_ready)
     commands = len(f.vehicle.commands)
-    monkeypatch.setattr(watch, "advance", breaks)
+    monkeypatch.setattr(monitor, "advance", breaks)
     f.run_to_end(1.0)
     assert f.companion.report().outcome == "failed"
     assert len(f.vehicle.commands) == commands and f.vehicle.setpoints == []

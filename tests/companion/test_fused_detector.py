@@ -124,7 +124,7 @@ def test_a_stiff_push_along_thrust_is_seen_because_propellers_cannot_do_it(push,
 def test_a_hit_between_the_samples_is_found_from_the_velocity_it_leaves(push, imu_every_us):
     """A rigid hit of 1 ms at 0.5 m/s, where the wire shows 4 ms of every 10 or 20."""
     impacts = Flight(pulse(push), imu_every_us=imu_every_us, velocity=(0.5, 0.0, 0.0)).fly()
-    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH]
+    assert [i.evidence for i in impacts] == [Evidence.VELOCITY_JUMP]
     assert impacts[0].contact_free_until_boot_us <= HIT_US < impacts[0].sample_time_boot_us <= HIT_US + 100_000
     along = sum(a * b for a, b in zip(impacts[0].specific_force_frd_m_s2, push, strict=True))
     assert along > 0.97 * math.hypot(*impacts[0].specific_force_frd_m_s2) * math.hypot(*push)
@@ -132,7 +132,7 @@ def test_a_hit_between_the_samples_is_found_from_the_velocity_it_leaves(push, im
 
 def test_a_hit_in_the_one_sample_that_was_lost_is_found_too():
     impacts = Flight(pulse((-950.0, 0.0, 0.0)), lost=lambda t: t == 3_004_000).fly()
-    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH]
+    assert [i.evidence for i in impacts] == [Evidence.VELOCITY_JUMP]
 
 
 def test_a_hit_far_from_the_centre_moves_little_and_turns_much():
@@ -141,7 +141,7 @@ def test_a_hit_far_from_the_centre_moves_little_and_turns_much():
 
     slight = pulse((-105.0, 0.0, 0.0))
     assert Flight(slight, imu_every_us=20_000).fly() == []
-    assert [i.evidence for i in Flight(slight, imu_every_us=20_000, rates=rates).fly()] == [Evidence.AFTERMATH]
+    assert [i.evidence for i in Flight(slight, imu_every_us=20_000, rates=rates).fly()] == [Evidence.VELOCITY_JUMP]
 
 
 @pytest.mark.parametrize(("step_m_s", "hits"), [(0.16, 1), (0.08, 0)])
@@ -149,14 +149,14 @@ def test_of_a_stiff_hit_between_the_samples_what_clipping_leaves_in_the_velocity
     """Straight into a ceiling, without a turn: a sensor that clips at 16 g shows the estimator 1 ms of that."""
     jump = (3_002_000, (0.0, 0.0, step_m_s), 0)
     impacts = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump).fly(until_us=3_200_000)
-    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
+    assert [i.evidence for i in impacts] == [Evidence.VELOCITY_JUMP] * hits
 
 
 @pytest.mark.parametrize(("step_m_s", "hits"), [(1.5, 1), (0.6, 0)])
 def test_velocities_ten_times_a_second_show_a_large_step_that_no_sample_showed(step_m_s, hits):
     jump = (3_002_000, (step_m_s, 0.0, 0.0), 0)
     impacts = Flight(imu_every_us=20_000, slower=3, jump=jump).fly()
-    assert [i.evidence for i in impacts] == [Evidence.AFTERMATH] * hits
+    assert [i.evidence for i in impacts] == [Evidence.VELOCITY_JUMP] * hits
 
 
 @pytest.mark.parametrize(("turn_rad_s", "hits"), [(11.0, 1), (3.0, 0)])
@@ -168,7 +168,7 @@ def test_a_turn_that_no_motor_makes_needs_little_of_a_step(turn_rad_s, hits):
 
     jump = (3_002_000, (0.0, 0.0, 0.1), 0)
     flight = Flight(imu_every_us=20_000, velocity=(0.0, 0.0, -1.0), jump=jump, rates=rates)
-    assert [i.evidence for i in flight.fly(until_us=3_045_000)] == [Evidence.AFTERMATH] * hits
+    assert [i.evidence for i in flight.fly(until_us=3_045_000)] == [Evidence.VELOCITY_JUMP] * hits
 
 
 @pytest.mark.parametrize(("counted", "heard_odometry", "hits"), [(1, True, 0), (0, True, 1), (1, False, 1)])

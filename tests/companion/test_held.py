@@ -18,13 +18,13 @@ from companion.flight.envelope import (
     touched,
     unattended_text,
 )
+from companion.flight.obstacle_map import known_surfaces
 from companion.flight.plan import mission_lines
-from companion.flight.remembering import known_surfaces
 from companion.memory.patch import Patch
 from companion.mission.model import Mission
 from companion.mission.policy import Limits
 from companion.reflex.config import HELD_S, NOTICED_S
-from companion.reflex.planner import Moving
+from companion.reflex.planner import MotionState
 from tests.companion.hostile import flight_in
 
 DOCS = Path(__file__).parents[2] / "bench" / "notes" / "px4.md"
@@ -41,17 +41,17 @@ def around(velocity, known=(), vehicle=HERE) -> Surroundings:
 
 
 def lean(acceleration, velocity=REST, place=HERE) -> Target:
-    return Target(place, 0.0, REST, acceleration, leans_only=True, expected=Moving(place, velocity))
+    return Target(place, 0.0, REST, acceleration, acceleration_only=True, expected=MotionState(place, velocity))
 
 
-def flown(target: Target, motion: Moving, seconds: float) -> tuple[tuple, tuple]:
+def flown(target: Target, motion: MotionState, seconds: float) -> tuple[tuple, tuple]:
     """PX4's loops in steps of a millisecond, by their gains' defaults."""
     place, velocity = list(motion.position_ned_m), list(motion.velocity_ned_m_s)
     wanted, ahead = target.velocity_ned_m_s or REST, target.acceleration_ned_m_s2 or REST
     for _ in range(round(seconds * 1e3)):
         for axis, (k_x, k_v) in enumerate(((0.95, 1.8), (0.95, 1.8), (1.0, 4.0))):
             pulled = k_v * (wanted[axis] + k_x * (target.position_ned_m[axis] - place[axis]) - velocity[axis])
-            velocity[axis] += 1e-3 * (ahead[axis] if target.leans_only and axis < 2 else pulled + ahead[axis])
+            velocity[axis] += 1e-3 * (ahead[axis] if target.acceleration_only and axis < 2 else pulled + ahead[axis])
             place[axis] += 1e-3 * velocity[axis]
     return tuple(place), tuple(velocity)
 
@@ -65,13 +65,13 @@ def flown(target: Target, motion: Moving, seconds: float) -> tuple[tuple, tuple]
     ],
 )
 def test_the_way_is_that_of_px4s_loops(target):
-    motion = Moving(HERE, (0.8, -0.3, 0.2))
+    motion = MotionState(HERE, (0.8, -0.3, 0.2))
     way = held_path(target, motion)
     place, velocity = flown(target, motion, HELD_S + NOTICED_S)
     assert way[0] == HERE
     assert way[-2] == pytest.approx(place, abs=0.01)
     # and then it stops: from 3 m/s^2 on a place, and of a lean as late as the docs say that PX4's estimate is right
-    n = 0.5 * abs(velocity[0]) * velocity[0] / 3.0 if not target.leans_only else 1.5 * velocity[0]
+    n = 0.5 * abs(velocity[0]) * velocity[0] / 3.0 if not target.acceleration_only else 1.5 * velocity[0]
     assert way[-1][0] - way[-2][0] == pytest.approx(n, abs=0.02)
 
 
@@ -83,10 +83,10 @@ def test_a_brake_after_a_rebound_leads_back_to_the_wall_and_is_weakened_by_as_li
     sent, _ = bounded(asked, around(off, known), FENCE, LIMITS)
     north, east, _ = sent.acceleration_ned_m_s2
     assert 0.0 < north < 1.5 and east == 1.0
-    assert min(WALL.off_m(place) for place in held_path(sent, Moving(HERE, off))) == pytest.approx(0.15, abs=0.15)
+    assert min(WALL.off_m(place) for place in held_path(sent, MotionState(HERE, off))) == pytest.approx(0.15, abs=0.15)
     # a hair more and it were too near
     more = lean((north + 0.2, 1.0, 0.0), off)
-    assert min(WALL.off_m(place) for place in held_path(more, Moving(HERE, off))) < 0.15
+    assert min(WALL.off_m(place) for place in held_path(more, MotionState(HERE, off))) < 0.15
 
 
 def test_a_vehicle_that_is_slower_off_the_wall_than_expected_may_brake_no_harder_than_that_allows():
@@ -109,7 +109,7 @@ def test_a_vehicle_that_is_nearer_to_the_wall_than_expected_may_brake_no_harder_
 
 def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_as_meant():
     # Given a vehicle that leans by 0.7 m/s^2 towards the wall where it takes itself for level
-    off = Moving(HERE, (-1.0, 0.0, 0.0), (0.7, 0.0, 0.0))
+    off = MotionState(HERE, (-1.0, 0.0, 0.0), (0.7, 0.0, 0.0))
     surroundings = around(off.velocity_ned_m_s, [KnownSurface(WALL)])
     # When it is to brake by 0.5
     sent, _ = bounded(replace(lean((0.5, 0.2, 0.0)), expected=off), surroundings, FENCE, LIMITS)
@@ -124,7 +124,7 @@ def test_a_vehicle_that_is_wrong_about_its_tilt_is_asked_for_what_makes_it_lean_
 
 def test_a_tilt_error_that_ends_meanwhile_does_not_lead_to_the_wall():
     """What is told to lean to the wall, because it leans off it by itself, must be safe when it does not any more."""
-    off = Moving(HERE, (-1.0, 0.0, 0.0))
+    off = MotionState(HERE, (-1.0, 0.0, 0.0))
     plain, _ = bounded(
         replace(lean((0.8, 0.0, 0.0)), expected=off), around(off.velocity_ned_m_s, [KnownSurface(WALL)]), FENCE, LIMITS
     )
@@ -145,7 +145,7 @@ def test_a_place_with_a_velocity_into_the_wall_loses_that_and_says_so():
     asked = Target((0.2, 0.0, -1.5), 0.0, (1.5, 0.5, 0.0), (1.0, 0.0, 0.0))
     sent, said = bounded(asked, around((0.5, 0.5, 0.0), [KnownSurface(WALL)]), FENCE, LIMITS)
     assert said == "leads too near to what is known, or out of the fence"
-    way = held_path(sent, Moving(HERE, (0.5, 0.5, 0.0)))
+    way = held_path(sent, MotionState(HERE, (0.5, 0.5, 0.0)))
     assert min(WALL.off_m(place) for place in way) > 0.1
     assert sent.position_ned_m == asked.position_ned_m
 
@@ -161,7 +161,7 @@ def test_a_velocity_that_leads_out_of_the_fence_is_held_back():
     asked = Target((11.2, 0.0, -1.5), 0.0, velocity, REST)
     sent, said = bounded(asked, around(velocity, vehicle=vehicle), FENCE, LIMITS)
     assert "out of the fence" in said
-    held, at_first = (held_path(target, Moving(vehicle, velocity))[-1][0] for target in (sent, asked))
+    held, at_first = (held_path(target, MotionState(vehicle, velocity))[-1][0] for target in (sent, asked))
     assert held < at_first and held < 12.2
     # in its middle it passes
     asked = Target((0.2, 0.0, -1.5), 0.0, velocity, REST)

@@ -24,14 +24,14 @@ def leaning_north(acceleration_m_s2):
     return (math.cos(half), 0.0, math.sin(half), 0.0)
 
 
-def watched(seconds, north_m, speed_m_s, lean_m_s2, goal_north_m=1.0):
+def watched(seconds, north_m, speed_m_s, tilt_m_s2, goal_north_m=1.0):
     """The first time at which something is found in the way, and what; functions of the time."""
     horizontal_force = HorizontalForceMonitor()
     for step in range(round(seconds / EVERY_S)):
         t = step * EVERY_S
         sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m(t), 0.0, -1.5), (speed_m_s(t), 0.0, 0.0))
-        horizontal_force.add_imu((0.0, 0.0, -math.hypot(9.80665, lean_m_s2(t))))
-        held = horizontal_force.step(sample, leaning_north(lean_m_s2(t)), (goal_north_m, 0.0, -1.5))
+        horizontal_force.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
+        held = horizontal_force.step(sample, leaning_north(tilt_m_s2(t)), (goal_north_m, 0.0, -1.5))
         if held is not None:
             return t, held
     return None
@@ -63,7 +63,7 @@ def test_what_is_begun_with_in_the_middle_of_speeding_up_is_no_wind():
     """Given a glide that is taken up while the vehicle speeds up away from what it hit, when it brakes past its goal.
     A tail wind gives it 0.7 m/s^2 all the while."""
 
-    def lean_m_s2(t):
+    def tilt_m_s2(t):
         return 1.5 - 15.0 * min(t, 0.24) - 4.0 * max(0.0, t - 0.24)
 
     def speed_m_s(t):
@@ -71,7 +71,7 @@ def test_what_is_begun_with_in_the_middle_of_speeding_up_is_no_wind():
         begun_s = min(t, 0.24)
         return 0.95 + 2.2 * begun_s - 7.5 * begun_s**2 - 1.4 * braking_s - 2.0 * braking_s**2
 
-    assert watched(0.7, lambda t: 1.0 + 0.55 * t, speed_m_s, lean_m_s2) is None
+    assert watched(0.7, lambda t: 1.0 + 0.55 * t, speed_m_s, tilt_m_s2) is None
 
 
 def test_a_steady_wind_is_no_wall_however_far_the_vehicle_is_from_its_goal():

@@ -11,15 +11,15 @@ from companion.detection.interface import ImpactKind, Situation
 from companion.estimate import guards, normal
 from companion.estimate.approach import Approach
 from companion.estimate.config import EstimateConfig, GuardsConfig
-from companion.estimate.facing import whole_normal
+from companion.estimate.contact_force import ContactForce
+from companion.estimate.facing import final_normal
+from companion.estimate.hypotheses import Touch
 from companion.estimate.impact import ImpactEstimator
 from companion.estimate.normal import normal_of
-from companion.estimate.push import Push
-from companion.estimate.suppositions import Touch
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample, Vibration
 from companion.mission.config import CompanionConfig
 from companion.motion.inertial import VelocityFix
-from companion.reflex.watch import advance, start_watch
+from companion.reflex.monitor import advance, start_monitor
 
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000
@@ -87,16 +87,16 @@ def test_a_hit_that_is_told_late_has_the_velocity_from_before_it(late_us):
 def test_v_c_is_found_from_velocities_that_belong_together(jumps, velocity_m_s):
     # Given a vehicle at 2 m/s that tells 5 m/s in its last 0.8 s
     estimator = ImpactEstimator(CONFIG)
-    estimator.hear(Attitude(0, LEVEL, (0.0, 0.0, 0.0)))
+    estimator.update(Attitude(0, LEVEL, (0.0, 0.0, 0.0)))
     for t_us in range(CONTACT_US - 4_000_000, CONTACT_US, 4_000):
-        estimator.hear(ImuSample(t_us, (0.0, 0.0, -9.80665), (0.0, 0.0, 0.0)))
-        estimator.hear(Attitude(t_us, LEVEL, (0.0, 0.0, 0.0)))
+        estimator.update(ImuSample(t_us, (0.0, 0.0, -9.80665), (0.0, 0.0, 0.0)))
+        estimator.update(Attitude(t_us, LEVEL, (0.0, 0.0, 0.0)))
         is_last = t_us > CONTACT_US - 800_000
         if t_us == jumps.get("touched_us"):
-            estimator._touched(t_us)
+            estimator._note_contact(t_us)
         if t_us % 20_000 == 0:
             told, count = (5.0, jumps.get("reset_counter", 0)) if is_last and jumps else (2.0, 0)
-            estimator.hear(Odometry(t_us, (0.0, 0.0, 0.0), (told, 0.0, 0.0), count))
+            estimator.update(Odometry(t_us, (0.0, 0.0, 0.0), (told, 0.0, 0.0), count))
     found = estimator._velocity(CONTACT_US)
     assert found is not None
     assert found[0][0] == pytest.approx(velocity_m_s, abs=0.05)
@@ -153,11 +153,11 @@ def touch(slant_deg, friction, tangent_m_s, every_s=0.004, lean_deg=0.0, pole_m=
         inward = -sliding @ n
         size = max(0.0, (GUARDS.stiffness_per_s2 * depth + GUARDS.damping_per_s * inward) / share**2) * (depth >= 0.0)
         sliding = sliding + inward * n
-        push = size * (n - friction * sliding / max(np.linalg.norm(sliding), 0.02))
-        body = r.T @ push + FREE
+        contact = size * (n - friction * sliding / max(np.linalg.norm(sliding), 0.02))
+        body = r.T @ contact + FREE
         v = v + step_s * (r @ body + (0.0, 0.0, 9.80665))
         x = x + step_s * v
-        w = w + step_s * (r.T @ np.cross(place, push)) / gyration2
+        w = w + step_s * (r.T @ np.cross(place, contact)) / gyration2
         r = r @ turned_by(step_s * w)
         force.append(body)
         rates.append(w)
@@ -251,53 +251,55 @@ def test_a_search_goes_on_by_pieces_of_bounded_work_and_comes_to_the_same(monkey
     """Each message of a flight has to be answered before the next setpoint is due."""
     followed = []
 
-    def counted(trials, *arguments, misfits=guards.misfits):
+    def counted(trials, *arguments, misfits=guards.weighted_residuals):
         followed[-1] += len(trials)
         return misfits(trials, *arguments)
 
-    monkeypatch.setattr(guards, "misfits", counted)
+    monkeypatch.setattr(guards, "weighted_residuals", counted)
     heard, _ = touch(25.0, 0.3, 0.4, every_s=0.020)
-    search = normal.begin(heard, (1.5, 0.4, 0.0), GUARDS, 0.005)
+    search = normal.begin_search(heard, (1.5, 0.4, 0.0), GUARDS, 0.005)
     while not search.is_over:
         followed.append(0)
-        before, search = search, normal.further(search)
-    assert max(followed) <= normal.FOLLOWED
+        before, search = search, normal.advance_search(search)
+    assert max(followed) <= normal.HYPOTHESES_A_PIECE
     assert len(followed) <= 10
-    assert normal.further(before).normal_ned == search.normal_ned
-    assert normal.further(search) is search
+    assert normal.advance_search(before).normal_ned == search.normal_ned
+    assert normal.advance_search(search) is search
     followed.append(0)
     assert found(heard, 0.4) == search.normal_ned
 
 
-def imu(t_us, push, yaw_rate=0.0):
-    return ImuSample(t_us, (push, 0.0, -9.81), (0.0, 0.0, yaw_rate))
+def imu(t_us, contact, yaw_rate=0.0):
+    return ImuSample(t_us, (contact, 0.0, -9.81), (0.0, 0.0, yaw_rate))
 
 
 def pushed(pushes, every_us=4_000, yaw_rate=0.0):
-    push = Push((0.0, 0.0, -9.81), LEVEL, 5_000, 156.9, 1_000_000)
+    contact = ContactForce((0.0, 0.0, -9.81), LEVEL, 5_000, 156.9, 1_000_000)
     for number, (force, loud) in enumerate(pushes, start=1):
-        push.add(imu(1_000_000 + number * every_us, force, yaw_rate), loud)
-    return push
+        contact.add(imu(1_000_000 + number * every_us, force, yaw_rate), loud)
+    return contact
 
 
 def test_the_impulse_is_the_sum_of_the_loud_samples_and_of_what_lies_between_them():
-    push = pushed([(-20.0, True), (-40.0, True), (-1.0, False), (-10.0, True), (-5.0, False)])
-    assert push.impulse_ned_m_s == pytest.approx((-0.284, 0.0, 0.0))
-    assert push.peak_m_s2 == pytest.approx(40.0)
+    contact = pushed([(-20.0, True), (-40.0, True), (-1.0, False), (-10.0, True), (-5.0, False)])
+    assert contact.impulse_ned_m_s == pytest.approx((-0.284, 0.0, 0.0))
+    assert contact.peak_m_s2 == pytest.approx(40.0)
 
 
 def test_of_a_few_clipped_axes_the_normal_lies_half_way_to_where_the_vehicle_came_from():
     # Given a push of two axes at the sensor's end, 45 degrees off the way that a vehicle came
-    push = Push((0.0, 0.0, -9.81), LEVEL, 5_000, 156.9, 1_000_000)
+    contact = ContactForce((0.0, 0.0, -9.81), LEVEL, 5_000, 156.9, 1_000_000)
     for number in (1, 2):
-        push.add(replace(imu(1_000_000 + 4_000 * number, 0.0), specific_force_frd_m_s2=(-156.9, -156.9, -9.81)), True)
+        contact.add(
+            replace(imu(1_000_000 + 4_000 * number, 0.0), specific_force_frd_m_s2=(-156.9, -156.9, -9.81)), True
+        )
     off_rad = math.radians(22.5)
-    assert whole_normal(push, None, (2.0, 0.0, 0.0)) == pytest.approx((-math.cos(off_rad), -math.sin(off_rad), 0.0))
+    assert final_normal(contact, None, (2.0, 0.0, 0.0)) == pytest.approx((-math.cos(off_rad), -math.sin(off_rad), 0.0))
     # Of one that hardly moved, and of a push that was measured, it is the push's own
     own = (-math.sqrt(0.5), -math.sqrt(0.5), 0.0)
-    assert whole_normal(push, None, (0.1, 0.0, 0.0)) == pytest.approx(own)
+    assert final_normal(contact, None, (0.1, 0.0, 0.0)) == pytest.approx(own)
     measured = pushed([(-10.0, True), (-25.0, True), (-30.0, True), (-22.0, True), (-8.0, True)])
-    assert whole_normal(measured, own, (2.0, 0.0, 0.0)) == own
+    assert final_normal(measured, own, (2.0, 0.0, 0.0)) == own
 
 
 def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():
@@ -306,13 +308,13 @@ def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():
 
 def test_the_first_window_tells_when_the_contact_began():
     """A quarter of the second window's mean: three quarters of it (5 ms) were still free."""
-    push = pushed([(-10.0, True), (-40.0, True)])
-    assert push.begun_boot_us == 1_004_000 - 1_250
+    contact = pushed([(-10.0, True), (-40.0, True)])
+    assert contact.begun_boot_us == 1_004_000 - 1_250
 
 
 def test_a_vehicle_that_turns_in_the_contact_is_followed():
-    push = pushed([(-20.0, True)] * 25, yaw_rate=math.radians(90.0) / 0.096)
-    north, east, _ = push.impulse_ned_m_s
+    contact = pushed([(-20.0, True)] * 25, yaw_rate=math.radians(90.0) / 0.096)
+    north, east, _ = contact.impulse_ned_m_s
     assert math.degrees(math.atan2(-east, -north)) == pytest.approx(45.0, abs=2.0)
 
 
@@ -333,7 +335,7 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
 
 def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_counts_to_heart():
     """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms; the sensor says a second later it clipped."""
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     finished, hit_us = [], 3_002_000
     for t in range(4_000, 4_400_000, 4_000):
@@ -346,7 +348,7 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_cou
             samples.append(Attitude(t, LEVEL))
         if t % 1_000_000 == 0:
             samples.append(Vibration(t, 0.0, 0.0, (0 if t < hit_us else 9, 0, 0)))
-        finished += advance(watch, samples, situation, t).finished
+        finished += advance(monitor, samples, situation, t).finished
     (final,) = finished
     assert final.kind is ImpactKind.WALL
     assert abs(final.time_boot_us - hit_us) < 2_000
@@ -354,5 +356,5 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_cou
     assert final.position_ned_m[0] == pytest.approx(1.5 * hit_us * 1e-6, abs=0.03)
     assert final.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.15)
     assert final.impulse_m_s == pytest.approx(1.5, abs=0.05)
-    assert (final.is_lower_bound, watch.estimate.is_lower_bound) == (False, True)
+    assert (final.is_lower_bound, monitor.estimate.is_lower_bound) == (False, True)
     assert not final.may_be_clipped

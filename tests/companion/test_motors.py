@@ -26,7 +26,7 @@ class Flown:
     """A vehicle's outputs ten times a second."""
 
     def __init__(self, zero=1000.0, most=2000.0, seed=1):
-        self.watch, self.now_us = MotorWatch(), 0
+        self.monitor, self.now_us = MotorWatch(), 0
         self._zero, self._most, self._random = zero, most, random.Random(seed)
 
     def fly(self, seconds, was_hit, change=(0.0,) * 4, hover=HOVER, manoeuvre=0.0):
@@ -39,7 +39,7 @@ class Flown:
                 for trim, more, sign in zip(TRIM, change, (1, -1, 1, -1), strict=True)
             ]
             outputs = [min(self._zero + hover * share, self._most) for share in shares]
-            damage = self.watch.take(tuple(outputs), was_hit, self.now_us)
+            damage = self.monitor.take(tuple(outputs), was_hit, self.now_us)
             told += [] if damage is None else [damage]
         return told
 
@@ -92,7 +92,7 @@ def test_a_motor_that_gives_all_it_has_is_named_although_another_is_spared_for_i
 
 def test_outputs_that_begin_at_zero_are_shares_of_what_they_are():
     flown = Flown(zero=0.0)
-    flown.watch.take((100.0,) * 4, None, 0)  # idling, as DShot has it
+    flown.monitor.take((100.0,) * 4, None, 0)  # idling, as DShot has it
     flown.fly(5.0, False)
     (damage,) = flown.fly(20.0, True, HURT)
     assert damage.harder == pytest.approx(0.16, abs=0.01)

@@ -7,10 +7,10 @@ import random
 import pytest
 
 from companion.fence import Fence
-from companion.reflex.config import HARDER, LEAD_S, OFF_PLAN_M, TOUCHES_M, RecoveryConfig
-from companion.reflex.halfspace import Envelope, Room, Surface, away_from, plus, split
+from companion.reflex.config import HARD_BRAKING, LEAD_S, OFF_PLAN_M, TOUCH_TOLERANCE_M, RecoveryConfig
+from companion.reflex.halfspace import FenceBounds, FreeSpace, Surface, away_from, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact
-from companion.reflex.planner import REST, Limits, Moving, Plan, height_held, kept_off, plan
+from companion.reflex.planner import REST, Limits, MotionState, Plan, height_feedback, kept_off, plan
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)
 ALL_SPEEDS = (0.5, 1.0, 2.0, 3.5, 5.0)
@@ -59,7 +59,7 @@ def some_motions(count, seed=1):
     for _ in range(count):
         place = plus(AT, draw.uniform(0.0, 0.8), SOUTH)
         velocity = (draw.uniform(-4.0, 1.0), draw.uniform(-3.0, 3.0), draw.uniform(-1.0, 1.0))
-        yield Moving(place, velocity, (draw.uniform(-3.0, 3.0), draw.uniform(-3.0, 3.0), 0.0))
+        yield MotionState(place, velocity, (draw.uniform(-3.0, 3.0), draw.uniform(-3.0, 3.0), 0.0))
 
 
 def test_a_plan_from_any_motion_is_finite_bounded_and_ends_at_rest_at_its_goal():
@@ -77,7 +77,7 @@ def test_a_plan_from_any_motion_is_finite_bounded_and_ends_at_rest_at_its_goal()
         end = found.at(found.duration_s - 1e-9)
         assert end.position_ned_m == pytest.approx(found.goal_ned_m, abs=1e-6)
         assert end.velocity_ned_m_s == pytest.approx(REST, abs=1e-6)
-        assert found.at(found.duration_s + 1.0) == Moving(found.goal_ned_m, REST)
+        assert found.at(found.duration_s + 1.0) == MotionState(found.goal_ned_m, REST)
 
 
 @pytest.mark.parametrize("speed", ALL_SPEEDS)
@@ -93,7 +93,7 @@ def test_adaptive_never_plans_towards_the_obstacle_nor_past_its_goal(speed, slan
 
 
 def test_a_plan_made_anew_from_any_motion_on_it_is_the_same_plan():
-    state = Moving(REST, (1.5, -0.4, 0.2), (1.0, 0.0, 0.0))
+    state = MotionState(REST, (1.5, -0.4, 0.2), (1.0, 0.0, 0.0))
     whole = Plan(state, (2.0, 0.5, 0.0), 1.6)
     half = Plan(whole.at(0.7, 0.0), whole.goal_ned_m, 0.9)
     for since_s in (0.0, 0.3, 0.8):
@@ -102,7 +102,7 @@ def test_a_plan_made_anew_from_any_motion_on_it_is_the_same_plan():
 
 
 def test_a_plan_goes_on_with_the_lean_that_there_is_and_takes_it_back():
-    found = plan(Moving(REST, (0.2, 0.0, 0.0), (3.0, 0.0, 0.0)), (1.2, 0.0, 0.0), [], LIMITS)
+    found = plan(MotionState(REST, (0.2, 0.0, 0.0), (3.0, 0.0, 0.0)), (1.2, 0.0, 0.0), [], LIMITS)
     step_s = 1e-4
     for time_s, motion in ((0.0, found.at(0.0, 0.0)), (0.5, found.at(0.5, 0.0))):
         x = [found.at(time_s + k * step_s, 0.0).position_ned_m[0] for k in (0, 1, 2)]
@@ -112,57 +112,57 @@ def test_a_plan_goes_on_with_the_lean_that_there_is_and_takes_it_back():
 
 
 def test_a_plan_that_is_too_short_for_its_speed_brakes_harder_and_does_not_run_past():
-    found = plan(Moving(REST, (3.0, 0.0, 0.0)), (0.4, 0.0, 0.0), [], LIMITS)
+    found = plan(MotionState(REST, (3.0, 0.0, 0.0)), (0.4, 0.0, 0.0), [], LIMITS)
     assert max(motion.position_ned_m[0] for motion in motions_of(found)) <= 0.4 + 1e-9
 
 
 def test_a_vehicle_that_flies_at_a_second_wall_brakes_harder_rather_than_to_touch_it():
     # Given 1.2 m/s towards a wall 0.35 m ahead, and a goal behind the vehicle
-    ahead, state = Surface((0.35, 0.0, 0.0), SOUTH, 0.3), Moving(REST, (1.2, 0.4, 0.0))
+    ahead, state = Surface((0.35, 0.0, 0.0), SOUTH, 0.3), MotionState(REST, (1.2, 0.4, 0.0))
     alone = plan(state, (-0.2, 0.3, 0.0), [], LIMITS)
     found = plan(state, (-0.2, 0.3, 0.0), [ahead], LIMITS)
     assert max(motion.position_ned_m[0] for motion in motions_of(alone)) > 0.4
-    assert max(motion.position_ned_m[0] for motion in motions_of(found)) <= 0.35 + 1.1 * TOUCHES_M
-    assert found.most_m_s2() <= 3.0 * HARDER
+    assert max(motion.position_ned_m[0] for motion in motions_of(found)) <= 0.35 + 1.1 * TOUCH_TOLERANCE_M
+    assert found.most_m_s2() <= 3.0 * HARD_BRAKING
 
 
 @pytest.mark.parametrize("off_the_wall_m", [0.0, 0.2, 0.34])
 def test_nothing_leads_into_a_surface_nearer_than_its_clearance(off_the_wall_m):
     wall, limits = Surface(AT, SOUTH, 0.35), LIMITS
     place = plus(AT, off_the_wall_m, SOUTH)
-    for into_m_s2, lean_m_s2, speed_m_s in itertools.product((-3.0, 0.0, 3.0), (-3.0, 0.0, 5.0), (-0.5, 0.0, 0.3)):
-        state = Moving(place, (speed_m_s, 0.2, 0.0), (lean_m_s2, 0.0, 0.0))
+    for into_m_s2, tilt_m_s2, speed_m_s in itertools.product((-3.0, 0.0, 3.0), (-3.0, 0.0, 5.0), (-0.5, 0.0, 0.3)):
+        state = MotionState(place, (speed_m_s, 0.2, 0.0), (tilt_m_s2, 0.0, 0.0))
         north_m_s2 = kept_off((into_m_s2, 1.0, 0.5), state, REST, [wall], limits)[0]
-        will_m_s = speed_m_s + 2.0 * LEAD_S * lean_m_s2  # by when a new lean acts
+        will_m_s = speed_m_s + 2.0 * LEAD_S * tilt_m_s2  # by when a new lean acts
         if will_m_s >= 0.0:
             assert north_m_s2 <= 0.0, "it stands, or comes nearer"
         if will_m_s > 0.2:
             assert north_m_s2 < -1.3, "it flies or leans into the wall: away"
-        assert abs(north_m_s2) <= 3.0 * HARDER
-    beside = kept_off((3.0, 1.0, 0.5), Moving(place, (0.0, 0.0, 0.0)), REST, [wall], limits)
+        assert abs(north_m_s2) <= 3.0 * HARD_BRAKING
+    beside = kept_off((3.0, 1.0, 0.5), MotionState(place, (0.0, 0.0, 0.0)), REST, [wall], limits)
     assert beside[1:] == (1.0, 0.5), "along the surface nothing is taken away"
-    assert kept_off((3.0, 1.0, 0.5), Moving(plus(AT, 0.36, SOUTH), REST), REST, [wall], limits)[0] == 3.0
+    assert kept_off((3.0, 1.0, 0.5), MotionState(plus(AT, 0.36, SOUTH), REST), REST, [wall], limits)[0] == 3.0
 
 
 def test_a_surface_far_behind_which_the_vehicle_is_keeps_it_off_nothing():
     # Given a vehicle that flies where a wall was thought to be, by more than arms give way and an estimate drifts
     wall = Surface(AT, SOUTH, 0.35)
     for deep_m, is_there in ((0.0, True), (0.15, True), (0.25, False), (3.0, False)):
-        state = Moving(plus(AT, -deep_m, SOUTH), (0.5, 0.0, 0.0))
+        state = MotionState(plus(AT, -deep_m, SOUTH), (0.5, 0.0, 0.0))
         asked = kept_off((1.0, 0.0, 0.0), state, REST, [wall], LIMITS)
         assert (asked == (1.0, 0.0, 0.0)) is not is_there
 
 
 def test_a_vehicle_that_may_not_leave_at_all_does_not_brake():
     # Given one that is thought to leave with 0.4 m/s, give or take 0.6 m/s
-    state, wall = Moving(plus(AT, 0.1, SOUTH), (-0.4, 0.0, 0.0)), Surface(AT, SOUTH, 0.35)
+    state, wall = MotionState(plus(AT, 0.1, SOUTH), (-0.4, 0.0, 0.0)), Surface(AT, SOUTH, 0.35)
     assert kept_off((2.0, 0.0, 0.0), state, (0.6, 0.1, 0.1), [wall], LIMITS)[0] == 0.0, "nor is it pushed away"
     assert kept_off((-1.0, 0.0, 0.0), state, (0.6, 0.1, 0.1), [wall], LIMITS)[0] == -1.0
     assert kept_off((2.0, 0.0, 0.0), state, (0.1, 0.1, 0.1), [wall], LIMITS)[0] == 2.0
 
 
 def test_brakes_off_a_wall_are_let_through_for_as_long_as_they_only_brake():
-    state = Moving(plus(AT, 0.1, SOUTH), (-2.0, 0.0, 0.0))
+    state = MotionState(plus(AT, 0.1, SOUTH), (-2.0, 0.0, 0.0))
     assert kept_off((3.0, 0.0, 0.0), state, REST, [Surface(AT, SOUTH, 0.35)], LIMITS) == (3.0, 0.0, 0.0)
 
 
@@ -180,7 +180,7 @@ def flown(state, goal, surfaces=(), drift_m_s2=0.0, velocity_p=1.8, lag_rad_s=12
     places = []
     for step in range(round(seconds / step_s)):
         now_s = step * step_s
-        moving = Moving((x, 0.0, 0.0), (v, 0.0, 0.0), (min(max(acceleration, -3.0), 3.0), 0.0, 0.0))
+        moving = MotionState((x, 0.0, 0.0), (v, 0.0, 0.0), (min(max(acceleration, -3.0), 3.0), 0.0, 0.0))
         if not found.holds(now_s - began_s, moving):
             found, began_s = plan(moving, goal, surfaces, LIMITS), now_s
         asked = found.at(now_s - began_s)
@@ -203,7 +203,7 @@ def flown(state, goal, surfaces=(), drift_m_s2=0.0, velocity_p=1.8, lag_rad_s=12
 @pytest.mark.parametrize("lag_rad_s", [9.0, 12.0])
 def test_a_vehicle_with_lag_and_drift_comes_to_rest_at_its_goal(speed_m_s, drift_m_s2, lag_rad_s):
     goal_m = max(0.5, 0.7 * speed_m_s)
-    places = flown(Moving(REST, (speed_m_s, 0.0, 0.0)), (goal_m, 0.0, 0.0), (), drift_m_s2, lag_rad_s=lag_rad_s)
+    places = flown(MotionState(REST, (speed_m_s, 0.0, 0.0)), (goal_m, 0.0, 0.0), (), drift_m_s2, lag_rad_s=lag_rad_s)
     assert max(places) < goal_m + OFF_PLAN_M + 0.1
     assert min(places) > -0.1, "nor back into what it came from"
     assert all(abs(place - goal_m) < 0.15 for place in places[-100:])
@@ -216,7 +216,7 @@ def spun(spin_rad_s, speed_m_s, seconds=12.0, limits=None):
     limits, goal = limits or LIMITS.spinning(spin_rad_s), (speed_m_s, 0.0, 0.0)
     places = []
     for _ in range(round(seconds / 0.02)):
-        state = Moving((place.real, place.imag, 0.0), (speed.real, speed.imag, 0.0))
+        state = MotionState((place.real, place.imag, 0.0), (speed.real, speed.imag, 0.0))
         north, east, _ = plan(state, goal, (), limits).at(0.0).acceleration_ned_m_s2
         for _ in range(20):
             turning += 1e-3 * (144.0 * (complex(north, east) - lean) - 24.0 * turning + 2j * spin_rad_s * turning)
@@ -247,7 +247,7 @@ def test_a_climb_ends_sooner_than_by_the_vehicles_own_loop(speed_m_s):
     for most_m_s2 in (3.0, 0.0):
         w, way, done, furthest = speed_m_s, 0.0, 0.0, 0.0
         for _ in range(500):
-            asked = height_held(Moving((0.0, 0.0, way), (0.0, 0.0, w)), 0.0, w, 0.0, 1.0, most_m_s2)
+            asked = height_feedback(MotionState((0.0, 0.0, way), (0.0, 0.0, w)), 0.0, w, 0.0, 1.0, most_m_s2)
             assert abs(asked) <= most_m_s2
             done += 0.002 / 0.03 * (asked - 4.0 * (w + way) - done)
             w += 0.002 * done
@@ -263,8 +263,8 @@ def test_a_climb_ends_sooner_than_by_the_vehicles_own_loop(speed_m_s):
     [(0.0, 0.0, -0.3), (0.1, 0.0, -0.2), (0.4, 0.0, 0.0), (0.4, -0.3, -0.3), (0.4, 0.05, 0.05), (0.1, -1.0, -0.4)],
 )
 def test_a_told_climb_counts_as_far_as_the_reckoned_one_allows(spread_m_s, told_m_s, counts_m_s):
-    climbing = Moving((0.0, 0.0, 0.0), (0.0, 0.0, -0.3))
-    asked_m_s2 = height_held(climbing, spread_m_s, told_m_s, 0.0, 1.0, 3.0)
+    climbing = MotionState((0.0, 0.0, 0.0), (0.0, 0.0, -0.3))
+    asked_m_s2 = height_feedback(climbing, spread_m_s, told_m_s, 0.0, 1.0, 3.0)
     assert asked_m_s2 == pytest.approx(-4.0 * counts_m_s)
 
 
@@ -333,7 +333,7 @@ def test_along_the_wall_adaptive_comes_to_rest_where_the_motion_along_it_ends():
 
 def test_a_hovering_vehicle_that_is_struck_gives_way():
     struck = Contact(0, AT, REST, (0.0, 1.0, 0.0))
-    goal, _ = adaptive(struck, Moving((4.0, -1.95, -1.5), (0.0, 0.45, 0.0)))
+    goal, _ = adaptive(struck, MotionState((4.0, -1.95, -1.5), (0.0, 0.45, 0.0)))
     assert goal[:2] == pytest.approx((4.0, -1.65)), "0.35 m from where it was struck, more than it takes to stop"
 
 
@@ -341,13 +341,13 @@ def test_what_overtook_the_vehicle_needs_no_more_clearance():
     # Given one that is struck from behind while it flies away from what strikes it
     fled = Contact(0, AT, (-3.0, 0.0, 0.0), SOUTH)
     assert fled.rebound(0.45).velocity_ned_m_s == (-3.0, 0.0, 0.0), "it goes on leaving"
-    goal, _ = adaptive(fled, Moving(AT, REST), clearance_s=0.5)
+    goal, _ = adaptive(fled, MotionState(AT, REST), clearance_s=0.5)
     assert off_m(fled, goal) == pytest.approx(0.35), "the speed away asks for none"
 
 
 def test_where_a_leant_vehicle_comes_to_rest_is_asked_for():
     # Given one that stands where it touched, leant away: taking the lean back carries it off by a T^2 / 12
-    goal, found = adaptive(hit(1.0), Moving(AT, REST, (-3.0, 0.0, 0.0)), clearance_m=0.1, clearance_s=0.0)
+    goal, found = adaptive(hit(1.0), MotionState(AT, REST, (-3.0, 0.0, 0.0)), clearance_m=0.1, clearance_s=0.0)
     assert off_m(hit(1.0), goal) == pytest.approx(3.0 * found.duration_s**2 / 12.0, rel=1e-6)
 
 
@@ -367,7 +367,7 @@ def test_away_is_level_from_a_wall_and_straight_from_what_is_steep(normal, away)
     assert away_from(normal) == pytest.approx(away, abs=1e-3)
 
 
-ROOM = Envelope((0.0, 0.0, 0.0), Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4))
+ROOM = FenceBounds((0.0, 0.0, 0.0), Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4))
 
 
 def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
@@ -375,19 +375,19 @@ def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
     assert goal_of("adaptive", under) == pytest.approx((0.0, 0.0, -1.65))
     low = Contact(0, (0.0, 0.0, -0.6), (0.0, 0.0, -1.0), (0.0, 0.0, 1.0))
     goal = goal_of("adaptive", low)
-    assert Room(ROOM).goal(low.position_ned_m, low.normal_ned, goal) == pytest.approx((0.0, 0.0, -0.4))
+    assert FreeSpace(ROOM).goal(low.position_ned_m, low.normal_ned, goal) == pytest.approx((0.0, 0.0, -0.4))
 
 
 def test_the_fence_stops_a_recovery_and_the_brakes_are_what_that_takes():
     touched = Contact(0, (5.5, 0.0, -1.5), (-5.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     motion = touched.rebound(0.5)
-    goal = Room(ROOM).goal(touched.position_ned_m, touched.normal_ned, goal_of("adaptive", touched, motion))
+    goal = FreeSpace(ROOM).goal(touched.position_ned_m, touched.normal_ned, goal_of("adaptive", touched, motion))
     assert goal[0] == pytest.approx(6.0)
     found = plan(motion, goal, [], LIMITS)
     assert max(motion.position_ned_m[0] for motion in motions_of(found)) <= 6.0 + 1e-9
 
 
-FENCE = Envelope((10.0, 0.0, 2.0), Fence(radius_m=5.0, max_height_m=6.0))
+FENCE = FenceBounds((10.0, 0.0, 2.0), Fence(radius_m=5.0, max_height_m=6.0))
 
 
 def test_a_setpoint_inside_the_fence_is_left_alone():
@@ -416,10 +416,10 @@ def test_out_of_a_corner_the_goal_is_clear_of_both_walls():
     east_wall = Contact(0, (2.7, 2.8, -1.5), (-0.4, 1.4, 0.0), (0.0, -1.0, 0.0))
     alone = goal_of("paper", east_wall)
     assert alone[0] > 2.7
-    goal = Room(ROOM, (NORTH_WALL,)).goal(east_wall.position_ned_m, east_wall.normal_ned, alone)
+    goal = FreeSpace(ROOM, (NORTH_WALL,)).goal(east_wall.position_ned_m, east_wall.normal_ned, alone)
     assert goal == pytest.approx((2.5, alone[1], -1.5))
     further = (1.0, 2.0, -1.5)
-    assert Room(ROOM, (NORTH_WALL,)).goal(east_wall.position_ned_m, east_wall.normal_ned, further) == further
+    assert FreeSpace(ROOM, (NORTH_WALL,)).goal(east_wall.position_ned_m, east_wall.normal_ned, further) == further
 
 
 def test_a_surface_that_the_vehicle_is_behind_is_not_there():
@@ -428,9 +428,9 @@ def test_a_surface_that_the_vehicle_is_behind_is_not_there():
     touched = Contact(0, (3.5, 4.0, -1.5), (0.5, 0.9, 0.0), (0.34, -0.94, 0.0))
     wanted = (3.6, 3.7, -1.5)
     # Then it is not moved through where the vehicle is, back into the wall
-    assert Room(ROOM, (NORTH_WALL,)).goal(touched.position_ned_m, touched.normal_ned, wanted) == wanted
+    assert FreeSpace(ROOM, (NORTH_WALL,)).goal(touched.position_ned_m, touched.normal_ned, wanted) == wanted
     # but a touch that lies a decimetre deeper than the surface is the estimate's
-    assert Room(ROOM, (NORTH_WALL,)).goal((3.1, 4.0, -1.5), touched.normal_ned, wanted)[0] == pytest.approx(2.5)
+    assert FreeSpace(ROOM, (NORTH_WALL,)).goal((3.1, 4.0, -1.5), touched.normal_ned, wanted)[0] == pytest.approx(2.5)
 
 
 @pytest.mark.parametrize(("gap_m", "north_m"), [(3.0, 1.0), (1.2, 2.5), (0.6, 2.7)])
@@ -438,5 +438,5 @@ def test_between_walls_that_face_each_other_the_goal_stays_between(gap_m, north_
     """The south wall is touched `gap_m` south of where the north wall was; away from it is towards the north wall."""
     south = Contact(0, (3.0 - gap_m, 2.0, -1.5), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     wanted = (4.0 - gap_m, 2.0, -1.5)
-    goal = Room(ROOM, (NORTH_WALL,)).goal(south.position_ned_m, south.normal_ned, wanted)
+    goal = FreeSpace(ROOM, (NORTH_WALL,)).goal(south.position_ned_m, south.normal_ned, wanted)
     assert goal[0] == pytest.approx(min(wanted[0], north_m), abs=1e-9)

@@ -13,9 +13,9 @@ from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition, Vector3
 from companion.mission.model import Mission
 from companion.motion.strapdown import GRAVITY_M_S2
-from companion.reflex.config import FALLS_M_S2
+from companion.reflex.config import DESCENT_M_S2
 from companion.reflex.laws import Contact
-from companion.reflex.reckoning import Reckoning
+from companion.reflex.motion_estimator import MotionEstimator
 
 HIT_US, SINCE_US = 1_000_000, 100_000
 OFF_M, OFF_M_S, LEVEL_LEANS_M_S2 = (0.3, -0.2, 0.1), (-0.1, 0.05, 0.0), (0.5, 0.4, 0.0)
@@ -31,7 +31,7 @@ def asked(
     height_m: float = 2.0,
     down_m_s: float = 0.0,
     attitude: Attitude | None = None,
-    is_whole: bool = False,
+    is_fully_measured: bool = False,
     told_off: bool = False,
     leant_deg: tuple[float, ...] = (),
 ) -> Target:
@@ -41,21 +41,21 @@ def asked(
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
     contact = Contact(HIT_US, (3.0, 0.0, -height_m), (2.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    reckoning = Reckoning(contact, HIT_US, contact.rebound(0.0), EstimateConfig())
+    estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.0), EstimateConfig())
     goal = (2.6, 0.0, -height_m)
     flight.collisions.append(
-        CollisionRecord(0, HIT_US, "fused", contact, goal, contact.normal_ned, 20.0, HIT_US, reckoning)
+        CollisionRecord(0, HIT_US, "fused", contact, goal, contact.normal_ned, 20.0, HIT_US, estimator)
     )
     recover, flight.vehicle.attitude = Recover(flight, 0), attitude
-    reckoning.tell(is_whole, HIT_US)
+    estimator.note_contact(is_fully_measured, HIT_US)
     sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
     recover.step(flight, Inputs(positions=[sample]), SINCE_US)
     if told_off:
-        reckoning.off_m, reckoning._missing_m_s = OFF_M, OFF_M_S
-        flight.collisions[0].level_leans_m_s2 = LEVEL_LEANS_M_S2
+        estimator.position_error_m, estimator._hidden_error_m_s = OFF_M, OFF_M_S
+        flight.collisions[0].level_acceleration_m_s2 = LEVEL_LEANS_M_S2
     for each_deg in (*leant_deg, lean_deg):
-        reckoning.lean_m_s2 = leans_m_s2(each_deg)
+        estimator.tilt_m_s2 = leans_m_s2(each_deg)
         recover.step(flight, Inputs(), SINCE_US)
     target = recover.target(SINCE_US)
     assert target is not None
@@ -66,10 +66,10 @@ def asked(
 def test_a_vehicle_hangs_that_leans_into_what_it_touches(lean_deg, hangs):
     target = asked(lean_deg)
     assert target.acceleration_ned_m_s2 is not None
-    assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is hangs
+    assert (target.acceleration_ned_m_s2[2] == DESCENT_M_S2) is hangs
     if hangs:
         # Nothing but accelerations: its thrust is to press less, and away from the wall.
-        assert target.leans_only and target.is_height_free
+        assert target.acceleration_only and target.is_height_free
         assert target.acceleration_ned_m_s2[0] < 0.0
 
 
@@ -80,7 +80,7 @@ def test_a_vehicle_hangs_that_leans_into_what_it_touches(lean_deg, hangs):
 def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, falls):
     target = asked(30.0, height_m, down_m_s)
     assert target.acceleration_ned_m_s2 is not None
-    assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is falls
+    assert (target.acceleration_ned_m_s2[2] == DESCENT_M_S2) is falls
 
 
 @pytest.mark.parametrize(
@@ -88,9 +88,9 @@ def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, fa
     [((30.0,), 15.0, True), ((30.0,), 5.0, False), ((15.0,), 19.0, False), ((30.0, -10.0), 15.0, False)],
 )
 def test_a_vehicle_hangs_until_it_does_not_lean_on_the_obstacle_any_more(leant_deg, lean_deg, hangs):
-    target = asked(lean_deg, is_whole=True, leant_deg=leant_deg)
+    target = asked(lean_deg, is_fully_measured=True, leant_deg=leant_deg)
     assert target.acceleration_ned_m_s2 is not None
-    assert (target.acceleration_ned_m_s2[2] == FALLS_M_S2) is hangs
+    assert (target.acceleration_ned_m_s2[2] == DESCENT_M_S2) is hangs
 
 
 LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
@@ -109,8 +109,8 @@ LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0
 )
 def test_the_spin_that_counts_is_that_about_the_vertical(attitude, rates, spins):
     # Given a hit that the vehicle's estimate knows whole: without a spin places are asked for
-    target = asked(-10.0, attitude=Attitude(HIT_US, attitude, rates), is_whole=True)
-    assert target.leans_only is spins
+    target = asked(-10.0, attitude=Attitude(HIT_US, attitude, rates), is_fully_measured=True)
+    assert target.acceleration_only is spins
 
 
 def less(a, b):
@@ -119,7 +119,7 @@ def less(a, b):
 
 def test_as_much_is_asked_for_beside_the_plan_as_the_told_estimate_is_off_by():
     # Given the same plan, for a vehicle that tells its place and its tilt as they are, and for one that does not
-    right, off = asked(-10.0, is_whole=True), asked(-10.0, is_whole=True, told_off=True)
+    right, off = asked(-10.0, is_fully_measured=True), asked(-10.0, is_fully_measured=True, told_off=True)
     assert right.acceleration_ned_m_s2 is not None and off.acceleration_ned_m_s2 is not None
     # Then place and velocity are off by as much, and the lean takes back what one gives that takes itself for level
     assert less(off.position_ned_m, right.position_ned_m) == pytest.approx(OFF_M)

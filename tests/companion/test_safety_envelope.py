@@ -77,7 +77,7 @@ def test_on_the_way_up_from_the_ground_the_ground_is_the_floor():
 
 
 def lean(acceleration, velocity=(0.0, 0.0, 0.0), place=(0.0, 0.0, -1.5), is_height_free=True) -> Target:
-    return replace(asked(place, velocity, acceleration), leans_only=True, is_height_free=is_height_free)
+    return replace(asked(place, velocity, acceleration), acceleration_only=True, is_height_free=is_height_free)
 
 
 def test_a_lean_is_bounded_by_the_tilt_and_by_gravity():
@@ -106,7 +106,7 @@ def test_a_lean_stays_a_lean_wherever_the_estimate_that_is_not_flown_by_says_the
     assert bounded(far, around((-25.0, 0.0, -1.5)), FENCE, LIMITS) == (far, "")
     held = lean((2.0, 0.0, 0.0), place=(25.0, 0.0, 3.0), is_height_free=False)
     target, reason = bounded(held, around(), FENCE, LIMITS)
-    assert target.leans_only and target.acceleration_ned_m_s2[0] == 2.0
+    assert target.acceleration_only and target.acceleration_ned_m_s2[0] == 2.0
     assert place_of(target)[2] == pytest.approx(-0.5) and "outside the fence" in reason, "its height is asked for"
 
 
@@ -179,7 +179,7 @@ def test_the_stream_is_held_back_and_it_is_told():
     go_to = {"go_to": {"position_ned_m": [6, 0, -1.5], "speed_m_s": 2.0}}
     f = in_mission(go_to, {"hold": {"duration_s": 3}}, limits={"max_speed_m_s": 2.0})
     # as if something in the flight forgot the limit
-    f.companion._core.machine.activity._trajectory = LineProfile((0.0, 0.0, -1.5), (6.0, 0.0, -1.5), 4.0, 4.0)
+    f.companion._core.machine.handler._trajectory = LineProfile((0.0, 0.0, -1.5), (6.0, 0.0, -1.5), 4.0, 4.0)
     f.run_for(2.5)
     places = [(t, m.x) for t, m in f.vehicle.setpoints]
     assert max((b - a) / ((u - t) * 1e-6) for (t, a), (u, b) in itertools.pairwise(places)) == pytest.approx(2, 0.02)

@@ -22,7 +22,7 @@ def test_every_kind_of_event_has_its_meaning():
 
 
 def test_an_event_that_is_told_under_a_name_is_found():
-    call = next(events._calls(ast.parse('flight.tell(now_us, "hold", text, hold_s=3)')))
+    call = next(events._calls(ast.parse('flight.report(now_us, "hold", text, hold_s=3)')))
     assert call.args[1].value == "hold"
 
 

@@ -260,7 +260,7 @@ def test_an_editor_has_a_word_for_every_key_of_a_mission():
     schema = mission_schema()
     parts = {"Mission": schema, **schema["$defs"]}
     detectors = schema["$defs"]["CompanionConfig"]["properties"]["detector"]["enum"]
-    own = {f"{name.capitalize()}Config" for name in detectors} | {"SightConfig"}
+    own = {f"{name.capitalize()}Config" for name in detectors} | {"StreamHealthConfig"}
     wordless = [
         f"{name}.{key}"
         for name, part in parts.items()

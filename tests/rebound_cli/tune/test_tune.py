@@ -15,7 +15,7 @@ from rebound_cli.logs.log import Heard
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
 from rebound_cli.tune.command import crash
-from rebound_cli.tune.hits import SPEEDS_M_S, STEP_S, Sight, hit_moments, impulse_since_touch, sight, with_hits
+from rebound_cli.tune.hits import SPEEDS_M_S, STEP_S, StreamHealth, hit_moments, impulse_since_touch, sight, with_hits
 from rebound_cli.tune.settings import RESERVE, advise, margins, settings_text
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import WALL
@@ -23,7 +23,7 @@ from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 from tests.rebound_cli.replay.flying import LATERAL, flight
 
 FOLDABLE, RIGID = load_built_in("foldable"), load_built_in("rigid")
-UNSEEN = Sight("foldable", 250.0, 10, (0,) * len(SPEEDS_M_S))
+UNSEEN = StreamHealth("foldable", 250.0, 10, (0,) * len(SPEEDS_M_S))
 
 
 def shares(log):

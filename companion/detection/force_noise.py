@@ -20,7 +20,7 @@ LONGEST_STEP_S = 0.05
 
 
 @dataclass(slots=True)
-class Floor:
+class ForceNoise:
     """Exponentially weighted, on body x, y, z. Changed only by `learn`.
 
     Two variances on each axis: of the departures from the mean (vibration that the stream's rate folds into slow

@@ -4,7 +4,7 @@ from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, as_text
 
 
-def tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:
+def report_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:
     """How hard, how fast, where, and where to from there."""
     report = record.report()
     text = (
@@ -13,7 +13,7 @@ def tell_detection(flight: FlightContext, record: CollisionRecord, now_us: int) 
         f"{as_text(flight.mission_ned_m(report.position_ned_m))}; recovery setpoint "
         f"{as_text(flight.mission_ned_m(record.setpoint_ned_m))}"
     )
-    flight.tell(
+    flight.report(
         now_us,
         "detection",
         text,

@@ -14,7 +14,7 @@ Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-100_00
 PositionNed = tuple[Coordinate, Coordinate, Coordinate]
 
 
-class Written(BaseModel):
+class StrictModel(BaseModel):
     """Base of everything a person writes: unknown keys are errors, values never change afterwards."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, use_attribute_docstrings=True)

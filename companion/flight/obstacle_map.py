@@ -20,7 +20,7 @@ def remember(flight: FlightContext, hits: int, now_us: int) -> None:
     flight.patches, flight.hits_remembered = _with_hits(flight, hits), hits
     for patch in flight.patches:
         if patch not in before:
-            flight.tell(now_us, "obstacle", f"remembered: {describe(patch)}", **as_data(patch))
+            flight.report(now_us, "obstacle", f"remembered: {describe(patch)}", **as_data(patch))
 
 
 def all_known(flight: FlightContext) -> tuple[Patch, ...]:

@@ -33,7 +33,7 @@ SURE = 3.0
 
 
 @dataclass(slots=True)
-class Claim:
+class ForceHypothesis:
     """What one sample says alone: a contact's force per unit mass, local NED, as a mean over a window."""
 
     time_boot_us: int
@@ -51,7 +51,7 @@ class Claim:
             turned = math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s)
             self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
 
-    def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
+    def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
         """Whether the velocities after the sample show that the push it claims has not been.
 
         `fixes` hold each velocity beside the accelerometer's sum (trapezoids). The claimed sample is taken out of the
@@ -84,7 +84,7 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
-class Leap:
+class VelocityJumpHypothesis:
     """What one velocity says alone: it has changed."""
 
     time_boot_us: int
@@ -92,7 +92,7 @@ class Leap:
     change_m_s: float
     away: Vector3  # its direction, local NED
 
-    def is_contradicted(self, fixes: Sequence[VelocityFix]) -> bool:
+    def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
         """Whether no velocity since shows so much as half of the change."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
         before = [less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
@@ -125,20 +125,22 @@ class Leap:
         return sum(a * (c - w) for a, c, w in zip(self.away, came, was, strict=True))
 
 
-def claim_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Claim | Leap | None:
+def hypothesis_of(
+    estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float
+) -> ForceHypothesis | VelocityJumpHypothesis | None:
     """None where more than one sample or message has spoken already."""
     impact = estimate.impact
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
-    if impact.evidence is Evidence.AFTERMATH:
+    if impact.evidence is Evidence.VELOCITY_JUMP:
         size_m_s2 = math.hypot(*force_ned_m_s2)
         if size_m_s2 == 0.0:
             return None
         n, e, d = force_ned_m_s2
         away = (n / size_m_s2, e / size_m_s2, d / size_m_s2)
-        return Leap(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
+        return VelocityJumpHypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
     if estimate.is_final or estimate.earlier is None:
         return None
-    return Claim(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)
+    return ForceHypothesis(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)
 
 
 def _ahead(fix: VelocityFix, away: Sequence[float]) -> float:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from companion.estimate.suppositions import LOOKED_AT_US, Touch
+from companion.estimate.hypotheses import LOOKED_AT_US, Touch
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import ZERO
@@ -25,7 +25,7 @@ LATE_US = 3_000
 
 
 @dataclass(slots=True)
-class Push:
+class ContactForce:
     """Changed only by `add`. Forces per unit mass, m/s^2; impulse per unit mass, m/s."""
 
     free_frd_m_s2: Vector3
@@ -105,14 +105,14 @@ class Push:
             self._confirm(now_us, frd, contiguous)
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
 
-    def hear(self, attitude: Attitude) -> None:
+    def update(self, attitude: Attitude) -> None:
         """What the vehicle says of its attitude meanwhile."""
         self.told_boot_us = attitude.time_boot_us
         if attitude.time_boot_us - self.first_boot_us <= LOOKED_AT_US:
             self.attitudes.append(attitude)
 
     @property
-    def is_heard(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether all that the normal is found by has come."""
         return self.told_boot_us - self.first_boot_us > LOOKED_AT_US + LATE_US
 
@@ -139,14 +139,14 @@ class Push:
 
     @property
     def may_be_clipped(self) -> bool:
-        return not self.is_whole
+        return not self.is_fully_measured
 
     @property
     def is_lower_bound(self) -> bool:
         return self.gap or self.may_be_clipped
 
     @property
-    def is_whole(self) -> bool:
+    def is_fully_measured(self) -> bool:
         """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
         x, y, z = max(self.loud_frd_m_s2, key=lambda force: math.hypot(*force), default=ZERO)
         least = LASTING_SHARE * (x * x + y * y + z * z)

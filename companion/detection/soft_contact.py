@@ -26,7 +26,7 @@ TURN_RAD_S, TURN_RAD_S2 = 0.2, 80.0
 
 
 @dataclass(slots=True)
-class SoftTouch:
+class SoftContact:
     """Times: vehicle's boot clock; forces body FRD, m/s^2."""
 
     hovered_boot_us: int = -HOVERED_US

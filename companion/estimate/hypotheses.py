@@ -30,7 +30,7 @@ MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 # Of the guards, those that may meet a round: the fourth is behind the vehicle.
 FOREMOST = 3
 # A round is as likely as a flat obstacle, but three guards and two radii describe it: by so much is it held back.
-ROUND_MISFIT = 2.0
+ROUND_CHI_SQUARED = 2.0
 # Standard deviations of what is known: vibration and bias of a sample and a share of what it shows, for all that the
 # model leaves out; the same of the rates; the attitude against the one before the touch.
 FORCE_M_S2, FORCE_SHARE, RATE_RAD_S, RATE_SHARE, ATTITUDE_RAD = 0.3, 0.06, 0.08, 0.06, 0.01
@@ -42,7 +42,7 @@ AVERAGING_SPREAD_S = 0.0007
 # Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
 TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
 # Plastic on walls, wood and steel: rarely slippery, seldom beyond what the guards are made for.
-LIKELY_FRICTION, LIKELY_SPREAD = 0.25, 0.15
+EXPECTED_FRICTION, EXPECTED_FRICTION_SPREAD = 0.25, 0.15
 # Of a force that may have been larger; the gyroscopes have shown what it turned, all the same.
 CLIPPED_SHARE = 0.3
 
@@ -62,7 +62,7 @@ class Touch:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class Measurement:
     """A touch in numbers; times in seconds from the first sample that shows it."""
 
     velocity_ned: Floats
@@ -75,20 +75,20 @@ class Known:
     spread: Floats
     averaging_s: float
     shape: Floats
-    push_ned: Floats
+    force_direction_ned: Floats
     before_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class Trials:
+class Hypotheses:
     """Suppositions side by side."""
 
     values: Floats
     axes: Floats
     obstacles: npt.NDArray[np.int64]
 
-    def chosen(self, which: Sequence[int]) -> "Trials":
-        return Trials(self.values[which], self.axes[which], self.obstacles[which])
+    def chosen(self, which: Sequence[int]) -> "Hypotheses":
+        return Hypotheses(self.values[which], self.axes[which], self.obstacles[which])
 
     def normals(self, values: Floats) -> Floats:
         """(n, 3) for as many values (n, 11)."""
@@ -98,7 +98,7 @@ class Trials:
         return directions
 
 
-def known_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s: float) -> Known | None:
+def measurement_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s: float) -> Measurement | None:
     """None where too little was heard of it."""
     if len(touch.samples) < 2:
         return None
@@ -110,7 +110,7 @@ def known_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s:
     attitude = turned(earlier[-1].attitude_wxyz, rates, 1e-6 * (zero_us - earlier[-1].time_boot_us))
     later = [told for told in touch.attitudes if zero_us <= told.time_boot_us <= zero_us + LOOKED_AT_US]
     rows: list[tuple[int, bool, Sequence[float], tuple[float, float]]] = []
-    push, free = np.zeros(3), touch.free_frd_m_s2
+    total_force, free = np.zeros(3), touch.free_frd_m_s2
     share = CLIPPED_SHARE if touch.is_clipped else FORCE_SHARE
     for sample in touch.samples:
         f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
@@ -119,14 +119,14 @@ def known_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s:
         rows.append((sample.time_boot_us, False, (*f, *w), spread))
         if sample is not before:
             fading = math.exp(-1e-6 * (sample.time_boot_us - zero_us) / FADING_S)
-            push += fading * np.array(_pushed(attitude, f, free))
+            total_force += fading * np.array(_contact_force_ned(attitude, f, free))
     for told in later:
         rows.append((told.time_boot_us, True, (*told.attitude_wxyz, 0.0, 0.0), (ATTITUDE_RAD, ATTITUDE_RAD)))
     rows.sort(key=lambda row: row[0])
-    size = float(np.linalg.norm(push))
+    size = float(np.linalg.norm(total_force))
     if size == 0.0:
         return None
-    return Known(
+    return Measurement(
         np.array(velocity),
         np.array(attitude),
         np.array(rates),
@@ -137,41 +137,43 @@ def known_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s:
         np.array([row[3] for row in rows]),
         averaging_s,
         _shape(guards),
-        push / size,
+        total_force / size,
         1e-6 * (before.time_boot_us - zero_us),
     )
 
 
-def _pushed(attitude: Quaternion, f: Vector3, free: Vector3) -> Vector3:
+def _contact_force_ned(attitude: Quaternion, f: Vector3, free: Vector3) -> Vector3:
     return body_to_ned(attitude, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
 
 
 def _shape(guards: GuardsConfig) -> Floats:
-    """As `guards.misfits` wants it."""
+    """As `guards.weighted_residuals` wants it."""
     arm = (guards.stiffness_per_s2, guards.damping_per_s, guards.travel_m)
     return np.array([guards.centre_m, guards.radius_m, guards.height_m, *arm, *guards.gyration_frd_m])
 
 
-def supposed(known: Known) -> Trials:
+def initial_hypotheses(measurement: Measurement) -> Hypotheses:
     """All that the search tries: flat obstacles round the push's direction, upright rounds on the foremost guards."""
     angles = np.arange(-SPAN_RAD, SPAN_RAD + 1e-9, STEP_RAD)
-    moments = [known.before_s * share for share in MOMENTS]
+    moments = [measurement.before_s * share for share in MOMENTS]
     flat = np.array(np.meshgrid(angles, angles, FRICTIONS, moments)).reshape(4, -1).T
     flat = flat[flat[:, 0] ** 2 + flat[:, 1] ** 2 <= SPAN_RAD**2 + 1e-9]
-    groups = [(flat, _axes(known.push_ned), g.FLAT, RADIUS)]
-    level = known.push_ned * (1.0, 1.0, 0.0)
+    groups = [(flat, _axes(measurement.force_direction_ned), g.FLAT, RADIUS)]
+    level = measurement.force_direction_ned * (1.0, 1.0, 0.0)
     if np.linalg.norm(level) > 0.5:
         axes = _axes(level / np.linalg.norm(level))
         upright = np.array(np.meshgrid(angles, 0.0, FRICTIONS, moments)).reshape(4, -1).T
-        for guard in _foremost(known, axes[0]):
+        for guard in _foremost(measurement, axes[0]):
             groups += [(upright, axes, guard, math.log(radius_m)) for radius_m in RADII_M]
     values = np.zeros((sum(len(tried) for tried, *_ in groups), g.SIZE))
     values[:, : g.ERROR] = np.concatenate([tried for tried, *_ in groups])
     values[:, g.BRAKING] = BRAKING_PER_S
-    values[:, g.AVERAGING] = known.averaging_s
+    values[:, g.AVERAGING] = measurement.averaging_s
     values[:, g.RADIUS] = np.concatenate([np.full(len(tried), radius) for tried, _, _, radius in groups])
     axes_of_all = np.concatenate([np.tile(axes, (len(tried), 1, 1)) for tried, axes, _, _ in groups])
-    return Trials(values, axes_of_all, np.concatenate([np.full(len(tried), guard) for tried, _, guard, _ in groups]))
+    return Hypotheses(
+        values, axes_of_all, np.concatenate([np.full(len(tried), guard) for tried, _, guard, _ in groups])
+    )
 
 
 def _axes(middle: Floats) -> Floats:
@@ -182,41 +184,41 @@ def _axes(middle: Floats) -> Floats:
     return np.array([middle, one, np.cross(middle, one)])
 
 
-def _foremost(known: Known, normal_ned: Floats) -> list[int]:
+def _foremost(measurement: Measurement, normal_ned: Floats) -> list[int]:
     """The guards that reach farthest towards an obstacle, the nearest first."""
-    w, x, y, z = known.attitude.tolist()
+    w, x, y, z = measurement.attitude.tolist()
     level = body_to_ned((w, -x, -y, -z), (float(normal_ned[0]), float(normal_ned[1]), float(normal_ned[2])))
     return [int(guard) for guard in np.argsort(g.ARMS_FRD @ np.array(level))[:FOREMOST]]
 
 
-def residuals(known: Known, trials: Trials, values: Floats, doubt: float) -> Floats:
-    """What was measured, taken for `doubt` times less certain, and what is known beforehand: (n, m)."""
-    off = g.misfits(
+def residuals(measurement: Measurement, hypotheses: Hypotheses, values: Floats, sigma_factor: float) -> Floats:
+    """What was measured, taken for `sigma_factor` times less certain, and what is known beforehand: (n, m)."""
+    off = g.weighted_residuals(
         values,
-        trials.axes,
-        trials.obstacles,
-        known.velocity_ned,
-        known.attitude,
-        known.rates,
-        known.free,
-        known.times,
-        known.is_attitude,
-        known.measured,
-        doubt * known.spread,
-        known.shape,
+        hypotheses.axes,
+        hypotheses.obstacles,
+        measurement.velocity_ned,
+        measurement.attitude,
+        measurement.rates,
+        measurement.free,
+        measurement.times,
+        measurement.is_attitude,
+        measurement.measured,
+        sigma_factor * measurement.spread,
+        measurement.shape,
     )
     friction, tilts = values[:, g.FRICTION], np.abs(values[:, : g.FRICTION])
-    down = trials.normals(values)[:, 2]
+    down = hypotheses.normals(values)[:, 2]
     beforehand = [
         *(values[:, g.ERROR : g.STIFFNESS] / VELOCITY_M_S).T,
         values[:, g.STIFFNESS] / STIFFER,
         (values[:, g.BRAKING] - BRAKING_PER_S) / BRAKING_SPREAD,
         (values[:, g.RADIUS] - RADIUS) / RADIUS_SPREAD,
-        (values[:, g.AVERAGING] - known.averaging_s) / AVERAGING_SPREAD_S,
+        (values[:, g.AVERAGING] - measurement.averaging_s) / AVERAGING_SPREAD_S,
         (friction - np.clip(friction, 0.0, g.MOST_FRICTION)) / FRICTION_SPREAD,
-        (friction - LIKELY_FRICTION) / LIKELY_SPREAD,
+        (friction - EXPECTED_FRICTION) / EXPECTED_FRICTION_SPREAD,
         *(np.maximum(tilts - TILT_RAD, 0.0) / TILT_SPREAD).T,
-        np.where(trials.obstacles == g.FLAT, 0.0, down / UPRIGHT),
-        np.where(trials.obstacles == g.FLAT, 0.0, math.sqrt(ROUND_MISFIT)),
+        np.where(hypotheses.obstacles == g.FLAT, 0.0, down / UPRIGHT),
+        np.where(hypotheses.obstacles == g.FLAT, 0.0, math.sqrt(ROUND_CHI_SQUARED)),
     ]
     return np.concatenate([off, np.array(beforehand).T], axis=1)

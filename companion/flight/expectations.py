@@ -109,7 +109,7 @@ def failure(flight: FlightContext) -> str | None:
 def _decide(flight: FlightContext, expectation: Expectation, met: bool, detail: str, now_us: int) -> None:
     expectation.met, expectation.detail = met, detail
     word = "met" if met else "NOT met"
-    flight.tell(now_us, "expect", f"{word}: {expectation.text} ({detail})", met=met)
+    flight.report(now_us, "expect", f"{word}: {expectation.text} ({detail})", met=met)
 
 
 def _heard_of(hits: list[CollisionReport]) -> str:

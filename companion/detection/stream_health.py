@@ -7,7 +7,7 @@ from typing import NamedTuple
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.history import STAMP_RESOLUTION_US
 from companion.motion.strapdown import MOTORS_RAD_S2
-from companion.written import Positive, Written
+from companion.strict_model import Positive, StrictModel
 
 # The received rate is judged over this: 20 samples at the least rate, and no longer than a link's brief gap.
 RATE_WINDOW_US = 1_000_000
@@ -17,10 +17,10 @@ PROOF_SAMPLES = 5
 PROOF_US = 100_000
 
 # Least threshold of a detector that is told to be blind.
-BLIND_M_S2 = 30.0
+MOST_THRESHOLD_M_S2 = 30.0
 
 
-class SightConfig(Written):
+class StreamHealthConfig(StrictModel):
     """When a detector counts as blind."""
 
     silence_s: Positive = 0.25
@@ -29,23 +29,23 @@ class SightConfig(Written):
     min_rate_hz: Positive = 20.0
     """Least rate of HIGHRES_IMU. 20 Hz is one sample in 50 ms: the longest contacts, about 100 ms, would show in two,
     most in none."""
-    max_threshold_m_s2: Positive = BLIND_M_S2
+    max_threshold_m_s2: Positive = MOST_THRESHOLD_M_S2
     """Largest threshold: vibration above it hides hits. By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a
     vehicle that shakes so much that less cannot be told from its shaking does not see the slower half of its hits."""
 
 
-class Sight(NamedTuple):
+class StreamHealth(NamedTuple):
     """What decides whether the detector sees: when it last heard, and how often. A tuple: one is made in every step."""
 
     last_heard_us: int
     window_started_us: int
     heard_in_window: int = 0
     rate_hz: float | None = None
-    blind_reason: str | None = None
+    no_data_reason: str | None = None
 
 
 @dataclass(slots=True)
-class Sameness:
+class StuckImuMonitor:
     """Whether the IMU measures. All six axes twice the same to the last bit, while the vehicle turned between, are no
     two measurements: noise alone changes the last bits of each. At rest a sensor without noise may repeat itself."""
 
@@ -71,12 +71,12 @@ class Sameness:
 
 
 @dataclass(slots=True)
-class Turning:
+class AttitudeGate:
     """Whether the vehicle can have turned to an attitude. One that it cannot have turned to counts from the second on
     that agrees with it, as after the estimator's reset. One forged or broken message turns no sum of accelerations."""
 
     latest: Attitude | None = None
-    doubted: Attitude | None = None
+    rejected: Attitude | None = None
     most_rad_s: float = 0.0
     """The fastest rate heard since the latest."""
 
@@ -86,11 +86,11 @@ class Turning:
 
     def attitude(self, sample: Attitude) -> bool:
         """Take one attitude; whether it counts."""
-        known = [before for before in (self.latest, self.doubted) if before is not None]
+        known = [before for before in (self.latest, self.rejected) if before is not None]
         if known and not any(self._leads_to(before, sample) for before in known):
-            self.doubted = sample
+            self.rejected = sample
             return False
-        self.latest, self.doubted, self.most_rad_s = sample, None, 0.0
+        self.latest, self.rejected, self.most_rad_s = sample, None, 0.0
         return True
 
     def _leads_to(self, before: Attitude, sample: Attitude) -> bool:
@@ -101,33 +101,33 @@ class Turning:
         return turned_rad <= (self.most_rad_s + MOTORS_RAD_S2 * over_s) * over_s
 
 
-def heard(sight: Sight, imu_samples: int, config: SightConfig, now_us: int) -> Sight:
+def with_samples(health: StreamHealth, imu_samples: int, config: StreamHealthConfig, now_us: int) -> StreamHealth:
     """With the IMU samples that arrived by ``now_us`` (companion's clock)."""
-    last_us, started_us, count, rate_hz, reason = sight
+    last_us, started_us, count, rate_hz, reason = health
     is_slow = rate_hz is not None and rate_hz < config.min_rate_hz
     if imu_samples:
         silent_us = now_us - last_us
         if silent_us > config.silence_s * 1e6:
             # What comes after a silence has to prove its rate; until then the silence's own rate stands.
-            return Sight(now_us, now_us, 0, 1e6 / silent_us, reason)
+            return StreamHealth(now_us, now_us, 0, 1e6 / silent_us, reason)
         if is_slow and started_us > last_us:
-            return Sight(now_us, now_us, 0, rate_hz, reason)
+            return StreamHealth(now_us, now_us, 0, rate_hz, reason)
         last_us, count = now_us, count + imu_samples
     elapsed_us = now_us - started_us
     is_proof = is_slow and imu_samples > 0 and count >= PROOF_SAMPLES and elapsed_us >= PROOF_US
     if is_proof or elapsed_us >= RATE_WINDOW_US:
         rate_hz, count, started_us = count * 1e6 / elapsed_us, 0, now_us
-    return Sight(last_us, started_us, count, rate_hz, reason)
+    return StreamHealth(last_us, started_us, count, rate_hz, reason)
 
 
-def why_blind(
-    sight: Sight, threshold_m_s2: float, config: SightConfig, now_us: int, useless: str | None = None
+def stream_fault(
+    health: StreamHealth, threshold_m_s2: float, config: StreamHealthConfig, now_us: int, imu_fault: str | None = None
 ) -> str | None:
-    """One phrase, or None for a detector that sees. `useless`: what was wrong with the newest IMU message."""
-    if now_us - sight.last_heard_us > config.silence_s * 1e6:
-        return useless or f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
-    if sight.rate_hz is not None and sight.rate_hz < config.min_rate_hz:
-        return f"HIGHRES_IMU at {sight.rate_hz:.0f} Hz, below {config.min_rate_hz:g}"
+    """One phrase, or None for a detector that sees. `imu_fault`: what was wrong with the newest IMU message."""
+    if now_us - health.last_heard_us > config.silence_s * 1e6:
+        return imu_fault or f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
+    if health.rate_hz is not None and health.rate_hz < config.min_rate_hz:
+        return f"HIGHRES_IMU at {health.rate_hz:.0f} Hz, below {config.min_rate_hz:g}"
     if threshold_m_s2 > config.max_threshold_m_s2:
         return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2"
     return None

@@ -5,11 +5,11 @@ import math
 import pytest
 
 from companion.detection.interface import Situation
-from companion.estimate.trust import Trust
+from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 from companion.motion.inertial import VelocityFix
-from companion.reflex.watch import advance, start_watch
+from companion.reflex.monitor import advance, start_monitor
 
 STILL = (0.0, 0.0, 0.0)
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -18,7 +18,7 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 @pytest.mark.parametrize(("push_m_s2", "normal_north", "normal_east"), [(-60.0, -1.0, 0.0), (-12.0, 0.0, -1.0)])
 def test_a_clipped_push_along_the_obstacle_is_none_of_its_normal(push_m_s2, normal_north, normal_east):
     """Clipped, each axis by itself: it gives way to where the vehicle came from. A weak one is a moving thing's."""
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     impacts = []
     for t_us in range(4_000, 2_100_000, 4_000):
@@ -28,9 +28,9 @@ def test_a_clipped_push_along_the_obstacle_is_none_of_its_normal(push_m_s2, norm
             samples.append(Odometry(t_us, STILL, (2.0, 0.0, 0.0), 0))
             samples.append(LocalPosition(t_us, STILL, (2.0, 0.0, 0.0)))
             samples.append(Attitude(t_us, LEVEL, STILL))
-        impacts += advance(watch, samples, situation, t_us).impacts
+        impacts += advance(monitor, samples, situation, t_us).impacts
     (impact,) = impacts
-    for estimate in (impact, watch.estimate):
+    for estimate in (impact, monitor.estimate):
         assert estimate.normal_ned[:2] == pytest.approx((normal_north, normal_east), abs=0.15)
 
 
@@ -42,7 +42,7 @@ def after_a_hit(
     With `stop_m_s2` the push's last sample is that much harder: arms that meet their stop; with `first_m_s2` its first.
     `again_m_s2` is what a touch at 2.12 s shows for 40 ms, `other_guard_m_s2` what one sample shows at 2.04 s.
     """
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     impacts, told, trusted = [], [], []
     speed = 0.0
@@ -59,10 +59,10 @@ def after_a_hit(
             # A hair's breadth of noise: velocities that stand still to the last digit are no estimate.
             samples.append(Odometry(t_us, STILL, (speed + error + 1e-3 * (t_us // 32_000 % 2), 0.0, 0.0), 0))
             samples.append(Attitude(t_us, LEVEL, STILL))
-        seen = advance(watch, samples, situation, t_us)
+        seen = advance(monitor, samples, situation, t_us)
         impacts += seen.impacts
         told += [(t_us, notice.text) for notice in seen.notices if notice.kind == "estimate"]
-        trusted.append(watch.estimate_trusted)
+        trusted.append(monitor.estimate_valid)
     return impacts, told, trusted
 
 
@@ -124,7 +124,7 @@ def test_a_hit_that_was_measured_whole_leaves_the_velocity_believed():
 def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2):
     """Told to be level, a vehicle whose filter says nose up by 4 degrees too much leans forward by as much."""
     # Given a clipped hit at 2.0 s, from 0.14 s after which the nose is told to come up at 20 degrees a second
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
+    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     rate_rad_s, up_rad = math.radians(20.0), 0.0
     for t_us in range(4_000, 2_500_000, 4_000):
@@ -136,25 +136,27 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
         samples: list[Sample] = [ImuSample(t_us, (push, 0.0, -9.80665), rates)]
         if t_us % 20_000 == 0:
             samples.append(Attitude(t_us, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), rates))
-        advance(watch, samples, situation, t_us)
+        advance(monitor, samples, situation, t_us)
         if t_us < 2_140_000:
-            assert watch.estimator.inertial.strapdown.level_leans_m_s2 == STILL
+            assert monitor.estimator.inertial.strapdown.level_acceleration_m_s2 == STILL
     # Then it is the filter's in the one case and the vehicle's in the other
-    assert not watch.estimate_trusted
-    assert watch.estimator.inertial.strapdown.level_leans_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
+    assert not monitor.estimate_valid
+    assert monitor.estimator.inertial.strapdown.level_acceleration_m_s2 == pytest.approx(
+        (leans_m_s2, 0.0, 0.0), abs=0.02
+    )
 
 
 @pytest.mark.parametrize(("leans_m_s2", "believed_s"), [(0.1, 0.7), (0.4, 4.6)])
 def test_a_tilt_that_the_gyroscopes_deny_keeps_the_doubt(leans_m_s2, believed_s):
     # Given a hit that may have been more, and velocities that agree with the accelerometer turned by the gyroscopes
-    trust = Trust()
-    trust.doubt(0)
+    validity = VelocityValidity()
+    validity.invalidate(0)
     fixes, believed_us = [], None
     for time_us in range(20_000, 6_000_000, 20_000):
-        trust.age(time_us)
+        validity.age(time_us)
         fixes.append(VelocityFix(time_us, (0.5, 0.0, 0.0), STILL, STILL))
-        trust.hear(fixes, (leans_m_s2, 0.0, 0.0))
-        if trust.is_trusted and believed_us is None:
+        validity.update(fixes, (leans_m_s2, 0.0, 0.0))
+        if validity.is_valid and believed_us is None:
             believed_us = time_us
     # Then the vehicle is believed once its attitude agrees, too, or after so long in any case
     assert believed_us == pytest.approx(1e6 * believed_s, abs=100_000)

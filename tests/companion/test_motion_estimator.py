@@ -8,16 +8,16 @@ import pytest
 from companion.estimate.config import EstimateConfig
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs
-from companion.flight.recovering import Recover, agreed_normal
+from companion.flight.recovering import Recover, consistent_normal
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from companion.motion.strapdown import Strapdown
-from companion.reflex.config import MOST_OFF_M_S, RIGHT_M_S, TILT_PER_S
+from companion.reflex.config import CONVERGED_M_S, MOST_VELOCITY_ERROR_M_S, TILT_PER_S
 from companion.reflex.laws import Contact
-from companion.reflex.planner import Moving
-from companion.reflex.reckoning import Reckoning, half_way, lean_ahead
+from companion.reflex.motion_estimator import MotionEstimator, blended_normal, tilt_ahead
+from companion.reflex.planner import MotionState
 
 NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)
 ZERO, LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
@@ -30,7 +30,7 @@ WAYS = [PX4, GPS, (0.08, 7.5, 0.9), (0.22, 3.0, 0.5)]
 
 def reckoned(velocity=(2.0, 0.0, 0.0), normal=SOUTH, restitution=0.2, earlier=None, hit_us=HIT_US):
     contact = Contact(hit_us, AT, velocity, normal)
-    return Reckoning(contact, hit_us, contact.rebound(restitution), EstimateConfig(), earlier)
+    return MotionEstimator(contact, hit_us, contact.rebound(restitution), EstimateConfig(), earlier)
 
 
 def said(north_m_s, since_us=60_000, position=AT):
@@ -66,7 +66,7 @@ def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1):
             lacks_m_s, lacks_m = missing(since_s, *way)
             velocity = (after_m_s + hidden_m_s * lacks_m_s + noise[0], noise[1], 0.0)
             place = (AT[0] + after_m_s * since_s + hidden_m_s * lacks_m + draw.gauss(0.0, 0.01), 0.0, AT[2])
-            found.hear(LocalPosition(strapdown.time_boot_us, place, velocity))
+            found.update(LocalPosition(strapdown.time_boot_us, place, velocity))
             yield since_s, after_m_s, velocity[0], found
 
 
@@ -75,13 +75,13 @@ def followed(way, speed_m_s, restitution, hides=1.0, until_s=1.4, seed=1):
 def test_the_motion_is_found_long_before_the_estimate_is_right_again(way, speed_m_s, restitution):
     # Given a hit of which the vehicle's own estimate knows nothing
     for since_s, true_m_s, told_m_s, found in followed(way, speed_m_s, restitution, until_s=3.0):
-        off_m_s = found.motion.velocity_ned_m_s[0] - true_m_s
+        velocity_error_m_s = found.motion.velocity_ned_m_s[0] - true_m_s
         hidden_m_s = (1.0 + restitution) * speed_m_s
         # Then it is never taken for right before what is missing still is known: to a few times its noise and a share
-        least_m_s = RIGHT_M_S + 0.05 * hidden_m_s
-        assert not found.is_right or abs(told_m_s - found.off_m_s[0] - true_m_s) < least_m_s
+        least_m_s = CONVERGED_M_S + 0.05 * hidden_m_s
+        assert not found.has_converged or abs(told_m_s - found.velocity_error_m_s[0] - true_m_s) < least_m_s
         # and the motion is known to half of what was hidden at any time, and to a tenth after a second
-        assert abs(off_m_s) < (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
+        assert abs(velocity_error_m_s) < (0.5 if since_s < 1.0 else 0.1) * hidden_m_s
 
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 3.0])
@@ -95,9 +95,9 @@ def test_the_spread_says_how_far_the_reckoned_velocity_may_be_off(speed_m_s):
 
 
 def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into_the_wall_is_not():
-    right_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, hides=0.0) if found.is_right)
+    right_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, hides=0.0) if found.has_converged)
     assert right_s < 0.5
-    lost_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, until_s=2.0) if found.is_right)
+    lost_s = next(since_s for since_s, _, _, found in followed(PX4, 2.0, 0.5, until_s=2.0) if found.has_converged)
     assert lost_s > 0.9
 
 
@@ -109,18 +109,18 @@ def test_part_of_a_hit_that_is_missing_is_found_too():
 
 def test_what_the_accelerometer_has_shown_whole_the_estimate_knows_at_once():
     whole = reckoned()
-    whole.tell(True, HIT_US)
-    whole.hear(said(-0.6, 60_000, (2.9, 0.0, -2.0)))
-    assert whole.is_right and whole.motion == Moving((2.9, 0.0, -2.0), (-0.6, 0.0, 0.0))
-    whole.hear(said(-0.5, 80_000, (2.9, 0.0, -2.0)))
+    whole.note_contact(True, HIT_US)
+    whole.update(said(-0.6, 60_000, (2.9, 0.0, -2.0)))
+    assert whole.has_converged and whole.motion == MotionState((2.9, 0.0, -2.0), (-0.6, 0.0, 0.0))
+    whole.update(said(-0.5, 80_000, (2.9, 0.0, -2.0)))
     assert -0.6 < whole.motion.velocity_ned_m_s[0] < -0.55, "noise counts little"
 
 
 def test_it_is_believed_in_the_end_whatever_it_says():
     found = reckoned()
     for since_us in range(20_000, 4_000_000, 20_000):
-        found.hear(said(2.0 - 9e-6 * since_us, since_us))
-    assert found.is_right
+        found.update(said(2.0 - 9e-6 * since_us, since_us))
+    assert found.has_converged
 
 
 @pytest.mark.parametrize("ahead_us", [1_000_000, 120_000, -70_000])
@@ -136,7 +136,7 @@ def test_a_place_of_another_time_leaves_the_motion_one_that_a_vehicle_can_have(a
             lacks_m_s, lacks_m = missing(1e-6 * since_us, *PX4)
             place = (3.0 - 0.4e-6 * since_us + 2.4 * hides * lacks_m, 0.0, -2.0)
             at_us = since_us + (ahead_us if tick % 25 == 0 and tick < 250 else 0)
-            found.hear(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
+            found.update(said(-0.4 + 2.4 * hides * lacks_m_s, at_us, place))
         # Then the motion stays one that a vehicle can have
         assert all(map(math.isfinite, found.spread_m_s))
         assert -2.5 < found.motion.velocity_ned_m_s[0] < 2.5
@@ -147,19 +147,19 @@ def test_another_hit_while_the_estimate_is_put_right_leaves_it_wrong():
     # Given a clipped hit on a wall, then a soft one on another whose force was shown whole
     *_, (_, _, told_m_s, first) = followed(PX4, 2.0, 0.5, until_s=0.16)
     again = reckoned((-1.0, 0.0, 0.0), NORTH, 0.0, first, HIT_US + 160_000)
-    again.tell(True, HIT_US + 160_000)
-    again.hear(said(told_m_s, 180_000))
-    assert told_m_s > 1.0 and not again.is_right
+    again.note_contact(True, HIT_US + 160_000)
+    again.update(said(told_m_s, 180_000))
+    assert told_m_s > 1.0 and not again.has_converged
     assert again.motion.velocity_ned_m_s[0] < 0.5 * told_m_s
 
 
-def heard(reckoning, acceleration, until_us=400_000, attitude=LEVEL):
+def heard(estimator, acceleration, until_us=400_000, attitude=LEVEL):
     strapdown = Strapdown(attitude_wxyz=attitude)
     for since_us in range(4_000, until_us + 1, 4_000):
         strapdown.time_boot_us = HIT_US + since_us
         strapdown.acceleration_ned_m_s2 = acceleration(since_us)
-        reckoning.imu(strapdown)
-    return reckoning.motion
+        estimator.imu(strapdown)
+    return estimator.motion
 
 
 def test_until_then_the_motion_is_the_expected_one_and_what_the_accelerometer_adds():
@@ -180,16 +180,16 @@ def test_the_lean_in_vain_is_the_wind():
 
 def test_a_lean_is_known_ahead_by_the_rates():
     level = Strapdown(rates_frd_rad_s=(0.0, -2.0, 0.0))
-    assert lean_ahead(Strapdown(), 0.15) == pytest.approx(ZERO)
-    assert lean_ahead(level, 0.15)[0] == pytest.approx(9.81 * 0.15 * 2.0, abs=0.05), "nose down leans north"
+    assert tilt_ahead(Strapdown(), 0.15) == pytest.approx(ZERO)
+    assert tilt_ahead(level, 0.15)[0] == pytest.approx(9.81 * 0.15 * 2.0, abs=0.05), "nose down leans north"
 
 
 def test_the_way_out_lies_between_a_clipped_push_and_the_way_back():
     turned = (-math.cos(0.5), -math.sin(0.5), 0.0)
-    n, e, d = half_way(turned, (1.5, 0.0, 0.2))
+    n, e, d = blended_normal(turned, (1.5, 0.0, 0.2))
     assert (n, e, d) == pytest.approx((-math.cos(0.25), -math.sin(0.25), 0.0))
-    assert half_way((-0.17, 0.985, 0.0), NORTH) == SOUTH, "80 degrees off: the push is wrong"
-    assert half_way(turned, ZERO) == turned, "a vehicle that hovered has no way back"
+    assert blended_normal((-0.17, 0.985, 0.0), NORTH) == SOUTH, "80 degrees off: the push is wrong"
+    assert blended_normal(turned, ZERO) == turned, "a vehicle that hovered has no way back"
 
 
 @pytest.mark.parametrize(
@@ -202,15 +202,15 @@ def test_the_way_out_lies_between_a_clipped_push_and_the_way_back():
     ],
 )
 def test_the_normal_is_the_pushs_unless_the_velocity_says_otherwise(pushed, after, normal):
-    assert agreed_normal(pushed, (2.0, 0.0, 0.0), after) == pytest.approx(normal)
+    assert consistent_normal(pushed, (2.0, 0.0, 0.0), after) == pytest.approx(normal)
 
 
 def recovering(**hit):
     mission = Mission.model_validate({"name": "m", "items": [{"takeoff": {"height_m": 2}}, {"land": {}}]})
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
     flight.origin_ned_m = ZERO
-    reckoning = reckoned(**hit)
-    record = CollisionRecord(0, HIT_US, "fused", reckoning.contact, (2.6, 0.0, -2.0), SOUTH, 20.0, HIT_US, reckoning)
+    estimator = reckoned(**hit)
+    record = CollisionRecord(0, HIT_US, "fused", estimator.contact, (2.6, 0.0, -2.0), SOUTH, 20.0, HIT_US, estimator)
     flight.collisions.append(record)
     return flight, record, Recover(flight, 0)
 
@@ -218,7 +218,7 @@ def recovering(**hit):
 def test_the_plan_begins_anew_when_a_slow_contact_is_over():
     # Given arms that push for 0.15 s, while which the vehicle still flies in
     flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
-    record.reckoning.tell(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US)
 
     def hears(at_us, north_m, north_m_s):
         sample = LocalPosition(HIT_US + at_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
@@ -242,7 +242,7 @@ def test_the_plan_begins_anew_when_a_slow_contact_is_over():
 def test_what_pushes_a_vehicle_along_takes_its_surface_and_its_goal_with_it():
     # Given a screen that carries a vehicle south with 0.8 m/s
     flight, record, recover = recovering(velocity=ZERO)
-    record.reckoning.tell(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US)
     goals = []
     for at_us in range(100_000, 1_500_000, 20_000):
         record.contact_ended_boot_us = HIT_US + at_us
@@ -264,7 +264,7 @@ def test_a_vehicle_whose_estimate_is_off_for_seconds_comes_to_rest_where_it_is_t
         since_s = 0.004 * tick
         left = math.exp(-since_s / gone_s)
         strapdown.time_boot_us, strapdown.acceleration_ned_m_s2 = HIT_US + 4_000 * tick, (2.0 / gone_s * left, 0.0, 0.0)
-        record.reckoning.imu(strapdown)
+        record.estimator.imu(strapdown)
         if tick % 5:
             continue
         lacks_m_s, lacks_m = (4.0 * each for each in missing(since_s, *PX4))
@@ -276,9 +276,9 @@ def test_a_vehicle_whose_estimate_is_off_for_seconds_comes_to_rest_where_it_is_t
         if recover.step(flight, Inputs(positions=[told]), 4_000 * tick) is not None:
             break
         if since_s == pytest.approx(1.6):
-            asked_m_s, off_m_s = recover.target(4_000 * tick + 5_000_000).velocity_ned_m_s[0], lacks_m_s
+            asked_m_s, velocity_error_m_s = recover.target(4_000 * tick + 5_000_000).velocity_ned_m_s[0], lacks_m_s
     # Then PX4 is asked for what it takes for motion at rest, and the recovery is over before its estimate is right
-    assert off_m_s < -0.25 and asked_m_s == pytest.approx(off_m_s, abs=0.1)
+    assert velocity_error_m_s < -0.25 and asked_m_s == pytest.approx(velocity_error_m_s, abs=0.1)
     assert record.is_over and lacks_m_s < -0.1
     assert record.settled_after_s() < 3.5
 
@@ -286,30 +286,30 @@ def test_a_vehicle_whose_estimate_is_off_for_seconds_comes_to_rest_where_it_is_t
 def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
     # Given a vehicle at rest that takes itself for moving at 0.15 m/s for seconds, and its places stand
     flight, record, recover = recovering()
-    record.reckoning.tell(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US)
     for at_us in range(100_000, 5_000_000, 20_000):
         recover.step(flight, Inputs(positions=[said(0.15, at_us, (2.38, 0.0, -2.0))]), at_us)
         if record.is_over:
             break
     # Then the recovery is over although 0.15 m/s is told, and PX4 is asked for as much at rest
     assert record.setpoint_ned_m[0] == pytest.approx(2.38, abs=0.05)
-    assert record.reckoning.off_m_s[0] == pytest.approx(0.15, abs=0.05)
-    assert recover.target(at_us + 3_000_000).velocity_ned_m_s[0] == record.reckoning.off_m_s[0]
+    assert record.estimator.velocity_error_m_s[0] == pytest.approx(0.15, abs=0.05)
+    assert recover.target(at_us + 3_000_000).velocity_ned_m_s[0] == record.estimator.velocity_error_m_s[0]
     assert record.is_over and record.settled_after_s() < 3.5
 
 
 def test_a_place_that_jumps_makes_no_large_error_of_a_velocity():
     found = reckoned()
-    found.tell(True, HIT_US)
+    found.note_contact(True, HIT_US)
     for since_us in range(60_000, 400_000, 20_000):
-        found.hear(said(0.0, since_us, (3.0 if since_us < 200_000 else 8.0, 0.0, -2.0)))
-    assert math.hypot(*found.off_m_s) <= MOST_OFF_M_S + 1e-9
+        found.update(said(0.0, since_us, (3.0 if since_us < 200_000 else 8.0, 0.0, -2.0)))
+    assert math.hypot(*found.velocity_error_m_s) <= MOST_VELOCITY_ERROR_M_S + 1e-9
 
 
 def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
     # Given arms that are pressed in by 0.1 m, and push the vehicle out again
     flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
-    record.reckoning.tell(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US)
     record.contact_ended_boot_us = HIT_US + 60_000
     sample = LocalPosition(HIT_US + 60_000, (2.9, 0.0, -2.0), (-0.1, 0.0, 0.0))
     recover.step(flight, Inputs(positions=[sample]), 60_000)
@@ -320,7 +320,7 @@ def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
 def test_what_shakes_a_vehicle_that_leaves_as_it_is_asked_to_moves_no_surface():
     # Given a vehicle that follows its plan off a wall, and shakes so that the contact seems never to end
     flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
-    record.reckoning.tell(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US)
     north_m, north_m_s, goal_m = 3.0, -0.2, None
     for at_us in range(100_000, 2_500_000, 20_000):
         record.contact_ended_boot_us = HIT_US + at_us
@@ -343,8 +343,8 @@ def test_a_whole_hit_is_followed_by_what_is_told_even_while_it_pushes():
     # Given arms that push for half a second, each sample shown whole
     found = reckoned((0.5, 0.0, 0.0))
     for since_us in range(40_000, 500_000, 20_000):
-        found.tell(True, HIT_US + since_us)
-        found.hear(said(0.3, since_us, (3.0 + 0.3e-6 * since_us, 0.0, -2.0)))
+        found.note_contact(True, HIT_US + since_us)
+        found.update(said(0.3, since_us, (3.0 + 0.3e-6 * since_us, 0.0, -2.0)))
     # Then the motion is what the estimate says, not what was expected of the hit
     assert found.motion.velocity_ned_m_s[0] == pytest.approx(0.3, abs=0.02)
 
@@ -355,13 +355,13 @@ def test_a_lean_is_meant_for_the_tilt_that_the_gyroscopes_show():
     strapdown = Strapdown()
     strapdown.attitude(HIT_US + 140_000, LEVEL)
     strapdown.imu(HIT_US + 150_000, (0.0, 0.0, -9.80665), ZERO)
-    strapdown.attitude(HIT_US + 160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), is_right=False)
+    strapdown.attitude(HIT_US + 160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), is_valid=False)
     _, record, recover = recovering()
     # When the recovery asks for a lean
     record.follow_motion(strapdown)
     target = recover.target(160_000)
     # Then it is known to what that is added
-    assert target.leans_only
+    assert target.acceleration_only
     assert target.expected.acceleration_ned_m_s2[0] == pytest.approx(9.80665 * math.tan(up_rad))
 
 
@@ -372,8 +372,8 @@ def test_gyroscopes_that_deny_more_tilt_than_a_hit_can_hide_are_wrong_themselves
     for since_us in range(4_000, 1_500_001, 4_000):
         strapdown.imu(HIT_US + since_us, (0.0, 0.0, -9.80665), (0.0, 0.5, 0.0))
         if since_us % 20_000 == 0:
-            strapdown.attitude(HIT_US + since_us, LEVEL, is_right=False)
-        leans_m_s2.append(math.hypot(*strapdown.level_leans_m_s2))
+            strapdown.attitude(HIT_US + since_us, LEVEL, is_valid=False)
+        leans_m_s2.append(math.hypot(*strapdown.level_acceleration_m_s2))
     # Then the lean is never corrected by more than 15 degrees, and the vehicle's own attitude counts again
     assert max(leans_m_s2) < 9.80665 * math.tan(math.radians(15.5))
     assert 0.0 in leans_m_s2[140:], "told anew, not held"
@@ -386,7 +386,7 @@ def test_a_fall_before_the_estimate_is_believed_makes_no_ceiling_of_the_wall():
     late = LocalPosition(HIT_US + 3_500_000, (2.8, 0.0, -0.5), (-0.4, 0.0, 3.5))
     recover.step(flight, Inputs(positions=[late]), 3_500_000)
     # Then the way out is still away from the wall, and back up to where it was
-    assert record.reckoning.is_right
+    assert record.estimator.has_converged
     n, e, d = record.setpoint_ned_m
     assert n < 2.7 and abs(e) < 0.1 and d == pytest.approx(-2.0)
     # And of the speed off the wall nothing is said: no velocity of that time was believed
@@ -397,6 +397,8 @@ def test_in_doubt_accelerations_alone_are_asked_for():
     flight, record, recover = recovering()
     recover.step(flight, Inputs(positions=[said(2.0, 100_000, (3.1, 0.0, -2.0))]), 100_000)
     asked = recover.target(100_000)
-    assert asked.leans_only and asked.is_height_free
+    assert asked.acceleration_only and asked.is_height_free
     assert asked.acceleration_ned_m_s2[0] < 0.5, "0.4 m/s off the wall: braked gently, never towards it harder"
-    assert asked.expected == Moving(record.reckoning.motion.position_ned_m, record.reckoning.motion.velocity_ned_m_s)
+    assert asked.expected == MotionState(
+        record.estimator.motion.position_ned_m, record.estimator.motion.velocity_ned_m_s
+    )

@@ -10,8 +10,8 @@ from companion.detection.interface import Phase, Situation
 from companion.estimate import impact
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
-from companion.reflex import watch as watching
-from companion.reflex.watch import advance, start_watch
+from companion.reflex import monitor as watching
+from companion.reflex.monitor import advance, start_monitor
 
 INTERVAL_US = 4_000
 WANTED = Situation()
@@ -22,7 +22,7 @@ def lateral(**changes):
     return BaselineConfig(detector="lateral", **changes)
 
 
-def fly(watch, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WANTED, start_us=INTERVAL_US):
+def fly(monitor, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WANTED, start_us=INTERVAL_US):
     """North at 2 m/s, level; `push` is the contact's force per unit mass on body x, m/s^2."""
     impacts, finished, notices = [], [], []
     for t in range(start_us, until_us, every_us):
@@ -30,7 +30,7 @@ def fly(watch, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=WAN
         samples: list[Sample] = [ImuSample(t, (push(t), 0.0, -9.81), (0.0, 0.0, 0.0))]
         samples.append(LocalPosition(t, (north_m, 0.0, -1.5), (2.0, 0.0, 0.0)))
         samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
-        seen = advance(watch, samples, situation, t)
+        seen = advance(monitor, samples, situation, t)
         impacts += seen.impacts
         finished += seen.finished
         notices += seen.notices
@@ -45,30 +45,30 @@ def hit(t):
 
 
 def test_an_impact_comes_at_its_first_sample_and_its_final_estimate_when_the_contact_is_over():
-    watch = start_watch(lateral(), 0)
-    impacts, finished, _ = fly(watch, 1_500_000, hit)
+    monitor = start_monitor(lateral(), 0)
+    impacts, finished, _ = fly(monitor, 1_500_000, hit)
 
     assert [e.impact.sample_time_boot_us for e in impacts] == [1_000_000]
     assert not impacts[0].is_final
     assert impacts[0].velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.01)
     assert len(finished) == 1 and finished[0].is_final
     assert finished[0].normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
-    assert watch.estimate == finished[0]
+    assert monitor.estimate == finished[0]
 
 
 def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_recovery_asks_for_it():
     """Given a hit of 20 ms, when samples come at 250 Hz, then its normal is there within 80 ms, and final with it; and
     the same if a watch in the middle of the search is copied."""
-    watch, told = start_watch(lateral(estimate=SPRING_ARMS), 0), []
-    fly(watch, 1_000_000)
+    monitor, told = start_monitor(lateral(estimate=SPRING_ARMS), 0), []
+    fly(monitor, 1_000_000)
     for t in range(1_000_000, 1_200_000, INTERVAL_US):
         if t == 1_032_000:
-            search = watch.estimator.search
+            search = monitor.estimator.search
             assert search is not None and not search.is_over
-            other = pickle.loads(pickle.dumps(watch))
-        told += [(t, one.normal_ned) for one in fly(watch, t + 1, hit, start_us=t)[1]]
+            other = pickle.loads(pickle.dumps(monitor))
+        told += [(t, one.normal_ned) for one in fly(monitor, t + 1, hit, start_us=t)[1]]
     ((told_us, normal_ned),) = told
-    assert watch.estimator.search.is_over and told_us <= 1_080_000
+    assert monitor.estimator.search.is_over and told_us <= 1_080_000
     (final,) = fly(other, 1_200_000, hit, start_us=1_032_000)[1]
     assert final.normal_ned == normal_ned
 
@@ -76,80 +76,83 @@ def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_
 def test_of_a_frame_that_does_not_fold_the_normal_is_the_pushs(monkeypatch):
     """Given a hit that friction turns the vehicle with, when no arm folds, then nothing is compiled or searched."""
     monkeypatch.setattr(watching, "prepare", lambda: pytest.fail("compiled for no arm"))
-    watch = start_watch(lateral(), 0)
-    (final,) = fly(watch, 1_200_000, hit)[1]
-    assert watch.estimator.search is None
+    monitor = start_monitor(lateral(), 0)
+    (final,) = fly(monitor, 1_200_000, hit)[1]
+    assert monitor.estimator.search is None
     assert final.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
 
 
 @pytest.mark.parametrize("estimate", [{}, SPRING_ARMS], ids=["stiff frame", "spring arms"])
 def test_only_a_vehicle_with_spring_arms_is_told_to_install_the_fit(estimate, monkeypatch):
     monkeypatch.setattr(impact, "IS_AVAILABLE", False)
-    _, _, notices = fly(start_watch(lateral(estimate=estimate), 0), 8_000_000)
+    _, _, notices = fly(start_monitor(lateral(estimate=estimate), 0), 8_000_000)
     assert any("px4-rebound[fit]" in notice.text for notice in notices) == bool(estimate)
 
 
 def test_a_second_hit_before_a_search_is_over_has_it_ended_and_the_first_estimate_told():
-    watch = start_watch(lateral(estimate=SPRING_ARMS), 0)
-    fly(watch, 1_000_000, hit)
-    fly(watch, 1_024_000, hit, start_us=1_000_000)
+    monitor = start_monitor(lateral(estimate=SPRING_ARMS), 0)
+    fly(monitor, 1_000_000, hit)
+    fly(monitor, 1_024_000, hit, start_us=1_000_000)
     # Three bare samples in 60 ms: over, and no search has come to its end.
-    seen = [advance(watch, [ImuSample(t, (force, 0.0, -9.81), (0.0, 0.0, 0.0))], WANTED, t) for t, force in SPARSE]
+    seen = [advance(monitor, [ImuSample(t, (force, 0.0, -9.81), (0.0, 0.0, 0.0))], WANTED, t) for t, force in SPARSE]
     finished = [one for step in seen for one in step.finished]
     assert [step.impacts != () for step in seen] == [False, False, True]
     assert [one.impact.sample_time_boot_us for one in finished] == [1_000_000]
-    assert finished[0].is_final and not watch.estimate.is_final
+    assert finished[0].is_final and not monitor.estimate.is_final
 
 
 def test_a_watch_survives_pickling_in_mid_flight():
     """Campaigns send watches between processes."""
-    watch = start_watch(lateral(), 0)
-    fly(watch, 900_000)
-    copy = pickle.loads(pickle.dumps(watch))
-    assert fly(copy, 1_500_000, hit, start_us=900_000)[0] == fly(watch, 1_500_000, hit, start_us=900_000)[0] != []
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 900_000)
+    copy = pickle.loads(pickle.dumps(monitor))
+    assert fly(copy, 1_500_000, hit, start_us=900_000)[0] == fly(monitor, 1_500_000, hit, start_us=900_000)[0] != []
 
 
 def test_late_and_doubled_samples_are_dropped_and_a_reboot_is_not():
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_900_000)
-    at = watch.last_imu_boot_us
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_900_000)
+    at = monitor.last_imu_boot_us
     late = ImuSample(at - INTERVAL_US, (-50.0, 0.0, -9.81), (0.0, 0.0, 0.0))
-    assert advance(watch, [late], WANTED, 1_900_000).impacts == ()
-    fly(watch, 500_000)
-    assert watch.last_imu_boot_us < 500_000
+    assert advance(monitor, [late], WANTED, 1_900_000).impacts == ()
+    fly(monitor, 500_000)
+    assert monitor.last_imu_boot_us < 500_000
 
 
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
-        (lambda watch: advance(watch, [], WANTED, 1_500_000), "no HIGHRES_IMU for 250 ms"),
-        (lambda watch: fly(watch, 4_000_000, every_us=100_000, start_us=1_000_000), "HIGHRES_IMU at 10 Hz, below 20"),
-        (lambda watch: fly(watch, 4_000_000, lambda t: 12.0 * math.sin(t), start_us=1_000_000), "vibration hides"),
+        (lambda monitor: advance(monitor, [], WANTED, 1_500_000), "no HIGHRES_IMU for 250 ms"),
+        (
+            lambda monitor: fly(monitor, 4_000_000, every_us=100_000, start_us=1_000_000),
+            "HIGHRES_IMU at 10 Hz, below 20",
+        ),
+        (lambda monitor: fly(monitor, 4_000_000, lambda t: 12.0 * math.sin(t), start_us=1_000_000), "vibration hides"),
     ],
 )
 def test_a_blind_watch_says_why_and_a_seeing_one_says_it_sees_again(spoil, reason):
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_000_000)
-    assert watch.blind_reason is None
-    spoil(watch)
-    assert reason in watch.blind_reason
-    assert watch.describe().startswith("blind (")
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000)
+    assert monitor.no_data_reason is None
+    spoil(monitor)
+    assert reason in monitor.no_data_reason
+    assert monitor.describe().startswith("blind (")
 
-    _, _, notices = fly(watch, 12_000_000, start_us=4_000_000)
+    _, _, notices = fly(monitor, 12_000_000, start_us=4_000_000)
 
-    assert watch.blind_reason is None
-    assert watch.state.phase is Phase.ARMED
+    assert monitor.no_data_reason is None
+    assert monitor.state.phase is Phase.ARMED
     assert "the detector sees again" in [notice.text for notice in notices]
 
 
-def imu_every(watch, every_us, start_us, until_us):
+def imu_every(monitor, every_us, start_us, until_us):
     """Samples with an attitude each, looked after every 4 ms; when the watch became seeing or blind."""
-    changes, was = [], watch.blind_reason is None
+    changes, was = [], monitor.no_data_reason is None
     for t in range(start_us, until_us, INTERVAL_US):
         pair: list[Sample] = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, 0.0, 0.0, 0.0))]
         heard = pair if (t - start_us) % every_us == 0 else []
-        advance(watch, heard, WANTED, t)
-        if (watch.blind_reason is None) is not was:
+        advance(monitor, heard, WANTED, t)
+        if (monitor.no_data_reason is None) is not was:
             was = not was
             changes.append(t - start_us)
     return changes
@@ -157,35 +160,35 @@ def imu_every(watch, every_us, start_us, until_us):
 
 @pytest.mark.parametrize(("every_us", "seeing_us"), [(4_000, 100_000), (20_000, 100_000), (40_000, 200_000)])
 def test_after_a_silence_five_intervals_and_a_tenth_of_a_second_prove_the_rate(every_us, seeing_us):
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_000_000)
-    advance(watch, [], WANTED, 1_500_000)
-    advance(watch, [], WANTED, 2_600_000)
-    assert watch.blind_reason is not None
-    assert imu_every(watch, every_us, 3_000_000, 6_000_000) == [seeing_us]
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000)
+    advance(monitor, [], WANTED, 1_500_000)
+    advance(monitor, [], WANTED, 2_600_000)
+    assert monitor.no_data_reason is not None
+    assert imu_every(monitor, every_us, 3_000_000, 6_000_000) == [seeing_us]
 
 
 def test_a_slow_stream_stays_blind_and_is_seen_again_a_tenth_of_a_second_after_it_is_fast():
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_000_000)
-    (blind_us,) = imu_every(watch, 100_000, 1_000_000, 5_000_000)
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000)
+    (blind_us,) = imu_every(monitor, 100_000, 1_000_000, 5_000_000)
     assert blind_us <= 2_000_000
-    (seeing_us,) = imu_every(watch, 20_000, 5_000_000, 8_000_000)
+    (seeing_us,) = imu_every(monitor, 20_000, 5_000_000, 8_000_000)
     assert seeing_us <= 220_000
 
 
 def test_samples_that_a_link_held_back_and_delivers_at_once_prove_no_rate():
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_000_000)
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000)
     late = [ImuSample(1_000_000 + INTERVAL_US * n, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)) for n in range(20)]
-    advance(watch, late, WANTED, 2_000_000)
-    advance(watch, [], WANTED, 2_200_000)
-    assert "below 20" in watch.blind_reason
+    advance(monitor, late, WANTED, 2_000_000)
+    advance(monitor, [], WANTED, 2_200_000)
+    assert "below 20" in monitor.no_data_reason
 
 
 def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_is_blind():
     # Given a level vehicle that flies north; no attitude comes from 4 s on, and at 4.4 s it leans to gain 1.8 m/s
-    watch, impacts, texts = start_watch(CompanionConfig(), 0), [], []
+    monitor, impacts, texts = start_monitor(CompanionConfig(), 0), [], []
     from_us, until_us, speeding_up_m_s2 = 4_400_000, 5_000_000, 3.0
     for t in range(INTERVAL_US, 6_000_000, INTERVAL_US):
         led_s, leans = max(0, min(t, until_us) - from_us) * 1e-6, from_us < t <= until_us
@@ -198,7 +201,7 @@ def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_
             samples += [Odometry(t, place, (north_m_s, 0.0, 0.0), 0), LocalPosition(t, place, (north_m_s, 0.0, 0.0))]
         if not 4_000_000 < t <= until_us:
             samples.append(Attitude(t, (1.0, 0.0, 0.0, 0.0)))
-        seen = advance(watch, samples, WANTED, t)
+        seen = advance(monitor, samples, WANTED, t)
         impacts += seen.impacts
         texts += [notice.text for notice in seen.notices if notice.kind == "link"]
     # Then a velocity that no force explains is no hit, and it is told
@@ -207,15 +210,15 @@ def test_a_lean_of_which_no_attitude_tells_is_no_hit_and_the_watch_says_that_it_
 
 
 def test_a_watch_that_is_not_wanted_is_off_not_blind():
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_000_000, situation=Situation("landing"))
-    seen = advance(watch, [], Situation("landing"), 3_000_000)
-    assert (seen.notices, watch.blind_reason, watch.describe()) == ((), None, "off (landing)")
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000, situation=Situation("landing"))
+    seen = advance(monitor, [], Situation("landing"), 3_000_000)
+    assert (seen.notices, monitor.no_data_reason, monitor.describe()) == ((), None, "off (landing)")
 
 
 def test_what_is_lost_without_a_message_is_said_once():
-    watch = start_watch(CompanionConfig(detector="fused"), 0)
-    _, _, notices = fly(watch, 8_000_000)
+    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
+    _, _, notices = fly(monitor, 8_000_000)
     losses = [notice.text for notice in notices if notice.text.startswith("no ")]
     assert [text.split(":")[0] for text in losses] == ["no ATTITUDE_TARGET", "no VIBRATION", "no ODOMETRY"]
 
@@ -223,11 +226,11 @@ def test_what_is_lost_without_a_message_is_said_once():
 @pytest.mark.parametrize("turns", [False, True])
 def test_samples_that_are_the_same_to_the_last_bit_are_none_only_of_a_vehicle_that_turned_between(turns):
     """At rest a sensor without noise repeats itself; nothing that turns does."""
-    watch = start_watch(lateral(), 0)
-    fly(watch, 1_000_000)
+    monitor = start_monitor(lateral(), 0)
+    fly(monitor, 1_000_000)
     notices = []
     for t in range(1_000_000, 2_000_000, INTERVAL_US):
         roll = 1e-4 * (t % 3) if turns else 0.0
         samples: list[Sample] = [ImuSample(t, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)), Attitude(t, (1.0, roll, 0.0, 0.0))]
-        notices += advance(watch, samples, WANTED, t).notices
+        notices += advance(monitor, samples, WANTED, t).notices
     assert [notice.text for notice in notices] == (["detector blind: IMU stuck at one value"] if turns else [])

@@ -26,70 +26,70 @@ from companion.motion.delay import DELAY_S
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.reflex.config import (
+    CLIPPED_PART,
     COMPARED_S,
+    CONVERGED_M_S,
     CORRECTED_S,
+    CORRECTION_DAMPING,
+    CORRECTION_DELAY_S,
+    CORRECTION_RAD_S,
     DRIFT_M2_S3,
+    EXTERNAL_FORCE_S,
     FRICTION_SPREAD,
-    HIDDEN_SHARE,
     LEAD_S,
     LEAST_SPREAD_M_S,
+    LEAST_UPRIGHT_COSINE,
     MODEL_ERROR,
     MODEL_ERROR_S,
-    MOST_LEANT,
-    MOST_OFF_M_S,
+    MOST_VELOCITY_ERROR_M_S,
     PLACE_SPREAD_M,
-    PUSHES_S,
-    PUT_RIGHT_AFTER_S,
-    PUT_RIGHT_DAMPING,
-    PUT_RIGHT_RAD_S,
-    REBOUND_SPREAD,
-    RIGHT_M_S,
+    RESTITUTION_SPREAD,
     SMOOTHED_S,
-    THROWN_SHARE,
     TILT_PER_S,
+    VERTICAL_SPREAD,
     WIND_S,
 )
 from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.laws import Contact
-from companion.reflex.planner import REST, Moving
+from companion.reflex.planner import REST, MotionState
 
 Floats = npt.NDArray[np.float64]
 
 # The ways in which an estimate may be put right: after how long, with which frequency and damping.
-_WAYS = np.array(list(product(PUT_RIGHT_AFTER_S, PUT_RIGHT_RAD_S, PUT_RIGHT_DAMPING)))
+_MODELS = np.array(list(product(CORRECTION_DELAY_S, CORRECTION_RAD_S, CORRECTION_DAMPING)))
 
 
 @dataclass(slots=True)
-class Bank:
+class FilterBank:
     """Filters of x, v, e: a state (ways, axes, 3) and its covariance (ways, axes, 3, 3) each; the last way is none
     missing. Local NED, SI. Changed only by its methods."""
 
-    start: Moving
+    start: MotionState
     spread_m_s: Vector3
-    missing_m_s: Vector3
-    hides_m_s: Vector3
+    error_m_s: Vector3
+    error_spread_m_s: Vector3
     state: Floats = field(init=False)
     covariance: Floats = field(init=False)
-    likely: Floats = field(init=False)  # twice the logarithm of each way's likelihood
+    log_likelihoods: Floats = field(init=False)  # twice the logarithm of each way's likelihood
 
     def __post_init__(self) -> None:
-        ways = len(_WAYS) + 1
-        state = np.stack([self.start.position_ned_m, self.start.velocity_ned_m_s, self.missing_m_s], axis=1)
-        spread = np.stack([np.full(3, PLACE_SPREAD_M), self.spread_m_s, self.hides_m_s], axis=1)
-        self.state = np.tile(state, (ways, 1, 1))
-        self.covariance = np.tile(np.einsum("ai,ij->aij", spread**2, np.eye(3)), (ways, 1, 1, 1))
-        self.likely = np.zeros(ways)
-        self.likely[-1] = 2.0 * math.log(len(_WAYS))  # as likely as all others together
+        models = len(_MODELS) + 1
+        state = np.stack([self.start.position_ned_m, self.start.velocity_ned_m_s, self.error_m_s], axis=1)
+        spread = np.stack([np.full(3, PLACE_SPREAD_M), self.spread_m_s, self.error_spread_m_s], axis=1)
+        self.state = np.tile(state, (models, 1, 1))
+        self.covariance = np.tile(np.einsum("ai,ij->aij", spread**2, np.eye(3)), (models, 1, 1, 1))
+        self.log_likelihoods = np.zeros(models)
+        self.log_likelihoods[-1] = 2.0 * math.log(len(_MODELS))  # as likely as all others together
 
-    def struck(self, faster_m_s: Vector3, spread_m_s: Vector3, hides_m_s: Vector3) -> "Bank":
+    def with_hit(self, faster_m_s: Vector3, spread_m_s: Vector3, error_spread_m_s: Vector3) -> "FilterBank":
         """Another hit, while what the first one hid is being put right."""
         bank = copy.deepcopy(self)
         bank.state[:, :, 1] += np.array(faster_m_s)
         bank.covariance[:, :, 1, 1] += np.array(spread_m_s) ** 2
-        bank.covariance[:, :, 2, 2] += np.array(hides_m_s) ** 2
+        bank.covariance[:, :, 2, 2] += np.array(error_spread_m_s) ** 2
         return bank
 
-    def move(self, elapsed_s: float, faster_m_s: Vector3) -> None:
+    def predict(self, elapsed_s: float, faster_m_s: Vector3) -> None:
         """By the accelerometer's sum over a time; its attitude may be a little off."""
         leads = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         self.state = self.state @ leads.T
@@ -99,7 +99,7 @@ class Bank:
         self.covariance = leads @ self.covariance @ leads.T
         self.covariance[:, :, 1, 1] += DRIFT_M2_S3 * elapsed_s
 
-    def hear(
+    def update(
         self, since_s: float, velocity_m_s: Vector3, place_m: Vector3, spread_m_s: float, spread_m: float, colour: float
     ) -> None:
         """What the vehicle tells of itself so long after the hit.
@@ -107,44 +107,46 @@ class Bank:
         No estimator is put right in quite one of these ways: it is off by a share of what was hidden. ``colour``: in so
         many samples the same error shows.
         """
-        g, way_s, _ = missing(since_s)
-        hidden2 = np.array(self.missing_m_s) ** 2
-        self._take(0, way_s, place_m, colour * (spread_m**2 + min(MODEL_ERROR * since_s, MODEL_ERROR_S) ** 2 * hidden2))
-        self._take(1, g, velocity_m_s, colour * (spread_m_s**2 + MODEL_ERROR**2 * hidden2))
+        g, way_s, _ = error_response(since_s)
+        hidden2 = np.array(self.error_m_s) ** 2
+        self._update(
+            0, way_s, place_m, colour * (spread_m**2 + min(MODEL_ERROR * since_s, MODEL_ERROR_S) ** 2 * hidden2)
+        )
+        self._update(1, g, velocity_m_s, colour * (spread_m_s**2 + MODEL_ERROR**2 * hidden2))
 
-    def _take(self, which: int, of_e: Floats, told: Vector3, variance: Floats) -> None:
+    def _update(self, which: int, of_e: Floats, measured: Vector3, variance: Floats) -> None:
         """One measurement on each axis: the place (0) or the velocity (1) with so much of e in it."""
         share = of_e[:, None]
-        missed = np.array(told) - self.state[:, :, which] - share * self.state[:, :, 2]
+        missed = np.array(measured) - self.state[:, :, which] - share * self.state[:, :, 2]
         with_it = self.covariance[..., which] + share[..., None] * self.covariance[..., 2]
         size = with_it[..., which] + share * with_it[..., 2] + variance
         self.state = self.state + with_it * (missed / size)[..., None]
         self.covariance = self.covariance - with_it[..., :, None] * with_it[..., None, :] / size[..., None, None]
-        self.likely = self.likely - (missed**2 / size + np.log(size)).sum(axis=1)
+        self.log_likelihoods = self.log_likelihoods - (missed**2 / size + np.log(size)).sum(axis=1)
 
-    def found(self, since_s: float) -> tuple[Moving, Vector3, float]:
+    def estimate(self, since_s: float) -> tuple[MotionState, Vector3, float]:
         """The motion, its velocity's spread, and how fast what is told may still swing about what is foreseen."""
-        share, left = self._shares(), missing(since_s)[2]
+        share, left = self._probabilities(), error_response(since_s)[2]
         (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
         spread2 = self.covariance[..., 1, 1] + (self.state[..., 1] - [u, v, w]) ** 2
         p, q, r = np.sqrt(share @ spread2).tolist()
         left2 = left**2 * (self.covariance[..., 2, 2] + self.state[..., 2] ** 2).sum(axis=1)
-        return Moving((x, y, z), (u, v, w)), (p, q, r), math.sqrt(share @ left2)
+        return MotionState((x, y, z), (u, v, w)), (p, q, r), math.sqrt(share @ left2)
 
-    def off(self, since_s: float) -> tuple[Vector3, Vector3]:
+    def errors(self, since_s: float) -> tuple[Vector3, Vector3]:
         """What is missing in the told place and in the told velocity."""
-        share, (g, way_s, _) = self._shares(), missing(since_s)
+        share, (g, way_s, _) = self._probabilities(), error_response(since_s)
         (x, y, z), (u, v, w) = np.einsum("ow,wa->oa", share * np.stack([way_s, g]), self.state[..., 2]).tolist()
         return (x, y, z), (u, v, w)
 
-    def _shares(self) -> Floats:
+    def _probabilities(self) -> Floats:
         """How probable each way is."""
-        share: Floats = np.exp(0.5 * (self.likely - self.likely.max()))
+        share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max()))
         share /= share.sum()
         return share
 
 
-def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
+def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
     """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and how much of
     the swing is left.
 
@@ -152,7 +154,7 @@ def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
     p = late_s, u = 1, a = 0; k, h and m so that a swing of frequency f and damping d and a slow rest c go on:
     s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
     """
-    (late_s, rad_s, damping), slow = _WAYS.T, TILT_PER_S
+    (late_s, rad_s, damping), slow = _MODELS.T, TILT_PER_S
     slowing, turning = damping * rad_s, rad_s * np.sqrt(1.0 - damping**2)
     k, h = 2.0 * slowing + slow, rad_s**2 + 2.0 * slowing * slow
     x = np.maximum(since_s - late_s, 0.0)
@@ -172,31 +174,33 @@ def missing(since_s: float) -> tuple[Floats, Floats, Floats]:
 
 
 @dataclass(slots=True)
-class Reckoning:
+class MotionEstimator:
     """Local NED, SI, the vehicle's boot clock. Changed only by its methods."""
 
     contact: Contact
     hit_boot_us: int  # its first sample
-    start: Moving  # after it, as expected
+    start: MotionState  # after it, as expected
     config: EstimateConfig
-    earlier: "Reckoning | None" = None  # of a hit before, of which the estimate still lacks a part
-    motion: Moving = field(init=False)
-    is_whole: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
-    is_right: bool = False  # the estimate has been found so
-    lean_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
+    earlier: "MotionEstimator | None" = None  # of a hit before, of which the estimate still lacks a part
+    motion: MotionState = field(init=False)
+    is_fully_measured: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
+    has_converged: bool = False  # the estimate has been found so
+    tilt_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
     wind_m_s2: tuple[float, float] = (0.0, 0.0)  # the slow external force, wind and drag: what it takes of the lean
-    push_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
+    external_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
     spread_m_s: Vector3 = REST  # of the motion's velocity
-    off_m: Vector3 = REST  # what the told place is off by, once the estimate is right: what is missing in it still
-    _bank: Bank = field(init=False)
+    position_error_m: Vector3 = (
+        REST  # what the told place is off by, once the estimate is right: what is missing in it still
+    )
+    _bank: FilterBank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
     _at_boot_us: int = 0  # of the bank
     _moved_m_s: Vector3 = REST  # the sum up to there
     _time_boot_us: int = 0
-    _missing_m_s: Vector3 = REST  # in the told velocity still
-    _beside_m_s: Vector3 = REST  # what the rest of it is not that of the places by
-    _told: LocalPosition | None = None  # the newest since the estimate is right, without what is missing
+    _hidden_error_m_s: Vector3 = REST  # in the told velocity still
+    _position_rate_error_m_s: Vector3 = REST  # what the rest of it is not that of the places by
+    _newest: LocalPosition | None = None  # the newest since the estimate is right, without what is missing
     _heard_boot_us: int = 0  # the newest told, by the bank
     _told_boot_us: int = 0  # and since the estimate is right
     _pushed_boot_us: int = 0
@@ -211,31 +215,31 @@ class Reckoning:
         before, after = self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s
         into_m_s = max(0.0, -split(before, self.contact.normal_ned)[0])
         speed_m_s = math.hypot(*before)
-        flat_m_s = LEAST_SPREAD_M_S + REBOUND_SPREAD * into_m_s + FRICTION_SPREAD * speed_m_s
-        spread = (flat_m_s, flat_m_s, LEAST_SPREAD_M_S + THROWN_SHARE * speed_m_s)
+        flat_m_s = LEAST_SPREAD_M_S + RESTITUTION_SPREAD * into_m_s + FRICTION_SPREAD * speed_m_s
+        spread = (flat_m_s, flat_m_s, LEAST_SPREAD_M_S + VERTICAL_SPREAD * speed_m_s)
         if self.contact.normal_ned[2] != 0.0:
             spread = (flat_m_s, flat_m_s, flat_m_s)
         lost = plus(before, -1.0, after)
-        self.spread_m_s = REST if self.is_whole else spread
-        half = plus(REST, HIDDEN_SHARE, lost)
+        self.spread_m_s = REST if self.is_fully_measured else spread
+        half = plus(REST, CLIPPED_PART, lost)
         n, e, d = (abs(each) + one for each, one in zip(half, spread, strict=True))
         self._clock_boot_us = self._at_boot_us = self.hit_boot_us
-        self._bank, self._moved_m_s = Bank(self.start, spread, half, (n, e, d)), REST
+        self._bank, self._moved_m_s = FilterBank(self.start, spread, half, (n, e, d)), REST
         if self.earlier is not None:
             self._clock_boot_us, self._at_boot_us = self.earlier._clock_boot_us, self.earlier._at_boot_us
-            self._bank = self.earlier._bank.struck(
+            self._bank = self.earlier._bank.with_hit(
                 plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
             )
         self._heard_boot_us = self._told_boot_us = 0
-        self._told, self.is_right = None, False
-        self.off_m = self._missing_m_s = self._beside_m_s = REST
+        self._newest, self.has_converged = None, False
+        self.position_error_m = self._hidden_error_m_s = self._position_rate_error_m_s = REST
 
-    def tell(self, is_whole: bool, pushed_boot_us: int) -> None:
+    def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
         """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
-        self._is_shown, self.is_whole = is_whole, is_whole and self.earlier is None
+        self._is_shown, self.is_fully_measured = is_fully_measured, is_fully_measured and self.earlier is None
         if pushed_boot_us != self._pushed_boot_us:
             self._pushed_boot_us = pushed_boot_us
-            if not self.is_whole:
+            if not self.is_fully_measured:
                 self._begin()
 
     def imu(self, strapdown: Strapdown) -> None:
@@ -250,30 +254,32 @@ class Reckoning:
         was, weight = self.motion, elapsed_s / (SMOOTHED_S + elapsed_s)
         mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
-        self.motion = Moving(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
+        self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s, self._acceleration = plus(self._summed_m_s, elapsed_s, pushed), pushed
-        self.lean_m_s2 = lean_ahead(strapdown, LEAD_S)
+        self.tilt_m_s2 = tilt_ahead(strapdown, LEAD_S)
         if pushed is not REST:
-            a, b, _ = plus(pushed, -1.0, lean_ahead(strapdown, 0.0))
-            self.push_m_s2 = plus(
-                self.push_m_s2, elapsed_s / (PUSHES_S + elapsed_s), plus((a, b, 0.0), -1.0, self.push_m_s2)
+            a, b, _ = plus(pushed, -1.0, tilt_ahead(strapdown, 0.0))
+            self.external_m_s2 = plus(
+                self.external_m_s2,
+                elapsed_s / (EXTERNAL_FORCE_S + elapsed_s),
+                plus((a, b, 0.0), -1.0, self.external_m_s2),
             )
-            (a, b), (n, e, _), share = self.wind_m_s2, self.lean_m_s2, elapsed_s / (WIND_S + elapsed_s)
+            (a, b), (n, e, _), share = self.wind_m_s2, self.tilt_m_s2, elapsed_s / (WIND_S + elapsed_s)
             self.wind_m_s2 = (a + share * (n - pushed[0] - a), b + share * (e - pushed[1] - b))
 
-    def hear(self, sample: LocalPosition) -> None:
+    def update(self, sample: LocalPosition) -> None:
         """Take what the vehicle says of its place and velocity."""
         at_us = sample.time_boot_us - round(1e6 * DELAY_S)
         if at_us <= self.hit_boot_us:
             return
-        if self.is_whole:
-            self.is_right, self.off_m, self._missing_m_s = True, REST, REST
-        elif self.is_right or sample.time_boot_us > self._pushed_boot_us:
-            self._reckon(sample, at_us)
-        if self.is_right:
+        if self.is_fully_measured:
+            self.has_converged, self.position_error_m, self._hidden_error_m_s = True, REST, REST
+        elif self.has_converged or sample.time_boot_us > self._pushed_boot_us:
+            self._filter(sample, at_us)
+        if self.has_converged:
             self._correct(sample)
 
-    def _reckon(self, sample: LocalPosition, at_us: int) -> None:
+    def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Take what is told into the filters. It is right once it will swing by next to nothing from now on."""
         is_ahead = self._time_boot_us > 0 and at_us > self._time_boot_us + LONGEST_GAP_US
         if is_ahead or at_us <= self._at_boot_us:
@@ -286,18 +292,18 @@ class Reckoning:
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
         behind_s = 1e-6 * (self._time_boot_us - at_us)
         summed = plus(self._summed_m_s, -behind_s, self._acceleration)
-        bank.move(1e-6 * (at_us - self._at_boot_us), plus(summed, -1.0, self._moved_m_s))
+        bank.predict(1e-6 * (at_us - self._at_boot_us), plus(summed, -1.0, self._moved_m_s))
         self._at_boot_us, self._moved_m_s = at_us, summed
         v, x = sample.velocity_ned_m_s, sample.position_ned_m
-        bank.hear(since_s, v, x, config.velocity_noise_m_s, config.position_noise_m, colour)
-        found, spread_m_s, left_m_s = bank.found(since_s)
-        self.is_right = self.is_right or left_m_s <= RIGHT_M_S
-        if self.is_right:
-            self.off_m, self._missing_m_s = bank.off(since_s)
+        bank.update(since_s, v, x, config.velocity_noise_m_s, config.position_noise_m, colour)
+        estimate, spread_m_s, left_m_s = bank.estimate(since_s)
+        self.has_converged = self.has_converged or left_m_s <= CONVERGED_M_S
+        if self.has_converged:
+            self.position_error_m, self._hidden_error_m_s = bank.errors(since_s)
             return
-        velocity = plus(found.velocity_ned_m_s, behind_s, self._acceleration)
-        place = plus(found.position_ned_m, behind_s, velocity)
-        self.motion = Moving(place, velocity, self.motion.acceleration_ned_m_s2)
+        velocity = plus(estimate.velocity_ned_m_s, behind_s, self._acceleration)
+        place = plus(estimate.position_ned_m, behind_s, velocity)
+        self.motion = MotionState(place, velocity, self.motion.acceleration_ned_m_s2)
         self.spread_m_s = spread_m_s
 
     def _correct(self, sample: LocalPosition) -> None:
@@ -306,55 +312,60 @@ class Reckoning:
         share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
         was, self._told_boot_us = self.motion, sample.time_boot_us
         self._compare(sample)
-        told = self.put_right(sample)
-        place = plus(was.position_ned_m, share, plus(told.position_ned_m, -1.0, was.position_ned_m))
-        velocity = plus(was.velocity_ned_m_s, share, plus(told.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
-        self.motion = Moving(place, velocity, was.acceleration_ned_m_s2)
+        measured = self.corrected(sample)
+        place = plus(was.position_ned_m, share, plus(measured.position_ned_m, -1.0, was.position_ned_m))
+        velocity = plus(was.velocity_ned_m_s, share, plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
+        self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
         self.spread_m_s = REST
 
     def _compare(self, sample: LocalPosition) -> None:
         """The told velocity, less what is missing in it, with the told places: its errors last longer than theirs."""
-        before, self._told = self._told, _less(sample, self.off_m, self._missing_m_s)
+        before, self._newest = self._newest, _without(sample, self.position_error_m, self._hidden_error_m_s)
         if before is not None:
             elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
             if 0.0 < elapsed_s < COMPARED_S:
-                self._beside_m_s = _beside(self._beside_m_s, before, self._told, elapsed_s)
+                self._position_rate_error_m_s = _rate_error(
+                    self._position_rate_error_m_s, before, self._newest, elapsed_s
+                )
 
     @property
-    def off_m_s(self) -> Vector3:
+    def velocity_error_m_s(self) -> Vector3:
         """The same of the velocity, and by what it is not that of the places besides."""
-        return plus(self._missing_m_s, 1.0, self._beside_m_s)
+        return plus(self._hidden_error_m_s, 1.0, self._position_rate_error_m_s)
 
-    def put_right(self, sample: LocalPosition) -> LocalPosition:
+    def corrected(self, sample: LocalPosition) -> LocalPosition:
         """What is told, without what it is off by."""
-        return _less(sample, self.off_m, self.off_m_s)
+        return _without(sample, self.position_error_m, self.velocity_error_m_s)
 
 
-def _less(sample: LocalPosition, off_m: Vector3, off_m_s: Vector3) -> LocalPosition:
-    place, velocity = plus(sample.position_ned_m, -1.0, off_m), plus(sample.velocity_ned_m_s, -1.0, off_m_s)
+def _without(sample: LocalPosition, position_error_m: Vector3, velocity_error_m_s: Vector3) -> LocalPosition:
+    place, velocity = (
+        plus(sample.position_ned_m, -1.0, position_error_m),
+        plus(sample.velocity_ned_m_s, -1.0, velocity_error_m_s),
+    )
     return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
 
 
-def _beside(was_m_s: Vector3, before: LocalPosition, told: LocalPosition, elapsed_s: float) -> Vector3:
+def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
     """By what the velocities from one told place to the next have led beside it, smoothed."""
     half_s = 0.5 * elapsed_s
-    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, told.velocity_ned_m_s)
-    further_m = plus(led, -1.0, told.position_ned_m)
-    found = plus(was_m_s, 1.0 / (COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
-    size = math.hypot(*found)
-    return found if size <= MOST_OFF_M_S else plus(REST, MOST_OFF_M_S / size, found)
+    led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
+    further_m = plus(led, -1.0, measured.position_ned_m)
+    estimate = plus(was_m_s, 1.0 / (COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
+    size = math.hypot(*estimate)
+    return estimate if size <= MOST_VELOCITY_ERROR_M_S else plus(REST, MOST_VELOCITY_ERROR_M_S / size, estimate)
 
 
-def lean_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
+def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
     """The level acceleration of a thrust that carries the vehicle, leant as after so long."""
-    n, e, d = body_to_ned(strapdown.right_wxyz, (0.0, 0.0, -1.0))
-    p, q, r = body_to_ned(strapdown.right_wxyz, strapdown.rates_frd_rad_s)
+    n, e, d = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, -1.0))
+    p, q, r = body_to_ned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s)
     n, e, d = n + lead_s * (q * d - r * e), e + lead_s * (r * n - p * d), d + lead_s * (p * e - q * n)
-    carrying_m_s2 = GRAVITY_M_S2 / max(-d, MOST_LEANT)
+    carrying_m_s2 = GRAVITY_M_S2 / max(-d, LEAST_UPRIGHT_COSINE)
     return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)
 
 
-def half_way(pushed_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
+def blended_normal(pushed_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
     """Away from an obstacle of which only a clipped push is known, each axis clipped alone; unit vectors.
 
     Back is where the vehicle came from, and free: half way between the two, or back where they are 60 degrees apart.
