@@ -11,6 +11,7 @@ from companion.memory.stored import describe as describe_patch
 from companion.mission import items
 from companion.mission.model import Mission
 from companion.mission.policy import AbortWhen, OnCollision, OnDamage
+from companion.reflex.config import RecoveryConfig
 
 # MPC_XY_P = 0.95 asks for 0.95 * gamma * v_c backwards: above this gamma, for more than the impact speed.
 LARGE_GAMMA_S = 1.05
@@ -118,13 +119,10 @@ def mission_lines(mission: Mission) -> list[str]:
     lines = []
     for number, item in enumerate(mission.items, start=1):
         lines += _item_lines(f"{number}.", item, "Items" if number == 1 else "")
-    gamma_1, gamma_2 = mission.recovery.gamma_per_axis
-    has_gamma = mission.recovery.law != "adaptive"
-    law = mission.recovery.law + (f" with gamma {gamma_1:g}, {gamma_2:g} s" if has_gamma else "")
     on_hit = mission.on_collision
     lines += [
         f"Fence      setpoints stay {describe_fence(mission.fence)}",
-        f"On a hit   detector {mission.companion.detector}, recovery law {law}; "
+        f"On a hit   detector {mission.companion.detector}, recovery law {_law(mission.recovery)}; "
         f"then {describe_after_recovery(on_hit)}; {describe_limit(on_hit)}",
         *_damage_lines(mission.on_damage),
         *_obstacle_lines(mission.obstacles),
@@ -132,9 +130,18 @@ def mission_lines(mission: Mission) -> list[str]:
         f"On abort   Ctrl-C or a silent link: hand the vehicle to {mission.on_interrupt}",
         f"Unattended {unattended_text(_fastest_m_s(mission))}",
     ]
-    if has_gamma and max(gamma_1, gamma_2) > LARGE_GAMMA_S:
+    if mission.recovery.law != "adaptive" and max(mission.recovery.gamma_per_axis) > LARGE_GAMMA_S:
         lines.append(f"Note       gamma above {LARGE_GAMMA_S:g} s asks for more speed backwards than the impact had")
     return lines
+
+
+def _law(recovery: RecoveryConfig) -> str:
+    """Its name, and the gains of eq. 3 that this law uses."""
+    north_s, east_s = recovery.gamma_per_axis
+    if recovery.law == "paper":
+        return f"paper with gamma {north_s:g}, {east_s:g} s"
+    uses_gamma = recovery.law == "normal" or recovery.tangential == "kept"
+    return f"{recovery.law} with gamma {north_s:g} s" if uses_gamma else recovery.law
 
 
 def _fastest_m_s(mission: Mission) -> float:

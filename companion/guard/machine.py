@@ -12,7 +12,7 @@ from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
 from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.guard.watching import CollisionMonitor, Connect, StandBy
+from companion.guard.watching import Connect, StandBy, Watching
 from companion.messages import Sticks
 from companion.motion.rotation import yaw_rad
 from companion.px4_mode import OFFBOARD, mode_name
@@ -184,7 +184,7 @@ class GuardMachine(StateMachine):
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:
-                return CollisionMonitor(guard, now_us)
+                return Watching(guard, now_us)
             case State.TAKING_OVER:
                 mode = "" if guard.previous_mode is None else mode_name(guard.previous_mode)
                 guard.report(now_us, "take_over", f"taking over from {mode}", mode=mode)

@@ -88,7 +88,7 @@ class StandBy(NoSetpoint):
         return None
 
 
-class CollisionMonitor:
+class Watching:
     """Until a hit. Setpoints are sent in advance, so that PX4 takes OFFBOARD at once; never beside somebody else's."""
 
     def __init__(self, guard: GuardContext, now_us: int) -> None:

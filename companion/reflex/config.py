@@ -121,7 +121,8 @@ class RecoveryConfig(StrictModel):
     law: str = "adaptive"
     """adaptive, normal or paper."""
     gamma: Positive | tuple[Positive, Positive] = 0.5
-    """Laws `paper` and `normal`. The paper's flights have 0.5 s."""
+    """Law `paper`. Law `normal`, and `tangential: kept` of any law, use the first number only. The paper's flights have
+    0.5 s."""
     tangential: Literal["damped", "kept"] = "damped"
     """Laws `normal` and `adaptive`: what becomes of the motion along the obstacle."""
     clearance_m: Positive = 0.35

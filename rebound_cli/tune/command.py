@@ -24,7 +24,7 @@ from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import is_run_folder
 from rebound_cli.replay.watching import Findings, watch_log
 from rebound_cli.run_folder import SUMMARY_NAME, TLOG_NAME
-from rebound_cli.tune.hits import SPEEDS_M_S, StreamHealth, hit_moments, sight
+from rebound_cli.tune.hits import SPEEDS_M_S, HitSensitivity, hit_moments, sensitivity
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 
 SCHEMA = 1
@@ -53,8 +53,8 @@ def run_tune(options: Namespace) -> int:
     # A rate as good as the recorded one shows nothing new.
     rates = [None, *(rate_hz for rate_hz in RATES_HZ if rate_hz < 0.9 * recorded_hz)]
     found = margins(logs, config)
-    sights = (sight(logs, config, airframe, rate_hz) for airframe in airframes for rate_hz in rates)
-    seen = list(with_progress(sights, len(airframes) * len(rates)))
+    sensitivities = (sensitivity(logs, config, airframe, rate_hz) for airframe in airframes for rate_hz in rates)
+    seen = list(with_progress(sensitivities, len(airframes) * len(rates)))
     tuning = Tuning(config.detector, flights, found, seen, advise(logs, config, found, seen))
     text = settings_text(tuning.advice, ", ".join(path.name for path in options.logs))
     # Read as `rebound fly` will read it before anybody has it.
@@ -91,7 +91,7 @@ class Tuning:
     detector: str
     flights: Sequence[Healthy]
     margins: Sequence[Margin]
-    sights: Sequence[StreamHealth]
+    sensitivities: Sequence[HitSensitivity]
     advice: Advice
 
 
@@ -176,10 +176,10 @@ def _margin_rows(tuning: Tuning) -> Iterator[str]:
 
 
 def _sight_rows(tuning: Tuning) -> Iterator[str]:
-    hits = tuning.sights[0].hits
+    hits = tuning.sensitivities[0].hits
     yield f"hits put into these flights, seen of {hits}, by speed in m/s (eq. 2, head-on, by force alone)"
     yield f"  {'':<24}{''.join(f'{speed:>6g}' for speed in SPEEDS_M_S)}   all seen from"
-    for one in tuning.sights:
+    for one in tuning.sensitivities:
         counts, certain = "".join(f"{count:>6}" for count in one.seen), one.certain_from_m_s
         text = "no speed tried" if certain is None else f"{certain:g} m/s on"
         yield f"  {one.airframe + f', {one.rate_hz:.0f} Hz':<24}{counts}   {text}"
@@ -201,7 +201,7 @@ def tuning_data(tuning: Tuning) -> dict[str, Any]:
                 "seen": list(one.seen),
                 "all_seen_from_m_s": one.certain_from_m_s,
             }
-            for one in tuning.sights
+            for one in tuning.sensitivities
         ],
         "settings": [
             {"place": ".".join(("companion", *place)), "value": value, "reason": reason}

@@ -42,7 +42,7 @@ SLOWEST_INTERVAL_US = 20_000
 
 
 @dataclass(frozen=True, slots=True)
-class StreamHealth:
+class HitSensitivity:
     """How many of `hits` put into the flights were seen at each of SPEEDS_M_S, by an airframe at a stream's rate."""
 
     airframe: str
@@ -57,7 +57,9 @@ class StreamHealth:
         return SPEEDS_M_S[-certain] if certain else None
 
 
-def sight(logs: Sequence[Log], config: CompanionConfig, airframe: Airframe, asked_hz: float | None) -> StreamHealth:
+def sensitivity(
+    logs: Sequence[Log], config: CompanionConfig, airframe: Airframe, asked_hz: float | None
+) -> HitSensitivity:
     """Over all flights together; `asked_hz` None for the recorded rate."""
     moments = [list(hit_moments(log)) for log in logs]
     counts = [0] * len(SPEEDS_M_S)
@@ -68,7 +70,7 @@ def sight(logs: Sequence[Log], config: CompanionConfig, airframe: Airframe, aske
             found_us = [finding.at_us for finding in findings.collisions]
             counts[index] += sum(any(t < at_us <= t + FOUND_WITHIN_US for at_us in found_us) for t in times_us)
     rate_hz = asked_hz or min(shaking(log).rate_hz for log in logs)
-    return StreamHealth(airframe.name, rate_hz, sum(map(len, moments)), tuple(counts))
+    return HitSensitivity(airframe.name, rate_hz, sum(map(len, moments)), tuple(counts))
 
 
 def impulse_since_touch(airframe: Airframe, speed_m_s: float) -> Floats:

@@ -15,7 +15,7 @@ from typing import Any
 from companion.mission.config import CompanionConfig
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.watching import watch_log
-from rebound_cli.tune.hits import StreamHealth
+from rebound_cli.tune.hits import HitSensitivity
 
 # What settings of a detector are compared with the flight, by the words in their names.
 _COMPARED = re.compile(r"threshold|factor|step")
@@ -81,7 +81,7 @@ def _false_alarms(logs: Sequence[Log], config: CompanionConfig) -> int:
 
 
 def advise(
-    logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin], sights: Sequence[StreamHealth]
+    logs: Sequence[Log], start: CompanionConfig, found: Sequence[Margin], sensitivities: Sequence[HitSensitivity]
 ) -> Advice:
     """Thresholds with a reserve over these flights, never below where they started."""
     raised = _raised(logs, start, found)
@@ -92,7 +92,7 @@ def advise(
         value = raised.get(margin.setting, margin.value)
         settings[start.detector, margin.setting] = value, _why(margin, raised)
     settings["estimate", "imu_averaging_interval_s"] = _averaging(logs, start)
-    settings["streams", "min_highres_imu_hz"] = _least_rate(sights, start)
+    settings["streams", "min_highres_imu_hz"] = _least_rate(sensitivities, start)
     config = _with(start, raised)
     return Advice(config, settings, _false_alarms(logs, config))
 
@@ -128,9 +128,9 @@ def _averaging(logs: Sequence[Log], start: CompanionConfig) -> tuple[float, str]
     return math.ceil(max(known) / 100) / 1e4, "99 of 100 IMU samples are means over this time or less"
 
 
-def _least_rate(sights: Sequence[StreamHealth], start: CompanionConfig) -> tuple[float, str]:
-    name, seen = sights[0].airframe, f"all hits from {WANTED_M_S:g} m/s on"
-    rates = [s.rate_hz for s in sights if s.airframe == name and (s.certain_from_m_s or math.inf) <= WANTED_M_S]
+def _least_rate(sensitivities: Sequence[HitSensitivity], start: CompanionConfig) -> tuple[float, str]:
+    name, seen = sensitivities[0].airframe, f"all hits from {WANTED_M_S:g} m/s on"
+    rates = [s.rate_hz for s in sensitivities if s.airframe == name and (s.certain_from_m_s or math.inf) <= WANTED_M_S]
     if not rates:
         reason = f"as it was: at no rate tried were {seen} seen ({name} arms)"
         return start.streams.min_highres_imu_hz, reason

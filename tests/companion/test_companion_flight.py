@@ -6,6 +6,8 @@ import math
 import pytest
 from pymavlink.dialects.v20 import development as mav
 
+from companion.flight.plan import mission_lines
+from companion.mission.model import Mission
 from tests.companion.fake_vehicle import EPOCH_US, LOITER, OFFBOARD, FakeVehicle, Flight, flight
 
 INTO_WALL = [
@@ -95,6 +97,21 @@ def test_nothing_arms_before_the_plan_is_confirmed():
 
     f.companion.confirm_plan()
     f.run_to("takeoff", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("recovery", "words"),
+    [
+        ({"law": "adaptive", "gamma": 0.4}, "recovery law adaptive; "),
+        ({"law": "adaptive", "gamma": 0.4, "tangential": "kept"}, "recovery law adaptive with gamma 0.4 s; "),
+        ({"law": "normal", "gamma": [0.4, 0.6]}, "recovery law normal with gamma 0.4 s; "),
+        ({"law": "paper", "gamma": [0.4, 0.6]}, "recovery law paper with gamma 0.4, 0.6 s; "),
+    ],
+)
+def test_the_plan_names_the_gains_that_its_recovery_law_uses(recovery, words):
+    steps = [{"takeoff": {"height_m": 1.5}}, {"land": {}}]
+    mission = Mission.model_validate({"name": "x", "items": steps, "recovery": recovery})
+    assert words in "\n".join(mission_lines(mission))
 
 
 def test_setpoints_stay_on_the_ground_until_the_vehicle_is_armed():

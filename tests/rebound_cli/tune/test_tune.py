@@ -15,7 +15,15 @@ from rebound_cli.logs.log import Heard
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
 from rebound_cli.tune.command import crash
-from rebound_cli.tune.hits import SPEEDS_M_S, STEP_S, StreamHealth, hit_moments, impulse_since_touch, sight, with_hits
+from rebound_cli.tune.hits import (
+    SPEEDS_M_S,
+    STEP_S,
+    HitSensitivity,
+    hit_moments,
+    impulse_since_touch,
+    sensitivity,
+    with_hits,
+)
 from rebound_cli.tune.settings import RESERVE, advise, margins, settings_text
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import WALL
@@ -23,7 +31,7 @@ from tests.rebound_cli.logs.ulog_file import every, sensor_combined, ulog
 from tests.rebound_cli.replay.flying import LATERAL, flight
 
 FOLDABLE, RIGID = load_built_in("foldable"), load_built_in("rigid")
-UNSEEN = StreamHealth("foldable", 250.0, 10, (0,) * len(SPEEDS_M_S))
+UNSEEN = HitSensitivity("foldable", 250.0, 10, (0,) * len(SPEEDS_M_S))
 
 
 def shares(log):
@@ -89,8 +97,8 @@ def test_hits_put_into_a_flight_leave_their_whole_impulse_in_its_samples():
 
 def test_a_contact_shorter_than_the_streams_interval_is_missed_now_and_then():
     log = replace(flight(duration_s=14.0, hit_us=None), averaging_us=4000.0)
-    folding = [sight([log], LATERAL, FOLDABLE, rate_hz) for rate_hz in (None, 50.0)]
-    stiff = [sight([log], LATERAL, RIGID, rate_hz) for rate_hz in (None, 50.0)]
+    folding = [sensitivity([log], LATERAL, FOLDABLE, rate_hz) for rate_hz in (None, 50.0)]
+    stiff = [sensitivity([log], LATERAL, RIGID, rate_hz) for rate_hz in (None, 50.0)]
     assert stiff[0].certain_from_m_s == SPEEDS_M_S[0]
     assert stiff[1].certain_from_m_s is None and 0 < stiff[1].seen[-1] < stiff[1].hits
     # Arms that fold push for longer: what the fast stream sees of them, the slow one mostly does, too
