@@ -7,109 +7,111 @@ from pydantic import Field
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- the plan
-# Lag of the thrust's direction behind the acceleration asked for: twice over an attitude loop of 12 rad/s, critically
-# damped, and a motor's 0.02 s.
+# The thrust's direction lags behind the acceleration setpoint: two time constants of a critically damped attitude loop
+# of 12 rad/s, and a motor's 0.02 s.
 LEAD_S = 0.15
-# rad/s. That loop's bandwidth. The spin of a vehicle makes it a gyroscope, whose lean follows later by
+# Bandwidth of that loop, rad/s. A spinning vehicle is a gyroscope: its tilt lags more, by the factor
 # sqrt(1 + (spin / bandwidth)^2).
 ATTITUDE_RAD_S = 12.0
-# A shorter way is over before a vehicle of that bandwidth has leant both ways.
+# A shorter plan ends before a vehicle of that bandwidth has tilted both ways.
 SHORTEST_S = 1.25
-# Braking before a surface asks for all there is; in less than the vehicle takes to lean there is nothing to be gained.
+# Shortest plan that brakes in front of a surface. The vehicle takes longer than this to tilt.
 SHORTEST_BRAKING_S = 0.2
-# Of the limit: a lean of 31 degrees instead of 17, rather than into a surface.
+# Factor on the acceleration limit in front of a surface: a tilt of 31 degrees instead of 17.
 HARD_BRAKING = 2.0
-# Arms give way by so much, and an estimate wavers by it.
+# Arms fold by this much, and a position estimate is noisy by it.
 TOUCH_TOLERANCE_M = 0.05
-# Cosine of 60 degrees: a goal further aside is not run past but turned to, which brakes cannot hasten.
+# Cosine of 60 degrees between velocity and goal. A goal further aside is turned to; braking does not speed that up.
 AHEAD_COSINE = 0.5
-# Durations are tried in steps of a twentieth, which is less than the lag is known to.
+# Ratio of one tried duration to the next. The lag is known less precisely than to 5 %.
 DURATION_STEP = 1.05
-# PX4's velocity loop takes back a share of the acceleration that it measures: MPC_XY_VEL_D_ACC, 0.2 at most.
+# PX4's velocity loop subtracts a share of the measured acceleration: MPC_XY_VEL_D_ACC, 0.2 at most.
 ACCELERATION_GAIN = 1.1
-# PX4's MPC_Z_VEL_P_ACC: what its own loop does against a climb, 1/s. As much again is asked for beside it.
+# PX4's MPC_Z_VEL_P_ACC, 1/s: the gain of its own loop against a climb. The companion adds the same again.
 CLIMB_GAIN_PER_S = 4.0
-# PX4's MPC_Z_P, and level MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
+# PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
 HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
-# What PX4's loops leave between a plan and the vehicle that follows it: LEAD_S behind 3 m/s^2, and its integral.
+# Largest error of a vehicle that follows its plan: LEAD_S behind 3 m/s^2, and the integral of that.
 OFF_PLAN_M_S = 0.45
 OFF_PLAN_M = 0.3
-# A lean of 9 degrees: arms that press on a wall carry a vehicle that leans by 15, from 22 on it is tipped over.
+# A tilt of 9 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
 PRESSING_TILT_M_S2 = 1.5
-# A lean of 20 degrees into what is touched. Thrust T at a lean a presses with T sin(a), and the motors turn the vehicle
-# back with at most a tenth of a metre times T: from 48 degrees on no thrust does; below that a small one does.
+# A tilt of 20 degrees into the obstacle. Thrust T at a tilt a presses with T sin(a). The motors' largest torque against
+# it is 0.1 m times T: from 48 degrees on no thrust turns the vehicle back; below that a small thrust does.
 HANGING_TILT_M_S2 = 3.6
-# Down, half of gravity: leaves thrust to steer with.
+# Half of gravity, down. The other half is thrust to steer with.
 DESCENT_M_S2 = 4.9
-# What a fall is stopped with, hovering at 78 % of the thrust and not yet level, and what is to be left of the height.
+# Acceleration that stops a descent (hover at 78 % of the thrust, not yet level), and the least height after it.
 STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
-# rad/s. From here on a lean that lags by LEAD_S points half a right angle and more beside what PX4's own loops ask for.
+# rad/s. From here on a tilt that lags by LEAD_S points 45 degrees and more beside the setpoint of PX4's own loops.
 SPINNING_RAD_S = 6.0
 
-# A setpoint that is the last is held for COM_OF_LOSS_T, 1 s by default. PX4 notices the silence late: with 1 s set, a
-# real one went into hold after 1.04 to 1.13 s (bench/notes/px4.md).
+# PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s by default, and notices the silence late: with 1 s set, a real PX4
+# changed to hold after 1.04 to 1.13 s (bench/notes/px4.md).
 HELD_S, NOTICED_S = 1.0, 0.13
-# A vehicle that does 1 m/s by then is at rest within 0.2 m with MPC_ACC_HOR.
+# Largest speed at that moment. From 1 m/s a vehicle stops within 0.2 m with MPC_ACC_HOR.
 HELD_TO_M_S = 1.0
 
 # --- half-spaces
-# Sine of 10 degrees: as well as a normal is known after most hits (bench/notes/detection.md).
+# Sine of 10 degrees: the error of the estimated normal after most hits (bench/notes/detection.md).
 NORMAL_SINE = 0.17
-# Sine of the normal's angle from the horizontal. Below it height is held, as the vehicle's own lean and a single
-# clipped sample tilt the normal of a wall; above it the obstacle is a ceiling, a floor or a steep roof.
+# Sine of the normal's angle from the horizontal. Above it the obstacle is a ceiling, a floor or a steep roof. Below it
+# the obstacle counts as upright, because the vehicle's tilt and a clipped sample tilt the normal of a wall.
 STEEP = 0.7
-# Cosine between two normals below which surfaces face each other, as in a corridor: away from one is towards the
-# other, and where there is not room enough for both distances the middle is kept. Walls of a corner are at 0.
+# Cosine between two normals. Below it the surfaces face each other, as in a corridor: the goal is then no further from
+# one than the middle between them. Walls of a corner are at 0.
 FACING_COSINE = -0.5
-# Where the vehicle is, is free: behind a surface by more than an estimate's drift and a touch's depth, the surface is
-# not where it was thought to be.
+# The vehicle's own position is free. A surface that it is behind by more than the estimate's drift and a touch's depth
+# is in a wrong place, and is ignored.
 BEHIND_M = 0.2
-# In a corner of an acute angle, away from one wall is towards the other: that converges in a few rounds or not at all.
+# In an acute corner the clearance from one wall leads towards the other. The goal converges in a few rounds or never.
 ROUNDS = 5
 
 # --- the present motion
-# Mean over the last samples of the slowest stream: vibration is no acceleration of the vehicle's.
+# Time constant of the acceleration's low-pass filter: a few samples of the slowest stream, against vibration.
 SMOOTHED_S = 0.05
-# The vehicle's estimate beside the accelerometer's sum: its noise lasts longer, its delay is shorter.
+# Time constant of corrections by the vehicle's estimate: shorter than its noise lasts, longer than its delay.
 CORRECTED_S = 0.1
-# Cosine of 60 degrees: further over no thrust carries the vehicle.
+# Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5
-# Wind and drag: slower than the steering, faster than the drift they cause.
+# Time constant of the estimate of wind and drag: slower than the steering, faster than the drift that they cause.
 WIND_S = 1.0
-# What pushes on: slower than a lean follows, faster than it tips the vehicle.
+# Time constant of the external force: slower than the tilt's response, faster than the force tips the vehicle.
 EXTERNAL_FORCE_S = 0.2
-# A contact pushes still, or what it did is not yet in the estimate, for so long after its last push.
+# A contact counts for this long after its last sample: it may go on, or the estimate does not contain it yet.
 CONTACT_LINGERS_US = 50_000
-# Head-on, spring arms push for 0.12 s at 1 m/s, most of it at the beginning, and an estimate is 20 ms late.
+# From here on the estimate shows the motion after the hit. Spring arms push for 0.12 s at 1 m/s, mostly at the
+# beginning, and an estimate is 20 ms late.
 MOTION_KNOWN_US = 80_000
-# How an estimate is put right after a clipped hit. By motion capture a real PX4 took 0.16 s, 4.7 rad/s and a damping of
-# 0.67, by GPS 0.13 s, 2.4 rad/s and 0.69 (bench/notes/px4.md); others are up to twice as late, and twice as fast.
+# Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
+# 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.
 CORRECTION_DELAY_S = (0.04, 0.1, 0.16, 0.22)
 CORRECTION_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
 CORRECTION_DAMPING = (0.5, 0.67, 0.85)
-# A part of what is missing is taken for a tilt, and goes as slowly as that: 0.51 and 0.49 per second.
+# The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
-# Of what was hidden, the share by which velocity and, in seconds, place of those hits differ from that, RMS over 3 s.
+# Errors of this model on those hits, RMS over 3 s, per m/s of clipped velocity: of the velocity, of the position in s.
 MODEL_ERROR, MODEL_ERROR_S = 0.03, 0.02
-# What the accelerometer's sum drifts by: a tilt that is off by 2 degrees for 0.3 s.
+# Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
-# Of where the hit was.
+# Standard deviation of the position of the hit.
 PLACE_SPREAD_M = 0.1
-# Right is what is known to be wrong by no more than four times a good velocity's noise.
+# The estimate has converged when its known error stays below four times a good velocity's noise.
 CONVERGED_M_S = 0.15
-# A velocity that is told is held against the places that are told over this time: their noise of 0.02 m makes 0.04 m/s
-# of it. What is more than twice RIGHT_M_S is a place that jumped.
+# The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
+# 0.04 m/s of it. More than twice CONVERGED_M_S is a position that jumped.
 COMPARED_S, MOST_VELOCITY_ERROR_M_S = 0.5, 0.3
-# Spreads of the velocity after a hit about the one expected: of the speed into the obstacle (frames give back 0.2 to
-# 0.9 of it, and the normal is good to 20 degrees), of the speed by friction, and upwards (0.6 m/s at 5 m/s).
+# Standard deviations of the velocity after a hit about the expected one. Restitution: a share of the speed into the
+# obstacle (frames return 0.2 to 0.9 of it, and the normal is good to 20 degrees). Friction and vertical: shares of the
+# speed (0.6 m/s upwards at 5 m/s).
 RESTITUTION_SPREAD, FRICTION_SPREAD, VERTICAL_SPREAD, LEAST_SPREAD_M_S = 0.26, 0.1, 0.12, 0.1
-# Of what a hit changes, clipping hides anything from none to all.
+# Clipping hides between none and all of the change of velocity: its mean share.
 CLIPPED_PART = 0.5
-# What still leans on an obstacle, too softly to be felt, comes nearer by less: arms give way by 5 cm.
+# A vehicle that approaches the obstacle faster than this does not touch it: arms fold by 5 cm only.
 NO_CONTACT_APPROACH_M_S = 0.3
-# A velocity that changed by less has no direction that 0.08 s of flight and noise could not have made.
+# A smaller change of velocity has no reliable direction: 0.08 s of flight and noise make as much.
 LEAST_VELOCITY_CHANGE_M_S = 1.0
-# Cosine of 30 degrees: friction leans a push by 17, and the estimate of the normal is good to ten.
+# Cosine of 30 degrees: friction turns the contact force by 17, and the normal is estimated to 10.
 AGREEMENT_COSINE = 0.87
 # Six times the noise of a good estimate.
 LEAVING_M_S = 0.2

@@ -1,4 +1,4 @@
-"""Keep-out half-spaces: what was touched, what is remembered, and the fence with its floor and ceiling."""
+"""Keep-out half-spaces: touched surfaces, remembered surfaces, and the fence with its floor and ceiling."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS, STEEP
 
 
 def away_from(normal_ned: Vector3) -> Vector3:
-    """Unit direction out of the obstacle: horizontal unless the obstacle is steep; zero where nothing is known."""
+    """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
     flat, size = math.hypot(n, e), math.sqrt(n * n + e * e + d * d)
     if size == 0.0:
@@ -21,7 +21,7 @@ def away_from(normal_ned: Vector3) -> Vector3:
 
 
 def split(vector: Vector3, normal: Vector3) -> tuple[float, Vector3]:
-    """The part of a vector along a unit normal, and the rest."""
+    """The component of a vector along a unit normal, and the vector without it."""
     (u, v, w), (a, b, c) = vector, normal
     along = u * a + v * b + w * c
     return along, (u - along * a, v - along * b, w - along * c)
@@ -38,8 +38,10 @@ def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Where the vehicle's centre was when it touched, the unit normal out of the surface, how far off to stay, and how
-    fast the surface itself comes."""
+    """A keep-out half-space: the vehicle's centre when it touched, the unit normal out of the surface, the clearance.
+
+    `comes_m_s` is the surface's own speed along its normal.
+    """
 
     point_ned_m: Vector3
     normal_ned: Vector3
@@ -47,7 +49,7 @@ class Surface:
     comes_m_s: float = 0.0
 
     def off_m(self, place_ned_m: Vector3) -> float:
-        """How far a place is from touching."""
+        """Distance of a position from touching, m; negative behind the surface."""
         (a, b, c), (x, y, z), (u, v, w) = self.normal_ned, place_ned_m, self.point_ned_m
         return a * (x - u) + b * (y - v) + c * (z - w)
 
@@ -60,9 +62,9 @@ class FenceBounds:
     fence: Fence
 
     def clamp(self, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
-        """Shorten the way from the contact to the setpoint so that it ends inside the fence.
+        """Shorten the line from the contact to the setpoint so that it ends inside the fence.
 
-        A contact that is itself outside is answered with the nearest place inside.
+        For a contact outside the fence the setpoint is the nearest position inside.
         """
         north_m, east_m, down_m = self.origin_ned_m
         start = (contact_ned_m[0] - north_m, contact_ned_m[1] - east_m)
@@ -80,7 +82,7 @@ class FreeSpace:
     surfaces: Sequence[Surface] = ()
 
     def goal(self, contact_ned_m: Vector3, normal_ned: Vector3, goal_ned_m: Vector3) -> Vector3:
-        """The law's goal, moved as little as keeps it off the surfaces and inside the fence."""
+        """The law's goal, moved as little as possible to clear the surfaces and stay inside the fence."""
         for _ in range(ROUNDS):
             before = goal_ned_m
             for surface in self.surfaces:
@@ -91,7 +93,7 @@ class FreeSpace:
 
 
 def _clear_of(surface: Surface, contact: Vector3, normal: Vector3, goal: Vector3) -> Vector3:
-    """The goal, off the surface by its distance or, between surfaces that face each other, by half of the room."""
+    """The goal, clear of the surface by its distance; between facing surfaces by at most half of the room."""
     wanted_m, room_m = surface.distance_m, surface.off_m(contact)
     if room_m < -BEHIND_M:
         return goal

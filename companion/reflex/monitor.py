@@ -1,6 +1,7 @@
-"""The watch for collisions: detector, estimate and sight joined; pure, and the same in flight, replay and bench.
+"""The collision monitor joins the detector, the impact estimate and the stream health.
 
-A `CollisionMonitor` is changed only by `advance`: the same samples at the same times give the same impacts and notices.
+It is pure, and the same in flight, replay and bench. A `CollisionMonitor` is changed only by `advance`: the same
+samples at the same times give the same impacts and notices.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,7 +28,7 @@ from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, O
 from companion.motion.history import REBOOT_US
 from companion.strict_model import StrictModel
 
-# What a detector may make use of besides HIGHRES_IMU; the slowest is PX4's VIBRATION, every two seconds by default.
+# Optional streams besides HIGHRES_IMU. The slowest is PX4's VIBRATION, every two seconds by default.
 OPTIONAL_STREAMS: dict[type, MessageId] = {
     AttitudeTarget: MessageId.ATTITUDE_TARGET,
     Odometry: MessageId.ODOMETRY,
@@ -37,10 +38,10 @@ OPTIONAL_STREAMS_WAIT_US = 3_000_000
 
 
 class CollisionMonitorConfig(StrictModel):
-    """Settings of the watch for collisions."""
+    """Settings of the collision monitor."""
 
     detectors: ClassVar[Mapping[str, MakeDetector]] = DETECTORS
-    """What `detector` may name. Whoever has others extends this class by them, and by a key for each one's settings."""
+    """The names allowed in `detector`. A subclass adds others, with a key for the settings of each."""
 
     detector: str = "fused"
     """Its own settings are those under its name."""
@@ -50,7 +51,7 @@ class CollisionMonitorConfig(StrictModel):
 
     @property
     def least_threshold_m_s2(self) -> float | None:
-        """What the chosen detector asks for sideways of a vehicle that does not shake; None if it looks at no force."""
+        """The detector's horizontal threshold without vibration, m/s^2; None for one without a force threshold."""
         settings = getattr(self, self.detector)
         names = ("side_threshold_m_s2", "threshold_m_s2")
         return next((float(getattr(settings, name)) for name in names if hasattr(settings, name)), None)
@@ -58,7 +59,7 @@ class CollisionMonitorConfig(StrictModel):
     @model_validator(mode="before")
     @classmethod
     def _no_settings_of_baselines(cls, data: object) -> object:
-        """They would have no effect; why not is said better than of any other unknown key."""
+        """Refuse settings of baseline detectors, with the reason that no drone has them."""
         for key in sorted(BASELINES.intersection(data) if isinstance(data, dict) else ()):
             check_known_detector(key, cls.detectors)
         return data
@@ -72,7 +73,7 @@ class CollisionMonitorConfig(StrictModel):
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something about the detector itself that is worth a line in the timeline."""
+    """An event of the timeline about the detector itself."""
 
     kind: str  # of the event
     text: str
@@ -81,7 +82,7 @@ class Notice:
 
 @dataclass(slots=True)
 class CollisionMonitor:
-    """All that is remembered between steps; copies and pickles as a whole."""
+    """The monitor's state between two steps. It can be copied and pickled as a whole."""
 
     config: CollisionMonitorConfig
     detector: Detector[Any]
@@ -100,26 +101,26 @@ class CollisionMonitor:
 
     @property
     def no_data_reason(self) -> str | None:
-        """Why a hit might not be seen although the detector is on; None while it sees."""
+        """Why an armed detector could miss a hit; None while the streams are healthy."""
         return self.stream_health.no_data_reason
 
     @property
     def is_attitude_old(self) -> bool:
-        """Whether forces can no longer be summed up to what velocities are held against."""
+        """Whether the attitude is too old to integrate the accelerometer."""
         latest = self.attitude_gate.latest
         return latest is not None and self.last_imu_boot_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
 
     @property
     def estimate_valid(self) -> bool:
-        """False while the vehicle's velocity and position cannot be believed: part of a hit was not measured.
+        """False while the vehicle's velocity and position estimate is not valid: part of a hit was not measured.
 
-        For the detector and the timeline; a recovery flies by `reflex.motion_estimator`.
+        For the detector and the timeline. A recovery uses `reflex.motion_estimator`.
         """
         return self.estimator.validity.is_valid
 
     @property
     def estimate(self) -> ImpactEstimate | None:
-        """Of the latest impact, as known by now."""
+        """The present estimate of the latest impact."""
         return self.estimator.estimate
 
     def describe(self) -> str:
@@ -129,7 +130,7 @@ class CollisionMonitor:
 
 @dataclass(frozen=True, slots=True)
 class MonitorResult:
-    """What one step showed: impacts as known at their first sample, estimates of contacts now over, notices."""
+    """Result of one step: impacts at their first sample, final estimates of contacts that have ended, notices."""
 
     impacts: Sequence[ImpactEstimate]
     finished: Sequence[ImpactEstimate]
@@ -140,7 +141,7 @@ NO_RESULT = MonitorResult((), (), ())
 
 
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
-    """A watch that has seen nothing; ``now_us`` on the same clock as `advance`'s."""
+    """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
     if config.estimate.fits_arms:
         prepare()
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
@@ -151,7 +152,7 @@ def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonit
 
 
 def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Situation, now_us: int) -> MonitorResult:
-    """Take the samples heard since the last call, in the order heard; call now and then without any, too."""
+    """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
     imu_samples = 0
@@ -203,7 +204,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
 def _update_stream_health(
     monitor: CollisionMonitor, imu_samples: int, situation: Situation, now_us: int
 ) -> list[Notice]:
-    """Blind or seeing, told when it changes and only while the detector is on; and, once, the threshold."""
+    """Notices about stream health when it changes while the detector is on; once, about threshold and losses."""
     notices: list[Notice] = []
     health = with_samples(monitor.stream_health, imu_samples, monitor.config.sight, now_us)
     on = situation.off_reason is None

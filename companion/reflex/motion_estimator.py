@@ -1,15 +1,14 @@
-"""Where a vehicle is after a hit, and how it moves, although its own estimate may lack a part of the hit.
+"""Position and velocity of a vehicle after a hit, although its own estimate may lack a part of the hit.
 
-What clipping hides of a hit is missing in the vehicle's own velocity, and then in its place. Other sensors put both
-right, as an estimator of place, velocity and tilt does. So t after the hit the vehicle tells, of its velocity v and its
-place x,
+A clipped accelerometer hides a part of the impulse. That part is missing in the vehicle's own velocity estimate, and
+then in its position. Its estimator corrects both by other sensors. So at a time t after the hit the vehicle reports
 
     v(t) + e g(t),    x(t) + e G(t)
 
-with e what is missing at first. The accelerometer carries x and v from one told place to the next, and a Kalman filter
-finds x, v and e on each axis. How soon and how fast an estimator puts itself right differs: a bank of filters supposes
-several ways, one of them that nothing was missing, and each counts by how well it foretells what is told (Magill 1965).
-At the hit v is the rebound that is expected, with a wide spread.
+for its velocity v and position x, where e is the error just after the hit. Between two reports the accelerometer is
+integrated; a Kalman filter estimates x, v and e on each axis. Delay and speed of the correction differ between
+estimators. A bank of filters has one hypothesis each, one of them e = 0; each is weighted by the likelihood of its
+innovations (Magill 1965). Before the first report v is the expected rebound, with a wide standard deviation.
 """
 
 import copy
@@ -55,14 +54,16 @@ from companion.reflex.planner import REST, MotionState
 
 Floats = npt.NDArray[np.float64]
 
-# The ways in which an estimate may be put right: after how long, with which frequency and damping.
+# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping.
 _MODELS = np.array(list(product(CORRECTION_DELAY_S, CORRECTION_RAD_S, CORRECTION_DAMPING)))
 
 
 @dataclass(slots=True)
 class FilterBank:
-    """Filters of x, v, e: a state (ways, axes, 3) and its covariance (ways, axes, 3, 3) each; the last way is none
-    missing. Local NED, SI. Changed only by its methods."""
+    """Kalman filters of x, v, e: states (models, axes, 3), covariances (models, axes, 3, 3); the last model has e = 0.
+
+    Local NED, SI. Changed only by its methods.
+    """
 
     start: MotionState
     spread_m_s: Vector3
@@ -70,7 +71,7 @@ class FilterBank:
     error_spread_m_s: Vector3
     state: Floats = field(init=False)
     covariance: Floats = field(init=False)
-    log_likelihoods: Floats = field(init=False)  # twice the logarithm of each way's likelihood
+    log_likelihoods: Floats = field(init=False)  # twice the logarithm of each model's likelihood
 
     def __post_init__(self) -> None:
         models = len(_MODELS) + 1
@@ -82,7 +83,7 @@ class FilterBank:
         self.log_likelihoods[-1] = 2.0 * math.log(len(_MODELS))  # as likely as all others together
 
     def with_hit(self, faster_m_s: Vector3, spread_m_s: Vector3, error_spread_m_s: Vector3) -> "FilterBank":
-        """Another hit, while what the first one hid is being put right."""
+        """The bank after another hit, while the error of the first one is still being corrected."""
         bank = copy.deepcopy(self)
         bank.state[:, :, 1] += np.array(faster_m_s)
         bank.covariance[:, :, 1, 1] += np.array(spread_m_s) ** 2
@@ -90,7 +91,7 @@ class FilterBank:
         return bank
 
     def predict(self, elapsed_s: float, faster_m_s: Vector3) -> None:
-        """By the accelerometer's sum over a time; its attitude may be a little off."""
+        """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong."""
         leads = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         self.state = self.state @ leads.T
         added = np.array(faster_m_s)
@@ -102,10 +103,10 @@ class FilterBank:
     def update(
         self, since_s: float, velocity_m_s: Vector3, place_m: Vector3, spread_m_s: float, spread_m: float, colour: float
     ) -> None:
-        """What the vehicle tells of itself so long after the hit.
+        """Take a reported velocity and position, `since_s` after the hit, with their standard deviations.
 
-        No estimator is put right in quite one of these ways: it is off by a share of what was hidden. ``colour``: in so
-        many samples the same error shows.
+        No estimator follows one of the models exactly; the difference is a share of the hidden velocity. ``colour`` is
+        the number of samples that share one error.
         """
         g, way_s, _ = error_response(since_s)
         hidden2 = np.array(self.error_m_s) ** 2
@@ -115,7 +116,7 @@ class FilterBank:
         self._update(1, g, velocity_m_s, colour * (spread_m_s**2 + MODEL_ERROR**2 * hidden2))
 
     def _update(self, which: int, of_e: Floats, measured: Vector3, variance: Floats) -> None:
-        """One measurement on each axis: the place (0) or the velocity (1) with so much of e in it."""
+        """One measurement on each axis: the position (0) or the velocity (1), with the share `of_e` of e in it."""
         share = of_e[:, None]
         missed = np.array(measured) - self.state[:, :, which] - share * self.state[:, :, 2]
         with_it = self.covariance[..., which] + share[..., None] * self.covariance[..., 2]
@@ -125,7 +126,7 @@ class FilterBank:
         self.log_likelihoods = self.log_likelihoods - (missed**2 / size + np.log(size)).sum(axis=1)
 
     def estimate(self, since_s: float) -> tuple[MotionState, Vector3, float]:
-        """The motion, its velocity's spread, and how fast what is told may still swing about what is foreseen."""
+        """Motion, standard deviation of its velocity, and the largest further swing of the reported velocity, m/s."""
         share, left = self._probabilities(), error_response(since_s)[2]
         (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
         spread2 = self.covariance[..., 1, 1] + (self.state[..., 1] - [u, v, w]) ** 2
@@ -134,24 +135,23 @@ class FilterBank:
         return MotionState((x, y, z), (u, v, w)), (p, q, r), math.sqrt(share @ left2)
 
     def errors(self, since_s: float) -> tuple[Vector3, Vector3]:
-        """What is missing in the told place and in the told velocity."""
+        """Errors of the reported position (m) and velocity (m/s)."""
         share, (g, way_s, _) = self._probabilities(), error_response(since_s)
         (x, y, z), (u, v, w) = np.einsum("ow,wa->oa", share * np.stack([way_s, g]), self.state[..., 2]).tolist()
         return (x, y, z), (u, v, w)
 
     def _probabilities(self) -> Floats:
-        """How probable each way is."""
+        """Probability of each model."""
         share: Floats = np.exp(0.5 * (self.log_likelihoods - self.log_likelihoods.max()))
         share /= share.sum()
         return share
 
 
 def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
-    """g and G: what is missing in the told velocity and, in seconds, in the place, of what was hidden; and how much of
-    the swing is left.
+    """g, G in seconds, and the swing's remaining amplitude, of each model at a time after the hit.
 
-    The errors p of the place, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
-    p = late_s, u = 1, a = 0; k, h and m so that a swing of frequency f and damping d and a slow rest c go on:
+    The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
+    p = late_s, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
     s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
     """
     (late_s, rad_s, damping), slow = _MODELS.T, TILT_PER_S
@@ -179,33 +179,31 @@ class MotionEstimator:
 
     contact: Contact
     hit_boot_us: int  # its first sample
-    start: MotionState  # after it, as expected
+    start: MotionState  # the expected motion after it
     config: EstimateConfig
-    earlier: "MotionEstimator | None" = None  # of a hit before, of which the estimate still lacks a part
+    earlier: "MotionEstimator | None" = None  # of an earlier hit whose error is still being corrected
     motion: MotionState = field(init=False)
-    is_fully_measured: bool = False  # the accelerometer has shown all of the hit, and so the estimate knows it
-    has_converged: bool = False  # the estimate has been found so
-    tilt_m_s2: Vector3 = REST  # the level acceleration that the thrust is about to give
-    wind_m_s2: tuple[float, float] = (0.0, 0.0)  # the slow external force, wind and drag: what it takes of the lean
-    external_m_s2: Vector3 = REST  # the quick external force besides the lean, level: a gust, or a contact that goes on
-    spread_m_s: Vector3 = REST  # of the motion's velocity
-    position_error_m: Vector3 = (
-        REST  # what the told place is off by, once the estimate is right: what is missing in it still
-    )
+    is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
+    has_converged: bool = False  # the vehicle's estimate is right again
+    tilt_m_s2: Vector3 = REST  # horizontal acceleration of the thrust, LEAD_S ahead
+    wind_m_s2: tuple[float, float] = (0.0, 0.0)  # slow external force per mass, wind and drag
+    external_m_s2: Vector3 = REST  # fast external force per mass, horizontal: a gust or a contact
+    spread_m_s: Vector3 = REST  # standard deviation of the motion's velocity
+    position_error_m: Vector3 = REST  # remaining error of the reported position, once it has converged
     _bank: FilterBank = field(init=False)
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
-    _at_boot_us: int = 0  # of the bank
-    _moved_m_s: Vector3 = REST  # the sum up to there
+    _at_boot_us: int = 0  # the bank's time
+    _moved_m_s: Vector3 = REST  # the integral up to that time
     _time_boot_us: int = 0
-    _hidden_error_m_s: Vector3 = REST  # in the told velocity still
-    _position_rate_error_m_s: Vector3 = REST  # what the rest of it is not that of the places by
-    _newest: LocalPosition | None = None  # the newest since the estimate is right, without what is missing
-    _heard_boot_us: int = 0  # the newest told, by the bank
-    _told_boot_us: int = 0  # and since the estimate is right
+    _hidden_error_m_s: Vector3 = REST  # remaining error of the reported velocity
+    _position_rate_error_m_s: Vector3 = REST  # its difference from the positions' rate
+    _newest: LocalPosition | None = None  # newest report since convergence, corrected
+    _heard_boot_us: int = 0  # newest report that the bank has taken
+    _told_boot_us: int = 0  # newest report since convergence
     _pushed_boot_us: int = 0
     _is_shown: bool = False
-    _clock_boot_us: int = 0  # from which on what was hidden is put right
+    _clock_boot_us: int = 0  # from here on the error is corrected
 
     def __post_init__(self) -> None:
         self.motion = self.start
@@ -235,7 +233,7 @@ class MotionEstimator:
         self.position_error_m = self._hidden_error_m_s = self._position_rate_error_m_s = REST
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
-        """Whether the accelerometer has shown all of the hit, as far as is known by now, and until when it pushed."""
+        """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
         self._is_shown, self.is_fully_measured = is_fully_measured, is_fully_measured and self.earlier is None
         if pushed_boot_us != self._pushed_boot_us:
             self._pushed_boot_us = pushed_boot_us
@@ -243,7 +241,7 @@ class MotionEstimator:
                 self._begin()
 
     def imu(self, strapdown: Strapdown) -> None:
-        """Take the newest sample. More than gravity is a contact's push, of which the start says what it leaves."""
+        """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
         time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
         first, self._time_boot_us = self._time_boot_us == 0, time_us
         if first or not 0.0 < elapsed_s < 0.1:
@@ -268,7 +266,7 @@ class MotionEstimator:
             self.wind_m_s2 = (a + share * (n - pushed[0] - a), b + share * (e - pushed[1] - b))
 
     def update(self, sample: LocalPosition) -> None:
-        """Take what the vehicle says of its place and velocity."""
+        """Take the vehicle's reported position and velocity."""
         at_us = sample.time_boot_us - round(1e6 * DELAY_S)
         if at_us <= self.hit_boot_us:
             return
@@ -280,15 +278,15 @@ class MotionEstimator:
             self._correct(sample)
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
-        """Take what is told into the filters. It is right once it will swing by next to nothing from now on."""
+        """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
         is_ahead = self._time_boot_us > 0 and at_us > self._time_boot_us + LONGEST_GAP_US
         if is_ahead or at_us <= self._at_boot_us:
-            # Of a time that the sum has not come to, or has left behind, the filters cannot take anything.
+            # The report's time is outside the integrated interval.
             return
         config, bank, before_us = self.config, self._bank, self._heard_boot_us
         self._heard_boot_us, since_s = sample.time_boot_us, 1e-6 * (at_us - self._clock_boot_us)
         every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
-        # An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not get.
+        # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
         behind_s = 1e-6 * (self._time_boot_us - at_us)
         summed = plus(self._summed_m_s, -behind_s, self._acceleration)
@@ -307,7 +305,7 @@ class MotionEstimator:
         self.spread_m_s = spread_m_s
 
     def _correct(self, sample: LocalPosition) -> None:
-        """By an estimate that is right: at once by the first, then by so much as is not its noise."""
+        """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""
         elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - self._told_boot_us))
         share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
         was, self._told_boot_us = self.motion, sample.time_boot_us
@@ -319,7 +317,7 @@ class MotionEstimator:
         self.spread_m_s = REST
 
     def _compare(self, sample: LocalPosition) -> None:
-        """The told velocity, less what is missing in it, with the told places: its errors last longer than theirs."""
+        """Compare the reported velocity with the rate of the reported positions, whose errors are shorter."""
         before, self._newest = self._newest, _without(sample, self.position_error_m, self._hidden_error_m_s)
         if before is not None:
             elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
@@ -330,11 +328,11 @@ class MotionEstimator:
 
     @property
     def velocity_error_m_s(self) -> Vector3:
-        """The same of the velocity, and by what it is not that of the places besides."""
+        """Remaining error of the reported velocity, m/s, NED."""
         return plus(self._hidden_error_m_s, 1.0, self._position_rate_error_m_s)
 
     def corrected(self, sample: LocalPosition) -> LocalPosition:
-        """What is told, without what it is off by."""
+        """The report without its known errors."""
         return _without(sample, self.position_error_m, self.velocity_error_m_s)
 
 
@@ -347,7 +345,7 @@ def _without(sample: LocalPosition, position_error_m: Vector3, velocity_error_m_
 
 
 def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
-    """By what the velocities from one told place to the next have led beside it, smoothed."""
+    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited."""
     half_s = 0.5 * elapsed_s
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
     further_m = plus(led, -1.0, measured.position_ned_m)
@@ -357,7 +355,7 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
-    """The level acceleration of a thrust that carries the vehicle, leant as after so long."""
+    """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt in `lead_s`."""
     n, e, d = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, -1.0))
     p, q, r = body_to_ned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s)
     n, e, d = n + lead_s * (q * d - r * e), e + lead_s * (r * n - p * d), d + lead_s * (p * e - q * n)
@@ -366,9 +364,10 @@ def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
 
 
 def blended_normal(pushed_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
-    """Away from an obstacle of which only a clipped push is known, each axis clipped alone; unit vectors.
+    """The normal of an obstacle whose contact force is clipped on each axis separately; unit vectors.
 
-    Back is where the vehicle came from, and free: half way between the two, or back where they are 60 degrees apart.
+    The direction that the vehicle came from is free. The normal is half way between that direction and the force, or
+    that direction itself where the two are more than 60 degrees apart.
     """
     n, e, _ = velocity_ned_m_s
     back = away_from((-n, -e, 0.0)) if math.hypot(n, e) >= LEAST_SPREAD_M_S else REST

@@ -1,10 +1,10 @@
-"""From the motion that there is to rest: the minimum-jerk stop, within limits and off the surfaces around.
+"""Plan a minimum-jerk stop from the present motion, within acceleration limits and clear of surfaces.
 
     x(s T) = x_0 + v_0 T (s - s^3 + s^4 / 2) + a_0 T^2 (s^2 / 2 - 2 s^3 / 3 + s^4 / 4)
              + e (10 s^3 - 15 s^4 + 6 s^5),          e = x_1 - x_0 - v_0 T / 2 - a_0 T^2 / 12
 
-The first part only brakes, the second takes back the lean there is; the last covers the rest of the way. T is the
-shortest that asks for no more than the limits allow. Planned anew from any motion on it, the plan is the same.
+The first part brakes, the second levels the present tilt, the last covers the remaining distance e. T is the shortest
+duration within the limits. A plan made anew from any motion on it is the same plan.
 """
 
 import math
@@ -35,13 +35,13 @@ from companion.reflex.config import (
 from companion.reflex.halfspace import Surface, plus, split
 
 REST: Vector3 = (0.0, 0.0, 0.0)
-# Where a plan is looked at: its first part's acceleration is greatest at s = 1/2, the second's at 0.21 and 0.79.
+# Values of s at which a plan is checked: its first part's acceleration is largest at 1/2, the second's at 0.21, 0.79.
 _LOOKED_AT = (0.21, 0.3, 0.4, 0.5, 0.6, 0.7, 0.79)
 
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """Where the vehicle is and how it moves, local NED; the acceleration where nothing but its own thrust makes it."""
+    """Position, velocity and acceleration, local NED. The acceleration is that of the vehicle's own thrust alone."""
 
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
@@ -50,26 +50,26 @@ class MotionState:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of a plan: its acceleration, and how soon the vehicle can lean both ways."""
+    """Limits of a plan: its largest acceleration and its shortest duration, in which the vehicle can tilt both ways."""
 
     acceleration_m_s2: float
     shortest_s: float = SHORTEST_S
 
     def spinning(self, spin_rad_s: float) -> "Limits":
-        """Of a vehicle that turns about the vertical: a gyroscope leans later, so all of it takes longer, and less."""
+        """The limits of a vehicle that spins about the vertical, rad/s: as a gyroscope it tilts later."""
         return Limits(self.acceleration_m_s2, self.shortest_s * math.hypot(1.0, spin_rad_s / ATTITUDE_RAD_S))
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """From a motion to rest at the goal within a duration."""
+    """A trajectory from a motion to rest at the goal, within a duration."""
 
     start: MotionState
     goal_ned_m: Vector3
     duration_s: float
 
     def at(self, elapsed_s: float, lead_s: float = LEAD_S) -> MotionState:
-        """The motion after so long, with the acceleration of a little later, as thrust follows late."""
+        """The motion after `elapsed_s`, with the acceleration of `lead_s` later, because the thrust lags."""
         if elapsed_s >= self.duration_s:
             return MotionState(self.goal_ned_m, REST)
         s = max(0.0, elapsed_s) / self.duration_s
@@ -84,24 +84,24 @@ class Plan:
         return [_axis(x_0, v_0, a_0, x_1, total_s, s, ahead) for x_0, v_0, a_0, x_1 in ends]
 
     def most_m_s2(self) -> float:
-        """Its largest acceleration."""
+        """The plan's largest acceleration, m/s^2."""
         return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in _LOOKED_AT)
 
     def enters(self, surface: Surface) -> bool:
-        """Whether it goes into the surface; where it begins or ends behind it, nothing is in the way."""
+        """Whether the plan goes through the surface. One that begins or ends behind the surface never does."""
         if min(surface.off_m(self.start.position_ned_m), surface.off_m(self.goal_ned_m)) < -TOUCH_TOLERANCE_M:
             return False
         return any(surface.off_m(self.at(s * self.duration_s).position_ned_m) < -TOUCH_TOLERANCE_M for s in _LOOKED_AT)
 
     def with_feedback(self, elapsed_s: float, motion: MotionState) -> Vector3:
-        """The plan's acceleration, and what PX4's loops would add for a vehicle that is beside it."""
+        """The plan's acceleration, plus the feedback of PX4's loops for a vehicle that is off the plan."""
         planned = self.at(elapsed_s)
         slower = plus(planned.velocity_ned_m_s, -1.0, motion.velocity_ned_m_s)
         short = plus(planned.position_ned_m, -1.0, motion.position_ned_m)
         return plus(planned.acceleration_ned_m_s2, VELOCITY_PER_S, plus(slower, PLACE_PER_S, short))
 
     def holds(self, elapsed_s: float, motion: MotionState) -> bool:
-        """Whether the vehicle is where it is to be by now, as far as PX4's loops bring it there."""
+        """Whether the vehicle follows the plan, as closely as PX4's loops do."""
         planned = self.at(elapsed_s)
         off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
         return off_m_s <= OFF_PLAN_M_S and math.dist(planned.position_ned_m, motion.position_ned_m) <= OFF_PLAN_M
@@ -121,7 +121,7 @@ def _axis(
 
 
 def plan(state: MotionState, goal_ned_m: Vector3, surfaces: Sequence[Surface], limits: Limits) -> Plan:
-    """The shortest plan within the limits; with harder brakes where it would run past its goal or into a surface."""
+    """The shortest plan within the limits. It brakes harder where it would pass its goal or enter a surface."""
     found = Plan(state, goal_ned_m, limits.shortest_s)
     longest_s = _longest_s(state, goal_ned_m)
     while found.duration_s < longest_s and found.most_m_s2() > limits.acceleration_m_s2:
@@ -136,7 +136,7 @@ def plan(state: MotionState, goal_ned_m: Vector3, surfaces: Sequence[Surface], l
 
 
 def _longest_s(state: MotionState, goal_ned_m: Vector3) -> float:
-    """e >= 0 along the velocity keeps the speed above zero: longer, and the plan would run past a goal ahead."""
+    """The longest duration that does not pass a goal ahead: e >= 0 along the velocity keeps the speed above zero."""
     n, e, d = (goal - start for goal, start in zip(goal_ned_m, state.position_ned_m, strict=True))
     (u, v, w), (a, b, c) = state.velocity_ned_m_s, state.acceleration_ned_m_s2
     ahead, speed2 = n * u + e * v + d * w, u * u + v * v + w * w
@@ -149,12 +149,11 @@ def _longest_s(state: MotionState, goal_ned_m: Vector3) -> float:
 def kept_off(
     acceleration_ned_m_s2: Vector3, state: MotionState, spread_m_s: Vector3, surfaces: Sequence[Surface], limits: Limits
 ) -> Vector3:
-    """Without what leads into a surface nearer than its clearance; `state` with the acceleration of its lean.
+    """The acceleration setpoint without any part that leads into a surface nearer than its clearance.
 
-    One that leaves by no more than its velocity's spread does not brake.
-
-    By when a lean is taken back, which turns it twice, the vehicle is to be no slower than at rest. So what only brakes
-    one that leaves is not taken away, and one that leans into the surface, or flies there, is asked to lean away.
+    `state` has the acceleration of the present tilt. Levelling takes 2 LEAD_S. The speed away from the surface then is
+    not below zero: braking a vehicle that leaves is allowed, and one that tilts or flies into the surface tilts away.
+    A vehicle that leaves by no more than the standard deviation of its velocity does not brake.
     """
     for surface in surfaces:
         if not -BEHIND_M <= surface.off_m(state.position_ned_m) < surface.distance_m:
@@ -172,7 +171,10 @@ def kept_off(
 
 
 def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
-    """So much of a level acceleration as, asked for last and held until PX4 notices, makes no slow vehicle fast."""
+    """The horizontal acceleration, limited so that PX4 can hold it until it notices the silence.
+
+    Held for HELD_S + NOTICED_S it makes no vehicle faster than it is, or than HELD_TO_M_S.
+    """
     (a, b, c), (u, v, _) = acceleration_ned_m_s2, velocity_ned_m_s
     most_m_s, asked2 = max(math.hypot(u, v), HELD_TO_M_S), a * a + b * b
     # |v + share a t| = most, of which the larger root.
@@ -185,9 +187,9 @@ def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> V
 def height_feedback(
     state: MotionState, spread_m_s: float, told_m_s: float, down_m: float, loops: float, most_m_s2: float
 ) -> float:
-    """What brings the vehicle back to a height, down positive: so many times what PX4's own loops ask for.
+    """Vertical acceleration, m/s^2 down, back to a height: `loops` times the setpoint of PX4's own loops.
 
-    The speed down that the vehicle tells counts as far as the motion reckoned, within its spread, does not deny it.
+    The reported vertical speed is limited to the estimated one plus or minus its standard deviation.
     """
     reckoned_m_s = state.velocity_ned_m_s[2]
     speed_m_s = min(max(told_m_s, reckoned_m_s - spread_m_s), reckoned_m_s + spread_m_s)
