@@ -1,13 +1,13 @@
-"""v_c: the velocity just before a contact, from velocities with their real stamps and the accelerometer between them.
+"""v_c: the velocity just before a contact, from the vehicle's velocities and the integrated accelerometer.
 
-The accelerometer's sum u (see `strapdown`) knows how the velocity changes, the vehicle's estimate where it is: the
-difference c = v - u is nearly constant, and what it drifts by is the accelerometer's bias. A Kalman filter
-follows c, its slope and the estimate's delay, state [c (3), slope (3), delay]:
+The integral u of the accelerometer (see `strapdown`) has the changes of the velocity, the vehicle's estimate v its
+value. Their difference c = v - u is nearly constant; it drifts by the accelerometer's bias. A Kalman filter estimates
+c, its slope and the estimate's delay, state [c (3), slope (3), delay]:
 
     v_k = c + u(t_k) - delay * a(t_k) + noise,      v_c = c + u(t_c)
 
-Only velocities from before the contact are used: after a stiff one PX4's estimate cannot be trusted. Without the
-accelerometer, as the paper does it, u is zero, c the velocity itself and its slope the acceleration.
+Only velocities from before the contact are used: after a stiff contact PX4's estimate is not valid. Without the
+accelerometer, as in the paper, u is zero, c is the velocity and its slope the acceleration.
 """
 
 import math
@@ -28,13 +28,15 @@ from companion.motion.strapdown import ZERO
 
 # Five positions at 50 Hz; at 2 m/s^2 the vehicle is 1 cm off a straight line in that time.
 POSITIONS_US = 100_000
-# The sum's own noise: 0.25 m/s^2 in samples of 5 ms, each of which stands for 50 ms at the slowest useful rate.
+# Noise of the integral: 0.25 m/s^2 in samples of 5 ms, each of which stands for 50 ms at the slowest useful rate.
 SUM_DENSITY_M2_S3 = 0.25**2 * 0.05
 
 
 class Slope(NamedTuple):
-    """What c's slope is, m/s^2: its spread at first and its walk per square root of a second; how far apart velocities
-    are taken, us; and the largest mean NIS of one on an axis."""
+    """Model of c's slope, m/s^2: initial standard deviation, random walk per square root of a second.
+
+    `spacing_us` is the least distance of two velocities, `most_nis` the largest mean NIS on an axis.
+    """
 
     spread_m_s2: float
     walk: float
@@ -42,23 +44,23 @@ class Slope(NamedTuple):
     most_nis: float
 
 
-# What a calibrated accelerometer and a good attitude leave: 0.05 m/s^2 of bias and 3 mrad of g on each axis, the latter
-# coming and going within seconds; with some reserve. Velocities closer together tell the same error again. The NIS is
-# 0.1 for the simulated vehicle (errors that last change little from one to the next), 1.0 for one with three times its
-# noise. Beyond, attitude or accelerometer do not belong to the velocities.
+# Slope of a calibrated accelerometer and a good attitude: 0.05 m/s^2 of bias and 3 mrad of g on each axis, which varies
+# within seconds; with some reserve. Velocities closer together have the same error. The NIS is 0.1 for the simulated
+# vehicle, whose errors are correlated, and 1.0 for one with three times its noise. Beyond `most_nis` attitude or
+# accelerometer contradict the velocities.
 BIAS = Slope(0.08, 0.05, 100_000, 1.5)
-# Of the acceleration nothing is known at first but the vehicle's limits, about 0.3 g; that of half a second ago says
-# nothing about now, and 25 velocities are enough.
+# Without the accelerometer: the acceleration is within the limits of a vehicle, about 0.3 g. Older velocities than this
+# are of no use; 25 are enough.
 LIMITS_M_S2, ALONE_US = 3.0, 500_000
-# So many filters are kept, the oldest of 0.4 s ago. The first velocity that shows a hit comes up to 0.17 s after it:
+# Number of filters kept, the oldest from 0.4 s ago. The first velocity that shows a hit comes up to 0.17 s after it:
 # velocities are at most 0.13 s apart (see `velocity_jump`) and 0.04 s late.
 LOOKED_BACK = 5
-# The NIS is the mean over so many velocities, 5 s: the bias is learnt in seconds.
+# Number of velocities in the mean NIS, 5 s: the bias is estimated within seconds.
 JUDGED_BY = 50
 
 
 class _Known(NamedTuple):
-    """What was known of c at a time; so many velocities have been taken, of a mean NIS."""
+    """The filter after a velocity: how many it has taken, and their mean NIS."""
 
     time_boot_us: int
     kalman: KalmanFilter
@@ -75,7 +77,7 @@ class Approach:
     _known: deque[_Known] = field(default_factory=lambda: deque(maxlen=LOOKED_BACK))
 
     def take(self, fix: VelocityFix) -> None:
-        """Take a velocity, unless it is too near to the one before it."""
+        """Take a velocity, unless it is too close in time to the one before."""
         if not self._known:
             self._known.append(_Known(fix.time_boot_us, self._filter(fix)))
             return
@@ -91,9 +93,9 @@ class Approach:
         self._known.append(_Known(fix.time_boot_us, kalman, taken, mean))
 
     def velocity_at(self, contact_boot_us: int, sum_ned_m_s: Vector3) -> tuple[Vector3, float] | None:
-        """v_c at a contact where the sum is ``sum_ned_m_s``, and its standard deviation on an axis, m/s.
+        """v_c at a contact where the integral is ``sum_ned_m_s``, and its standard deviation on an axis, m/s.
 
-        None where nothing is known from before, or when accelerometer and velocities contradict each other.
+        None without earlier velocities, or where accelerometer and velocities contradict each other.
         """
         end_us = contact_boot_us - STAMP_RESOLUTION_US
         before = next((known for known in reversed(self._known) if known.time_boot_us <= end_us), None)
@@ -105,8 +107,7 @@ class Approach:
 
     @property
     def _noise(self) -> Floats:
-        """An error that lasts for a time tau shows 2 tau / spacing times in a row: so much more weight it must not
-        get."""
+        """Measurement covariance. An error with correlation time tau repeats in 2 tau / spacing velocities."""
         spacing_us, lasts_us = self.slope.spacing_us, 2e6 * self.config.velocity_correlation_s
         colour = max(1.0, lasts_us / spacing_us) if spacing_us else 1.0
         return np.eye(3) * (self.config.velocity_noise_m_s**2 * colour)
@@ -117,7 +118,7 @@ class Approach:
         return KalmanFilter(np.concatenate([offset, np.zeros(3), [DELAY_S]]), np.pad(self._noise, (0, 4)) + unknown)
 
     def _ahead(self, kalman: KalmanFilter, elapsed_us: int) -> KalmanFilter:
-        """Another filter, later."""
+        """A copy of the filter, predicted to a later time."""
         dt_s = 1e-6 * elapsed_us
         transition = np.eye(7)
         transition[0, 3] = transition[1, 4] = transition[2, 5] = dt_s
@@ -130,7 +131,7 @@ class Approach:
 def velocity_alone(
     samples: Sequence[LocalPosition], contact_boot_us: int, config: EstimateConfig
 ) -> tuple[Vector3, float] | None:
-    """The same without the accelerometer; samples that may have been taken after the contact are ignored."""
+    """v_c and its standard deviation without the accelerometer; samples that may be after the contact are ignored."""
     start_us, end_us = contact_boot_us - ALONE_US, contact_boot_us - STAMP_RESOLUTION_US
     approach = Approach(config, Slope(LIMITS_M_S2, math.sqrt(config.jerk_density_m2_s5), 0, math.inf))
     for sample in samples:

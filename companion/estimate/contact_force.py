@@ -1,4 +1,4 @@
-"""The contact's own force while it lasts: its impulse in NED, part by part, its peak, when it began."""
+"""The contact force per mass while it lasts: its impulse in NED, its peak, its beginning, whether it was clipped."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,19 +8,19 @@ from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import ZERO
 
-# Samples whose windows follow each other: PX4 sends what it has, and 1.5 windows is nearer to one than to two.
+# Samples at most 1.5 averaging windows apart are contiguous: that is nearer to one window than to two.
 CONTIGUOUS = 1.5
-# What comes after this long without a push is another part of the vehicle, turned round by the first: the guard on the
-# other side, the hub. Its direction is no longer that of the hit.
+# After this time without force another part of the rotated vehicle touches: the opposite guard or the hub. That force's
+# direction is not the hit's.
 QUIET_US = 20_000
-# Raw samples are clipped at the range before they are averaged: a pulse of a third of the window that reaches the
-# range shows a third of it in the mean.
+# The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
+# is a third of the range in the mean.
 CLIPPED_SHARE = 1.0 / 3.0
-# A force that is over within this many samples was shorter than they can tell: its raw peak may well have been clipped.
-# What rings after it, below a third of the most, or pushes another way tells nothing of that.
+# A contact of no more samples than this is too short to exclude clipping of its raw peak. Ringing below a third of the
+# peak, or in another direction, does not count.
 SHORT = 2
 LASTING_SHARE = 1.0 / 3.0
-# What is sent in one loop of the link comes in any order, with time stamps some milliseconds apart.
+# Messages of one loop of the link come in any order, with time stamps some milliseconds apart.
 LATE_US = 3_000
 
 
@@ -29,43 +29,43 @@ class ContactForce:
     """Changed only by `add`. Forces per unit mass, m/s^2; impulse per unit mass, m/s."""
 
     free_frd_m_s2: Vector3
-    """What the accelerometer would show without the contact."""
+    """The accelerometer's value without the contact."""
     attitude_wxyz: Quaternion
     averaging_us: int
     range_m_s2: float
     started_boot_us: int
-    """Latest time at which there was no contact."""
+    """Latest time without contact."""
     earlier: ImuSample | None = None
     """The sample before the contact's first."""
     attitudes: list[Attitude] = field(default_factory=list)
     """From before the contact on."""
     time_boot_us: int = 0
     heard_boot_us: int = 0
-    """Of the latest sample, also after the push."""
+    """Time of the latest IMU sample, also after the contact."""
     told_boot_us: int = 0
-    """Of the latest sample or attitude."""
+    """Time of the latest sample or attitude."""
     first_boot_us: int = 0
     rates_frd_rad_s: Vector3 = ZERO
     first_rates_frd_rad_s: Vector3 = ZERO
     impulse_ned_m_s: Vector3 = ZERO
     unconfirmed_ned_m_s: Vector3 = ZERO
     shown: list[ImuSample] = field(default_factory=list)
-    """Those of the first hundredths of a second, until one may have clipped; all of them where the first one may."""
+    """Samples for the fit: those up to the first that may be clipped, or all where the first one may be."""
     last_ned_m_s2: Vector3 = ZERO
     peak_m_s2: float = 0.0
     loud_frd_m_s2: list[Vector3] = field(default_factory=list)
-    """The contact's force in its loud samples."""
+    """The contact force in samples above the threshold."""
     loud_boot_us: int = 0
     closed: bool = False
     clipped: bool = False
     clipped_late: bool = False
-    """Of the whole contact, also of what comes after the push."""
+    """Clipping in the whole contact, also after `closed`."""
     clipped_at_once: bool = False
     gap: bool = False
     begun_boot_us: int | None = None
 
     def add(self, sample: ImuSample, loud: bool) -> None:
-        """Take one sample of the contact; what comes after the last loud one does not belong to it."""
+        """Take one IMU sample; `loud`: it is above the threshold. Samples after the last such one do not count."""
         now_us, w = sample.time_boot_us, sample.angular_velocity_frd_rad_s
         f, free = sample.specific_force_frd_m_s2, self.free_frd_m_s2
         frd = (f[0] - free[0], f[1] - free[1], f[2] - free[2])
@@ -106,24 +106,24 @@ class ContactForce:
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
 
     def update(self, attitude: Attitude) -> None:
-        """What the vehicle says of its attitude meanwhile."""
+        """Take one attitude."""
         self.told_boot_us = attitude.time_boot_us
         if attitude.time_boot_us - self.first_boot_us <= LOOKED_AT_US:
             self.attitudes.append(attitude)
 
     @property
     def is_complete(self) -> bool:
-        """Whether all that the normal is found by has come."""
+        """Whether all messages for the fit have come."""
         return self.told_boot_us - self.first_boot_us > LOOKED_AT_US + LATE_US
 
     @property
     def touch(self) -> Touch:
-        """For the normal."""
+        """The messages for the fit of the normal."""
         earlier = [] if self.earlier is None else [self.earlier]
         return Touch(self.free_frd_m_s2, earlier + self.shown, self.attitudes, self.clipped_at_once)
 
     def _confirm(self, now_us: int, force_frd_m_s2: Vector3, contiguous: bool) -> None:
-        """The sample and all since the last loud one belong to the contact."""
+        """Count the sample, and all since the last one above the threshold, as contact."""
         size_m_s2 = math.hypot(*force_frd_m_s2)
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
@@ -133,7 +133,7 @@ class ContactForce:
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
         self.gap = self.gap or not contiguous
         if len(self.loud_frd_m_s2) == 2 and contiguous and size_m_s2 > 0.0:
-            # The first window held the force for the share that its mean has of the second's.
+            # The contact began within the first window: its mean is that share of the second window's.
             share = min(1.0, math.hypot(*self.loud_frd_m_s2[0]) / size_m_s2)
             self.begun_boot_us = self.time_boot_us - round(share * self.averaging_us)
 
@@ -147,7 +147,7 @@ class ContactForce:
 
     @property
     def is_fully_measured(self) -> bool:
-        """Whether the sensor, as far as one can tell, has shown the force so far as it was."""
+        """Whether the force so far was measured without clipping, as far as the samples show."""
         x, y, z = max(self.loud_frd_m_s2, key=lambda force: math.hypot(*force), default=ZERO)
         least = LASTING_SHARE * (x * x + y * y + z * z)
         lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.loud_frd_m_s2)
@@ -155,16 +155,16 @@ class ContactForce:
 
     @property
     def is_blurred(self) -> bool:
-        """Whether the push's direction is that of a few clipped axes."""
+        """Whether the force's direction is that of a few clipped samples."""
         return self.clipped and len(self.loud_frd_m_s2) <= SHORT
 
     def turn_rad_s(self) -> float:
-        """How much the contact has changed the rates by since its first sample."""
+        """Change of the body rates since the contact's first sample, rad/s."""
         w, first = self.rates_frd_rad_s, self.first_rates_frd_rad_s
         return math.sqrt((w[0] - first[0]) ** 2 + (w[1] - first[1]) ** 2 + (w[2] - first[2]) ** 2)
 
 
 def unit(vector: Vector3) -> Vector3:
-    """Direction; zero when there is none."""
+    """Unit vector; zero for a zero vector."""
     length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     return (vector[0] / length, vector[1] / length, vector[2] / length) if length > 1e-9 else (0.0, 0.0, 0.0)

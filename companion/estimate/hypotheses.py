@@ -1,7 +1,7 @@
-"""What is supposed of a touch, and how far each supposition is from what was measured and from what is known.
+"""Hypotheses about a contact, and their weighted residuals against measurements and prior knowledge.
 
-Tried are flat obstacles round the direction of the push and upright rounds on the foremost guards, each with friction
-and a moment of the touch. Known are, more or less, v_c, the arms' stiffness, the motors, the length of a sample's mean.
+Hypotheses are flat obstacles with normals around the force's direction, and upright poles at the foremost guards, each
+with friction and a time of the first touch. Priors are v_c, the arms' stiffness, the motors and a sample's length.
 """
 
 import math
@@ -18,52 +18,52 @@ from companion.motion.rotation import body_to_ned, turned
 
 Floats = npt.NDArray[np.float64]
 
-# After the first sample. Later an arm has met its stop or the hub the wall, which nothing here describes.
+# Time after the first sample that is fitted. Later an arm meets its stop or the hub the wall: not in the model.
 LOOKED_AT_US = 22_000
-# The direction of the whole push, where the search begins: what comes later counts less.
+# Time constant of the weights in the mean force, around which the search begins.
 FADING_S = 0.015
-# Friction of 0.3 leans the push by 17 degrees; a round turns it by as much again as the guard rolls.
+# Grid of normals. Friction of 0.3 turns the force by 17 degrees; on a pole the rolling guard turns it by as much again.
 SPAN_RAD, STEP_RAD = math.radians(40.0), math.radians(10.0)
 FRICTIONS, RADII_M = (0.05, 0.25), (0.04, 0.15)
-# The moment of the touch, as shares of the time between the sample before and the first that shows it.
+# Times of the first touch, as shares of the interval between the last free sample and the first of the contact.
 MOMENTS = (0.1, 0.3, 0.5, 0.7, 0.9)
-# Of the guards, those that may meet a round: the fourth is behind the vehicle.
+# Guards that may touch a pole: the fourth is behind the vehicle.
 FOREMOST = 3
-# A round is as likely as a flat obstacle, but three guards and two radii describe it: by so much is it held back.
+# Penalty of a pole: it is as likely as a flat obstacle, and has six hypotheses (guards, radii) for one.
 ROUND_CHI_SQUARED = 2.0
-# Standard deviations of what is known: vibration and bias of a sample and a share of what it shows, for all that the
-# model leaves out; the same of the rates; the attitude against the one before the touch.
+# Standard deviations of force, rate and attitude: vibration and bias, and a share of the measured value for the errors
+# of the model.
 FORCE_M_S2, FORCE_SHARE, RATE_RAD_S, RATE_SHARE, ATTITUDE_RAD = 0.3, 0.06, 0.08, 0.06, 0.01
-# v_c on an axis, arms of a kind, a controller's gain of 20 /s, poles of 4 to 20 cm.
+# Standard deviations of the priors: v_c on an axis, stiffness, the rate controller's gain of 20 /s; poles of 4-20 cm.
 VELOCITY_M_S, STIFFER, BRAKING_PER_S, BRAKING_SPREAD = 0.04, 0.1, 20.0, 8.0
 RADIUS, RADIUS_SPREAD = math.log(0.1), 0.7
-# IMU_INTEG_RATE gives 4 or 5 ms.
+# The sample's length: IMU_INTEG_RATE gives 4 or 5 ms.
 AVERAGING_SPREAD_S = 0.0007
-# Normals further than 29 degrees from the push, friction below none or above the most, poles that lean.
+# Limits, and the standard deviations beyond them: normals 29 degrees from the force, friction, the lean of poles.
 TILT_RAD, TILT_SPREAD, FRICTION_SPREAD, UPRIGHT = 0.5, 0.05, 0.1, 0.05
-# Plastic on walls, wood and steel: rarely slippery, seldom beyond what the guards are made for.
+# Friction of plastic on walls, wood and steel.
 EXPECTED_FRICTION, EXPECTED_FRICTION_SPREAD = 0.25, 0.15
-# Of a force that may have been larger; the gyroscopes have shown what it turned, all the same.
+# Standard deviation of a clipped force, as a share of it. The rates are not clipped.
 CLIPPED_SHARE = 0.3
 
 
 @dataclass(slots=True)
 class Touch:
-    """What the wire told of the first hundredths of a second."""
+    """Messages of the first hundredths of a second of a contact."""
 
     free_frd_m_s2: Vector3
-    """What the accelerometer would show without the contact."""
+    """The accelerometer's value without the contact."""
     samples: list[ImuSample] = field(default_factory=list)
-    """The last one before it, then those that show it."""
+    """The last free sample, then those of the contact."""
     attitudes: list[Attitude] = field(default_factory=list)
-    """From before the touch on, the newest last."""
+    """From before the contact on, the newest last."""
     is_clipped: bool = False
-    """Whether the first of them that shows it may have."""
+    """Whether the contact's first sample may be clipped."""
 
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """A touch in numbers; times in seconds from the first sample that shows it."""
+    """A contact as arrays; times in seconds from its first sample."""
 
     velocity_ned: Floats
     attitude: Floats
@@ -81,7 +81,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class Hypotheses:
-    """Suppositions side by side."""
+    """Several hypotheses: parameters (n, 11), axes of their normals (n, 3, 3), obstacles (n,)."""
 
     values: Floats
     axes: Floats
@@ -91,7 +91,7 @@ class Hypotheses:
         return Hypotheses(self.values[which], self.axes[which], self.obstacles[which])
 
     def normals(self, values: Floats) -> Floats:
-        """(n, 3) for as many values (n, 11)."""
+        """Unit normals (n, 3), NED, of parameters (n, 11)."""
         tilts = np.tan(values[:, : g.FRICTION])
         vectors = self.axes[:, 0] + tilts[:, :1] * self.axes[:, 1] + tilts[:, 1:] * self.axes[:, 2]
         directions: Floats = vectors / np.linalg.norm(vectors, axis=1)[:, None]
@@ -99,7 +99,7 @@ class Hypotheses:
 
 
 def measurement_of(touch: Touch, velocity: Vector3, guards: GuardsConfig, averaging_s: float) -> Measurement | None:
-    """None where too little was heard of it."""
+    """None where too few messages have come."""
     if len(touch.samples) < 2:
         return None
     before, first = touch.samples[0], touch.samples[1]
@@ -147,13 +147,13 @@ def _contact_force_ned(attitude: Quaternion, f: Vector3, free: Vector3) -> Vecto
 
 
 def _shape(guards: GuardsConfig) -> Floats:
-    """As `guards.weighted_residuals` wants it."""
+    """The vehicle's shape, as `guards.weighted_residuals` takes it."""
     arm = (guards.stiffness_per_s2, guards.damping_per_s, guards.travel_m)
     return np.array([guards.centre_m, guards.radius_m, guards.height_m, *arm, *guards.gyration_frd_m])
 
 
 def initial_hypotheses(measurement: Measurement) -> Hypotheses:
-    """All that the search tries: flat obstacles round the push's direction, upright rounds on the foremost guards."""
+    """Hypotheses of the coarse search: flat obstacles around the force, upright poles at the foremost guards."""
     angles = np.arange(-SPAN_RAD, SPAN_RAD + 1e-9, STEP_RAD)
     moments = [measurement.before_s * share for share in MOMENTS]
     flat = np.array(np.meshgrid(angles, angles, FRICTIONS, moments)).reshape(4, -1).T
@@ -192,7 +192,7 @@ def _foremost(measurement: Measurement, normal_ned: Floats) -> list[int]:
 
 
 def residuals(measurement: Measurement, hypotheses: Hypotheses, values: Floats, sigma_factor: float) -> Floats:
-    """What was measured, taken for `sigma_factor` times less certain, and what is known beforehand: (n, m)."""
+    """Weighted residuals (n, m) of measurements and priors; `sigma_factor` scales the measurements' deviations."""
     off = g.weighted_residuals(
         values,
         hypotheses.axes,

@@ -1,4 +1,4 @@
-"""What is known of an impact: at once, better while the contact lasts, final when it is over."""
+"""The estimate of an impact: a first one at detection, refined during the contact, final when the contact is over."""
 
 import math
 from collections import deque
@@ -21,17 +21,17 @@ from companion.motion.strapdown import ZERO
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
-# After a contact the estimate swings (delay, a filter's switching): velocities count again after this.
+# After a contact PX4's velocity oscillates (delay, a filter's switching). Velocities count again after this.
 REST_US = 150_000
 # PX4 sends VIBRATION every two seconds by default.
 CLIPPING_TOLD_US = 2_100_000
-# A detector that waited for no more than this many samples still knows what the contact did to the present one.
+# A detection later than this many samples has no contact force: the contact's samples are gone.
 LATE_SAMPLES = 3
-# Sums kept to look back: the first velocity that shows a hit comes up to 0.17 s after it (see `approach`), at 400 Hz.
+# Integrals kept: the first velocity that shows a hit comes up to 0.17 s after it (see `approach`), at 400 Hz.
 SUMS_KEPT = 80
-# Of these one is from before a contact, at up to 250 Hz.
+# Enough for one from before the contact, at up to 250 Hz.
 ATTITUDES_KEPT = 16
-# What the detector leaves open or takes for soft is not classified anew.
+# Kinds that are not classified again: unknown, and a soft contact.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
 
@@ -66,7 +66,7 @@ class ImpactEstimate:
 
 @dataclass(slots=True)
 class ImpactEstimator:
-    """Listens to all samples; from an impact on it knows more with each of them. Times: vehicle's boot clock."""
+    """Takes all samples, and refines the estimate of the latest impact with each. Times: vehicle's boot clock."""
 
     config: EstimateConfig
     history: MotionHistory = field(default_factory=MotionHistory)
@@ -80,7 +80,7 @@ class ImpactEstimator:
     estimate: ImpactEstimate | None = None
     contact: ContactForce | None = None
     search: Search | None = None
-    run_search: Callable[[Search], Search] = advance_search  # what takes the search on with each message
+    run_search: Callable[[Search], Search] = advance_search  # runs one piece of the search with each message
     is_over: bool = False
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
@@ -91,7 +91,7 @@ class ImpactEstimator:
 
     @property
     def fits_normal(self) -> bool:
-        """Whether a touch is fitted for its normal: where arms fold, and the extra [fit] is installed."""
+        """Whether the normal is fitted: the arms fold, and the extra [fit] is installed."""
         return self.config.fits_arms and IS_AVAILABLE
 
     def update(self, sample: Sample) -> None:
@@ -123,19 +123,19 @@ class ImpactEstimator:
             self._advance_search(self.contact)
 
     def _approach(self, fixes: Sequence[VelocityFix]) -> None:
-        """The newest velocity, unless the latest contact's swing may be in it. After a jump the first begins anew."""
+        """Take the newest velocity for v_c, unless it may contain the latest contact. A gap restarts the filter."""
         if len(fixes) == 1:
             self.approach = Approach(self.config)
         if self.contact_ended_boot_us is None or fixes[-1].time_boot_us > self.contact_ended_boot_us + REST_US:
             self.approach.take(fixes[-1])
 
     def _note_contact(self, boot_us: int) -> None:
-        """The contact lasts: v_c of a next one is found from what follows."""
+        """The contact goes on: the filter of the next v_c restarts after it."""
         if boot_us != self.contact_ended_boot_us:
             self.contact_ended_boot_us, self.approach = boot_us, Approach(self.config)
 
     def _advance_search(self, contact: ContactForce) -> None:
-        """The normal: its search begins when all that it looks at has been heard, and goes on with each message."""
+        """Begin the search for the normal when its messages are complete; continue it with each message."""
         estimate, search, config = self.estimate, self.search, self.config
         if estimate is None or not self.fits_normal:
             return
@@ -150,12 +150,12 @@ class ImpactEstimator:
 
     @property
     def _is_searching(self) -> bool:
-        """Whether the normal is still to come."""
+        """Whether the fit of the normal has not ended yet."""
         is_wanted = self.contact is not None and self.fits_normal
         return is_wanted and (self.search is None or not self.search.is_over)
 
     def _clipped(self, sample: Vibration) -> None:
-        """Counts that grew since the message before the contact: what was said of its size is a lower bound."""
+        """Take PX4's clipping counts. One that grew since before the contact makes its size a lower bound."""
         before, self.clipping_counts = self.clipping_counts, sample.clipping_counts
         estimate, ended_us = self.estimate, self.contact_ended_boot_us
         if estimate is None or ended_us is None or before is None or before == sample.clipping_counts:
@@ -164,7 +164,7 @@ class ImpactEstimator:
             self.estimate = replace(estimate, is_lower_bound=True)
 
     def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
-        """A new impact: what was known just before it, and what its first sample, or velocity, shows."""
+        """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
         sample_us = impact.sample_time_boot_us
         free_until_us = impact.contact_free_until_boot_us
         place, velocity, error_m_s = self._motion(free_until_us)
@@ -195,7 +195,7 @@ class ImpactEstimator:
         return estimate
 
     def _begin_contact_force(self, impact: Impact) -> ContactForce | None:
-        """The contact's course, its first sample taken; None for one that was reported late, its course unseen."""
+        """The contact force with its first sample; None for an impact that was detected too late for it."""
         sample = self.imu
         if sample is None or len(self.sums) < 2:
             return None
@@ -218,8 +218,10 @@ class ImpactEstimator:
         return contact
 
     def follow(self, state: DetectorState) -> ImpactEstimate | None:
-        """After each IMU sample: its share in the present contact; once, the final estimate, when that is over and the
-        normal has been found."""
+        """Take the detector's state after each IMU sample.
+
+        Returns the final estimate, once: when the contact is over and the fit has ended.
+        """
         estimate, contact, sample = self.estimate, self.contact, self.imu
         if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
@@ -229,15 +231,17 @@ class ImpactEstimator:
             if contact is not None and sample.time_boot_us > contact.time_boot_us:
                 loud = state.last_loud_boot_us == sample.time_boot_us
                 contact.add(sample, loud)
-                # Anew with each sample: arms may meet their stop, and clip, long after a touch that could be measured.
+                # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
                 self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
                 if loud or self.is_over:
                     self.estimate = self._refined(estimate, contact)
         return self.close() if self.is_over and not self._is_searching else None
 
     def close(self) -> ImpactEstimate | None:
-        """The final estimate, where the contact is over and it was not told yet: another hit does not wait, and what is
-        left of the search is done at once."""
+        """The final estimate of a contact that is over, if it was not returned yet; None otherwise.
+
+        Another hit does not wait: the rest of the search runs at once.
+        """
         if self.estimate is None or self.estimate.is_final or not self.is_over:
             return None
         while self.contact is not None and self._is_searching:
@@ -250,7 +254,7 @@ class ImpactEstimator:
         explains_alone = found is not None and not contact.clipped_at_once
         if self.is_over and not explains_alone:
             return final_normal(contact, found, velocity_ned_m_s)
-        # What explains forces and turning before anything clipped is not averaged with the way back.
+        # A fit without clipped samples is not averaged with the direction that the vehicle came from.
         return plausible_normal(contact, found or unit(contact.impulse_ned_m_s), velocity_ned_m_s)
 
     def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
@@ -274,8 +278,7 @@ class ImpactEstimator:
         )
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
-        """x(t_c) and v_c from what was heard before this contact and after the one before it; v_c's standard deviation
-        on an axis."""
+        """x(t_c), v_c, and v_c's standard deviation on an axis, from messages between the last contact and this one."""
         start_us, config = contact_us - ALONE_US, self.config
         if self.contact_ended_boot_us is not None:
             start_us = max(start_us, self.contact_ended_boot_us + STAMP_RESOLUTION_US)
@@ -290,7 +293,7 @@ class ImpactEstimator:
         return latest.position_ned_m, latest.velocity_ned_m_s, config.velocity_noise_m_s
 
     def _velocity(self, contact_us: int) -> tuple[Vector3, float] | None:
-        """v_c by velocities and accelerometer; None where too little was heard for it."""
+        """v_c from velocities and accelerometer; None where too few messages have come."""
         before = next((entry for entry in reversed(self.sums) if entry[0] <= contact_us), None)
         if before is None:
             return None

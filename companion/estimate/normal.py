@@ -1,17 +1,17 @@
-"""The obstacle's normal, from how the first hundredths of a second of a touch pushed and turned the vehicle.
+"""The obstacle's normal, fitted to forces and rotation in the first 22 ms of a contact.
 
-Friction leans the push against the sliding of the contact, by up to atan(mu): a head-on hit without friction and a
-slanting one with it push the same way. They do not turn the vehicle the same way, because the normal decides where a
-guard is touched, and when the next one is. So suppositions are followed (see `guards`) and held against all that was
-measured: forces and rates, and the attitude, which tells what the samples leave out. What is supposed: the normal,
-flat or round (and then which guard met it and the radius), friction, the moment of the touch, and, near what is known
-of them, v_c, the arms' stiffness and how hard the motors brake the turning.
+Friction turns the contact force away from the normal by up to atan(mu): a head-on hit without friction and an oblique
+hit with friction have the same force direction. Their rotation differs, because the normal decides where a guard is
+touched, and when the next guard is. So hypotheses are simulated (see `guards`) and compared with all measurements:
+forces, rates, and the attitude, which contains what falls between the samples. A hypothesis has a normal, a flat or a
+round obstacle (with a guard and a radius), friction, and the time of the first touch. v_c, the arms' stiffness and the
+motors' damping of the rotation vary about their known values.
 
-A coarse search chooses a few; each is then improved by least squares (Levenberg 1944, Marquardt 1963), with what was
-measured taken for less certain at first, or a sample that falls beside the touch of a second guard ends the way to it.
-The normal is the mean of what they become, weighed by exp(-misfit / 2).
+A coarse search selects a few hypotheses. Least squares refine each (Levenberg 1944, Marquardt 1963). The first rounds
+have larger standard deviations: a sample beside the touch of a second guard would otherwise be a local minimum. The
+normal is the mean of the refined hypotheses, weighted by exp(-chi_squared / 2).
 
-All that takes some 15 ms of a core here, which nothing that sends setpoints has to spare at once. So the search is a
+The search takes some 15 ms of a core here, longer than a loop that sends setpoints may block. So the search is a
 value, `Search`, and `advance_search` takes it on by a piece: no more than so many hypotheses are simulated, whatever
 the time that takes. So the same messages give the same normal at the same message in flight, lockstep and replay.
 """
@@ -37,21 +37,22 @@ from companion.messages import Attitude, ImuSample, Vector3
 
 # Without machine code the search would take seconds.
 IS_AVAILABLE = g.IS_COMPILED
-# Suppositions that are followed in one piece of work: two milliseconds here. Nine messages are then enough, and the
-# normal is there before the recovery asks for it (flight.recovering), also where two hundred come in a second.
+# Hypotheses that are simulated in one piece of work, 2 ms here. Nine messages are then enough: at 200 messages a second
+# the normal is known before the recovery needs it (flight.recovering).
 HYPOTHESES_A_PIECE = 400
-# How much apart suppositions of one kind that are improved are at least.
+# Least angle between the normals of two selected hypotheses of one kind.
 APART_COSINE = math.cos(math.radians(18.0))
-# The search takes what was measured for so much less certain, and so do the rounds of least squares, in which the best
-# so many are improved by so many steps.
+# Factors on the measurements' standard deviations: of the coarse search, and of each round of least squares with the
+# number of hypotheses that it keeps. Each round has STEPS steps.
 COARSE, ROUNDS, STEPS = 2.5, ((5.0, 12), (2.0, 12), (1.0, 12)), 4
-# What misfits by so much more than the best goes no further.
+# A hypothesis whose chi squared is larger than the best one's by more than this is dropped.
 MOST_CHI_SQUARED_ABOVE_BEST = 25.0
-# Of a touch that is explained each number misfits by one or less; by this, it was not by guards on spring arms.
+# Largest reduced chi squared, per measured number. A fit that explains the contact has 1 or less; above this it was no
+# contact of guards on spring arms.
 MOST_REDUCED_CHI_SQUARED = 3.0
 DIFFERENCE_STEPS = np.array([0.005, 0.005, 0.01, 0.0002, 0.005, 0.005, 0.005, 0.02, 1.0, 0.05, 0.0002])
 DAMPING, DAMPINGS, LEAST_DAMPING, MOST_DAMPING = 1e-2, (0.1, 1.0, 10.0, 100.0), 1e-5, 1e3
-# Of one supposition in one step: itself, its slopes, and what may become of it.
+# Simulations of one hypothesis in one step: itself, its finite differences, and its candidates.
 HYPOTHESES_A_STEP = 1 + g.SIZE + len(DAMPINGS)
 LOWER_BOUNDS = np.array([-0.7, -0.7, -0.02, -0.2, -0.5, -0.5, -0.5, -0.7, 0.0, -4.6, 0.001])
 UPPER_BOUNDS = np.array([0.7, 0.7, 0.32, 0.0, 0.5, 0.5, 0.5, 0.7, 50.0, 0.0, 0.1])
@@ -64,17 +65,17 @@ class Search:
     measurement: Measurement | None
     hypotheses: Hypotheses | None
     chi_squared: Floats
-    """Of the suppositions that have been looked at."""
+    """Sum of squared residuals of the hypotheses that have been simulated."""
     damping: Floats
     steps: int = -1
-    """Of least squares; -1 while suppositions are looked at."""
+    """Steps of least squares so far; -1 during the coarse search."""
     is_over: bool = False
     normal_ned: Vector3 | None = None
-    """Unit vector out of the obstacle; None where too little is known of the touch or nothing explains it."""
+    """Unit vector out of the obstacle; None where too little was measured or no hypothesis fits."""
 
 
 def begin_search(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Search:
-    """A search of which nothing is done; `velocity_ned_m_s` is v_c."""
+    """A search before its first piece; `velocity_ned_m_s` is v_c, `averaging_s` the length of an IMU sample's mean."""
     measurement = measurement_of(touch, velocity_ned_m_s, guards, averaging_s)
     nothing = np.zeros(0)
     if measurement is None:
@@ -83,7 +84,7 @@ def begin_search(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, 
 
 
 def advance_search(search: Search) -> Search:
-    """The same search by one piece of work further; itself where it is over."""
+    """The search after one more piece of work; itself where it is over."""
     measurement, hypotheses = search.measurement, search.hypotheses
     if search.is_over or measurement is None or hypotheses is None:
         return search
@@ -93,7 +94,7 @@ def advance_search(search: Search) -> Search:
 
 
 def normal_of(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, averaging_s: float) -> Vector3 | None:
-    """What the search comes to, all at once."""
+    """The result of a whole search, all pieces at once."""
     search = begin_search(touch, velocity_ned_m_s, guards, averaging_s)
     while not search.is_over:
         search = advance_search(search)
@@ -102,7 +103,7 @@ def normal_of(touch: Touch, velocity_ned_m_s: Vector3, guards: GuardsConfig, ave
 
 @lru_cache(maxsize=1)
 def prepare() -> None:
-    """Compile, or load what the last start compiled: seconds that a flight does not have."""
+    """Compile the simulation, or load its compiled code: that takes seconds, and is done before a flight."""
     if not IS_AVAILABLE:
         return
     samples = [ImuSample(4_000 * number, (-float(number), 0.0, -10.0), (0.0, 0.0, 0.0)) for number in range(2)]
@@ -111,7 +112,7 @@ def prepare() -> None:
 
 
 def _scored(search: Search, measurement: Measurement, hypotheses: Hypotheses) -> Search:
-    """The next of the suppositions; after the last of them the best are left."""
+    """Simulate the next hypotheses of the coarse search; after the last, keep the best."""
     begun, count = search.chi_squared.size, len(hypotheses.values)
     part = hypotheses.chosen(range(begun, min(begun + HYPOTHESES_A_PIECE, count)))
     found = np.square(residuals(measurement, part, part.values, COARSE)).sum(axis=1)
@@ -123,7 +124,7 @@ def _scored(search: Search, measurement: Measurement, hypotheses: Hypotheses) ->
 
 
 def _distinct(hypotheses: Hypotheses, chi_squared: Floats) -> list[int]:
-    """The few that fit best, each of another kind or with another normal than the better ones."""
+    """Indices of the best hypotheses that differ from all better ones in kind or normal."""
     normals = hypotheses.normals(hypotheses.values)
     kept: list[int] = []
     for one in np.argsort(chi_squared, kind="stable").tolist():
@@ -136,7 +137,7 @@ def _distinct(hypotheses: Hypotheses, chi_squared: Floats) -> list[int]:
 
 
 def _refined(search: Search, measurement: Measurement, hypotheses: Hypotheses) -> Search:
-    """As many steps as the piece has room for, but for one round; after a round the hopeless are left behind."""
+    """Steps of least squares within one piece and one round; a round ends by dropping the worst hypotheses."""
     sigma_factor, _ = ROUNDS[search.steps // STEPS]
     damping, chi_squared, steps = search.damping, search.chi_squared, search.steps
     left = HYPOTHESES_A_PIECE // (HYPOTHESES_A_STEP * len(hypotheses.values))
@@ -156,7 +157,7 @@ def _refined(search: Search, measurement: Measurement, hypotheses: Hypotheses) -
 
 
 def _mean(measurement: Measurement, hypotheses: Hypotheses, chi_squared: Floats) -> Vector3 | None:
-    """Weighed by how likely each is."""
+    """Mean normal, weighted by likelihood; None where no hypothesis fits."""
     if chi_squared.min() > MOST_REDUCED_CHI_SQUARED * measurement.measured.size:
         return None
     mean = np.exp(0.5 * (chi_squared.min() - chi_squared)) @ hypotheses.normals(hypotheses.values)
@@ -167,7 +168,7 @@ def _mean(measurement: Measurement, hypotheses: Hypotheses, chi_squared: Floats)
 def _levenberg_marquardt_step(
     measurement: Measurement, hypotheses: Hypotheses, damping: Floats, sigma_factor: float
 ) -> tuple[Floats, Floats, Floats]:
-    """One step with the damping that helps most: values, dampings, misfits."""
+    """One step with the best of several dampings: values (n, 11), dampings (n,), chi squared (n,)."""
     values, count = hypotheses.values, len(hypotheses.values)
     every = [*range(count)]
     around = np.concatenate([values, *(values + step for step in np.diag(DIFFERENCE_STEPS))])

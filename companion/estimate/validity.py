@@ -1,12 +1,11 @@
-"""May the vehicle's velocity be believed? After a hit that its accelerometer did not show whole, not at once.
+"""Validity of the vehicle's velocity estimate. After a hit that was not measured whole it is not valid for a while.
 
-What clipping hides of a hit is missing in PX4's velocity. Its estimator finds back in a swing that looks like another
-hit. Measured on a real PX4: off by up to 7.8 m/s, unchanged for a tenth of a second, a fifth too far on the other side
-after 0.7 s, and a tilt for seconds. While velocity and accelerometer contradict each other it is correcting itself.
+A clipped accelerometer hides a part of the hit from PX4's velocity. PX4's estimator corrects this in a swing that looks
+like another hit. On a real PX4 the velocity was wrong by up to 7.8 m/s. It stayed so for 0.1 s, overshot by a fifth
+after 0.7 s, and the tilt was wrong for seconds. During the correction velocity and accelerometer contradict each other.
 
-This judges for the detector, which must not take that swing for a second hit and loses little by waiting. A recovery
-has its own estimate, `reflex.motion_estimator`: it needs a velocity sooner, and knows the normal and the rebound to
-expect.
+The detector uses this validity: it must not take that swing for a second hit. A recovery needs a velocity sooner, and
+knows the normal and the expected rebound: it uses `reflex.motion_estimator`.
 """
 
 import math
@@ -16,17 +15,17 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.inertial import VelocityFix, less_sum
 
-# The estimator has not yet begun to correct itself for 0.14 s, and swings through the truth at about 0.5 s.
+# PX4's estimator begins to correct itself after 0.14 s. Its swing passes the true value at about 0.5 s.
 UNCORRECTED_US = 140_000
 LEAST_US = 600_000
-# By then what a filter has taken for a tilt, 15 degrees after 4.2 m/s, is down to the two that agree (0.5 per second,
+# By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to the two degrees of agreement (0.5 per second,
 # bench/notes/px4.md).
 MOST_US = 4_500_000
-# Agreement is judged over this; the swing's turning points are shorter.
+# Velocity and accelerometer must agree over this time. The swing's turning points are shorter.
 AGREE_US = 300_000
-# A good velocity estimate's noise of 0.03 m/s, twice, and an accelerometer off by 0.3 m/s^2 in that time.
+# Twice the noise of a good velocity estimate, 0.03 m/s, and an accelerometer's error of 0.3 m/s^2 over that time.
 AGREE_M_S = 0.15
-# A tilt of 1.2 degrees: what gyroscopes off by half a degree a second make of themselves in 2.4 s.
+# A tilt of 1.2 degrees: gyroscopes with a bias of 0.5 degrees a second drift by it in 2.4 s.
 AGREE_M_S2 = 0.2
 
 
@@ -35,16 +34,16 @@ class VelocityValidity:
     """Changed only by its methods. Times: vehicle's boot clock."""
 
     invalid_since_boot_us: int | None = None
-    """Since the latest hit; None when that was measured whole."""
+    """Time of the latest hit; None when it was measured whole."""
     earlier_invalid_since_boot_us: int | None = None
-    """Since one before it, which was still in doubt when the latest came."""
+    """Time of an earlier hit after which the velocity was not yet valid when the latest came."""
 
     @property
     def is_valid(self) -> bool:
         return self._since_us is None
 
     def is_attitude_valid(self, time_us: int) -> bool:
-        """Whether the estimator cannot have begun to correct itself, and its attitude with its velocity."""
+        """Whether the attitude is valid: no hit is being corrected, or the correction cannot have begun."""
         since_us = self._since_us
         return since_us is None or (self.earlier_invalid_since_boot_us is None and time_us - since_us < UNCORRECTED_US)
 
@@ -53,29 +52,31 @@ class VelocityValidity:
         return self.earlier_invalid_since_boot_us if self.invalid_since_boot_us is None else self.invalid_since_boot_us
 
     def invalidate(self, time_us: int) -> None:
-        """A new hit, which may have been more than was seen."""
+        """A new hit: the velocity is not valid until the hit is known to be measured whole."""
         self.earlier_invalid_since_boot_us, self.invalid_since_boot_us = self._since_us, time_us
 
     def assess(self, is_fully_measured: bool, time_us: int) -> None:
-        """Whether the latest hit has been measured whole, as far as it is known now; what an earlier one hid stays."""
+        """Take whether the latest hit was measured whole, as known by now. An earlier hit's part stays hidden."""
         if is_fully_measured:
             self.invalid_since_boot_us = None
         elif self.invalid_since_boot_us is None:
             self.invalid_since_boot_us = time_us
 
     def restore(self) -> None:
-        """The estimate agrees again."""
+        """The velocity is valid again."""
         self.invalid_since_boot_us = self.earlier_invalid_since_boot_us = None
 
     def age(self, now_us: int) -> None:
-        """Doubt ends, whatever the velocities say or if none comes."""
+        """The velocity is valid again after MOST_US in any case."""
         since_us = self._since_us
         if since_us is not None and now_us - since_us > MOST_US:
             self.restore()
 
     def update(self, fixes: Sequence[VelocityFix], level_acceleration_m_s2: Vector3) -> None:
-        """Take the newest of the velocities: less the accelerometer's sum they stand still while the two agree. And the
-        acceleration of a vehicle that is level by its attitude, as its gyroscopes show it."""
+        """Take the newest velocity, and the acceleration of a vehicle that is level by its own attitude, NED.
+
+        While velocity and accelerometer agree, the velocity minus the accelerometer's integral is constant.
+        """
         invalid_since_us, now_us = self._since_us, fixes[-1].time_boot_us
         if (
             invalid_since_us is None
