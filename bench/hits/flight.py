@@ -1,4 +1,4 @@
-"""One hit through the whole wire: a vehicle begins in flight, a guard watches it into an obstacle and brings it to rest.
+"""One hit through the whole wire: a vehicle begins in flight, and a guard watches it into an obstacle and to rest.
 
 What a mission's flight has besides, take-off, the way to the wall and the landing, decides nothing about its hit.
 """

@@ -16,5 +16,8 @@ def add_hits(commands: Commands) -> None:
     hits.add_argument("--first-seed", type=count, default=1, metavar="SEED", help="of the first hit (default 1)")
     add_vehicles(hits, "every hit")
     add_workers(hits)
+    hits.add_argument(
+        "--growth", action="store_true", help="write instead what a hit costs after 1, 10, 100 to N of them"
+    )
     hits.add_argument("--out", type=Path, default=NOTES / "hits.md", metavar="FILE", help="default: %(default)s")
     hits.set_defaults(run=runs("bench.hits_report.command:run_hits"))
