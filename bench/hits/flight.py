@@ -20,8 +20,9 @@ from bench.detectors.hits import (
     obstacle_before,
     vehicle_of_hit,
 )
+from bench.detectors.scoring import FOUND_WITHIN_US
 from bench.detectors.vehicles import AIRFRAMES
-from bench.random_missions.contacts import covers
+from bench.random_missions.contacts import SEEN_AFTER_US
 from bench.random_missions.crashes import tilts_deg
 from bench.recoveries.hits import returns
 from bench.speed.parse import parse_us
@@ -34,6 +35,7 @@ from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
+from sim_vehicle.truth import Hit
 from sim_vehicle.vehicle import SimulatedVehicle
 
 # What is met sideways; each as often as the others.
@@ -134,26 +136,32 @@ def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
 
 
 def _judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
-    """Found: the companion told of the first contact, or of what it became of it while a guard bounced."""
+    """Found: the companion told of the first contact, or of one that a guard's bounce made soon after."""
     hits, series = vehicle.truth.hits, vehicle.truth.series()
-    false = [collision for collision in told if not any(covers(hit, collision) for hit in hits)]
-    judged: Json = {"seconds": round(1e-6 * vehicle.time_boot_us, 3), "false": len(false), "touched": bool(hits)}
+    false = sum(not any(_tells_of(hit, collision) for hit in hits) for collision in told)
+    judged: Json = {"seconds": round(1e-6 * vehicle.time_boot_us, 3), "false": false, "touched": bool(hits)}
     if not hits:
         return judged
     first = hits[0]
     touched_us = first.contact_at_boot_us
     after = series["time_boot_us"] >= touched_us
-    answered = [c for c in told if touched_us <= c.sample_time_boot_us <= touched_us + 1e6 * FOLLOWED_S]
-    found = [c for c in answered if c not in false]
+    late_us = [c.sample_time_boot_us - touched_us for c in told if c.sample_time_boot_us >= touched_us]
+    is_found = bool(late_us) and late_us[0] <= FOUND_WITHIN_US
     judged |= {
-        "found": bool(found),
+        "found": is_found,
         "closing_m_s": round(first.closing_speed_m_s, 3),
         "tilt_deg": round(float(tilts_deg(series["attitude_wxyz"][after]).max()), 1),
         "lost_m": round(max(0.0, float(series["position_ned_m"][after, 2].max()) - first.contact_position_ned_m[2]), 3),
         "rest_s": None if rest_us is None else round(1e-6 * (rest_us - touched_us), 3),
     }
-    if found:
+    if is_found:
         until_s = MOST_RECOVERY_S if rest_us is None else 1e-6 * (rest_us - touched_us)
-        judged["latency_ms"] = round(1e-3 * (found[0].sample_time_boot_us - touched_us), 1)
+        judged["latency_ms"] = round(1e-3 * late_us[0], 1)
         judged["again"] = returns(FlightTruth(hits, series, EPOCH_US), np.array(first.normal_ned), until_s)
     return judged
+
+
+def _tells_of(hit: Hit, collision: CollisionReport) -> bool:
+    """While the contact lasts, or as soon after its first touch as the detectors' bench calls it found."""
+    until_us = max(hit.ended_at_boot_us + SEEN_AFTER_US, hit.contact_at_boot_us + FOUND_WITHIN_US)
+    return hit.contact_at_boot_us <= collision.sample_time_boot_us <= until_us

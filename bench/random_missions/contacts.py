@@ -87,10 +87,10 @@ def same_surface(hit: Hit, other: Hit) -> bool:
 
 
 def _seen_as(hit: Hit, collisions: Sequence[CollisionReport]) -> int | None:
-    return next((n for n, collision in enumerate(collisions) if covers(hit, collision)), None)
+    return next((n for n, collision in enumerate(collisions) if _covers(hit, collision)), None)
 
 
-def covers(hit: Hit, collision: CollisionReport) -> bool:
+def _covers(hit: Hit, collision: CollisionReport) -> bool:
     return hit.contact_at_boot_us <= collision.sample_time_boot_us <= hit.ended_at_boot_us + SEEN_AFTER_US
 
 
@@ -102,5 +102,5 @@ def without_contact(flight: JudgedFlight) -> list[CollisionReport]:
         at_us = collision.sample_time_boot_us
         return bool(on_ground[(time_us >= at_us - SEEN_AFTER_US) & (time_us <= at_us)].any())
 
-    found = [c for c in flight.report.collisions if not any(covers(hit, c) for hit in flight.truth.hits)]
+    found = [c for c in flight.report.collisions if not any(_covers(hit, c) for hit in flight.truth.hits)]
     return [collision for collision in found if not meets_ground(collision)]
