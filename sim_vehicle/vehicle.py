@@ -1,9 +1,11 @@
 """The simulated vehicle: MAVLink bytes in, one interval of flight, MAVLink bytes out."""
 
+import math
 from collections.abc import Mapping
 
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US, Autopilot
+from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget
 from sim_vehicle.autopilot.messages import Identity, StatusText
 from sim_vehicle.autopilot.mission_protocol.mission_store import MissionStore
 from sim_vehicle.mavlink.faulty_link import FaultyLink, needs_faulty_link
@@ -16,15 +18,20 @@ from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.mavlink.vibration import VibrationMetrics
 from sim_vehicle.parameters.airframe_values import defaults_from, position_gains, with_parameters
 from sim_vehicle.parameters.store import Parameters
+from sim_vehicle.physics.layout import PlantState
 from sim_vehicle.plant.plant import Plant, PlantOutput
 from sim_vehicle.scene import Scene, check_start_is_free
+from sim_vehicle.setpoint import TrajectorySetpoint
 from sim_vehicle.slow_sensors import SlowSensors
 from sim_vehicle.truth import TruthRecorder
+from sim_vehicle.world import Vector3
 
 # A signature has one byte for the link.
 _LINK_NUMBERS = 256
 # PX4 answers, then waits 0.4 s before it resets itself; a flight controller then takes some seconds to be heard again.
 REBOOT_AFTER_US, BOOT_TAKES_US = 400_000, 2_000_000
+# A vehicle that begins in flight is on the way to where it would be after so long: further than any study of a hit.
+FAR_S = 60.0
 
 
 class SimulatedVehicle:
@@ -106,6 +113,25 @@ class SimulatedVehicle:
             link.boot(self._board)
         self._tuned_at = 0
         self._reboot_at_us: int | None = None
+
+    def begin_in_flight(self, position_ned_m: Vector3, velocity_ned_m_s: Vector3) -> None:
+        """Instead of on the ground: in HOLD, nose ahead, steadily on the way to a place far ahead."""
+        north, east, down = position_ned_m
+        v_north, v_east, v_down = velocity_ned_m_s
+        yaw_rad = math.atan2(v_east, v_north)
+        self._plant.cruise(position_ned_m, velocity_ned_m_s, yaw_rad)
+        steady = TrajectorySetpoint(position_ned_m, velocity_ned_m_s, yaw_rad=yaw_rad)
+        sample = self._plant.step(steady, armed=True)
+        self._autopilot.observe(sample)
+        goal = (north + FAR_S * v_north, east + FAR_S * v_east, down + FAR_S * v_down)
+        speed_m_s = math.hypot(v_north, v_east)
+        self._autopilot.begin_in_flight(NavigatorTarget(Kind.HOLD, goal, yaw_rad, speed_m_s))
+        self.time_boot_us = sample.time_boot_us
+
+    @property
+    def state(self) -> PlantState:
+        """What is really so."""
+        return self._plant.state
 
     @property
     def truth(self) -> TruthRecorder:

@@ -56,7 +56,7 @@ def run_campaign(campaign: Campaign, workers: Workers, folder: Path = RECORDS_FO
         if missing:
             for outcome in with_progress(_outcomes(campaign, missing, workers), len(missing), campaign.name):
                 record.add(outcome)
-        return _sorted(record)
+        return _sorted(record, len(campaign.cases))
     except KeyboardInterrupt:
         _say(f"\n{campaign.name}: broken off after {len(record.outcomes)} cases; the same command goes on from there")
         raise
@@ -137,8 +137,9 @@ def _check_versions(client: Client, campaign: Campaign) -> None:
             )
 
 
-def _sorted(record: Record) -> Results:
-    ordered = [record.outcomes[number] for number in sorted(record.outcomes)]
+def _sorted(record: Record, cases: int) -> Results:
+    """Without what a longer campaign of the same cases has beyond them."""
+    ordered = [record.outcomes[number] for number in sorted(record.outcomes) if number < cases]
     return Results(
         {outcome.number: outcome.result for outcome in ordered if outcome.result is not None},
         {outcome.number: outcome.failure for outcome in ordered if outcome.failure is not None},

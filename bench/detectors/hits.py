@@ -138,7 +138,7 @@ def fly_hit(
     free_s = float(rng.uniform(*FREE_FLIGHT_S))
     start = np.array([0.0, 0.0, -HEIGHT_M])
     yaw_rad = float(rng.uniform(-math.pi, math.pi))
-    obstacle = _obstacle(case, airframe, start + free_s * velocity, towards, rng, offset_share)
+    obstacle = obstacle_before(case, airframe, start + free_s * velocity, towards, rng, offset_share)
     scene = Scene.model_validate(_coming(obstacle, -towards, free_s) if case.is_struck else obstacle)
     cruise = Cruise(airframe, scene, _triple(start), _triple(velocity), yaw_rad, case.seed)
     recording, interval_s = VehicleRecording(), 1e-6 * airframe.imu.integration_interval_us
@@ -182,7 +182,7 @@ def _velocity(case: HitCase, airframe: Airframe, rng: np.random.Generator) -> Fl
     return case.speed_m_s * direction
 
 
-def _obstacle(
+def obstacle_before(
     case: HitCase,
     airframe: Airframe,
     at_ned_m: Floats,

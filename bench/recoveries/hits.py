@@ -119,7 +119,7 @@ def _figures(flown: Flown, truth: FlightTruth, mission: Mission) -> Json:
     below_m = path[during, 2] - touched[2]
     past_m = (path[during] - np.array(last.recovery_setpoint_ned_m)) @ normal
     return {
-        "returned": _returns(truth, normal, until_s),
+        "returned": returns(truth, normal, until_s),
         "settled_s": settled_s,
         "past_m": max(0.0, float(past_m.max())),
         "clear_m": float(((path[resting] - touched) @ normal).min()) if resting.any() else None,
@@ -128,7 +128,7 @@ def _figures(flown: Flown, truth: FlightTruth, mission: Mission) -> Json:
     }
 
 
-def _returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
+def returns(truth: FlightTruth, normal: np.ndarray, until_s: float) -> int:
     """Touches in the recovery to which the centre had come back; the others are another guard swinging in."""
     hit, time_us = truth.hits[0], truth.series["time_boot_us"]
     off_m = truth.series["position_ned_m"] @ normal

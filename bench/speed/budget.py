@@ -4,8 +4,9 @@ The same flight is flown again and again: its intervals are the same each time, 
 the least time of all flights is taken. What the machine does besides falls out.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter_ns
+from time import perf_counter_ns, thread_time_ns
 from typing import Any
 
 import numpy as np
@@ -33,31 +34,53 @@ class Budget:
 
 def measured_budget(flights: int) -> Budget:
     least = 1e-3 * np.min([_timed_flight() for _ in range(flights)], axis=0)
-    names = [part.name for part in PARTS]
-    spent = dict(zip(names, map(float, least.mean(axis=0)), strict=True))
-    mean = {name: us - sum(spent[part.name] for part in PARTS if part.caller == name) for name, us in spent.items()}
-    return Budget(mean, float(least[:, names.index(KERNEL)].min()))
+    spent = dict(zip((part.name for part in PARTS), map(float, least.mean(axis=0)), strict=True))
+    return Budget(_own(spent), float(least[:, [part.name for part in PARTS].index(KERNEL)].min()))
+
+
+def spent_ms(run: Callable[[], object]) -> dict[str, float]:
+    """Of the processor, by part without the parts that it calls, in a run of any kind; the timers count, too."""
+    spent = _timed(run, lambda spent: None, thread_time_ns)
+    return _own({name: 1e-6 * ns for name, ns in spent.items()})
+
+
+def _own(spent: dict[str, float]) -> dict[str, float]:
+    return {name: one - sum(spent[part.name] for part in PARTS if part.caller == name) for name, one in spent.items()}
 
 
 def _timed_flight() -> Ints:
     """Nanoseconds of each part in each interval, with the parts that it calls (intervals, parts)."""
     rows: list[tuple[int, ...]] = []
+
+    def end_interval(spent: dict[str, int]) -> None:
+        rows.append(tuple(spent.values()))
+        spent.update(dict.fromkeys(spent, 0))
+
+    _timed(fly, end_interval)
+    return np.array(rows)
+
+
+def _timed(
+    run: Callable[[], object],
+    when_logged: Callable[[dict[str, int]], None],
+    clock_ns: Callable[[], int] = perf_counter_ns,
+) -> dict[str, int]:
+    """Nanoseconds of each part, with the parts that it calls; `when_logged` is told after each interval's log."""
     spent = {part.name: 0 for part in PARTS}
 
     def timed(part: Part, function: Function) -> Function:
         name, is_last = part.name, part.name == LOG
 
-        def run(*arguments: Any, **named: Any) -> Any:
-            begun = perf_counter_ns()
+        def call(*arguments: Any, **named: Any) -> Any:
+            begun = clock_ns()
             result = function(*arguments, **named)
-            spent[name] += perf_counter_ns() - begun
+            spent[name] += clock_ns() - begun
             if is_last:
-                rows.append(tuple(spent.values()))
-                spent.update(dict.fromkeys(spent, 0))
+                when_logged(spent)
             return result
 
-        return run
+        return call
 
     with wrapped(timed):
-        fly()
-    return np.array(rows)
+        run()
+    return spent

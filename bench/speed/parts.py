@@ -24,13 +24,13 @@ KERNEL, PLANT, VEHICLE, COMPANION, LOG = "plant: kernel", "plant: the rest", "ve
 PARTS = (
     Part(KERNEL, "sim_vehicle.plant.plant:advance_boxed", PLANT),
     Part(PLANT, "sim_vehicle.plant.plant:Plant._advance", VEHICLE),
-    Part(VEHICLE, "sim_vehicle.vehicle:SimulatedVehicle.step"),
+    Part(VEHICLE, "sim_vehicle.vehicle:SimulatedVehicle.advance"),
     Part("vehicle: MAVLink in", "sim_vehicle.mavlink.link:Link.receive", VEHICLE),
     Part("vehicle: MAVLink out", "sim_vehicle.mavlink.link:Link.update", VEHICLE),
     Part("companion: MAVLink in", "companion.mavlink.decode:Decoder.feed", COMPANION),
-    Part(COMPANION, "companion.companion:Companion.step"),
+    Part(COMPANION, "companion.companion:Stepped.step"),
     Part("companion: MAVLink out", "companion.mavlink.encode:Encoder.all_packets", COMPANION),
-    # The last of an interval.
+    # The last of an interval of a flight that is logged.
     Part(LOG, "rebound_cli.run_folder:FlightRecorder.record"),
 )
 

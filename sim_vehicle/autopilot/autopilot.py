@@ -5,8 +5,8 @@ from enum import IntEnum
 from sim_vehicle.autopilot import commands, flight_commands
 from sim_vehicle.autopilot.commander.commander import Commander, SystemStatus
 from sim_vehicle.autopilot.flight_tasks.manual import BY_STICKS, ManualFlight
-from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, wants_takeoff
-from sim_vehicle.autopilot.flight_tasks.target import Kind, View
+from sim_vehicle.autopilot.flight_tasks.takeoff import Takeoff, TakeoffState, wants_takeoff
+from sim_vehicle.autopilot.flight_tasks.target import Kind, NavigatorTarget, View
 from sim_vehicle.autopilot.ground_commands import Ground
 from sim_vehicle.autopilot.land_detector import LandDetector
 from sim_vehicle.autopilot.messages import (
@@ -120,6 +120,18 @@ class Autopilot:
         self._estimate = estimate
         self._now_us = estimate.time_boot_us
         self.battery.update(self._now_us, self.arming.armed, estimate.thrust_fraction)
+
+    def begin_in_flight(self, goal: NavigatorTarget) -> None:
+        """As after a while on the way in HOLD: armed, off the ground, with a demand for the motors."""
+        self.detector.begin_in_flight()
+        self._takeoff.state = TakeoffState.FLIGHT
+        home = self.home_ned_m, self.home_yaw_rad
+        self._look()
+        self.arm()
+        self.navigator.set_home(*home)
+        self.commander.texts.clear()
+        self.navigator.hold_at(goal)
+        self._demanded_us = self._now_us - POSITION_PERIOD_US
 
     # --- commands ----------------------------------------------------------------------------------------
 

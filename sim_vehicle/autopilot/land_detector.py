@@ -61,6 +61,12 @@ class LandDetector:
         self.landed = True
         """Third stage: all of it for long enough."""
 
+    def begin_in_flight(self) -> None:
+        """The vehicle has been flying for a while."""
+        for stage in (self._contact, self._maybe, self._landed):
+            stage.state = False
+        self.ground_contact = self.maybe_landed = self.landed = False
+
     def update(
         self,
         now_us: int,

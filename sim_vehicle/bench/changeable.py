@@ -7,7 +7,7 @@ from sim_vehicle.faults.spec import Fault, overlapping
 from sim_vehicle.mavlink.faulty_link import FaultyLink
 from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.restamp import check_messages
-from sim_vehicle.physics.layout import Constants, PlantState
+from sim_vehicle.physics.layout import Constants
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle
 from sim_vehicle.world import Obstacle, build_world
@@ -25,11 +25,6 @@ class ChangeableVehicle(SimulatedVehicle):
 
     def _new_link(self, options: LinkOptions, number: int, seed: int) -> Link:
         return FaultyLink(options, self._board, number, seed, self._faults)
-
-    @property
-    def state(self) -> PlantState:
-        """What is really so."""
-        return self._plant.state
 
     @property
     def constants(self) -> Constants:

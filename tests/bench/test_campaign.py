@@ -1,7 +1,9 @@
 """The campaign engine: who computes, in what order and how often it was broken off changes nothing."""
 
 import json
+import os
 import random
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -20,12 +22,14 @@ pytestmark = pytest.mark.slow
 SCRIPT = """\
 import sys
 from pathlib import Path
-from tests.bench.test_campaign import campaign, table
+from tests.bench.test_campaign import campaign, table, throw_and_die_once
 from distributed import LocalCluster
 from bench.campaign.run import Workers, run_campaign
 if __name__ == "__main__":
     who, folder = sys.argv[1], Path(sys.argv[2])
-    if who == "scheduler":
+    if who == "killed":
+        print(table(run_campaign(campaign(work_out=throw_and_die_once, die=str(folder / "died")), Workers(2), folder)))
+    elif who == "scheduler":
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=':0') as cluster:
             print(table(run_campaign(campaign(), Workers(scheduler=cluster.scheduler_address), folder)))
     else:
@@ -39,6 +43,7 @@ class Throw:
 
     seed: int
     fails: bool = False
+    die: str = ""
 
 
 def throw(case):
@@ -47,9 +52,17 @@ def throw(case):
     return {"height_m": random.Random(case.seed).random(), "seed": case.seed}
 
 
-def campaign(cases=30, **parameters):
-    throws = [Throw(1000 + number, fails=number in (4, 17)) for number in range(cases)]
-    return Campaign("throws", {"cases": cases, **parameters}, throws, throw)
+def throw_and_die_once(case):
+    """The same, but the tenth takes its worker with it the first time."""
+    if case.seed == 1010 and not os.path.exists(case.die):
+        Path(case.die).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return throw(case)
+
+
+def campaign(cases=30, work_out=throw, die="", **parameters):
+    throws = [Throw(1000 + number, fails=number in (4, 17), die=die) for number in range(cases)]
+    return Campaign("throws", {"cases": cases, **parameters}, throws, work_out)
 
 
 def table(results):
@@ -70,13 +83,13 @@ def in_process(monkeypatch):
 def test_one_two_or_a_schedulers_workers_give_the_same_bytes(tmp_path):
     # Given the same campaign in folders of its own
     texts = []
-    for who in ("1", "2", "scheduler"):
-        # When one process works it out, or two, or the workers of a scheduler that was there before
+    for who in ("1", "2", "killed", "scheduler"):
+        # When one process works it out, or two, or two of which one is killed, or those of a scheduler that was there
         command = [sys.executable, "-c", SCRIPT, who, str(tmp_path / who)]
         done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=True, timeout=300)
         texts.append(done.stdout)
     # Then the results are the same to the byte, with the failures among them
-    assert texts[0] == texts[1] == texts[2]
+    assert len(set(texts)) == 1 and (tmp_path / "killed" / "died").exists()
     results, failures = json.loads(texts[0])
     assert len(results) == 28 and set(failures) == {"4", "17"}
 
@@ -143,6 +156,16 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(running, "CONNECT_TIMEOUT_S", 0.5)
     with pytest.raises(CampaignError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:9"):
         run_campaign(campaign(), Workers(scheduler="tcp://127.0.0.1:9"), tmp_path)
+
+
+def test_of_a_longer_campaigns_record_a_shorter_one_takes_its_own_cases(tmp_path, in_process, monkeypatch):
+    monkeypatch.setattr(Campaign, "key", "the same")
+    run_campaign(campaign(), Workers(), tmp_path)
+    head = {"parameters": {"cases": 30}, "campaign": "throws", "version": campaign().version}
+    record = tmp_path / "throws-the same.jsonl"
+    assert json.loads(record.read_text().partition("\n")[0]) == head
+    shorter = Campaign("throws", {"cases": 30}, campaign().cases[:12], throw)
+    assert set(run_campaign(shorter, Workers(), tmp_path).results) == {*range(12)} - {4}
 
 
 def test_the_record_grows_one_line_a_case(tmp_path, in_process):

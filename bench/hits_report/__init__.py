@@ -1,0 +1,1 @@
+"""What the hits through the whole wire show: bench/notes/hits.md."""

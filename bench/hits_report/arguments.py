@@ -1,0 +1,23 @@
+"""The arguments of `bench hits`."""
+
+from pathlib import Path
+
+from bench.arguments import NOTES, add_vehicles, add_workers
+from rebound_cli.arguments import Commands, count, runs
+
+
+def add_hits(commands: Commands) -> None:
+    hits = commands.add_parser(
+        "hits",
+        help="fly hits alone, from just before each to rest, and write which were missed",
+        description="Hits on walls and poles by vehicles that begin in flight, guarded through the whole wire.",
+    )
+    hits.add_argument("--hits", type=count, default=1000, metavar="N", help="default 1000")
+    hits.add_argument("--first-seed", type=count, default=1, metavar="SEED", help="of the first hit (default 1)")
+    add_vehicles(hits, "every hit")
+    add_workers(hits)
+    hits.add_argument(
+        "--growth", action="store_true", help="write instead what a hit costs after 1, 10, 100 to N of them"
+    )
+    hits.add_argument("--out", type=Path, default=NOTES / "hits.md", metavar="FILE", help="default: %(default)s")
+    hits.set_defaults(run=runs("bench.hits_report.command:run_hits"))
