@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.after_hit import afterwards, take_back
-from companion.flight.collision import CollisionRecord, in_one_recovery
+from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery
 from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.detection_event import report_detection
@@ -147,7 +147,7 @@ class Recover:
                 if transition is not None:
                     return transition
             record.estimator.update(sample)
-            is_known = self._knows(sample.time_boot_us)
+            is_known = self._knows(sample)
             self._follow(flight, sample, now_us)
             if not is_known:
                 continue
@@ -178,16 +178,15 @@ class Recover:
         flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
         return afterwards(flight)
 
-    def _knows(self, time_boot_us: int) -> bool:
+    def _knows(self, sample: LocalPosition) -> bool:
         """Whether the estimate shows the motion after the hit; until then the motion reckoned is planned from."""
-        if self._is_known:
-            return True
-        record = self._record
-        since_us = time_boot_us - record.sample_time_boot_us
-        self._is_known = record.estimator.has_converged and since_us >= MOTION_KNOWN_US
-        if self._is_known:
-            v, w = record.contact.velocity_ned_m_s, record.estimator.motion.velocity_ned_m_s
-            self._agreed = consistent_normal(record.normal_ned, v, w)
+        record, was_known = self._record, self._is_known
+        since_us = sample.time_boot_us - record.sample_time_boot_us
+        self._is_known = was_known or (record.estimator.has_converged and since_us >= MOTION_KNOWN_US)
+        is_rebound = sample.time_boot_us <= record.contact_ended_boot_us + REBOUND_WINDOW_US
+        if self._law.follows and self._is_known and (is_rebound or not was_known):
+            after = record.estimator.corrected(sample).velocity_ned_m_s
+            self._agreed = consistent_normal(record.normal_ned, record.contact.velocity_ned_m_s, after)
         return self._is_known
 
     def _state(self) -> MotionState:

@@ -306,6 +306,23 @@ def test_a_place_that_jumps_makes_no_large_error_of_a_velocity():
     assert math.hypot(*found.velocity_error_m_s) <= MOST_VELOCITY_ERROR_M_S + 1e-9
 
 
+def test_a_push_that_its_sensor_shows_one_axis_of_is_turned_back_by_the_velocity():
+    # Given a slanted wall met at 1.2 m/s, of whose push the accelerometer shows the part along the east alone
+    flight, record, recover = recovering(velocity=(1.2, 0.0, 0.0))
+    record.reckoning.tell(True, HIT_US)
+    record.normal_ned, record.contact_ended_boot_us = (0.0, -1.0, 0.0), HIT_US + 80_000
+    # When the velocity goes on changing after the last sample that showed a push
+    north_m, east_m, before_us = 3.05, 0.0, 60_000
+    for at_us, (n, e) in ((84, (0.6, -0.47)), (124, (0.4, -0.55)), (164, (0.2, -0.6)), (260, (0.6, 0.4))):
+        elapsed_s, before_us = 1e-3 * at_us - 1e-6 * before_us, 1_000 * at_us
+        north_m, east_m = north_m + elapsed_s * n, east_m + elapsed_s * e
+        told = LocalPosition(HIT_US + before_us, (north_m, east_m, -2.0), (n, e, 0.0))
+        recover.step(flight, Inputs(positions=[told]), before_us)
+    # Then the way off is along what the contact did to it, and not along what the vehicle's own thrust does later
+    normal = recover._contact.normal_ned
+    assert normal == pytest.approx((-0.857, -0.514, 0.0), abs=0.02)
+
+
 def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
     # Given arms that are pressed in by 0.1 m, and push the vehicle out again
     flight, record, recover = recovering(velocity=(1.0, 0.0, 0.0))
