@@ -12,7 +12,7 @@ from companion.flight.context import FlightContext, Inputs, Target, Transition, 
 from companion.flight.detection_event import report_detection
 from companion.flight.obstacle_map import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
-from companion.motion.rotation import body_to_ned
+from companion.motion.rotation import body_to_ned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.reflex.config import (
     ACCELERATION_GAIN,
@@ -30,6 +30,7 @@ from companion.reflex.config import (
     SPINNING_RAD_S,
     STOPPING_M_S2,
     TOUCH_TOLERANCE_M,
+    YAW_LEAD_RAD,
 )
 from companion.reflex.halfspace import FenceBounds, FreeSpace, Surface, away_from, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
@@ -46,7 +47,7 @@ class Recover:
         self._contact = record.contact
         self._limits = Limits(self._config.acceleration_m_s2)
         self._first_hit_us = in_one_recovery(flight.collisions)[-1].detected_at_us
-        if flight.target is not None:
+        if flight.target is not None and len(in_one_recovery(flight.collisions)) == 1:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
@@ -137,8 +138,10 @@ class Recover:
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
         record, attitude = self._record, flight.vehicle.attitude
-        if attitude is not None and attitude.angular_velocity_frd_rad_s is not None:
-            self._spin_rad_s = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)[2]
+        if attitude is not None:
+            self._yaw_rad = heading_towards(yaw_rad(attitude.attitude_wxyz), flight.yaw_rad)
+            if attitude.angular_velocity_frd_rad_s is not None:
+                self._spin_rad_s = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)[2]
         self._may_fall = _has_room_below(flight)
         for sample in inputs.positions:
             noise_m = flight.mission.companion.estimate.position_noise_m
@@ -175,7 +178,7 @@ class Recover:
 
     def _leave(self, flight: FlightContext) -> Transition:
         """What follows begins at rest at the setpoint."""
-        flight.target = Target(self._record.setpoint_ned_m, self._yaw_rad)
+        flight.target = Target(self._record.setpoint_ned_m, flight.yaw_rad)
         return afterwards(flight)
 
     def _knows(self, sample: LocalPosition) -> bool:
@@ -258,6 +261,17 @@ class Recover:
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+
+def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | None:
+    """The heading to ask for on the way back to a wanted one: it leads the vehicle's own by `YAW_LEAD_RAD` at most.
+
+    Motors that turn a vehicle as fast as they can have no thrust left to climb with.
+    """
+    if wanted_rad is None:
+        return None
+    short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
+    return wanted_rad if abs(short_rad) <= YAW_LEAD_RAD else heading_rad + math.copysign(YAW_LEAD_RAD, short_rad)
 
 
 def _has_room_below(flight: FlightContext) -> bool:

@@ -11,7 +11,7 @@ from companion.flight.context import FlightContext, Inputs
 from companion.flight.recovering import Recover, consistent_normal
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
-from companion.messages import LocalPosition
+from companion.messages import Attitude, LocalPosition
 from companion.mission.model import Mission
 from companion.motion.strapdown import Strapdown
 from companion.reflex.config import CONVERGED_M_S, MOST_VELOCITY_ERROR_M_S, TILT_PER_S
@@ -309,7 +309,7 @@ def test_a_place_that_jumps_makes_no_large_error_of_a_velocity():
 def test_a_push_that_its_sensor_shows_one_axis_of_is_turned_back_by_the_velocity():
     # Given a slanted wall met at 1.2 m/s, of whose push the accelerometer shows the part along the east alone
     flight, record, recover = recovering(velocity=(1.2, 0.0, 0.0))
-    record.reckoning.tell(True, HIT_US)
+    record.estimator.note_contact(True, HIT_US)
     record.normal_ned, record.contact_ended_boot_us = (0.0, -1.0, 0.0), HIT_US + 80_000
     # When the velocity goes on changing after the last sample that showed a push
     north_m, east_m, before_us = 3.05, 0.0, 60_000
@@ -321,6 +321,22 @@ def test_a_push_that_its_sensor_shows_one_axis_of_is_turned_back_by_the_velocity
     # Then the way off is along what the contact did to it, and not along what the vehicle's own thrust does later
     normal = recover._contact.normal_ned
     assert normal == pytest.approx((-0.857, -0.514, 0.0), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "asked_deg"), [(10.0, 0.0), (-15.0, 0.0), (-120.0, -104.0), (120.0, 104.0), (350.0, 0.0)]
+)
+def test_a_vehicle_that_a_hit_has_turned_is_turned_back_at_leisure(heading_deg, asked_deg):
+    # Given a vehicle that is to head north
+    flight, _, recover = recovering()
+    flight.yaw_rad, half_rad = 0.0, math.radians(0.5 * heading_deg)
+    flight.vehicle.attitude = Attitude(HIT_US, (math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)))
+    # When it recovers, then it is asked for no heading far from its own
+    recover.step(flight, Inputs(), 100_000)
+    assert math.degrees(recover.target(100_000).yaw_rad) == pytest.approx(asked_deg, abs=0.1)
+    # And for its heading of before when that is over
+    assert recover.step(flight, Inputs(), 11_000_000) is not None
+    assert flight.target.yaw_rad == 0.0
 
 
 def test_what_pushes_until_the_motion_is_known_is_where_the_vehicle_is():
