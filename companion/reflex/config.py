@@ -45,8 +45,8 @@ DESCENT_M_S2 = 4.9
 STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 # rad/s. From here on a tilt that lags by LEAD_S points 45 degrees and more beside the setpoint of PX4's own loops.
 SPINNING_RAD_S = 6.0
-# Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s. A
-# slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
+# Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
+# A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
 YAW_LEAD_RAD = 0.28
 
 # PX4 holds the last setpoint for COM_OF_LOSS_T, 1 s by default, and notices the silence late: with 1 s set, a real PX4
