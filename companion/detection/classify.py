@@ -1,4 +1,4 @@
-"""What was touched, from the push's direction, the motion before it and what the flight was about."""
+"""The kind of an impact, from the contact force's direction, the motion before it and the flight's situation."""
 
 import math
 
@@ -7,7 +7,7 @@ from companion.messages import Vector3
 
 # A vehicle slower than this did not run into anything: the obstacle came to it. Six times the noise of a good estimate.
 HOVER_M_S = 0.2
-# Push within 45 degrees of the vertical: from a ceiling or a floor.
+# Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
@@ -16,17 +16,17 @@ TURN_RAD_S_PER_M_S = 10.0
 
 
 def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
-    """Whether a vehicle with this velocity is too slow to have run into anything; not where it is unknown."""
+    """Whether this velocity is too small to have run into anything; False where it is unknown."""
     return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < HOVER_M_S
 
 
 def kind_of(
     impulse_ned_m_s: Vector3, velocity_ned_m_s: Vector3 | None, turn_rad_s: float, situation: Situation
 ) -> ImpactKind:
-    """By direction and circumstances alone: no magnitude of the push decides, so that none can be mistaken.
+    """The kind by direction and situation alone; the size of the force has no influence.
 
-    Touching the ground at the end of a commanded descent is a landing however hard it is; the same push without a
-    descent having been asked for is a strike. `turn_rad_s` is by how much the contact changed the rates.
+    Contact with the ground at the end of a commanded descent is a landing, however hard. The same force without a
+    commanded descent is a strike. `turn_rad_s` is the change of the body rates by the contact.
     """
     push = impulse_ned_m_s
     size = math.sqrt(push[0] ** 2 + push[1] ** 2 + push[2] ** 2)

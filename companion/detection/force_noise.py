@@ -1,31 +1,30 @@
-"""What this vehicle shakes, axis by axis: running means and spreads of the specific force, learnt in its own flight."""
+"""Running mean and standard deviation of the specific force on each axis, learnt in the vehicle's own flight."""
 
 import math
 from dataclasses import dataclass
 
-# The mean follows what is not noise: drag as the speed changes, a gust that builds up in a few tenths of a second.
+# Memory of the mean. It follows drag as the speed changes, and a gust that builds up in a few tenths of a second.
 MEAN_MEMORY_S = 0.25
-# A spread good to 5 % needs 200 samples; at the slowest useful rates it is still good to 12 %.
+# Memory of the standard deviation: good to 5 % with 200 samples, to 12 % at the slowest useful rates.
 SPREAD_MEMORY_S = 2.0
-# Heard for less than this, what a vehicle shakes is not known: 50 samples at 50 Hz make a spread good to a tenth.
+# The noise is known after this time: 50 samples at 50 Hz make a standard deviation good to a tenth.
 LEARNT_S = 1.0
-# Off the ground its rotors at full thrust have yet to show what they shake: as long as a rising spread needs.
+# After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
 SETTLED_US = 300_000
-# More throttle shakes more within a second: the spread of what changes from sample to sample rises fast and falls
-# slowly. Of normal noise it then reads half too much, 1.5 standard deviations.
+# Vibration grows within a second of more throttle. So the jitter, the change from sample to sample, rises fast and
+# falls slowly. For normal noise it then reads 1.5 standard deviations.
 JITTER_RISE_S = 0.3
 JITTER_EXCESS = 1.5
-# A gap says nothing about what was in it: a sample after one weighs as one of this length.
+# A sample after a gap has the weight of an interval of this length.
 LONGEST_STEP_S = 0.05
 
 
 @dataclass(slots=True)
 class ForceNoise:
-    """Exponentially weighted, on body x, y, z. Changed only by `learn`.
+    """Exponentially weighted mean and variances on body x, y, z. Changed only by `learn`.
 
-    Two variances on each axis: of the departures from the mean (vibration that the stream's rate folds into slow
-    waves shows here) and, as half the squared change from sample to sample, of the jitter (which a force that only
-    grows does not feign, and which may rise fast for that).
+    Each axis has two variances. One is about the mean; it contains vibration that is aliased to slow waves. The other
+    is of the jitter, half the squared change from sample to sample; a force that grows steadily does not raise it.
     """
 
     x: float = 0.0
@@ -41,8 +40,8 @@ class ForceNoise:
     jitter_y: float = 0.0
     jitter_z: float = 0.0
     known_s: float = 0.0
-    side_m_s2: float = 0.0  # spread on the noisier of x and y
-    vertical_m_s2: float = 0.0  # spread on z
+    side_m_s2: float = 0.0  # standard deviation on the noisier of x and y
+    vertical_m_s2: float = 0.0  # standard deviation on z
 
     @property
     def is_known(self) -> bool:

@@ -1,6 +1,6 @@
-"""What one sample of the accelerometer shows of a contact: a push sideways or along the thrust.
+"""Thresholds of the contact force in one accelerometer sample, horizontal and along the thrust.
 
-Each against what this vehicle shows in its own flight (see `fused`); the state is only read.
+They depend on this vehicle's noise in its own flight (see `fused`). The state is only read.
 """
 
 import math
@@ -9,13 +9,13 @@ from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.messages import Vector3
 
-# On a vehicle that shakes one sample below so many thresholds may be the sensor's own (once in four public logs, 1.2):
-# the next one must show it, too. Where it shakes until the detector is told to be blind, only what is clear counts.
+# On a vibrating vehicle a single sample below this many thresholds may be noise (once in four public logs, with 1.2):
+# the next one must confirm it. Above MOST_THRESHOLD_M_S2 only larger forces count.
 CLEAR = 1.3
 
 
 def side_threshold_m_s2(s: FusedState, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
-    """What a push sideways must reach: drag goes round with a vehicle that turns while its mean stays behind."""
+    """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
     v = s.velocity_ned_m_s
     if v is None:
         return s.threshold_m_s2
@@ -25,12 +25,12 @@ def side_threshold_m_s2(s: FusedState, config: FusedConfig, rates_frd_rad_s: Vec
 
 
 def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
-    """What a push along the thrust must be beyond what propellers can do."""
+    """Vertical threshold, m/s^2, beyond the force that propellers can make."""
     return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
 
 
 def pushes_on(s: FusedState, force_frd_m_s2: Vector3) -> bool:
-    """Whether the sample before was pushed the same way, as by a contact; what shakes goes to and fro."""
+    """Whether the sample before had a force in the same direction, as in a contact; vibration alternates."""
     x, y, z = s.soft.last
     f_x, f_y, f_z = force_frd_m_s2
     return (x - s.floor.x) * f_x + (y - s.floor.y) * f_y + (z - s.floor.z) * f_z > 0.0

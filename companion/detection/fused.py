@@ -1,17 +1,16 @@
-"""Detector `fused`, the default: force that nothing else explains, and what an unseen contact leaves behind.
+"""Detector `fused`, the default: an unexplained external force, or a velocity jump after an unseen contact.
 
-By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs of a
-contact, each against what this vehicle shows in its own flight:
+By the paper's eq. 1 a free quadrotor's accelerometer shows thrust along body z and drag on x and y. Three signs show a
+contact, each compared with this vehicle's own flight:
 
-* sideways: a departure of f_x, f_y from their running mean, and from nothing, with room for the drag that changes
-  as the vehicle turns;
-* vertical: f_z outside what propellers can do, from nothing to their most (see `thrust`): a motor that fails, free
+* horizontal: f_x, f_y differ from their running mean and from zero, with an allowance for drag on a turning vehicle;
+* vertical: f_z is outside the range of the propellers, from zero to their maximum (see `thrust`). A failed motor, free
   fall, a dropped payload and every manoeuvre stay inside;
-* a velocity that jumps by what the accelerometer did not show (see `velocity_jump`), with less asked for when the rates
-  jumped, too.
+* the velocity jumps and the accelerometer does not show it (see `velocity_jump`). The threshold is lower beside a rate
+  jump.
 
-What was touched is `classify`'s; a weak force on a vehicle that hovers, or just did, is looked at for a moment before
-it is called a hit or a hand (see `soft`).
+`classify` names the kind. A weak force on a hovering vehicle is observed for a moment before it counts as a hit or a
+hand (see `soft_contact`).
 """
 
 import math
@@ -30,15 +29,15 @@ from companion.messages import AttitudeTarget, ImuSample, LocalPosition, Message
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import LEVEL
 
-# A vehicle shakes whose threshold is this many times the least: four public logs' are at four to nine times.
+# A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times.
 SHAKING = 2.0
-# A contact that has lasted longer than springs take to bottom out, and then is half as hard again as it has ever
-# been, is another hit: a vehicle that scrapes along the ground and then strikes it.
+# A contact longer than springs take to bottom out, whose force then exceeds its peak by half, is another hit: a vehicle
+# scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
 WORSE = 1.5
-# After a hit an estimator puts right what it missed of it; by then what is left of the swing is no step. Also where the
-# hit seemed to have been measured whole, which a slow stream's samples, a quarter of the time, cannot know.
-# Those steps reach 0.25 m/s (random missions at 50 Hz); a second hit of 0.5 m/s makes twice that.
+# For this time after a hit the velocity threshold is larger by this factor, because the estimator corrects the part it
+# missed. That holds for every hit: a slow stream samples a quarter of the time and cannot exclude a hidden part. The
+# corrections reach 0.25 m/s (random missions at 50 Hz); a second hit of 0.5 m/s makes twice that.
 SWING_US, SWINGING = 1_500_000, 3.0
 
 
@@ -85,7 +84,7 @@ class FusedDetector:
         f_x, f_y, f_z = f
         off = situation.why_off
         x, y = f_x - s.floor.x, f_y - s.floor.y
-        # A push that ends leaves nothing, however long it has lasted and been learnt.
+        # Compared with zero, too: the end of a long force, which the mean has learnt, is no hit.
         side = math.sqrt(min(x * x + y * y, f_x * f_x + f_y * f_y))
         room = vertical_threshold_m_s2(s, config)
         most = s.thrust.most_m_s2(now_us)
@@ -129,7 +128,7 @@ class FusedDetector:
             s.phase = Phase.ARMED if s.floor.is_known else Phase.QUIET
 
     def _switched_on(self, s: FusedState) -> None:
-        """Quiet must follow; after standing on the ground, from a while later on."""
+        """Begin a quiet interval; after the ground it begins SETTLED_US later."""
         now_us = s.contact_began_boot_us = s.last_sample_boot_us
         s.last_loud_boot_us = now_us + SETTLED_US if s.off_reason == ON_THE_GROUND else now_us
         s.phase, s.off_reason = Phase.QUIET, ""
@@ -150,7 +149,7 @@ class FusedDetector:
                 self._learn(s, f, now_us - 1)
             return None
         if s.phase is not Phase.ARMED:
-            # Switched on in the middle of a shake: it is learnt too, or a threshold too low would never rise.
+            # Switched on during vibration: it is learnt too, or too low a threshold would never rise.
             if s.phase is Phase.OFF:
                 self._switched_on(s)
             waited = now_us - s.contact_began_boot_us > self._longest_us and s.floor.is_known
@@ -227,7 +226,7 @@ class FusedDetector:
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, confidence)
 
     def _least_jump_m_s(self, s: FusedState, time_us: int, spread_m_s: float, counts_resets: bool) -> float:
-        """What a jump must reach; more where the velocity may jump by itself."""
+        """Threshold of a velocity jump, m/s; larger where the estimate may jump without a hit."""
         config, jump = self._config, s.jump
         caution = 1.0 if counts_resets else 2.0
         if s.hit_boot_us is not None and time_us - s.hit_boot_us < SWING_US:
@@ -238,7 +237,7 @@ class FusedDetector:
         shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
         noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
         if jump.no_motor_turns(time_us, config.rate_step_rad_s):
-            # Two signs, half as clear, and the thrust has not turned for long.
+            # Two signs confirm each other: half the noise is enough, and the thrust has turned for a moment only.
             noise_m_s, room = 0.5 * noise_m_s, 0.0
         if jump.is_slow:
             least = config.velocity_step_slow_m_s

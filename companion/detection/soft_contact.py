@@ -1,8 +1,8 @@
 """A weak force on a vehicle that hovers, or just did: a person's hand, or a soft strike.
 
-They differ in how the force begins. An arm takes 80 ms and more to push; a hand that grips takes away the little speed
-that a hover has. Whatever strikes comes with its speed, and its force is there from one sample to the next. So a force
-is looked at for a moment, and is a strike as soon as it jumps.
+They differ in how the force begins. An arm takes 80 ms and more to push; a hand that grips stops the small speed of a
+hover. An obstacle strikes with its own speed, and its force is there from one sample to the next. So a force is
+observed for a moment, and is a strike as soon as it jumps.
 """
 
 import math
@@ -11,17 +11,18 @@ from dataclasses import dataclass
 from companion.detection.classify import hovers
 from companion.messages import Vector3
 
-# A vehicle that a hand pushes with 2 m/s^2 soon moves, and is let go half a second later.
+# A vehicle counts as hovering for this time after it hovered: pushed by a hand with 2 m/s^2 it soon moves.
 HOVERED_US = 500_000
-# What a hand does steadily is learnt as if it were drag, and shows again when it lets go; it was told before.
+# A steady hand's force is learnt as if it were drag, and shows again when it lets go. Within this time it is the same
+# hand.
 HAND_US = 2_000_000
-# A jump may fall into two windows of a quick stream; in 20 ms the fastest push of 6 m/s^2 changes by 2.3.
+# A jump may lie in two averaging windows of a fast stream. In 20 ms a hand's force of 6 m/s^2 changes by 2.3.
 JUMP_OVER_US = 21_000
-# A grip of 30 N s/m takes the 0.1 m/s that a hovering kilogram drifts at with 2.7 m/s^2, noise comes on top: in
-# thresholds, of which the least is 1.75 m/s^2.
+# Least jump, in thresholds of at least 1.75 m/s^2. A grip of 30 N s/m stops a kilogram that drifts at 0.1 m/s with
+# 2.7 m/s^2, plus noise.
 JUMP = 2.4
-# A hand turns a vehicle by what it pushes with beside the middle, and that rises slowly, too: less than half of what
-# motors do, where a guard that is struck turns it by more.
+# Least rate jump, and per second between the samples. A hand's torque rises slowly, too: less than half of what motors
+# do. A struck guard turns the vehicle by more.
 TURN_RAD_S, TURN_RAD_S2 = 0.2, 80.0
 
 
@@ -41,7 +42,7 @@ class SoftContact:
     before: Vector3 = (0.0, 0.0, 0.0)
 
     def imu(self, time_us: int, f: Vector3) -> None:
-        """Take one sample, after it was judged."""
+        """Take one sample, after its detection step."""
         self.before_us, self.before = self.last_us, self.last
         self.last_us, self.last = time_us, f
 
@@ -50,7 +51,7 @@ class SoftContact:
             self.hovered_boot_us = time_us
 
     def fired(self, time_us: int, is_hand: bool) -> None:
-        """A contact has been told."""
+        """Note that a contact was reported."""
         self.since_boot_us, self.is_hand = None, is_hand
         if is_hand:
             self.hand_boot_us = time_us
@@ -59,18 +60,18 @@ class SoftContact:
         return time_us - self.hovered_boot_us < HOVERED_US or time_us - self.hand_boot_us < HAND_US
 
     def jumps(self, time_us: int, f: Vector3, threshold_m_s2: float) -> bool:
-        """Whether the force has changed since the sample before, or the two before, by more than a hand's does."""
+        """Whether the force changed over one sample, or over two, by more than a hand's does."""
         least = JUMP * threshold_m_s2
         if math.dist(f, self.last) >= least:
             return True
         return time_us - self.before_us < JUMP_OVER_US and math.dist(f, self.before) >= least
 
     def turns(self, time_us: int, rate_step_rad_s: float) -> bool:
-        """Whether the rates have stepped since the sample before by more than a hand makes them."""
+        """Whether the rate jump since the sample before exceeds a hand's."""
         return rate_step_rad_s >= TURN_RAD_S + TURN_RAD_S2 * 1e-6 * (time_us - self.last_us)
 
     def looked_at_us(self, time_us: int, free_until_us: int) -> int:
-        """How long the present doubtful force has been looked at."""
+        """How long the present uncertain force has been observed, us."""
         if self.since_boot_us is None:
             self.since_boot_us, self.free_until_us = time_us, free_until_us
         return time_us - self.since_boot_us

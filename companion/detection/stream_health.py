@@ -1,4 +1,4 @@
-"""Can the detector see? A blind detector is a state that is told, never silence."""
+"""Stream health: whether the detector has data. A fault of the streams is reported, never silent."""
 
 import math
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ from companion.motion.history import STAMP_RESOLUTION_US
 from companion.motion.strapdown import MOTORS_RAD_S2
 from companion.strict_model import Positive, StrictModel
 
-# The received rate is judged over this: 20 samples at the least rate, and no longer than a link's brief gap.
+# The received rate is measured over this time: 20 samples at the least rate, and no longer than a link's brief gap.
 RATE_WINDOW_US = 1_000_000
 # A stream that was too slow, or silent, has proven its rate by as many samples over as long a time: five intervals,
 # because two that happen to be short would pass a slower stream, and at 50 Hz they take 0.1 s.
 PROOF_SAMPLES = 5
 PROOF_US = 100_000
 
-# Least threshold of a detector that is told to be blind.
+# Above this threshold vibration hides hits, and the stream counts as faulty.
 MOST_THRESHOLD_M_S2 = 30.0
 
 
@@ -35,7 +35,7 @@ class StreamHealthConfig(StrictModel):
 
 
 class StreamHealth(NamedTuple):
-    """What decides whether the detector sees: when it last heard, and how often. A tuple: one is made in every step."""
+    """Time and rate of the received IMU samples. A tuple, because one is made in every step."""
 
     last_heard_us: int
     window_started_us: int
@@ -46,16 +46,18 @@ class StreamHealth(NamedTuple):
 
 @dataclass(slots=True)
 class StuckImuMonitor:
-    """Whether the IMU measures. All six axes twice the same to the last bit, while the vehicle turned between, are no
-    two measurements: noise alone changes the last bits of each. At rest a sensor without noise may repeat itself."""
+    """Detects an IMU stuck at one value: all six axes equal to the last bit while the vehicle has turned.
+
+    Noise alone changes the last bits of real measurements. At rest a simulated sensor without noise may repeat itself.
+    """
 
     values: tuple[Vector3, Vector3] | None = None
     attitude_wxyz: Quaternion | None = None
-    """At the first of the samples that are the same."""
+    """Attitude at the first of the equal samples."""
     has_turned: bool = False
 
     def imu(self, sample: ImuSample) -> bool:
-        """Take one sample; whether it repeats the one before of a vehicle that has turned since."""
+        """Take one sample; whether it equals the one before although the vehicle has turned."""
         values = (sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
         if values == self.values:
             return self.has_turned
@@ -63,7 +65,7 @@ class StuckImuMonitor:
         return False
 
     def attitude(self, sample: Attitude) -> None:
-        """Take one attitude: another than the first since the values are the same."""
+        """Take one attitude; one that differs from the first shows that the vehicle has turned."""
         if self.attitude_wxyz is None:
             self.attitude_wxyz = sample.attitude_wxyz
         elif sample.attitude_wxyz != self.attitude_wxyz:
@@ -72,20 +74,23 @@ class StuckImuMonitor:
 
 @dataclass(slots=True)
 class AttitudeGate:
-    """Whether the vehicle can have turned to an attitude. One that it cannot have turned to counts from the second on
-    that agrees with it, as after the estimator's reset. One forged or broken message turns no sum of accelerations."""
+    """Innovation gate on attitudes: rejects one that the vehicle cannot have turned to since the last.
+
+    A second attitude that agrees with a rejected one is accepted, as after a reset of the estimator. So one forged or
+    broken message does not disturb the integrated accelerometer.
+    """
 
     latest: Attitude | None = None
     rejected: Attitude | None = None
     most_rad_s: float = 0.0
-    """The fastest rate heard since the latest."""
+    """The largest rate since the latest attitude."""
 
     def imu(self, sample: ImuSample) -> None:
         """Take one sample."""
         self.most_rad_s = max(self.most_rad_s, math.hypot(*sample.angular_velocity_frd_rad_s))
 
     def attitude(self, sample: Attitude) -> bool:
-        """Take one attitude; whether it counts."""
+        """Take one attitude; whether it is accepted."""
         known = [before for before in (self.latest, self.rejected) if before is not None]
         if known and not any(self._leads_to(before, sample) for before in known):
             self.rejected = sample
@@ -94,7 +99,7 @@ class AttitudeGate:
         return True
 
     def _leads_to(self, before: Attitude, sample: Attitude) -> bool:
-        """By the fastest rate, and by what motors may have changed it by since."""
+        """Whether the largest rate, and what motors may have added to it, can turn one into the other."""
         over_s = 1e-6 * (abs(sample.time_boot_us - before.time_boot_us) + STAMP_RESOLUTION_US)
         (a, b, c, d), (w, x, y, z) = before.attitude_wxyz, sample.attitude_wxyz
         turned_rad = 2.0 * math.acos(min(1.0, abs(a * w + b * x + c * y + d * z)))
@@ -102,13 +107,13 @@ class AttitudeGate:
 
 
 def with_samples(health: StreamHealth, imu_samples: int, config: StreamHealthConfig, now_us: int) -> StreamHealth:
-    """With the IMU samples that arrived by ``now_us`` (companion's clock)."""
+    """The stream health with the number of IMU samples that arrived by ``now_us`` (companion's clock)."""
     last_us, started_us, count, rate_hz, reason = health
     is_slow = rate_hz is not None and rate_hz < config.min_rate_hz
     if imu_samples:
         silent_us = now_us - last_us
         if silent_us > config.silence_s * 1e6:
-            # What comes after a silence has to prove its rate; until then the silence's own rate stands.
+            # A stream proves its rate again after a silence; until then the silence's own rate stands.
             return StreamHealth(now_us, now_us, 0, 1e6 / silent_us, reason)
         if is_slow and started_us > last_us:
             return StreamHealth(now_us, now_us, 0, rate_hz, reason)
@@ -123,7 +128,7 @@ def with_samples(health: StreamHealth, imu_samples: int, config: StreamHealthCon
 def stream_fault(
     health: StreamHealth, threshold_m_s2: float, config: StreamHealthConfig, now_us: int, imu_fault: str | None = None
 ) -> str | None:
-    """One phrase, or None for a detector that sees. `imu_fault`: what was wrong with the newest IMU message."""
+    """The fault in one phrase, or None. `imu_fault`: what was wrong with the newest IMU message."""
     if now_us - health.last_heard_us > config.silence_s * 1e6:
         return imu_fault or f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
     if health.rate_hz is not None and health.rate_hz < config.min_rate_hz:

@@ -1,27 +1,27 @@
-"""What the propellers can do to the accelerometer's z axis: push up, at most as hard as they can."""
+"""Range of the specific force on body z that the propellers can make: from zero to their maximum thrust."""
 
 from dataclasses import dataclass
 
-# A quadrotor lifts between 1.3 and 5 times its weight. Where nothing is heard of the thrust asked for, a push from
-# below counts only beyond the strongest vehicle's own: that much is lost without ATTITUDE_TARGET.
+# A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
+# the maximum of the strongest vehicle.
 STRONGEST_M_S2 = 5.0 * 9.81
-# The gain follows a sagging battery (minutes) and not a climb (its thrust is in the message).
+# Memory of the gain: it follows a sagging battery (minutes) and not a climb (its thrust is in the message).
 GAIN_MEMORY_S = 2.0
-# Below this thrust the gain is a quotient of small numbers.
+# Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
 LEAST_FRACTION = 0.1
-# The thrust asked for is what the motors make a few of their lags (20 ms) later; older than this it is history.
+# A commanded thrust is valid for this time. Motors follow it with a lag of 20 ms.
 KEPT_US = 300_000
-# A gain is trusted when it was learnt over this long in the air.
+# A gain is valid when it was learnt over this time in the air.
 LEAST_LEARNT_S = 0.5
-# Between two messages 20 to 50 ms apart the thrust asked for changes by no more than this share of the greatest.
+# Between two messages 20 to 50 ms apart the commanded thrust changes by no more than this share of the maximum.
 CHANGE = 0.3
-# Batteries, ground effect and a mean that is not yet settled: the gain is good to this.
+# Error of the gain from the battery, ground effect and a mean that has not converged.
 MARGIN = 1.15
 
 
 @dataclass(slots=True)
 class ThrustGain:
-    """Specific force at full thrust, learnt as -f_z over the thrust asked for. Changed only by its methods."""
+    """Specific force at full thrust, learnt as -f_z over the commanded thrust. Changed only by its methods."""
 
     fraction: float = 0.0
     fraction_boot_us: int = -KEPT_US
@@ -32,7 +32,7 @@ class ThrustGain:
         self.fraction, self.fraction_boot_us = fraction, time_us
 
     def learn(self, time_us: int, f_z: float, elapsed_s: float) -> None:
-        """Take the z axis of one sample of a vehicle in the air that nothing touches."""
+        """Take f_z of one sample of a vehicle in free air."""
         if self.fraction < LEAST_FRACTION or time_us - self.fraction_boot_us > KEPT_US:
             return
         known_s = self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
@@ -40,13 +40,13 @@ class ThrustGain:
             self.full_m_s2 += (-f_z / self.fraction - self.full_m_s2) * elapsed_s / known_s
 
     def most_m_s2(self, time_us: int) -> float:
-        """The hardest push up that thrust can explain now."""
+        """Largest upward specific force that thrust can explain now, m/s^2."""
         if self.known_s < LEAST_LEARNT_S or time_us - self.fraction_boot_us > KEPT_US:
             return STRONGEST_M_S2
         return MARGIN * self.full_m_s2 * min(1.0, self.fraction + CHANGE)
 
     def expected_m_s2(self, time_us: int, mean_m_s2: float) -> float:
-        """f_z of a vehicle that nothing touches: by the thrust asked for, else its recent mean."""
+        """Expected f_z in free air: from the commanded thrust, else its recent mean."""
         if self.known_s < LEAST_LEARNT_S or time_us - self.fraction_boot_us > KEPT_US:
             return mean_m_s2
         return -self.full_m_s2 * self.fraction

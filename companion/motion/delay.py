@@ -1,16 +1,16 @@
-"""How late the vehicle's own velocity is, learnt from its flight.
+"""The delay of the vehicle's velocity estimate, learnt in its flight.
 
-A velocity that is late by d is, by the accelerometer's sum, off by -d a. So a change of the acceleration a shows as a
-step of velocity less sum: s = -d a + noise. d is the least squares of all steps so far, beginning with what is common.
+A velocity with the delay d differs from the integrated accelerometer by -d a. So a change of the acceleration a is a
+step of velocity minus integral: s = -d a + noise. d is the least-squares estimate over all steps, with a prior.
 """
 
 from dataclasses import dataclass
 
 from companion.messages import Vector3
 
-# PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
+# Prior: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
 DELAY_S, DELAY_SPREAD_S = 0.01, 0.01
-# A delay shows in velocities that lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY): of a longer one only a part does.
+# Longest delay that is estimated: compared velocities lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY).
 LATEST_S = 0.1
 
 
@@ -22,13 +22,13 @@ class Delay:
     _square: float = 0.0
 
     def learn(self, step_m_s: Vector3, change_m_s2: Vector3) -> None:
-        """Take one step of velocity less sum, and by how much the acceleration changed with it."""
+        """Take one step of velocity minus integral, and the change of the acceleration in the same interval."""
         (a, b, c), (x, y, z) = step_m_s, change_m_s2
         self._against -= a * x + b * y + c * z
         self._square += x * x + y * y + z * z
 
     def delay_s(self, variance_m2_s2: float) -> float:
-        """By steps that scatter by so much on an axis where the acceleration stays as it is."""
+        """The delay; `variance_m2_s2` is the steps' variance on an axis at constant acceleration."""
         weight = variance_m2_s2 / DELAY_SPREAD_S**2
         total = weight + self._square
         found_s = (weight * DELAY_S + self._against) / total if total > 0.0 else DELAY_S

@@ -5,14 +5,14 @@ from itertools import islice
 
 from companion.messages import LocalPosition
 
-# A contact is looked at over the half second before it; twice that and a reserve for late detections.
+# An estimate uses the half second before a contact; twice that, and a reserve for late detections.
 KEPT_US = 2_000_000
 # A time this far back is not a reordered packet but a rebooted vehicle.
 REBOOT_US = 1_000_000
 # PX4 cuts time_boot_ms to whole milliseconds: a stamp may be this much before its sample.
 STAMP_RESOLUTION_US = 1_000
-# ODOMETRY counts as coming for as long after the latest: 15 of PX4's default 30 Hz. Until then its velocities and its
-# reset counter are the ones to go by.
+# For this time after its latest message ODOMETRY counts as received: 15 messages at PX4's 30 Hz. Until then its
+# velocities and its reset counter are used.
 ODOMETRY_KEPT_US = 500_000
 
 

@@ -1,6 +1,6 @@
-"""The accelerometer's sum and the vehicle's own velocities beside it, heard once for all who judge by them.
+"""The vehicle's velocities beside the integrated accelerometer.
 
-Between two velocities the estimate changes as the accelerometer says: velocity less sum stands still while they agree.
+While the two agree, velocity minus integral is constant.
 """
 
 from collections import deque
@@ -10,13 +10,13 @@ from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Vec
 from companion.motion.history import ODOMETRY_KEPT_US
 from companion.motion.strapdown import Strapdown
 
-# What shows a hit, or denies it, lies within three tenths of a second of it.
+# Evidence for or against a hit lies within 0.3 s of it.
 KEPT_US = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class VelocityFix:
-    """One velocity of the estimate with the accelerometer's sum and mean at its stamp; local NED."""
+    """One velocity of the estimate, with the accelerometer's integral and mean at its time; local NED."""
 
     time_boot_us: int
     velocity_ned_m_s: Vector3
@@ -25,7 +25,7 @@ class VelocityFix:
 
 
 def less_sum(fix: VelocityFix) -> Vector3:
-    """What the velocity says beyond the accelerometer: constant while the two agree."""
+    """Velocity minus integral, m/s: constant while the two agree."""
     v, u = fix.velocity_ned_m_s, fix.sum_ned_m_s
     return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
 
@@ -36,14 +36,14 @@ class Inertial:
 
     strapdown: Strapdown = field(default_factory=Strapdown)
     fixes: deque[VelocityFix] = field(default_factory=deque)
-    """Between which neither sum nor velocity has jumped by itself, the newest last."""
+    """Velocities without a restart of the integral or a reset of the estimator between them, the newest last."""
     has_new_fix: bool = False
-    """Whether the newest velocity is one of them: while ODOMETRY comes, its are the ones to go by."""
+    """Whether the newest velocity is one of them; while ODOMETRY comes, only its velocities are."""
     _odometry_boot_us: int | None = None
     _reset_counter: int = 0
 
     def imu(self, sample: ImuSample) -> bool:
-        """Take one sample; False where a hole in the stream made the sum begin anew."""
+        """Take one sample; False where a gap restarted the integral."""
         whole = self.strapdown.imu(
             sample.time_boot_us, sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
         )

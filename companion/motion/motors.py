@@ -1,13 +1,13 @@
-"""After a hit: does one motor have to work harder than before? Which, by how much, and how surely.
+"""Detect a motor or propeller damaged by a hit: its output is higher than before, relative to the other three.
 
-What a hurt propeller or a worn motor no longer lifts, PX4's rate control asks of that motor in addition, and of no
-other: in steady flight lift and drag torque of all four have to be what they were. A shifted load, or something that
-leans on the vehicle, asks more of two, or of one as much as it spares the opposite one.
+PX4's rate control commands the lift that a damaged propeller or motor lacks from that motor alone: in steady flight
+lift and drag torque of all four stay the same. A shifted load, or a force on the vehicle, loads two motors more, or one
+as much as it relieves the opposite one.
 
-Nothing is known of the vehicle beforehand. Each half second of the flight before the hit says how its four outputs
-differ, trim, wind and manoeuvres included. A motor is hurt if after the recovery it works harder, beside the others,
-than in any of these. Of moments that come in random order the probability is 1 / C(n + m, m) that m last ones exceed
-all n first ones; four motors have four chances.
+No model of the vehicle is needed. Each half second of the flight before the hit shows how the four outputs differ, with
+trim, wind and manoeuvres. A motor is damaged if after the recovery its relative output exceeds all of these. For
+windows in random order the probability that the m last exceed all n first is 1 / C(n + m, m); four motors have four
+chances.
 """
 
 import math
@@ -16,17 +16,17 @@ from dataclasses import dataclass, field
 from statistics import fmean, median
 from typing import TypeAlias
 
-# Five of PX4's SERVO_OUTPUT_RAW at the 10 Hz of its onboard set; in so long a turn is begun and ended.
+# Five SERVO_OUTPUT_RAW at the 10 Hz of PX4's onboard set. A turn begins and ends within this time.
 WINDOW_US = 500_000
-# What a hit has done shows in the first minute.
+# A minute of windows after the hit is enough.
 MOST_WINDOWS = 60
 # The usual level of significance.
 LEAST_CONFIDENCE = 0.99
-# A rotor that has lost a twentieth of its blades lifts 0.95^3 of what it did (lift goes with r^2 dr), which takes a
-# command of 1.08 where lift goes with its square. Told is what is nearer to that than to a whole one.
+# Least relative increase that is reported. A rotor that has lost a twentieth of its blades lifts 0.95^3 of its lift
+# (lift grows with r^2 dr), and needs a command of 1.08 where lift grows with its square. Half of that increase counts.
 LEAST_HARDER = (0.95**-1.5 - 1.0) / 2.0
-# A weight that shifts towards one motor asks of the opposite one as much less: the other three then differ by half of
-# what the first has more. Of a motor alone they do not. Half way between.
+# Largest difference among the other three motors, in increases of the first. A weight that shifts towards one motor
+# relieves the opposite one: the other three then differ by 0.5. For one damaged motor they do not differ. Half way.
 MOST_UNLIKE = 0.25
 # The least that PX4 lets a PWM output be (PWM_MAIN_MINn). Outputs of DShot and CAN begin at zero, those of PWM at 1 ms.
 LEAST_PWM, PWM_ZERO = 800.0, 1000.0

@@ -1,8 +1,8 @@
-"""A local frame that stays where it is when PX4's estimator resets its position, which moves no setpoint along.
+"""A local frame that does not move when PX4's estimator resets its position.
 
-What is heard is moved back by the resets so far, what is sent is moved on by them: the vehicle stays where it is. So
-does all that is known around it. ODOMETRY counts the resets (`reset_counter`). The jump is what lies between its place
-after a reset and where its velocity led.
+Received positions are shifted back by the resets so far, sent setpoints are shifted on. So the vehicle, its setpoints
+and the obstacle map stay in place. ODOMETRY counts the resets (`reset_counter`). The jump is the difference between the
+position after a reset and the position to which its velocity led.
 """
 
 import math
@@ -26,12 +26,12 @@ STILL: Vector3 = (0.0, 0.0, 0.0)
 
 @dataclass(slots=True)
 class Resets:
-    """A reset counts from the second message on that tells of it: one forged or broken message moves nothing."""
+    """A reset counts from its second message on, so that one forged or broken message shifts nothing."""
 
     shift_ned_m: Vector3 = STILL
-    """From this frame to the vehicle's."""
+    """Offset from this frame to the vehicle's, m."""
     _shifts: dict[int, Vector3] = field(default_factory=dict)
-    """By earlier counters: a counter that comes back brings its shift back."""
+    """Offsets by reset counter: a counter that comes back restores its offset."""
     _latest: Odometry | None = None
     _first: Odometry | None = None
     """The first message with another counter than the latest's."""
@@ -39,7 +39,7 @@ class Resets:
     """The latest one accepted; None after a reset."""
 
     def follow(self, samples: Sequence[Sample], most_m: float) -> Sequence[Sample]:
-        """What was heard, in this frame. A jump of more than `most_m` does not shift it."""
+        """The samples in this frame. A jump of more than `most_m` does not shift it."""
         return [self._moved(sample, most_m) for sample in samples]
 
     def _moved(self, sample: Sample, most_m: float) -> Sample:
@@ -61,7 +61,7 @@ class Resets:
         return sample
 
     def _jumps(self, sample: LocalPosition) -> bool:
-        """Whether no velocity that EKF2 can have leads to a place, while ODOMETRY comes and counts no reset."""
+        """Whether a position jumps faster than any velocity of EKF2, while ODOMETRY counts no reset."""
         place, told = self._place, self._latest
         if place is None or told is None:
             return False

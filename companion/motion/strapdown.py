@@ -1,4 +1,4 @@
-"""The accelerometer summed up: v' = R f + g, in the attitude told and turned on by the rates since."""
+"""The integrated accelerometer: v' = R f + g, with the reported attitude carried on by the body rates."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,16 @@ from companion.motion.rotation import body_to_ned, ned_to_body, turned
 GRAVITY_M_S2 = 9.80665
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector3 = (0.0, 0.0, 0.0)
-# Older than this an attitude says nothing of a vehicle that may turn at 3 rad/s.
+# An attitude is valid for this time; a vehicle may turn at 3 rad/s.
 ATTITUDE_KEPT_S = 0.1
-# A longer silence leaves a hole in the sum: two samples of 20 Hz, the least rate of a detector that sees.
+# A longer gap restarts the integral: two samples of 20 Hz, the least rate of HIGHRES_IMU.
 LONGEST_GAP_US = 100_000
-# A velocity that is held against the sum lags by no more than this (optical flow with an output predictor: 20 ms).
+# Largest lag of a velocity that is compared with the integral (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
-# Cosine of 15 degrees: about the tilt that a real PX4 made of 7.8 m/s missed (bench/notes/px4.md). Gyroscopes that show
-# more are wrong themselves.
+# Cosine of 15 degrees: about the tilt error of a real PX4 after 7.8 m/s were clipped (bench/notes/px4.md). Beyond it
+# the gyroscopes are wrong.
 MOST_WRONG = 0.966
-# Motors turn the vehicle with no more than this.
+# Largest angular acceleration by motors, rad/s^2.
 MOTORS_RAD_S2 = 100.0
 
 
@@ -32,18 +32,18 @@ class Strapdown:
     acceleration_ned_m_s2: Vector3 = ZERO
     sum_ned_m_s: Vector3 = ZERO
     by_rates_wxyz: Quaternion | None = None
-    """The attitude by the rates alone, from the last one told that was right; None while those told are right.
+    """Attitude from the rates alone, since the last valid one; None while the reported attitude is valid.
 
-    A filter that puts a velocity right takes part of its error for a tilt. Gyroscopes do not. Of 2.4 m/s that a real
-    PX4 had missed it made 4 degrees, for more than a second (bench/notes/px4.md).
+    An estimator that corrects its velocity takes part of the error for a tilt; gyroscopes do not. After 2.4 m/s were
+    clipped, a real PX4's tilt was wrong by 4 degrees for more than a second (bench/notes/px4.md).
     """
     level_acceleration_m_s2: Vector3 = ZERO
-    """The horizontal acceleration, NED, of a vehicle that is level by the attitude told; zero while that is right."""
+    """Horizontal acceleration, NED, of a vehicle that is level by its reported attitude; zero while that is valid."""
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_valid: bool = True) -> None:
         behind_s = 1e-6 * (self.time_boot_us - self.attitude_boot_us)
         if is_valid or (self.by_rates_wxyz is None and behind_s > ATTITUDE_KEPT_S):
-            # Right, or too long ago that one was: rates of one moment lead nowhere from there.
+            # Valid, or the last valid one is too old to be carried on by the rates.
             self.by_rates_wxyz, self.level_acceleration_m_s2 = None, ZERO
         else:
             if self.by_rates_wxyz is None:
@@ -57,7 +57,7 @@ class Strapdown:
         self.attitude_wxyz, self.attitude_boot_us = attitude_wxyz, time_us
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> bool:
-        """Add one sample (body FRD); False where a hole in the stream made the sum begin anew."""
+        """Integrate one sample (body FRD); False where a gap restarted the integral."""
         elapsed_us = time_us - self.time_boot_us
         whole, half_s = 0 < elapsed_us < LONGEST_GAP_US, 0.5e-6 * elapsed_us
         behind_s = (time_us - self.attitude_boot_us) * 1e-6
