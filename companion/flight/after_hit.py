@@ -21,7 +21,7 @@ _WITH_A_GOAL = (GoToItem, PathItem, OrbitItem)
 
 
 def decide(flight: FlightContext, state: State, now_us: int) -> None:
-    """Count the newest hit and settle what follows its recovery. `state`: in which it happened.
+    """Count the newest hit and decide what follows its recovery. `state`: in which it happened.
 
     A hit during a recovery, or during the hold after it, belongs to the step in which the first one happened.
     """
@@ -42,13 +42,13 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
 
 
 def _verdict(flight: FlightContext, policy: OnCollision, hits: int) -> tuple[str, str]:
-    """What follows, and why where it is not what the policy says first."""
+    """What follows, and the reason where that is not the policy's `then`."""
     limit_m_s = flight.mission.abort_when.hit_above_m_s
     speed_m_s = flight.collisions[-1].report().impact_speed_m_s
     if limit_m_s is not None and speed_m_s > limit_m_s:
         return "abort", f"hit at {speed_m_s:.2f} m/s, above abort_when.hit_above_m_s = {limit_m_s:g}"
     if hits >= policy.max_hits:
-        # A way home on which there are obstacles too is none.
+        # With obstacles on the way home the vehicle lands.
         then = "land" if flight.going_home or flight.is_landing else policy.after_max_hits
         return then, f"hit {hits} of at most {policy.max_hits}"
     if flight.is_landing:
@@ -62,7 +62,7 @@ def lands_anyway(flight: FlightContext) -> bool:
 
 
 def afterwards(flight: FlightContext) -> Transition:
-    """What was decided, as a move."""
+    """The decision as a transition."""
     after = flight.after_recovery
     return Transition(after.trigger, after.text, hand_over=after.trigger is Trigger.RECOVERED_TO_ABORT)
 
@@ -78,7 +78,7 @@ _GOES_ON = {
 
 
 def note_before(flight: FlightContext, state: State) -> None:
-    """What the hit that is about to be recorded changes. Within a recovery the one that began it counts."""
+    """Save the state before a hit is recorded. Within a recovery there is nothing to restore."""
     tally = flight.tally
     if state is State.RECOVERING:
         flight.before_hit = None
@@ -87,8 +87,7 @@ def note_before(flight: FlightContext, state: State) -> None:
 
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:
-    """The newest hit was none: it is forgotten, and what it interrupted goes on from here. None within a recovery that
-    another hit began."""
+    """Remove the rejected newest hit, and go on with what it interrupted; None within another hit's recovery."""
     before, latest = flight.before_hit, flight.vehicle.history.latest()
     if before is None or latest is None:
         return None

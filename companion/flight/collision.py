@@ -1,4 +1,4 @@
-"""One collision's record: what was known at the hit, and what telemetry has shown since."""
+"""The record of one collision: the state at the hit, and what telemetry has shown since."""
 
 import math
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.report import CollisionReport
 
-# The estimate lags a few tens of milliseconds behind the end of the contact; later than this the speed back is
-# the vehicle's own controller's doing.
+# The rebound's speed is the largest within this time after the contact. The estimate lags some tens of milliseconds;
+# later the speed is made by the vehicle's own controller.
 REBOUND_WINDOW_US = 100_000
 # No contact that ends in a rebound lasts longer.
 REBOUND_KEPT_US = 1_000_000
-# Below this there is no direction in a velocity or a way that noise could not have made.
+# A smaller velocity, or distance, has no reliable direction.
 LEAST_SPEED_M_S = 0.05
 LEAST_WAY_M = 0.01
 
@@ -46,21 +46,19 @@ class CollisionRecord:
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     estimator: MotionEstimator
-    is_behind: bool = False  # what was hit came after the vehicle: the normal is the earlier hit's
+    is_behind: bool = False  # the obstacle followed the vehicle: the normal is the earlier hit's
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
-    is_clipped: bool = False  # the sensor's range was not enough: the force was larger, its direction may be another
-    hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = (
-        None  # of the first sample or velocity, until something else shows the hit, too
-    )
+    is_clipped: bool = False  # the force was larger than measured, its direction may differ
+    hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = None  # until it is confirmed or rejected
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
-    estimated_down_m_s: float = 0.0  # by the vehicle's own estimate at this moment, be it right or wrong
-    level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # the acceleration of a vehicle that takes itself for level, NED
+    estimated_down_m_s: float = 0.0  # the vehicle's own estimate now, right or wrong
+    level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # of a vehicle that is level by its own attitude, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
 
     def follow_motion(self, strapdown: Strapdown) -> None:
-        """What accelerometer and gyroscopes show with each sample."""
+        """Take the newest accelerometer and gyroscope sample."""
         if isinstance(self.hypothesis, ForceHypothesis):
             self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
@@ -72,7 +70,7 @@ class CollisionRecord:
     def follow_contact(
         self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
     ) -> None:
-        """While the contact lasts: its largest force, its end, and the newest estimate of the normal."""
+        """Update the contact's largest force, its end and its normal while it lasts."""
         self.fixes = fixes
         hypothesis = self.hypothesis
         is_turned = isinstance(hypothesis, ForceHypothesis) and hypothesis.is_turned
@@ -90,11 +88,11 @@ class CollisionRecord:
         self.is_clipped = estimate.is_lower_bound
 
     def _is_seen_again(self, state: DetectorState, hypothesis: ForceHypothesis | VelocityJumpHypothesis) -> bool:
-        """Another sample of the contact's force has come."""
+        """Whether another sample of the contact's force has come."""
         return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > hypothesis.time_boot_us
 
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
-        """Whether, once that is decided, nothing but its first sample shows this hit."""
+        """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
         if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
         hypothesis, self.hypothesis = self.hypothesis, None
@@ -103,7 +101,7 @@ class CollisionRecord:
         return isinstance(hypothesis, VelocityJumpHypothesis) and hypothesis.stays_in_place(places, position_noise_m)
 
     def follow_recovery(self, sample: LocalPosition) -> None:
-        """While the vehicle recovers: how far past the setpoint, how fast back."""
+        """Update overshoot and rebound speed while the vehicle recovers."""
         if sample.time_boot_us <= self.sample_time_boot_us:
             return
         away = self._direction_away()
@@ -128,9 +126,7 @@ class CollisionRecord:
         return horizontal_unit((-v[0], -v[1], 0.0)) if math.hypot(v[0], v[1]) >= LEAST_SPEED_M_S else self.normal_ned
 
     def rebound_speed_m_s(self) -> float | None:
-        """Largest speed back in the tenth of a second after the contact's last loud sample; None where no velocity of
-        that time was valid.
-        """
+        """Largest speed back, m/s, within REBOUND_WINDOW_US after the contact; None without a valid velocity."""
         start, end = self.contact_ended_boot_us, self.contact_ended_boot_us + REBOUND_WINDOW_US
         speeds = [speed for time_us, speed in self._speeds_away if start < time_us <= end]
         return max(0.0, *speeds) if speeds else None
@@ -168,5 +164,5 @@ class CollisionRecord:
 
 
 def in_one_recovery(records: Sequence[CollisionRecord]) -> list[CollisionRecord]:
-    """The last hits, the newest first, between which the vehicle has not settled."""
+    """The last hits, the newest first, without a recovery in between."""
     return list(takewhile(lambda record: not record.is_over, reversed(records)))

@@ -1,9 +1,8 @@
-"""Was it a hit? One sample is answered at once; it counts as a hit when something else shows it, too.
+"""Confirmation of a hit. The first sample starts a recovery at once; the hit counts when other evidence confirms it.
 
-The first piece of evidence is one IMU sample. The second is another sample of the contact's force, or angular rates
-that no motor makes so fast, or a change of the vehicle's own velocity. A true impulse over that sample's averaging time
-must have changed the velocity. A broken or forged packet does none of this: the next rates and velocities contradict
-it.
+The first piece of evidence is one IMU sample. The second is another sample of the contact's force, or a rate jump that
+no motor makes, or a change of the vehicle's own velocity. A true impulse over that sample's averaging time must change
+the velocity. A broken or forged packet does not: the next rates and velocities reject it.
 """
 
 import math
@@ -18,33 +17,33 @@ from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix, less_sum
 from companion.motion.strapdown import MOTORS_RAD_S2
 
-# A push that moved the vehicle by as much is a hit: twice what an estimate has been seen to show of one that it missed.
+# A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
 STRUCK_M_S = 0.5
-# All but the longest contacts are over (0.12 s at 1 m/s), and the vehicle's estimate is 20 to 40 ms late. A setpoint
-# that leans by 17 degrees for so long moves a vehicle by 3 cm.
+# Time to the decision. All but the longest contacts are over by then (0.12 s at 1 m/s), and the vehicle's estimate is
+# 20 to 40 ms late. A tilt of 17 degrees for this time moves a vehicle by 3 cm.
 DECIDED_US = 150_000
 LATE_US = 40_000
-# What the velocity was is taken from as long before; the estimate's own slow errors are the smaller the shorter it is.
+# Velocities before the hit are averaged over the same time; the shorter it is, the smaller are the slow errors.
 BEFORE_US = DECIDED_US
-# No hit that matters leaves less than this; noise alone departs by 0.1 m/s now and then.
+# A hit that matters changes the velocity by more than this; noise alone reaches 0.1 m/s now and then.
 HIT_LEAVES_M_S = 0.15
-# Three standard deviations: what the velocity cannot tell from its own noise does not speak against a hit.
+# Standard deviations of the noise that a rejection needs.
 SURE = 3.0
 
 
 @dataclass(slots=True)
 class ForceHypothesis:
-    """What one sample says alone: a contact's force per unit mass, local NED, as a mean over a window."""
+    """A hit that one IMU sample shows: the contact force per mass, local NED, as a mean over a window."""
 
     time_boot_us: int
-    earlier: ImuSample  # the one before
+    earlier: ImuSample  # the sample before
     force_ned_m_s2: Vector3
     averaging_s: float
-    later_boot_us: int | None = None  # of the one after, once it has come
-    is_turned: bool = False  # by it, as no motor turns
+    later_boot_us: int | None = None  # time of the sample after, once it has come
+    is_turned: bool = False  # whether that sample shows a rate jump that no motor makes
 
     def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
-        """Take the newest IMU sample's time and rates (FRD). The first one after the claim shows a rate jump."""
+        """Take the newest IMU sample's time and rates (FRD). The first one after the hit may show a rate jump."""
         if self.later_boot_us is None and time_boot_us > self.time_boot_us:
             self.later_boot_us = time_boot_us
             elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)
@@ -52,10 +51,10 @@ class ForceHypothesis:
             self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
 
     def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
-        """Whether the velocities after the sample show that the push it claims has not been.
+        """Whether the velocities after the sample show no impulse of this size.
 
-        `fixes` hold each velocity beside the accelerometer's sum (trapezoids). The claimed sample is taken out of the
-        sum. After a true impulse the velocity is ahead of the sum by the whole impulse; otherwise both agree.
+        `fixes` have each velocity beside the accelerometer's integral (trapezoids). The sample in question is taken out
+        of the integral. After a true impulse the velocity is ahead of it by the whole impulse; otherwise both agree.
         """
         hit_us, later_us = self.time_boot_us, self.later_boot_us
         before = [fix for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
@@ -78,14 +77,14 @@ class ForceHypothesis:
     def _any_push_m_s(
         before: Sequence[VelocityFix], after: Sequence[VelocityFix], in_sum_m_s: float, away: Sequence[float]
     ) -> float:
-        """By how much the velocities show a push from whatever side: an axis that is stuck shows no force along it."""
+        """Velocity change in any direction, m/s: a stuck axis shows no force along itself."""
         was, came = ([fmean(axis) for axis in zip(*map(less_sum, fixes), strict=True)] for fixes in (before, after))
         return math.hypot(*(c - w + in_sum_m_s * a for c, w, a in zip(came, was, away, strict=True)))
 
 
 @dataclass(frozen=True, slots=True)
 class VelocityJumpHypothesis:
-    """What one velocity says alone: it has changed."""
+    """A hit that one velocity shows: it has jumped."""
 
     time_boot_us: int
     free_until_boot_us: int
@@ -93,18 +92,18 @@ class VelocityJumpHypothesis:
     away: Vector3  # its direction, local NED
 
     def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
-        """Whether no velocity since shows so much as half of the change."""
+        """Whether no velocity since shows half of the jump."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
         before = [less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
         after = [less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
         if len(before) < 2 or len(after) < 2:
             return False
-        # One of them may be what was forged.
+        # The median: one of them may be forged.
         was = tuple(median(axis) for axis in zip(*before, strict=True))
         return all(self._departs_m_s(came, was) < 0.5 * self.change_m_s for came in after)
 
     def stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
-        """Whether the places before and after show less than half of the change, as far as their noise lets them."""
+        """Whether the positions before and after show less than half of the jump, beyond their noise."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
         was = self._came_m_s(history.between(free_us - BEFORE_US, free_us + 1))
         came = self._came_m_s(history.between(hit_us + 1, hit_us + DECIDED_US + 1))
@@ -114,7 +113,7 @@ class VelocityJumpHypothesis:
         return came - was < least_m_s
 
     def _came_m_s(self, places: Sequence[LocalPosition]) -> float | None:
-        """How fast the places went along the change."""
+        """Speed of the positions along the jump, m/s; None for too few of them."""
         if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
             return None
         over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
@@ -128,7 +127,7 @@ class VelocityJumpHypothesis:
 def hypothesis_of(
     estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float
 ) -> ForceHypothesis | VelocityJumpHypothesis | None:
-    """None where more than one sample or message has spoken already."""
+    """The hypothesis that remains to be confirmed; None where more than one message shows the hit already."""
     impact = estimate.impact
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
     if impact.evidence is Evidence.VELOCITY_JUMP:
@@ -144,5 +143,5 @@ def hypothesis_of(
 
 
 def _ahead(fix: VelocityFix, away: Sequence[float]) -> float:
-    """The velocity less the accelerometer's sum, along a direction."""
+    """Velocity minus the accelerometer's integral, along a direction, m/s."""
     return sum(a * less for a, less in zip(away, less_sum(fix), strict=True))

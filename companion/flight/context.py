@@ -26,7 +26,7 @@ from companion.report import Event, JsonValue, Outcome
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What the setpoint stream asks for; local NED. Without a velocity the vehicle stops at the position.
+    """The setpoint to be sent; local NED. Without a velocity the vehicle stops at the position.
 
     `acceleration_only`: only the acceleration is a setpoint, because the vehicle's position and velocity estimates are
     wrong. `is_height_free`: the height has velocity and acceleration setpoints, and no position. `expected`: its motion
@@ -42,7 +42,7 @@ class Target:
     expected: MotionState | None = None
 
     def at_rest(self) -> "Target":
-        """Its place alone, which is safe to hold for as long as nobody says more."""
+        """The position alone, which PX4 can hold without further setpoints."""
         return Target(self.position_ned_m, self.yaw_rad)
 
     def setpoint(self, time_us: int) -> PositionSetpoint:
@@ -60,7 +60,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A trigger with its story. `hand_over`: give the vehicle to hold or land before going."""
+    """A trigger and its reason. `hand_over`: hand the vehicle to hold or land before the transition."""
 
     trigger: Trigger
     text: str = ""
@@ -68,23 +68,21 @@ class Transition:
 
 
 class Inputs(NamedTuple):
-    """What one step brings to the flight, beyond what the vehicle view already holds. A tuple: it is made in every
-    step.
-    """
+    """Inputs of one step besides the vehicle's state. A tuple, because one is made in every step."""
 
     acks: Sequence[CommandAck] = ()
     positions: Sequence[LocalPosition] = ()
     impacts: Sequence[ImpactEstimate] = ()
     stop_reason: str | None = None
     refusal: str | None = None  # why the other end cannot be flown
-    echoes: Sequence[PositionTarget] = ()  # as the next two for a guard alone
+    echoes: Sequence[PositionTarget] = ()  # this and the next two are a guard's
     sticks: Sequence[Sticks] = ()
     is_enabled: bool = False  # by a person, after it stood down
 
 
 @dataclass(slots=True)
 class StepTally:
-    """What has happened to the present step; reset by the next one."""
+    """Counts of the present mission step; reset by the next one."""
 
     index: int = 0
     began_us: int | None = None
@@ -104,7 +102,7 @@ class AfterRecovery:
 
 @dataclass(frozen=True, slots=True)
 class BeforeHit:
-    """What a hit changes, as it was: taken up again where the hit turns out to be none."""
+    """The state before a hit, restored where the hit is rejected."""
 
     state: State
     step_index: int
@@ -128,7 +126,7 @@ class Expectation:
 
 @dataclass(slots=True)
 class FlightContext:
-    """Shared and changed by the flight's parts within a step; nothing else holds or changes it."""
+    """The flight's shared state. Only the flight's parts change it, within a step."""
 
     mission: Mission
     vehicle: Vehicle
@@ -277,10 +275,10 @@ class FlightContext:
 
 
 class StateHandler(Protocol):
-    """What the flight does in a state; made anew each time the state is entered."""
+    """A state's behaviour; one object is made each time the state is entered."""
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        """Do what is due now; a Move when the state is over."""
+        """Do what is due now; returns a transition when the state is over."""
         ...
 
     def target(self, now_us: int) -> Target | None:
@@ -289,7 +287,7 @@ class StateHandler(Protocol):
 
 
 class NoSetpoint:
-    """Of a state in which no setpoint is sent."""
+    """Base of states in which no setpoint is sent."""
 
     def target(self, now_us: int) -> None:
         return None

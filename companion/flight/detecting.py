@@ -1,4 +1,4 @@
-"""The samples through the watch: its notices are reported, and its collisions returned."""
+"""Runs the collision monitor in a flight: reports its notices, returns its collisions."""
 
 from collections.abc import Sequence
 

@@ -1,11 +1,11 @@
-"""A hit in the timeline."""
+"""The timeline's event of a hit."""
 
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, as_text
 
 
 def report_detection(flight: FlightContext, record: CollisionRecord, now_us: int) -> None:
-    """How hard, how fast, where, and where to from there."""
+    """Report the hit's force, v_c, position and recovery setpoint."""
     report = record.report()
     text = (
         f"hit {len(flight.collisions)}: {report.peak_specific_force_m_s2:.1f} m/s^2, v_c "

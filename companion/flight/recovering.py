@@ -1,4 +1,4 @@
-"""State recovering: from the hit to rest behind what was touched, by a plan that follows the motion that there is."""
+"""State recovering: the flight from the hit to rest clear of the obstacle, on a plan from the present motion."""
 
 import math
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ from companion.reflex.planner import REST, Limits, MotionState, Plan, height_fee
 
 
 class Recover:
-    """Fly to rest behind the newest collision's surface, and wait for rest there."""
+    """Fly to rest at the recovery setpoint of the newest collision, and wait until the vehicle has settled."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
         self._record = record = flight.collisions[-1]
@@ -52,11 +52,11 @@ class Recover:
         self._yaw_rad = flight.yaw_rad
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         self._spin_rad_s = 0.0
-        self._is_known = not self._law.follows  # the motion after the hit
+        self._is_known = not self._law.follows  # whether the motion after the hit is known
         self._has_left, self._may_fall, self._hangs, self._comes_m_s = False, False, False, 0.0
-        self._agreed: Vector3 | None = None  # the normal by the velocities before and after
-        self._planned_for: object = None  # what was known of the contact
-        self._plan: Plan | None = None  # while the vehicle follows one; else it is asked for accelerations alone
+        self._agreed: Vector3 | None = None  # the normal from the velocities before and after
+        self._planned_for: object = None  # the state of the contact that the plan was made for
+        self._plan: Plan | None = None  # None: only accelerations are setpoints
         self._plan_began_us = now_us
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
@@ -68,14 +68,14 @@ class Recover:
         return self._by_plan(elapsed_s) if is_steady else self._by_acceleration(elapsed_s)
 
     def _by_plan(self, elapsed_s: float) -> Target:
-        """Place, velocity and acceleration, by which PX4's own loops follow the plan."""
+        """A setpoint of position, velocity and acceleration: PX4's own loops follow the plan."""
         record, estimator, goal = self._record, self._record.estimator, self._record.setpoint_ned_m
         motion = MotionState(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
         a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
         if self._is_level:
             (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
             motion, c = MotionState((n, e, goal[2]), (u, v, 0.0)), self._height_m_s2(1.0)
-        # PX4 takes place, velocity and tilt for what it tells: as much is asked for beside the plan's.
+        # The estimate's known errors of position, velocity and tilt are added, because PX4 controls its own estimate.
         place = plus(motion.position_ned_m, 1.0, estimator.position_error_m)
         velocity = plus(motion.velocity_ned_m_s, 1.0, estimator.velocity_error_m_s)
         return Target(
@@ -86,7 +86,7 @@ class Recover:
         )
 
     def _by_acceleration(self, elapsed_s: float) -> Target:
-        """Accelerations alone: PX4's loops know nothing right of the motion, or would do harm to this one."""
+        """A setpoint of acceleration alone: PX4's estimate is wrong, or its loops would harm this motion."""
         goal, record, state = self._record.setpoint_ned_m, self._record, self._state()
         if self._plan is not None and not self._tilts_into_surface():
             asked = self._plan.with_feedback(elapsed_s, state)
@@ -100,14 +100,14 @@ class Recover:
         is_free = falls or (self._is_level and not self._is_known)
         if is_free:
             c = DESCENT_M_S2 if falls else self._height_m_s2(2.0)
-        # As it takes itself to move, which leaves PX4's own loop nothing to add to what is asked for up and down.
+        # The velocity of the vehicle's own estimate: PX4's vertical loop then adds nothing to the acceleration.
         velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
         expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
         return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
 
     @property
     def _is_level(self) -> bool:
-        """Whether what was touched is upright, and the height is held by itself."""
+        """Whether the obstacle is upright: the height is then held separately."""
         return self._contact.normal_ned[2] == 0.0
 
     def _height_m_s2(self, loops: float) -> float:
@@ -122,13 +122,13 @@ class Recover:
 
     @property
     def _tilted_motion(self) -> MotionState:
-        """The motion that there is, with the acceleration that the lean is about to give."""
+        """The present motion, with the acceleration of the present tilt."""
         return replace(self._record.estimator.motion, acceleration_ned_m_s2=self._record.estimator.tilt_m_s2)
 
     def _tilts_into_surface(self, least_m_s2: float = PRESSING_TILT_M_S2) -> bool:
-        """Whether the vehicle leans into a surface that it touches.
+        """Whether the vehicle tilts into a surface that it touches, by more than an acceleration.
 
-        What PX4's loops add to that against a wind, or have added up against the surface itself, is not to be had.
+        The tilt that PX4's loops add against a wind, or have integrated against the surface, is then left out.
         """
         return any(
             -BEHIND_M <= surface.off_m(self._tilted_motion.position_ned_m) < TOUCH_TOLERANCE_M
@@ -162,7 +162,7 @@ class Recover:
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.report(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
-        # Once it hangs, until it does not lean on it any more.
+        # A vehicle that hangs does so until it no longer tilts into the surface.
         self._hangs = self._tilts_into_surface(PRESSING_TILT_M_S2 if self._hangs else HANGING_TILT_M_S2)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._first_hit_us > timeout_s * 1e6:
@@ -182,7 +182,7 @@ class Recover:
         return afterwards(flight)
 
     def _knows(self, sample: LocalPosition) -> bool:
-        """Whether the estimate shows the motion after the hit; until then the motion reckoned is planned from."""
+        """Whether the vehicle's estimate shows the motion after the hit. Until then plans use the estimated motion."""
         record, was_known = self._record, self._is_known
         since_us = sample.time_boot_us - record.sample_time_boot_us
         self._is_known = was_known or (record.estimator.has_converged and since_us >= MOTION_KNOWN_US)
@@ -193,12 +193,14 @@ class Recover:
         return self._is_known
 
     def _state(self) -> MotionState:
-        """The present motion as a plan begins with it: towards what pushes still is never asked for, and a lean counts
-        as far as a plan may ask for it. Level where the height is held by itself."""
+        """The present motion as the start of a plan.
+
+        During the contact it has no velocity into the obstacle. Its acceleration is limited to a plan's.
+        """
         motion, normal = self._record.estimator.motion, self._contact.normal_ned
         velocity, acceleration, place = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2, motion.position_ned_m
         if self._is_spinning:
-            acceleration = REST  # what a gyroscope leans to is not where it will lean next
+            acceleration = REST  # a gyroscope's tilt does not stay in its direction
         if not self._has_left:
             off_m_s, along = split(velocity, normal)
             velocity, acceleration = plus(along, max(0.0, off_m_s), normal), REST
@@ -208,7 +210,7 @@ class Recover:
         return MotionState(place, velocity, acceleration)
 
     def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """Goal and plan as they follow from what is known by now; the plan alone where the vehicle is not on it."""
+        """Update goal and plan from what is known by now; the plan alone where the vehicle is off it."""
         record, law = self._record, self._law
         if not law.follows:
             return
@@ -226,9 +228,9 @@ class Recover:
             self._plan, self._plan_began_us = plan(state, record.setpoint_ned_m, self._surfaces, self._limits), now_us
 
     def _touch(self, sample: LocalPosition, elapsed_s: float) -> None:
-        """The surface as it is known by now: what still pushes is where the vehicle is, and moves along with it.
+        """Update the surface. A surface that still pushes is at the vehicle's position, and moves with it.
 
-        A vehicle that leaves no faster than it is asked to is pushed by nothing, however it shakes.
+        A vehicle that leaves no faster than its setpoint is not pushed, even if it vibrates.
         """
         record, contact = self._record, self._contact
         motion = record.estimator.motion
@@ -243,21 +245,21 @@ class Recover:
         has_left = self._has_left or off_m_s > 0.0 or off_m_s < -NO_CONTACT_APPROACH_M_S
         self._has_left = has_left and not (is_touched or is_carried)
         place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
-        # Before its motion is known, what a vehicle still touches is where it is: frames and arms give way.
+        # Before its motion is known, a touched surface is at the vehicle's position: frames and arms fold.
         goes_along = is_carried or (is_touched and not self._is_known)
         if goes_along and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
             place = motion.position_ned_m
         self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
 
     def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
-        """The recovery setpoint anew."""
+        """Set the recovery setpoint again, from the present contact and motion."""
         record, before = self._record, self._record.setpoint_ned_m
         limits = self._limits.spinning(self._spin_rad_s)
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, limits, self._surfaces)
         self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
         if math.dist(place, before) > flight.mission.companion.settled.distance_m:
-            record.overshoot_m = 0.0  # that past the setpoint expected is none
+            record.overshoot_m = 0.0  # measured past the earlier setpoint
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
@@ -284,9 +286,9 @@ def _has_room_below(flight: FlightContext) -> bool:
 
 
 def consistent_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
-    """The normal by the push, or by what it did to the velocity where the two do not agree; level as the push's is.
+    """The normal from the contact force, or from the change of velocity where the two contradict each other.
 
-    The push of a contact of a millisecond is one sample, shaken and clipped; the change of velocity is all of it.
+    In a contact of 1 ms the force is one sample, with noise and clipping. The change of velocity contains all of it.
     """
     n, e, d = plus(after_ned_m_s, -1.0, before_ned_m_s)
     change = (n, e, d if pushed_ned[2] != 0.0 else 0.0)
@@ -297,7 +299,7 @@ def consistent_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
-    """A new collision: what was known just before it, and from that the setpoint."""
+    """Record a new collision: the motion just before it, and the recovery setpoint from that."""
     mission, impact, law = flight.mission, estimate.impact, _law(flight)
     normal = away_from(estimate.normal_ned)
     place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
@@ -307,7 +309,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     contact_normal, earlier = normal, None
     if law.follows:
         if before is not None and not (before.estimator.has_converged or before.estimator.is_fully_measured):
-            # Place and velocity now are as wrong as the estimate.
+            # The vehicle's estimate is still wrong from the hit before.
             earlier = before.estimator
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
         contact_normal = behind or blended_normal(normal, velocity)
@@ -335,9 +337,9 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
 def _struck_from_behind(
     flight: FlightContext, before: CollisionRecord, push_frd_m_s2: Vector3, velocity_ned_m_s: Vector3
 ) -> Vector3 | None:
-    """The normal of the hit before, where what was hit has come after a vehicle that still recovers from it.
+    """The earlier hit's normal, where its obstacle has followed the vehicle and struck it again from behind.
 
-    What pushes a vehicle on in the direction in which it leaves is behind it, whatever an estimate makes of a push.
+    A force in the direction in which the vehicle leaves comes from behind it.
     """
     if flight.vehicle.attitude is None:
         return None
@@ -347,7 +349,7 @@ def _struck_from_behind(
 
 
 def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
-    """What the first sample says alone; None where that is not known, or the vehicle recovers from another hit."""
+    """The hypothesis of a first sample; None without an attitude, or while the vehicle recovers from another hit."""
     attitude = flight.vehicle.attitude
     if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
         return None
@@ -362,7 +364,7 @@ def _law(flight: FlightContext) -> Law:
 def _setpoint(
     flight: FlightContext, contact: Contact, motion: MotionState, limits: Limits, surfaces: Sequence[Surface]
 ) -> Vector3:
-    """The law's goal, as what is around lets it be."""
+    """The law's goal, moved clear of surfaces and into the fence."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
     goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion, limits)
     room = FreeSpace(FenceBounds(flight.origin_ned_m, flight.mission.fence), surfaces[1:])
@@ -370,7 +372,7 @@ def _setpoint(
 
 
 def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[CollisionRecord]) -> list[Surface]:
-    """What was just hit first, then what was hit before in the same recovery and what is remembered."""
+    """The surface just hit first, then those hit before in the same recovery, then the obstacle map's."""
     surfaces = [Surface(contact.position_ned_m, contact.normal_ned, flight.mission.recovery.clearance_m)]
     for record in reversed(records):
         if record.is_over:

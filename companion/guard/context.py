@@ -12,7 +12,7 @@ from companion.messages import GlobalPosition, Sticks, Vector3
 
 @dataclass(frozen=True, slots=True)
 class GuardTransition:
-    """A trigger with its story, "" where the state's own events tell it."""
+    """A trigger and its reason; "" where the state reports its own events."""
 
     trigger: Trigger
     text: str = ""
@@ -41,10 +41,10 @@ class GuardContext(FlightContext):
 
 
 class GuardStateHandler(Protocol):
-    """What the guard does in a state; made anew each time the state is entered."""
+    """A state's behaviour; one object is made each time the state is entered."""
 
     def step(self, guard: GuardContext, inputs: Inputs, now_us: int) -> GuardTransition | None:
-        """Do what is due now; a Move when the state is over."""
+        """Do what is due now; returns a transition when the state is over."""
         ...
 
     def target(self, now_us: int) -> Target | None:
