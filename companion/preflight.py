@@ -211,7 +211,7 @@ DOUBTFUL, BAD = Verdict.DOUBTFUL, Verdict.BAD
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class PreflightItem:
     """`fix` is a parameter and the value that mends it; None where only a person can."""
 
     item: str
@@ -223,28 +223,28 @@ class Finding:
 
 def _judged(
     item: str, found: str, *cases: tuple[bool, Verdict, str], mended: float | None = None, beyond: str = ""
-) -> Finding:
+) -> PreflightItem:
     """The first case that holds, with its remedy; good where none does. `mended`: the parameter's value that mends it.
 
     `beyond` is added to what was found where it is not good.
     """
     for holds, verdict, remedy in cases:
         if holds:
-            return Finding(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
-    return Finding(item, Verdict.GOOD, found)
+            return PreflightItem(item, verdict, found + beyond, remedy, None if mended is None else (item, mended))
+    return PreflightItem(item, Verdict.GOOD, found)
 
 
-def findings(survey: Survey) -> list[Finding]:
+def findings(survey: Survey) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
     found = [_frame(survey), *_rotors(survey), *_port(survey), *_delivery(survey), *_streams(survey)]
     for name, judge in _SETTINGS.items():
         value = survey.parameters.get(name)
-        unread = Finding(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
+        unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
         found.append(unread if value is None else judge(name, value, survey))
     return [*found, *_estimate(survey), *_vibration(survey), _time(survey), _battery(survey), *_sight(survey)]
 
 
-def _frame(survey: Survey) -> Finding:
+def _frame(survey: Survey) -> PreflightItem:
     """HEARTBEAT tells how many arms there are, not where: a quadrotor is taken for an X."""
     kind = "" if survey.vehicle.identity is None else survey.vehicle.identity.vehicle_type
     remedy = "companion.estimate.fits_normal: false in the mission: the normal is the push's direction then"
@@ -252,7 +252,7 @@ def _frame(survey: Survey) -> Finding:
     return _judged("frame", kind, (is_fitted, DOUBTFUL, remedy), beyond=": a hit's normal is fitted for a quad-x")
 
 
-def _rotors(survey: Survey) -> Iterator[Finding]:
+def _rotors(survey: Survey) -> Iterator[PreflightItem]:
     """Where PX4's control allocation has them; before 1.13 it had no such parameters."""
     told, guards = survey.parameters, survey.config.estimate.guards
     if not all(name in told for name in ROTORS):
@@ -277,7 +277,7 @@ def _rotors(survey: Survey) -> Iterator[Finding]:
     )
 
 
-def _port(survey: Survey) -> Iterator[Finding]:
+def _port(survey: Survey) -> Iterator[PreflightItem]:
     """The port of PX4's that this line is plugged into, by its baud rate."""
     told, line = survey.parameters, survey.line
     if line is None:
@@ -293,7 +293,7 @@ def _port(survey: Survey) -> Iterator[Finding]:
     fitting = [number for number, port in ports.items() if port and told.get(f"SER_{port}_BAUD") == line.baud]
     if not fitting:
         remedy = "MAV_1_CONFIG = 102 (TELEM2), SER_TEL2_BAUD as in --connect, MAV_1_MODE = 2; then reboot"
-        yield Finding("port", DOUBTFUL, f"none of PX4's TELEM ports is told to have {line.baud} baud", remedy)
+        yield PreflightItem("port", DOUBTFUL, f"none of PX4's TELEM ports is told to have {line.baud} baud", remedy)
         return
     # Of two with the same rate the one that was meant for this.
     number = next((number for number in fitting if told.get(f"MAV_{number}_MODE") == ONBOARD), fitting[-1])
@@ -316,7 +316,7 @@ def _port(survey: Survey) -> Iterator[Finding]:
         yield _judged(name, found, *cases, mended=wish, beyond=f": {why}" if is_less else "")
 
 
-def _delivery(survey: Survey) -> Iterator[Finding]:
+def _delivery(survey: Survey) -> Iterator[PreflightItem]:
     delivery, line = survey.delivery, survey.line
     if delivery.received:
         lost, bad, sent = delivery.lost, delivery.unreadable_bytes, delivery.received + delivery.lost
@@ -326,7 +326,7 @@ def _delivery(survey: Survey) -> Iterator[Finding]:
     if delivery.signed and not survey.parameters:
         # With a key, packets come here without their signatures.
         found = "the vehicle signs its packets and answers nothing that has no signature"
-        yield Finding("signing", BAD, found, "--signing-key FILE, with the key that the vehicle has")
+        yield PreflightItem("signing", BAD, found, "--signing-key FILE, with the key that the vehicle has")
     jitter_us, timer_ms = delivery.jitter_us, None if line is None else line.latency_timer_ms
     if jitter_us is not None:
         held = "an FTDI converter's latency timer" + (
@@ -338,7 +338,7 @@ def _delivery(survey: Survey) -> Iterator[Finding]:
         yield _judged("arrival", found, (is_held or jitter_us > UNEVEN_US, DOUBTFUL, remedy))
 
 
-def _streams(survey: Survey) -> Iterator[Finding]:
+def _streams(survey: Survey) -> Iterator[PreflightItem]:
     rates = survey.streams.rates_hz()
     serial = "serial: baud rate 921600 (SER_TEL2_BAUD), MAV_1_MODE 2 (Onboard), MAV_1_RATE 0; then ask again"
     full = "the link is full: baud rate 921600 and MAV_1_RATE 0 give HIGHRES_IMU about 200 Hz"
@@ -353,7 +353,7 @@ def _streams(survey: Survey) -> Iterator[Finding]:
             )
 
 
-def _integration(name: str, rate_hz: float, survey: Survey) -> Finding:
+def _integration(name: str, rate_hz: float, survey: Survey) -> PreflightItem:
     found = f"{rate_hz:g} Hz: each sample is a mean over {1e3 / rate_hz:.1f} ms"
     if rate_hz < LEAST_INTEG_HZ:
         remedy = f"{name} = {LEAST_INTEG_HZ}, then reboot"
@@ -363,14 +363,14 @@ def _integration(name: str, rate_hz: float, survey: Survey) -> Finding:
     return _judged(name, found, (is_long, DOUBTFUL, remedy))
 
 
-def _offboard_loss_time(name: str, loss_s: float, survey: Survey) -> Finding:
+def _offboard_loss_time(name: str, loss_s: float, survey: Survey) -> PreflightItem:
     found = f"{loss_s:g} s until PX4 acts when the companion has died"
     further = f"at 2 m/s the vehicle flies {2.0 * (loss_s - HELD_S):g} m further unattended"
     case = (loss_s > HELD_S, DOUBTFUL, f"{name} = {HELD_S:g}; {further}")
     return _judged(name, found, case, mended=HELD_S, beyond=f"; setpoints are made safe to hold {HELD_S:g} s")
 
 
-def _offboard_loss(name: str, action: float, survey: Survey) -> Finding:
+def _offboard_loss(name: str, action: float, survey: Survey) -> PreflightItem:
     number = int(action)
     called = LOSS_NAMES[number] if 0 <= number < len(LOSS_NAMES) else "unknown"
     remedy, drops, found = f"{name} = {LOSS_LAND} (land)", number in LOSS_DROPS, f"{number} ({called})"
@@ -384,25 +384,27 @@ def _offboard_loss(name: str, action: float, survey: Survey) -> Finding:
     )
 
 
-def _radio(name: str, bits: float, survey: Survey) -> Finding:
+def _radio(name: str, bits: float, survey: Survey) -> PreflightItem:
     if survey.parameters.get("COM_RC_IN_MODE") == RC_DISABLED:
-        return Finding(name, Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
+        return PreflightItem(name, Verdict.GOOD, "no radio is expected (COM_RC_IN_MODE 4)")
     if int(bits) & RCL_EXCEPT_OFFBOARD:
-        return Finding(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
+        return PreflightItem(name, Verdict.GOOD, "a lost radio does not end OFFBOARD")
     value = int(bits) | RCL_EXCEPT_OFFBOARD
     found = f"{int(bits)}: a lost radio ends OFFBOARD, in the middle of a recovery too"
-    return Finding(name, DOUBTFUL, found, f"{name} = {value}, if the flight may go on without a radio", (name, value))
+    return PreflightItem(
+        name, DOUBTFUL, found, f"{name} = {value}, if the flight may go on without a radio", (name, value)
+    )
 
 
-def _termination(name: str, breaker: float, survey: Survey) -> Finding:
+def _termination(name: str, breaker: float, survey: Survey) -> PreflightItem:
     if breaker == FLIGHTTERM_OFF:
-        return Finding(name, Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
+        return PreflightItem(name, Verdict.GOOD, "a hit that tips the vehicle does not stop its motors")
     found = f"{breaker:g}: the failure detector stops the motors beyond FD_FAIL_R, FD_FAIL_P (60 degrees)"
     remedy = f"{name} = {FLIGHTTERM_OFF}, unless a parachute or people below ask for it"
-    return Finding(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
+    return PreflightItem(name, DOUBTFUL, found, remedy, (name, FLIGHTTERM_OFF))
 
 
-def _speeding_up(name: str, most_m_s2: float, survey: Survey) -> Finding:
+def _speeding_up(name: str, most_m_s2: float, survey: Survey) -> PreflightItem:
     """Of PX4's own modes, as `rebound guard` watches them; the companion's setpoints have their own limit."""
     lean_deg = math.degrees(math.atan(most_m_s2 / GRAVITY_M_S2))
     found = f"{most_m_s2:g} m/s^2: PX4's own modes lean by {lean_deg:.0f} degrees as they speed up"
@@ -411,7 +413,7 @@ def _speeding_up(name: str, most_m_s2: float, survey: Survey) -> Finding:
 
 
 # What decides whether a collision is survived.
-_SETTINGS: dict[str, Callable[[str, float, Survey], Finding]] = {
+_SETTINGS: dict[str, Callable[[str, float, Survey], PreflightItem]] = {
     "IMU_INTEG_RATE": _integration,
     "COM_OF_LOSS_T": _offboard_loss_time,
     "COM_OBL_RC_ACT": _offboard_loss,
@@ -422,10 +424,10 @@ _SETTINGS: dict[str, Callable[[str, float, Survey], Finding]] = {
 PARAMETERS = (*_SETTINGS, "COM_RC_IN_MODE", *ROTORS)
 
 
-def _estimate(survey: Survey) -> Iterator[Finding]:
+def _estimate(survey: Survey) -> Iterator[PreflightItem]:
     if not survey.positions:
         remedy = "wait for GPS, flow or motion capture; QGroundControl's arming checks name what is missing"
-        yield Finding("position", BAD, "no LOCAL_POSITION_NED", remedy)
+        yield PreflightItem("position", BAD, "no LOCAL_POSITION_NED", remedy)
         return
     if not survey.flies:
         wander_m = spread([sample.position_ned_m for sample in survey.positions])
@@ -440,10 +442,10 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
         )
     worst = max((ratio for status in survey.estimator for ratio in status.ratios), default=None)
     if worst is None:
-        yield Finding("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
+        yield PreflightItem("estimator", DOUBTFUL, "no ESTIMATOR_STATUS", "look at EKF2 in QGroundControl")
     elif not survey.estimator[-1].horizontal_velocity_is_good:
         remedy = "wait for GPS, flow or motion capture: v_c is taken from this velocity"
-        yield Finding("estimator", BAD, "no horizontal velocity", remedy)
+        yield PreflightItem("estimator", BAD, "no horizontal velocity", remedy)
     else:
         is_bad = worst >= BAD_RATIO or any(status.accelerometer_is_faulty for status in survey.estimator)
         yield _judged(
@@ -454,7 +456,7 @@ def _estimate(survey: Survey) -> Iterator[Finding]:
         )
 
 
-def _vibration(survey: Survey) -> Iterator[Finding]:
+def _vibration(survey: Survey) -> Iterator[PreflightItem]:
     doing = "hovering" if survey.flies else "standing"
     if survey.vibration:
         clipped = sum(survey.vibration[-1].clipping_counts) - sum(survey.vibration[0].clipping_counts)
@@ -476,10 +478,10 @@ def _vibration(survey: Survey) -> Iterator[Finding]:
         yield _judged("shaking", found, (shakes_m_s2 > STANDS_M_S2, DOUBTFUL, remedy))
 
 
-def _time(survey: Survey) -> Finding:
+def _time(survey: Survey) -> PreflightItem:
     median_us, worst_us = survey.round_trip.median_us, survey.round_trip.worst_us
     if median_us is None or worst_us is None:
-        return Finding("time", DOUBTFUL, "TIMESYNC is not answered", "MAVLink 2 on the link (MAV_PROTO_VER 2)")
+        return PreflightItem("time", DOUBTFUL, "TIMESYNC is not answered", "MAVLink 2 on the link (MAV_PROTO_VER 2)")
     return _judged(
         "time",
         f"{median_us / 1e3:.1f} ms there and back (median), {worst_us / 1e3:.1f} ms at worst",
@@ -488,15 +490,15 @@ def _time(survey: Survey) -> Finding:
     )
 
 
-def _battery(survey: Survey) -> Finding:
+def _battery(survey: Survey) -> PreflightItem:
     percent = survey.vehicle.battery_percent
     if percent is None:
-        return Finding("battery", DOUBTFUL, "unknown", "set up the power module (BAT1_SOURCE)")
+        return PreflightItem("battery", DOUBTFUL, "unknown", "set up the power module (BAT1_SOURCE)")
     cases = ((percent < BAD_BATTERY, BAD, "charge it"), (percent < DOUBTFUL_BATTERY, DOUBTFUL, "charge it"))
     return _judged("battery", f"{percent} %", *cases)
 
 
-def _sight(survey: Survey) -> Iterator[Finding]:
+def _sight(survey: Survey) -> Iterator[PreflightItem]:
     """By force alone and in the quiet of standing: a flight's vibration is `rebound tune`'s to judge."""
     rate_hz = survey.streams.rates_hz().get("HIGHRES_IMU", 0.0)
     if not rate_hz:
@@ -546,6 +548,6 @@ class Preflight:
     def finished(self) -> bool:
         return self.survey.finished
 
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[PreflightItem]:
         """All items; complete once `finished` without a refusal."""
         return findings(self.survey)

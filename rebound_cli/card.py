@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Sequence
 
 from companion.flight.envelope import LOSS_PARAMETER
-from companion.preflight import LOSS_NAMES, Finding, Survey, Verdict
+from companion.preflight import LOSS_NAMES, PreflightItem, Survey, Verdict
 
 _WIDTH = 100
 _CARD = """FIRST FLIGHT WITH REBOUND
@@ -44,7 +44,7 @@ Not as written here? Land, and keep the flight: rebound doctor --out help.tar.gz
 """
 
 
-def card(survey: Survey, found: Sequence[Finding], connect: str) -> str:
+def card(survey: Survey, found: Sequence[PreflightItem], connect: str) -> str:
     vehicle = survey.vehicle
     kind = "vehicle" if vehicle.identity is None else vehicle.identity.vehicle_type
     battery = "unknown" if vehicle.battery_percent is None else f"{vehicle.battery_percent} %"

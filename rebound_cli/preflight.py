@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from companion.errors import ConfigurationError
-from companion.preflight import Finding, Preflight, SerialLine, Verdict
+from companion.preflight import Preflight, PreflightItem, SerialLine, Verdict
 from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
@@ -75,7 +75,7 @@ def _exchange(preflight: Preflight, connection: Connection, clock: Clock) -> Non
         connection.send(frame)
 
 
-def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
+def _show(console: Console, preflight: Preflight, found: list[PreflightItem]) -> None:
     identity, version = preflight.survey.vehicle.identity, preflight.survey.vehicle.version
     release = "" if version is None else " " + ".".join(map(str, version))
     kind = identity.vehicle_type if identity is not None else "vehicle"
@@ -85,7 +85,7 @@ def _show(console: Console, preflight: Preflight, found: list[Finding]) -> None:
     console.print(f"\n  {counts[0]} good, {counts[1]} worth a look, {counts[2]} in the way of a flight")
 
 
-def show_findings(found: Sequence[Finding], width: int, tell: Callable[[str], None]) -> None:
+def show_findings(found: Sequence[PreflightItem], width: int, tell: Callable[[str], None]) -> None:
     for finding in found:
         tell(f"  {finding.verdict.value:4}  {finding.item:{width}} {finding.found}")
         if finding.remedy:
@@ -93,8 +93,13 @@ def show_findings(found: Sequence[Finding], width: int, tell: Callable[[str], No
 
 
 def _fix(
-    console: Console, preflight: Preflight, connection: Connection, clock: Clock, found: list[Finding], is_agreed: bool
-) -> list[Finding]:
+    console: Console,
+    preflight: Preflight,
+    connection: Connection,
+    clock: Clock,
+    found: list[PreflightItem],
+    is_agreed: bool,
+) -> list[PreflightItem]:
     """Set what can be set, one by one as the person agrees; the findings afterwards."""
     if preflight.survey.vehicle.armed:
         raise ConfigurationError("The vehicle is armed: nothing is set on a vehicle that may be flying.")

@@ -21,7 +21,7 @@ from rebound_cli.console import Console, state_fields
 from rebound_cli.interrupts import Interrupts
 from rebound_cli.run_folder import FlightRecorder
 from rebound_cli.status import StatusServer
-from rebound_cli.timing import Heard, Timing, undisturbed
+from rebound_cli.timing import LinkRate, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.
 LONGEST_WAIT_S = 0.05
@@ -147,7 +147,7 @@ class Loop:
     server: StatusServer | None = None
     computer: Computer | None = None
     timing: Timing = field(default_factory=Timing)
-    heard: Heard = field(default_factory=Heard)
+    heard: LinkRate = field(default_factory=LinkRate)
     manager: ServiceManager | None = field(default_factory=service_manager)
     now_us: int | None = None  # of the last step
     is_interrupted: bool = False

@@ -41,7 +41,7 @@ class Timing:
         return {"tick_lateness_ms": _quantiles_ms(self._late), "step_ms": _quantiles_ms(self._took)}
 
 
-class Heard:
+class LinkRate:
     """What of the link is worth a glance: how much comes in, or for how long nothing has."""
 
     def __init__(self) -> None:

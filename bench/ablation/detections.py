@@ -36,7 +36,7 @@ ROUNDS = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class DetectionCase:
     """Something to hear, and the rules that are looked at."""
 
     kind: str
@@ -60,11 +60,11 @@ def detections_campaign(hits: int, first_seed: int, names: tuple[str, ...], data
         cases += [("recorded flight", case) for case in healthy_campaign(data, FLOWN_WITH).cases]
         cases += [("recorded impact", case) for case in injected_campaign(data, ROUNDS, FLOWN_WITH).cases]
     parameters = {"hits": hits, "first_seed": first_seed, "rules": list(names), "recorded": data is not None}
-    heard = [Heard(kind, case, names) for kind, case in cases]
+    heard = [DetectionCase(kind, case, names) for kind, case in cases]
     return Campaign("ablation-detections", parameters, heard, work_out, uses=("bench.detectors", "bench.baselines"))
 
 
-def work_out(heard: Heard) -> Json:
+def work_out(heard: DetectionCase) -> Json:
     """What the detector said, by rate; and what it said without each rule that mattered."""
     rules = [rule for rule in RULES if rule.name in heard.names]
     with switched(rules) as copies:
@@ -76,7 +76,7 @@ def work_out(heard: Heard) -> Json:
         return {"kind": heard.kind, "with": said, "without": copies.found}
 
 
-def _said(heard: Heard) -> Json:
+def _said(heard: DetectionCase) -> Json:
     """By rate: hits found and when, and alarms that were none."""
     rates = _WORK[type(heard.case)](heard.case)["rates"]
     return {rate: _of_rate(found.get("detectors", found)[FLOWN_WITH[0]]) for rate, found in rates.items()}

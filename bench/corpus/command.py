@@ -8,7 +8,7 @@ from bench.campaign.plan import Campaign, Json
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.corpus.comparison import comparison_text
 from bench.corpus.recording import record
-from bench.corpus.verdict import FlightCase, work_out
+from bench.corpus.verdict import CorpusCase, work_out
 from bench.detectors.campaigns import healthy_campaign, injected_campaign
 from bench.detectors.watching import FLOWN_WITH
 from bench.places import make_folder, make_place
@@ -49,7 +49,7 @@ def run_judge(options: Namespace) -> int:
         raise CorpusError(f"{options.folder}: no run folder with {TLOG_NAME} and {TRUTH_NAME} in it.")
     workers = Workers(options.jobs, options.scheduler)
     names = [str(folder.relative_to(options.folder)) for folder in found]
-    cases = [FlightCase(str(folder.resolve())) for folder in found]
+    cases = [CorpusCase(str(folder.resolve())) for folder in found]
     campaign = Campaign("corpus", {"flights": names}, cases, work_out, USES)
     results = run_campaign(campaign, workers)
     verdicts: Json = {"version": campaign.version, "flights": {names[n]: r for n, r in results.results.items()}}

@@ -21,13 +21,13 @@ ASKED_HZ = {"recorded": None, "50": 50.0}
 
 
 @dataclass(frozen=True, slots=True)
-class FlightCase:
+class CorpusCase:
     """A run folder of the corpus."""
 
     folder: str
 
 
-def work_out(case: FlightCase) -> dict[str, Any]:
+def work_out(case: CorpusCase) -> dict[str, Any]:
     """By rate: each true hit with what was told of it, and collisions told that were none."""
     folder = Path(case.folder)
     log, settings = read_log(folder / TLOG_NAME), mission_from(load_flown(folder / RESOLVED_NAME)).companion

@@ -22,7 +22,7 @@ from bench.detectors.watching import alarms_only
 from companion.errors import ReboundError
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
 from companion.motion.rotation import body_to_ned
-from rebound_cli.logs.log import Heard, Log, Told
+from rebound_cli.logs.log import Log, LoggedSample, Told
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.watching import Circumstances, watch_log
 
@@ -110,7 +110,7 @@ def work_out_healthy(case: HealthyCase) -> dict[str, Any]:
     return result
 
 
-def _scaled(log: Log, scale: float) -> Iterator[Heard]:
+def _scaled(log: Log, scale: float) -> Iterator[LoggedSample]:
     for item in log.heard:
         sample = item.sample
         if isinstance(sample, ImuSample):
@@ -118,7 +118,7 @@ def _scaled(log: Log, scale: float) -> Iterator[Heard]:
                 tuple(scale * value for value in vector)
                 for vector in (sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
             )
-            yield Heard(item.at_us, ImuSample(sample.time_boot_us, _triple(force), _triple(rate)))
+            yield LoggedSample(item.at_us, ImuSample(sample.time_boot_us, _triple(force), _triple(rate)))
         else:
             yield item
 
@@ -166,7 +166,7 @@ def with_impact(log: Log, force_frd_m_s2: Floats, first_us: int, hit_us: int) ->
     return replace(log, heard=tuple(_struck(inside, force_frd_m_s2, hit_us)))
 
 
-def _struck(items: list[Heard], force: Floats, hit_us: int) -> Iterator[Heard]:
+def _struck(items: list[LoggedSample], force: Floats, hit_us: int) -> Iterator[LoggedSample]:
     attitude = (1.0, 0.0, 0.0, 0.0)
     last_imu_us = 0
     velocity = shift = np.zeros(3)
@@ -190,7 +190,7 @@ def _struck(items: list[Heard], force: Floats, hit_us: int) -> Iterator[Heard]:
                 position_ned_m=_triple(np.array(sample.position_ned_m) + shift),
                 velocity_ned_m_s=_triple(np.array(sample.velocity_ned_m_s) + velocity),
             )
-        yield Heard(item.at_us, sample)
+        yield LoggedSample(item.at_us, sample)
 
 
 def averaged(own_m_s2: Floats, force_m_s2: Floats, end_s: float, window_s: float) -> Floats:

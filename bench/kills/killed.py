@@ -72,7 +72,7 @@ def mission_data(case: Case) -> dict[str, Any]:
     return data
 
 
-class Flight:
+class SimulatedFlight:
     """The mission beside the simulated vehicle, interval by interval."""
 
     def __init__(self, case: Case) -> None:
@@ -108,14 +108,14 @@ class Flight:
 
 def work_out(case: Case) -> Json:
     """Every kill of a flight, and what the same flight does when nobody is killed."""
-    first = Flight(case)
+    first = SimulatedFlight(case)
     limit_us = virtual_time_limit_s(first.mission) * 1e6
     while not first.vehicle.truth.hits and first.vehicle.time_boot_us < limit_us and not first.companion.finished:
         first.fly()
     if not first.vehicle.truth.hits:
         raise AssertionError("the vehicle never reached the wall")
     touch = first.vehicle.truth.hits[0]
-    flight, killed = Flight(case), []
+    flight, killed = SimulatedFlight(case), []
     for kill_s in sorted(case.kills_s):
         flight.fly_until(touch.contact_at_boot_us + kill_s * 1e6)
         killed.append(_in_a_copy(lambda: _killed(flight, touch)))
@@ -141,7 +141,7 @@ def _in_a_copy(work: Callable[[], Json]) -> Json:
     return found
 
 
-def _killed(flight: Flight, touch: Hit) -> Json:
+def _killed(flight: SimulatedFlight, touch: Hit) -> Json:
     killed_at_us = flight.vehicle.time_boot_us
     since_s = 1e-6 * (killed_at_us - touch.contact_at_boot_us)
     flight.fall()

@@ -19,7 +19,7 @@ from companion.fence import Fence
 from companion.guard.config import GuardConfig
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.mission.policy import Limits
+from companion.mission.policy import SetpointLimits
 from companion.reflex.config import RecoveryConfig
 from sim_vehicle.airframe import BUILT_IN_FOLDER, Airframe, load_built_in
 from sim_vehicle.faults.spec import Fault
@@ -44,7 +44,7 @@ def guard_page() -> str:
     head = "# Guard keys\n\nThe file of `rebound guard --config`. Every key is optional. `fence`, `limits`, `recovery` "
     head += "and\n`companion` mean what they do in a [mission](mission.md).\n\n"
     shared: dict[Model, str] = {CompanionConfig: "[companion](companion.md)"}
-    shared |= {Fence: "[fence](mission.md#fence)", Limits: "[limits](mission.md#limits)"}
+    shared |= {Fence: "[fence](mission.md#fence)", SetpointLimits: "[limits](mission.md#limits)"}
     shared |= {RecoveryConfig: "[recovery](mission.md#recovery)"}
     return head + _sections(GuardConfig, shared)
 

@@ -16,7 +16,7 @@ from companion.flight.context import Target
 from companion.memory.patch import Patch
 from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
-from companion.mission.policy import Limits
+from companion.mission.policy import SetpointLimits
 from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.config import (
     BEHIND_M,
@@ -179,7 +179,7 @@ class Surroundings:
     known: Sequence[KnownSurface] = ()
 
 
-def bounded(target: Target, around: Surroundings, fence: Fence, limits: Limits) -> tuple[Target, str]:
+def bounded(target: Target, around: Surroundings, fence: Fence, limits: SetpointLimits) -> tuple[Target, str]:
     """The setpoint as it may be sent, and which limits changed it, for people; "" for none.
 
     A place that is moved loses its velocity and acceleration: the vehicle stops there. The fence has the last word.
@@ -206,7 +206,9 @@ def is_finite(target: Target) -> bool:
     return all(map(math.isfinite, values)) and (target.yaw_rad is None or math.isfinite(target.yaw_rad))
 
 
-def _with_place(target: Target, around: Surroundings, fence: Fence, limits: Limits, reasons: list[str]) -> Target:
+def _with_place(
+    target: Target, around: Surroundings, fence: Fence, limits: SetpointLimits, reasons: list[str]
+) -> Target:
     """The place within the step and the fence. What of it is not asked for, as of a lean, is left alone."""
     if target.acceleration_only and target.is_height_free:
         return target
@@ -235,7 +237,7 @@ def _with_place(target: Target, around: Surroundings, fence: Fence, limits: Limi
     return Target(place, target.yaw_rad)
 
 
-def _with_velocity(target: Target, limits: Limits, reasons: list[str]) -> Target:
+def _with_velocity(target: Target, limits: SetpointLimits, reasons: list[str]) -> Target:
     """A velocity that is too fast, in its own direction; the acceleration that leads to it is left out."""
     velocity, most_m_s = target.velocity_ned_m_s, limits.max_speed_m_s
     if velocity is None or math.hypot(*velocity) <= most_m_s:
@@ -247,7 +249,7 @@ def _with_velocity(target: Target, limits: Limits, reasons: list[str]) -> Target
     return replace(target, velocity_ned_m_s=(n * scale, e * scale, d * scale), acceleration_ned_m_s2=acceleration)
 
 
-def _with_acceleration(target: Target, limits: Limits, reasons: list[str]) -> Target:
+def _with_acceleration(target: Target, limits: SetpointLimits, reasons: list[str]) -> Target:
     """Sideways what the tilt allows in hover; down what gravity gives, and as much up."""
     if target.acceleration_ned_m_s2 is None:
         return target
@@ -368,7 +370,7 @@ def _with_height(target: Target, around: Surroundings, fence: Fence, reasons: li
     return replace(target, velocity_ned_m_s=velocity, acceleration_ned_m_s2=acceleration)
 
 
-def _with_tilt(target: Target, limits: Limits) -> Target:
+def _with_tilt(target: Target, limits: SetpointLimits) -> Target:
     """Within the tilt after all else: what keeps off a slant makes sideways of down.
 
     Of a vehicle that is wrong about its tilt, the lean to ask for so that it has the one that was meant.

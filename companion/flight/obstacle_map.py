@@ -8,7 +8,7 @@ from companion.flight.envelope import KnownSurface, touched
 from companion.flight.states import Trigger
 from companion.memory.patch import Patch, is_same, remembered, touch_of
 from companion.memory.stored import as_data, describe
-from companion.memory.surroundings import Surroundings
+from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.reflex.halfspace import Surface, plus
 from companion.reflex.laws import Contact
@@ -29,7 +29,7 @@ def all_known(flight: FlightContext) -> tuple[Patch, ...]:
     return remembered(flight.patches, _touches(flight, new), _clearance_m(flight)) if new else flight.patches
 
 
-def surroundings(flight: FlightContext) -> Surroundings:
+def surroundings(flight: FlightContext) -> ObstacleMap:
     """The obstacles that the flight plans its trajectories around.
 
     An item that is tried again shall meet what stopped it: that hit is left out, and nothing else.
@@ -39,7 +39,7 @@ def surroundings(flight: FlightContext) -> Surroundings:
     if is_retry and tally.hits:
         patches = _with_hits(flight, len(flight.collisions) - tally.hits)
     mission = flight.mission
-    return Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    return ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
 
 
 def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:

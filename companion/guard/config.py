@@ -8,7 +8,7 @@ from companion.fence import Fence
 from companion.mission.config import CompanionConfig
 from companion.mission.items import LandItem, MissionItem, TakeoffItem
 from companion.mission.model import KnownRecovery, Mission
-from companion.mission.policy import Limits
+from companion.mission.policy import SetpointLimits
 from companion.px4_mode import MODE_NAMES
 from companion.reflex.config import RecoveryConfig
 from companion.strict_model import Positive, StrictModel
@@ -44,7 +44,7 @@ class GuardConfig(StrictModel):
     fence: Fence = Fence(radius_m=100_000.0, max_height_m=10_000.0)
     """Where recoveries may lead. From where the vehicle was armed. Nobody knows a stranger's field: as good as none
     until it is given."""
-    limits: Limits = Limits()
+    limits: SetpointLimits = SetpointLimits()
     """What no setpoint exceeds."""
     recovery: KnownRecovery = RecoveryConfig()
     """How a recovery is planned."""

@@ -8,7 +8,7 @@ from companion.guard.config import GuardConfig
 from companion.guard.context import GuardContext
 from companion.guard.machine import GuardMachine
 from companion.guard.states import HOLDING, State
-from companion.guard.watching import Connect, why_not
+from companion.guard.watching import GuardConnect, why_not
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import GlobalPosition, PositionTarget, Sample, Sticks
@@ -22,7 +22,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         monitor = start_monitor(config.companion, now_us)
         streams = StreamMonitor(config.companion.streams, tuple(monitor.detector.losses))
         guard = GuardContext(config.as_mission(), Vehicle(), streams, config=config, keeps_others_out=keeps_others_out)
-        super().__init__(guard, GuardMachine(guard, Connect(now_us)), monitor, now_us)
+        super().__init__(guard, GuardMachine(guard, GuardConnect(now_us)), monitor, now_us)
         self.is_enabled = False  # asked for, and not yet taken up
 
     @property

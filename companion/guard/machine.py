@@ -12,7 +12,7 @@ from companion.flight.states import State as FlightState
 from companion.guard.context import GuardContext, GuardStateHandler, GuardTransition
 from companion.guard.holding import GiveBack, Recovering, StandDown, TakeOver
 from companion.guard.states import HOLDING, TABLE, State, Trigger
-from companion.guard.watching import Connect, StandBy, Watching
+from companion.guard.watching import GuardConnect, StandBy, Watching
 from companion.messages import Sticks
 from companion.motion.rotation import yaw_rad
 from companion.px4_mode import OFFBOARD, mode_name
@@ -180,7 +180,7 @@ class GuardMachine(StateMachine):
                 guard.collisions[-1].is_over = True
         match self.state:
             case State.CONNECTING:
-                return Connect(now_us, is_first=False)
+                return GuardConnect(now_us, is_first=False)
             case State.STANDING_BY:
                 return StandBy()
             case State.WATCHING:

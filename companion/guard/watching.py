@@ -35,7 +35,7 @@ def why_not(guard: GuardContext) -> str | None:
     return None if guard.origin_ned_m is not None else "no position yet"
 
 
-class Connect(Meet[GuardTransition]):
+class GuardConnect(Meet[GuardTransition]):
     """The vehicle may be flying.
 
     A guard that was connected before goes on asking: a vehicle that was restarted has no position at first.

@@ -9,7 +9,7 @@ from companion.mission.config import StreamsConfig
 
 
 @dataclass(frozen=True, slots=True)
-class Stream:
+class RequestedStream:
     """A wanted stream; a flight does not begin below `min_hz`."""
 
     message_id: MessageId
@@ -21,22 +21,24 @@ class Stream:
         return messages.SetMessageInterval(self.message_id, round(1e6 / self.asked_hz))
 
 
-def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -> tuple[Stream, ...]:
+def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -> tuple[RequestedStream, ...]:
     """Mode and landed state are wished for, not required: HEARTBEAT tells the mode too, if more slowly.
 
     What the detector makes use of beyond that is wished for, too: it says what it loses without.
     """
     always = (
-        Stream(MessageId.HIGHRES_IMU, messages.ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
-        Stream(MessageId.LOCAL_POSITION_NED, LocalPosition, config.local_position_hz, config.min_local_position_hz),
-        Stream(MessageId.ATTITUDE_QUATERNION, messages.Attitude, config.attitude_hz, config.min_attitude_hz),
-        Stream(MessageId.EXTENDED_SYS_STATE, messages.ExtendedState, config.extended_sys_state_hz, 0.0),
-        Stream(MessageId.CURRENT_MODE, messages.CurrentMode, config.current_mode_hz, 0.0),
+        RequestedStream(MessageId.HIGHRES_IMU, messages.ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
+        RequestedStream(
+            MessageId.LOCAL_POSITION_NED, LocalPosition, config.local_position_hz, config.min_local_position_hz
+        ),
+        RequestedStream(MessageId.ATTITUDE_QUATERNION, messages.Attitude, config.attitude_hz, config.min_attitude_hz),
+        RequestedStream(MessageId.EXTENDED_SYS_STATE, messages.ExtendedState, config.extended_sys_state_hz, 0.0),
+        RequestedStream(MessageId.CURRENT_MODE, messages.CurrentMode, config.current_mode_hz, 0.0),
     )
     wished = (
-        Stream(MessageId.ATTITUDE_TARGET, messages.AttitudeTarget, config.attitude_target_hz, 0.0),
-        Stream(MessageId.ODOMETRY, messages.Odometry, config.odometry_hz, 0.0),
-        Stream(MessageId.VIBRATION, messages.Vibration, config.vibration_hz, 0.0),
+        RequestedStream(MessageId.ATTITUDE_TARGET, messages.AttitudeTarget, config.attitude_target_hz, 0.0),
+        RequestedStream(MessageId.ODOMETRY, messages.Odometry, config.odometry_hz, 0.0),
+        RequestedStream(MessageId.VIBRATION, messages.Vibration, config.vibration_hz, 0.0),
     )
     return always + tuple(stream for stream in wished if stream.message_id in for_detector)
 

@@ -13,7 +13,7 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.fence import Fence
-from companion.memory.surroundings import ROUNDING_M, Place, Surroundings, Walls
+from companion.memory.surroundings import ROUNDING_M, ObstacleMap, Place, Walls
 from companion.messages import Vector3
 
 # For ways along an edge of a polygon; less than what the safety envelope takes for rounding.
@@ -21,7 +21,7 @@ FENCE_SLACK_M = 5e-6
 START, GOAL = 0, 1
 
 
-def route(known: Surroundings, start_ned_m: Vector3, goal_ned_m: Vector3) -> tuple[Vector3, ...] | None:
+def route(known: ObstacleMap, start_ned_m: Vector3, goal_ned_m: Vector3) -> tuple[Vector3, ...] | None:
     """The places to fly to, one after the other, the goal last; None when there is no way that is known to be free.
 
     Round about first, the height changing evenly; then at the nearest level at which there is a way.
@@ -40,7 +40,7 @@ def route(known: Surroundings, start_ned_m: Vector3, goal_ned_m: Vector3) -> tup
     return None
 
 
-def _search(known: Surroundings, walls: Walls, start: Place, goal: Place) -> list[Place] | None:
+def _search(known: ObstacleMap, walls: Walls, start: Place, goal: Place) -> list[Place] | None:
     """The shortest way over the corners of what is known (A*): the places after the start."""
     if walls.holds(goal):
         return None

@@ -59,7 +59,7 @@ class Walls:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class ObstacleMap:
     """All patches for one vehicle: `reach_m` from its centre to the guards' rim, `margin_m` from there to surfaces."""
 
     patches: tuple[Patch, ...]

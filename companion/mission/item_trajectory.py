@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from companion.fence import Fence
 from companion.memory.route import route
-from companion.memory.surroundings import Surroundings
+from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import FlightConfig
@@ -20,7 +20,7 @@ LEAST_SPEEDING_UP_M_S2 = 0.4
 LEAST_TRY_M_S = 0.3
 
 # Speed, acceleration, and that while the speed grows.
-Limits: TypeAlias = tuple[float, float, float]
+SpeedAndAccelerations: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class SpeedLimits:
         least = min(LEAST_SPEEDING_UP_M_S2, self.speeding_up_m_s2)
         return replace(self, speeding_up_m_s2=max(least, self.speeding_up_m_s2 - max(0.0, head_m_s2)))
 
-    def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> Limits:
+    def limits(self, speed_m_s: float | None, acceleration_m_s2: float | None) -> SpeedAndAccelerations:
         """Speed and acceleration of an item, or else the present ones; and the acceleration while the speed grows."""
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
         acceleration = self.acceleration_m_s2 if acceleration_m_s2 is None else acceleration_m_s2
@@ -117,7 +117,7 @@ def _with_velocity(item: items.VelocityItem, start_m: Vector3, speeds: SpeedLimi
     return LineProfile(start_m, target, top, braking, speeding_up)
 
 
-def _round(item: items.OrbitItem, start_m: Vector3, limits: Limits) -> Chain:
+def _round(item: items.OrbitItem, start_m: Vector3, limits: SpeedAndAccelerations) -> Chain:
     """To the nearest point of the circle, which for a start in its middle is the one in the north, and round."""
     n, e, _ = item.centre_ned_m
     start_rad = math.atan2(start_m[1] - e, start_m[0] - n)
@@ -157,7 +157,7 @@ class Planned:
     left_out: int = 0
 
 
-def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits, known: Surroundings) -> Planned:
+def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """The item's own trajectory where that is free. A velocity item is flown as it is: it has no goal."""
     own = trajectory_of(item, start_m, speeds)
     if isinstance(item, items.VelocityItem) or not _is_blocked(own, known):
@@ -180,7 +180,7 @@ def trajectory_around(item: items.Motion, start_m: Vector3, speeds: SpeedLimits,
     return Planned(lines(places, limits), True, left_out)
 
 
-def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: Surroundings) -> Planned:
+def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, known: ObstacleMap) -> Planned:
     """Home as the item says; round known obstacles, also above the vehicle."""
     own = trajectory_home(start_m, item, speeds, known.fence)
     if not _is_blocked(own, known):
@@ -193,7 +193,7 @@ def home_around(start_m: Vector3, item: items.ReturnItem, speeds: SpeedLimits, k
     return Planned(lines([*places, *found], speeds.limits(item.speed_m_s, None)), True)
 
 
-def lines(places_m: Sequence[Vector3], limits: Limits) -> Chain:
+def lines(places_m: Sequence[Vector3], limits: SpeedAndAccelerations) -> Chain:
     """Straight from each to the next, at rest in each."""
     return Chain([LineProfile(a, b, *limits) for a, b in pairwise(places_m)])
 
@@ -215,7 +215,7 @@ def looks(trajectory: Trajectory, until_s: float) -> list[Vector3]:
     return [trajectory.at(until_s * number / count)[0] for number in range(count + 1)]
 
 
-def _is_blocked(trajectory: Trajectory, known: Surroundings) -> bool:
+def _is_blocked(trajectory: Trajectory, known: ObstacleMap) -> bool:
     if not known.patches:
         return False
     if isinstance(trajectory, Chain):
@@ -225,7 +225,7 @@ def _is_blocked(trajectory: Trajectory, known: Surroundings) -> bool:
     return known.block(looks(trajectory, trajectory.duration_s))
 
 
-def _is_inside(trajectory: Trajectory, known: Surroundings) -> bool:
+def _is_inside(trajectory: Trajectory, known: ObstacleMap) -> bool:
     places = looks(trajectory, trajectory.duration_s)
     fence = known.fence
     return all(fence.contains(n, e) and fence.min_height_m <= -d <= fence.max_height_m for n, e, d in places)

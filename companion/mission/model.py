@@ -13,13 +13,13 @@ from pydantic import AfterValidator, Field, model_validator
 from companion.fence import Fence
 from companion.memory.patch import Patch
 from companion.memory.stored import ObstaclesConfig
-from companion.memory.surroundings import Surroundings
+from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.mission import items
 from companion.mission.config import CompanionConfig
 from companion.mission.item_trajectory import Planned, SpeedLimits, climb, home_around, trajectory_around
 from companion.mission.items import MissionItem
-from companion.mission.policy import AbortWhen, Handover, Limits, OnCollision, OnDamage, Resume
+from companion.mission.policy import AbortWhen, Handover, OnCollision, OnDamage, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
 from companion.reflex.laws import RECOVERY_LAWS, check_known_law
@@ -42,7 +42,7 @@ class Mission(StrictModel):
     description: str = ""
     """A line for people."""
     fence: Fence = Fence()
-    limits: Limits = Limits()
+    limits: SetpointLimits = SetpointLimits()
     items: Annotated[tuple[MissionItem, ...], Field(min_length=2)]
     """Flown in order; take-off first, land or return last."""
     on_collision: OnCollision = OnCollision()
@@ -152,7 +152,7 @@ def steps_to_fly(mission: Mission) -> tuple[items.Step, ...]:
 
 def _legs(mission: Mission, patches: tuple[Patch, ...] = ()) -> Iterator[Leg]:
     place: Vector3 = (0.0, 0.0, 0.0)
-    known = Surroundings(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
+    known = ObstacleMap(patches, mission.fence, mission.companion.estimate.reach_m, mission.obstacles.margin_m)
     flight = mission.companion.flight
     speeds = SpeedLimits.of(flight)
     for step in items.program(mission.items):

@@ -47,7 +47,7 @@ class AbortWhen(StrictModel):
     """After the recovery from a hit this hard: the airframe wants to be looked at."""
 
 
-class Limits(StrictModel):
+class SetpointLimits(StrictModel):
     """What no setpoint exceeds, whatever asks for it; see also the fence."""
 
     max_speed_m_s: Annotated[Positive, Field(le=20.0)] = 12.0

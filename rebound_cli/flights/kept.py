@@ -142,7 +142,7 @@ def flight_named(runs: Path, name: str) -> KeptFlight:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class DiskLimits:
     """In bytes: of all flights together, and of what is left free."""
 
     max_use: int
@@ -153,9 +153,9 @@ class Limits:
         return max(used_bytes - self.max_use, self.keep_free - free_bytes, 0)
 
 
-def limits_of(config: DiskConfig, file_system_bytes: int) -> Limits:
+def limits_of(config: DiskConfig, file_system_bytes: int) -> DiskLimits:
     tenth = file_system_bytes // 10
-    return Limits(
+    return DiskLimits(
         min(tenth, _MOST_BYTES) if config.max_use_mb is None else round(config.max_use_mb * _MB),
         min(tenth, _FREE_BYTES) if config.keep_free_mb is None else round(config.keep_free_mb * _MB),
     )

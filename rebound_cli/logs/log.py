@@ -52,7 +52,7 @@ Told: TypeAlias = Sample | Demand
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class LoggedSample:
     """A sample and when it was heard, in microseconds of the log's own clock."""
 
     at_us: int
@@ -71,7 +71,7 @@ class Log:
     path: Path
     vehicle: str
     started_at_us: int
-    heard: tuple[Heard, ...]
+    heard: tuple[LoggedSample, ...]
     losses: tuple[str, ...]
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None

@@ -10,7 +10,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import WANTED, Demand, Heard, Log, LogError, other_arms
+from rebound_cli.logs.log import WANTED, Demand, Log, LogError, LoggedSample, other_arms
 
 _ULOG_MAGIC = b"ULog"
 Packets = list[tuple[int, bytes]]
@@ -42,16 +42,16 @@ def read_telemetry(path: Path) -> Log:
     vehicle, others = _vehicle(path, packets)
     source, decoder = (vehicle.system_id, vehicle.component_id), Decoder()
     decoder.listen_to(*source)
-    heard: list[Heard] = []
+    heard: list[LoggedSample] = []
     kinds: set[int] = set()
     for at_us, packet in packets:
         if source_of(packet) != source:
             continue
         kinds.add(message_id_of(packet))
         if message_id_of(packet) == MessageId.POSITION_TARGET_LOCAL_NED:
-            heard.append(Heard(at_us, _demand(packet)))
+            heard.append(LoggedSample(at_us, _demand(packet)))
         else:
-            heard.extend(Heard(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
+            heard.extend(LoggedSample(at_us, sample) for _, sample in decoder.feed(packet) if sample is not None)
     if MessageId.HIGHRES_IMU not in kinds:
         raise LogError(
             f"{path}: no HIGHRES_IMU from system {vehicle.system_id} in it; PX4 sends none to a ground station unless "

@@ -18,7 +18,7 @@ from pyulog import ULog
 
 from companion import messages
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
-from rebound_cli.logs.log import Demand, Heard, Log, LogError, other_arms, vector
+from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, other_arms, vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -230,7 +230,7 @@ def _losses(log: ULog, topics: _Topics, imu: _Topic) -> Iterator[str]:
 _CLIPPING = ("accelerometer_clipping", "delta_velocity_clipping")
 
 
-def _imu_samples(topics: _Topics, imu: _Topic) -> Iterator[Heard]:
+def _imu_samples(topics: _Topics, imu: _Topic) -> Iterator[LoggedSample]:
     """Mean specific force and angular rate over each integration interval, less the estimator's biases."""
     force, turning, taken_us = imu.array("accelerometer_m_s2"), imu.array("gyro_rad"), None
     if force is None:
@@ -247,7 +247,7 @@ def _imu_samples(topics: _Topics, imu: _Topic) -> Iterator[Heard]:
     biases = [_bias(topics, sensor, imu.time_us) for sensor in ("accel", "gyro")]
     for index, time_us, row in imu.rows(np.column_stack([force, turning]) - np.column_stack(biases)):
         sample_us = time_us if taken_us is None else int(taken_us[index])
-        yield Heard(time_us, messages.ImuSample(sample_us, vector(row), vector(row[3:])))
+        yield LoggedSample(time_us, messages.ImuSample(sample_us, vector(row), vector(row[3:])))
 
 
 def _bias(topics: _Topics, sensor: str, at_us: npt.NDArray[np.int64]) -> Floats:
@@ -271,44 +271,44 @@ def _ms(time_us: int) -> int:
     return time_us // 1000 * 1000
 
 
-def _local_position(topic: _Topic) -> Iterator[Heard]:
+def _local_position(topic: _Topic) -> Iterator[LoggedSample]:
     """LOCAL_POSITION_NED and, where the version counts its jumps, ODOMETRY: the wire sends both, valid or not."""
     columns = [topic.column(f"{name}_reset_counter") for name in ("xy", "z", "vxy", "vz")]
     counters = [column for column in columns if column is not None]
     resets = np.sum(counters, axis=0) if counters else None
     for index, time_us, row in topic.rows(topic.vector("x", "y", "z", "vx", "vy", "vz")):
         position, velocity = vector(row), vector(row[3:])
-        yield Heard(time_us, messages.LocalPosition(_ms(time_us), position, velocity))
+        yield LoggedSample(time_us, messages.LocalPosition(_ms(time_us), position, velocity))
         if resets is not None:
-            yield Heard(time_us, messages.Odometry(time_us, position, velocity, int(resets[index]) % 256))
+            yield LoggedSample(time_us, messages.Odometry(time_us, position, velocity, int(resets[index]) % 256))
 
 
-def _attitude(topic: _Topic) -> Iterator[Heard]:
+def _attitude(topic: _Topic) -> Iterator[LoggedSample]:
     rates = topic.vector("rollspeed", "pitchspeed", "yawspeed")  # until v1.11
     for index, time_us, (w, x, y, z) in topic.rows(topic.array("q", 4)):
         turning = None if rates is None else vector(rates[index].tolist())
-        yield Heard(time_us, messages.Attitude(_ms(time_us), (w, x, y, z), turning))
+        yield LoggedSample(time_us, messages.Attitude(_ms(time_us), (w, x, y, z), turning))
 
 
-def _attitude_target(topic: _Topic) -> Iterator[Heard]:
+def _attitude_target(topic: _Topic) -> Iterator[LoggedSample]:
     attitudes = topic.array("q_d", 4)
     for index, time_us, thrust in topic.rows(topic.array("thrust_body")):
         w, x, y, z = [math.nan] * 4 if attitudes is None else attitudes[index].tolist()
         attitude = (w, x, y, z) if math.isfinite(w + x + y + z) else None
-        yield Heard(time_us, messages.AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
+        yield LoggedSample(time_us, messages.AttitudeTarget(_ms(time_us), math.hypot(*thrust), attitude))
 
 
-def _vibration(topic: _Topic) -> Iterator[Heard]:
+def _vibration(topic: _Topic) -> Iterator[LoggedSample]:
     clipping, levels = topic.array("accel_clipping"), topic.vector("gyro_vibration_metric", "accel_vibration_metric")
     if clipping is None or levels is None:
         return
     for time_us, count, (gyro, accel) in zip(
         topic.time_us.tolist(), clipping.sum(axis=1), levels.tolist(), strict=True
     ):
-        yield Heard(time_us, messages.Vibration(time_us, gyro, accel, (int(count), 0, 0)))
+        yield LoggedSample(time_us, messages.Vibration(time_us, gyro, accel, (int(count), 0, 0)))
 
 
-def _heartbeat(topic: _Topic) -> Iterator[Heard]:
+def _heartbeat(topic: _Topic) -> Iterator[LoggedSample]:
     count = len(topic.time_us)
     arming, none = topic.column("arming_state"), np.full(count, -1.0)
     if arming is None:
@@ -319,10 +319,10 @@ def _heartbeat(topic: _Topic) -> Iterator[Heard]:
         kind = int(kind) if int(kind) in MULTICOPTERS else _QUADROTOR
         mode = _MODES.get(int(state), 0)
         beat = messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, bool(arm == _ARMED), mode, status)
-        yield Heard(time_us, beat)
+        yield LoggedSample(time_us, beat)
 
 
-def _demand(topic: _Topic) -> Iterator[Heard]:
+def _demand(topic: _Topic) -> Iterator[LoggedSample]:
     """Fields are x, y, z, vx, ... until v1.13 and position[], velocity[] since; NaN where nothing is asked."""
     positions, velocities = topic.array("position"), topic.array("velocity")
     if positions is None or velocities is None:
@@ -330,10 +330,10 @@ def _demand(topic: _Topic) -> Iterator[Heard]:
     if positions is None or velocities is None:
         return
     for time_us, place, speed in zip(topic.time_us.tolist(), positions.tolist(), velocities.tolist(), strict=True):
-        yield Heard(time_us, Demand.of(time_us, place, speed))
+        yield LoggedSample(time_us, Demand.of(time_us, place, speed))
 
 
-def _landed_states(topics: _Topics) -> Iterator[Heard]:
+def _landed_states(topics: _Topics) -> Iterator[LoggedSample]:
     """EXTENDED_SYS_STATE by PX4's rule (EXTENDED_SYS_STATE.hpp): one at every change of what it is made of."""
     news: list[tuple[int, str, int]] = []
     for name, field in (
@@ -350,7 +350,7 @@ def _landed_states(topics: _Topics) -> Iterator[Heard]:
     for time_us, field, value in sorted(news, key=lambda item: item[0]):
         known[field] = value
         if "landed" in known:
-            yield Heard(time_us, messages.ExtendedState(_landed_state(known)))
+            yield LoggedSample(time_us, messages.ExtendedState(_landed_state(known)))
 
 
 def _landed_state(known: Mapping[str, int]) -> messages.LandedState:

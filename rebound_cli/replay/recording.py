@@ -31,7 +31,7 @@ from rebound_cli.replay.watching import Findings
 
 
 @dataclass(slots=True)
-class Step:
+class RecordedStep:
     """One call of the companion's step; `told`: what it was told after it, as `inputs.jsonl` has it."""
 
     time_us: int
@@ -49,7 +49,7 @@ class Recording:
     """
 
     settings: Mission | GuardConfig
-    steps: Sequence[Step]
+    steps: Sequence[RecordedStep]
     event_lines: Sequence[str]
     is_cut: bool
     versions: Mapping[str, str]
@@ -75,7 +75,7 @@ def read_recording(folder: Path) -> Recording:
     if is_cut:
         inputs, events = run_folder.whole_lines(inputs), run_folder.whole_lines(events)
     for record in run_folder.read_records(inputs_file, inputs):
-        steps.setdefault(record["time_us"], Step(record["time_us"])).told.append(record)
+        steps.setdefault(record["time_us"], RecordedStep(record["time_us"])).told.append(record)
     lines = events.splitlines(keepends=True)
     if is_cut:
         # Of the step with the last packet perhaps not all was written. Nor does the flight end after a step with
@@ -108,7 +108,7 @@ def settings_file(folder: Path) -> Path:
     return folder / (run_folder.GUARD_NAME if (folder / run_folder.GUARD_NAME).exists() else run_folder.RESOLVED_NAME)
 
 
-def _steps(tlog: Path) -> dict[int, Step]:
+def _steps(tlog: Path) -> dict[int, RecordedStep]:
     """Packets of one stamp belong to one step: first what was received, then what was sent."""
     steps = {}
     for time_us, group in groupby(read_tlog(tlog), key=itemgetter(0)):
@@ -116,7 +116,7 @@ def _steps(tlog: Path) -> dict[int, Step]:
         count = len(packets)
         while count and source_of(packets[count - 1])[1] == COMPONENT_ID:
             count -= 1
-        steps[time_us] = Step(time_us, packets[:count], packets[count:])
+        steps[time_us] = RecordedStep(time_us, packets[:count], packets[count:])
     return steps
 
 

@@ -12,7 +12,7 @@ from companion.link.vehicle import OLD_NEWS_US
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND, mode_name
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
-from rebound_cli.logs.log import Demand, Heard, Log
+from rebound_cli.logs.log import Demand, Log, LoggedSample
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request
 
 # In a gap of the log the watch is asked this often, as a flight would, and then no more: it has told by then.
@@ -45,7 +45,7 @@ class Circumstances:
         self._demand = _NO_DEMAND
         self._demand_old_us = 0  # from then on it is no longer flown, unless it is renewed
 
-    def hear(self, heard: Heard) -> Sequence[str]:
+    def hear(self, heard: LoggedSample) -> Sequence[str]:
         """Take-offs, landings, arming and modes, as the sample reports them."""
         happened: list[str] = []
         match heard.sample:
@@ -239,7 +239,7 @@ def watch_log(
     return findings
 
 
-def thinned(heard: tuple[Heard, ...], rate_hz: float) -> Iterator[Heard]:
+def thinned(heard: tuple[LoggedSample, ...], rate_hz: float) -> Iterator[LoggedSample]:
     """What PX4's link would have sent of the IMU samples, asked for this rate; all other samples as they are.
 
     A sample stays the mean over its own interval: a lower rate does not average, it leaves samples out.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from companion.errors import ConfigurationError
-from companion.preflight import Finding, Verdict
+from companion.preflight import PreflightItem, Verdict
 from rebound_cli.preflight import show_findings
 from rebound_cli.service.files import UNIT, UNIT_NAME, USER, PlannedFile, ServiceSettings
 from rebound_cli.service.system import System, answer, hidden_program
@@ -29,21 +29,21 @@ def run_check(system: System, plan: Plan) -> int:
     return 1 if any(finding.verdict is Verdict.BAD for finding in found) else 0
 
 
-def _judged(item: str, is_good: bool, good: str, bad: str, remedy: str = _AGAIN) -> Finding:
-    return Finding(item, Verdict.GOOD, good) if is_good else Finding(item, Verdict.BAD, bad, remedy)
+def _judged(item: str, is_good: bool, good: str, bad: str, remedy: str = _AGAIN) -> PreflightItem:
+    return PreflightItem(item, Verdict.GOOD, good) if is_good else PreflightItem(item, Verdict.BAD, bad, remedy)
 
 
-def _findings(system: System, plan: Plan) -> Iterator[Finding]:
+def _findings(system: System, plan: Plan) -> Iterator[PreflightItem]:
     unit = system.root / UNIT
     if not unit.exists():
-        yield Finding("unit", Verdict.BAD, f"/{UNIT} is not there", f"{_AGAIN} --guard CONFIG --connect URL")
+        yield PreflightItem("unit", Verdict.BAD, f"/{UNIT} is not there", f"{_AGAIN} --guard CONFIG --connect URL")
         return
     try:
         settings, planned = plan(system)
     except ConfigurationError as error:
-        yield Finding("settings", Verdict.BAD, str(error), f"mend it, then {_AGAIN}")
+        yield PreflightItem("settings", Verdict.BAD, str(error), f"mend it, then {_AGAIN}")
         return
-    yield Finding("settings", Verdict.GOOD, f"{settings.run} at {settings.connect}")
+    yield PreflightItem("settings", Verdict.GOOD, f"{settings.run} at {settings.connect}")
     there = {file: system.root / file.path for file in planned}
     other = [
         f"/{file.path}"
@@ -62,18 +62,18 @@ def _findings(system: System, plan: Plan) -> Iterator[Finding]:
     yield from analysed(unit.read_text(encoding="utf-8"))
 
 
-def _device(device: str) -> Finding:
+def _device(device: str) -> PreflightItem:
     names = sorted(name for name in _BY_ID.glob("*") if name.resolve() == Path(device).resolve())
     if names and not device.startswith(str(_BY_ID)):
-        return Finding("device", Verdict.DOUBTFUL, f"{device} may be another device tomorrow", f"use {names[0]}")
+        return PreflightItem("device", Verdict.DOUBTFUL, f"{device} may be another device tomorrow", f"use {names[0]}")
     remedy = "look at the cable, and at raspi-config's serial port"
     return _judged("device", Path(device).exists(), device, f"{device} is not there", remedy)
 
 
-def analysed(unit: str) -> Iterator[Finding]:
+def analysed(unit: str) -> Iterator[PreflightItem]:
     """What systemd-analyze says of the unit, offline."""
     if shutil.which("systemd-analyze") is None:
-        yield Finding("unit", Verdict.DOUBTFUL, "not looked at: there is no systemd-analyze here")
+        yield PreflightItem("unit", Verdict.DOUBTFUL, "not looked at: there is no systemd-analyze here")
         return
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, UNIT_NAME)

@@ -9,7 +9,7 @@ from bench.detectors import flights
 from bench.detectors.flights import FlightCase, fly_healthy
 from bench.detectors.recorded import DataError, averaged, data_files, turned, with_impact
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry
-from rebound_cli.logs.log import Heard, Log
+from rebound_cli.logs.log import Log, LoggedSample
 from sim_vehicle.airframe import load_built_in
 
 REST = np.array([0.0, 0.0, -9.81])
@@ -83,11 +83,11 @@ def test_a_flight_with_an_impact_in_it_differs_from_then_on_only(tmp_path):
     heard = []
     for number in range(400):
         at_us = 5_000 * number
-        heard.append(Heard(at_us, ImuSample(at_us, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))))
+        heard.append(LoggedSample(at_us, ImuSample(at_us, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))))
         if number % 20 == 0:
-            heard.append(Heard(at_us, LocalPosition(at_us, (0.0, 0.0, -5.0), (0.0, 0.0, 0.0))))
-            heard.append(Heard(at_us, Odometry(at_us, (0.0, 0.0, -5.0), (0.0, 0.0, 0.0), 0)))
-            heard.append(Heard(at_us, Attitude(at_us, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)))))
+            heard.append(LoggedSample(at_us, LocalPosition(at_us, (0.0, 0.0, -5.0), (0.0, 0.0, 0.0))))
+            heard.append(LoggedSample(at_us, Odometry(at_us, (0.0, 0.0, -5.0), (0.0, 0.0, 0.0), 0)))
+            heard.append(LoggedSample(at_us, Attitude(at_us, (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)))))
     log = Log(tmp_path, "", 0, tuple(heard), ())
     # When something pushes it from the front for 10 ms
     struck = with_impact(log, np.full((10, 3), (-100.0, 0.0, 0.0)), 500_000, 1_000_000)

@@ -22,7 +22,7 @@ from companion.flight.obstacle_map import known_surfaces
 from companion.flight.plan import mission_lines
 from companion.memory.patch import Patch
 from companion.mission.model import Mission
-from companion.mission.policy import Limits
+from companion.mission.policy import SetpointLimits
 from companion.reflex.config import HELD_S, NOTICED_S
 from companion.reflex.planner import MotionState
 from tests.companion.hostile import flight_in
@@ -30,7 +30,7 @@ from tests.companion.hostile import flight_in
 DOCS = Path(__file__).parents[2] / "bench" / "notes" / "px4.md"
 ORIGIN = (0.0, 0.0, 0.0)
 REST = (0.0, 0.0, 0.0)
-FENCE, LIMITS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), Limits()
+FENCE, LIMITS = Fence(radius_m=12, max_height_m=5, min_height_m=0.3), SetpointLimits()
 HERE = (0.0, 0.0, -1.5)
 # A wall that is touched with the centre 0.5 m north of here.
 WALL = touched((0.5, 0.0, -1.5), (-1.0, 0.0, 0.0))

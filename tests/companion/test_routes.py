@@ -9,7 +9,7 @@ from shapely import LineString, Point
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
-from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, Surroundings, assumed_area, core
+from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, assumed_area, core
 from companion.mission.item_trajectory import SpeedLimits, home_around, passed, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
 from companion.mission.trajectory import CurveProfile
@@ -30,8 +30,8 @@ def ceiling(height_m: float, north_m: float = 0.0) -> Patch:
     return Patch(((north_m, 0.0, -height_m),), (0.0, 0.0, 1.0), ERROR_RAD, REACHES_M, 0)
 
 
-def around(*patches: Patch, fence: Fence | None = None) -> Surroundings:
-    return Surroundings(patches, fence or Fence(radius_m=9, max_height_m=2.4), REACH_M, MARGIN_M)
+def around(*patches: Patch, fence: Fence | None = None) -> ObstacleMap:
+    return ObstacleMap(patches, fence or Fence(radius_m=9, max_height_m=2.4), REACH_M, MARGIN_M)
 
 
 def length_m(start, places) -> float:

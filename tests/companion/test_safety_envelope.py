@@ -13,7 +13,7 @@ from bench.faults.packets import made
 from companion.fence import Fence
 from companion.flight.context import Target
 from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded
-from companion.mission.policy import Limits
+from companion.mission.policy import SetpointLimits
 from companion.mission.trajectory import LineProfile
 from companion.motion.strapdown import GRAVITY_M_S2
 from companion.reflex.halfspace import Surface, plus
@@ -21,7 +21,7 @@ from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked
 
 FENCE = Fence(radius_m=8, max_height_m=4, min_height_m=0.5)
-LIMITS = Limits(max_speed_m_s=3.0, max_step_m=4.0)
+LIMITS = SetpointLimits(max_speed_m_s=3.0, max_step_m=4.0)
 ORIGIN = (100.0, -50.0, 2.0)
 METRES = st.floats(-30, 30)
 POINT = st.tuples(METRES, METRES, METRES)

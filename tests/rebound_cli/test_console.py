@@ -12,7 +12,7 @@ from companion.report import Event, Status
 from rebound_cli.compiling import compiling_shown
 from rebound_cli.console import Console
 from rebound_cli.interrupts import Interrupts
-from rebound_cli.timing import Heard
+from rebound_cli.timing import LinkRate
 from rebound_cli.vehicle_process import VehicleProcess, VehicleProcessError
 
 ROOT = Path(__file__).parents[2]
@@ -159,7 +159,7 @@ def test_the_vehicles_progress_is_shown_by_who_waits_for_it_and_ctrl_c_ends_that
 
 
 def test_the_link_is_a_rate_and_then_a_silence():
-    heard = Heard()
+    heard = LinkRate()
     assert heard.text(500_000) == ""
     for now_us in range(1_000_000, 2_100_001, 10_000):
         heard.take(400, now_us)

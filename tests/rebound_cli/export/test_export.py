@@ -19,7 +19,7 @@ from companion.messages import GlobalPosition, ImuSample, LocalPosition
 from rebound_cli.export.foxglove import write_mcap
 from rebound_cli.export.merging import merge
 from rebound_cli.export.ulog import Row, boot_us, with_rows
-from rebound_cli.logs.log import Heard, LogError
+from rebound_cli.logs.log import LogError, LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
 from rebound_cli.report.shown_flight import recorded_flight
@@ -108,8 +108,8 @@ def test_a_pose_turns_from_ned_and_frd_to_enu_and_flu(flight, attitude_frd_to_ne
     moved = LocalPosition(1_000_000, (3.0, 2.0, -1.0), (0.0, 0.0, 0.0))
     attitude = next(h for h in log.heard if type(h.sample).__name__ == "Attitude")
     heard = (replace(attitude, sample=replace(attitude.sample, attitude_wxyz=attitude_frd_to_ned)),)
-    imu = Heard(*log.imu()[0])
-    topics = mcap_of(shown, replace(log, heard=(imu, *heard, Heard(log.heard[-1].at_us, moved))))
+    imu = LoggedSample(*log.imu()[0])
+    topics = mcap_of(shown, replace(log, heard=(imu, *heard, LoggedSample(log.heard[-1].at_us, moved))))
     ((_, _, found),) = topics["/pose"]
     assert found["pose"]["position"] == {"x": 2.0, "y": 3.0, "z": 1.0}
     assert [found["pose"]["orientation"][axis] for axis in "wxyz"] == pytest.approx(flu_to_enu)
@@ -152,7 +152,7 @@ def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
 
 def test_a_position_on_earth_becomes_a_fix(flight):
     shown, log = flight
-    here = Heard(log.heard[-1].at_us, GlobalPosition(47.397742, 8.545594, 488.0))
+    here = LoggedSample(log.heard[-1].at_us, GlobalPosition(47.397742, 8.545594, 488.0))
     ((schema, _, fix),) = mcap_of(shown, replace(log, heard=(*log.heard, here)))["/location"]
     assert schema == "foxglove.LocationFix"
     assert (fix["latitude"], fix["longitude"], fix["altitude"]) == (47.397742, 8.545594, 488.0)
@@ -305,7 +305,7 @@ def test_an_event_stands_at_the_newest_sample_that_was_heard_by_then(flight):
     _, log = flight
     times_us = list(every(4000, 1_000_000, 1_100_000))
     force, still = (0.0, 0.0, -9.8), (0.0, 0.0, 0.0)
-    heard = tuple(Heard(time_us + 500_003_000, ImuSample(time_us, force, still)) for time_us in times_us)
+    heard = tuple(LoggedSample(time_us + 500_003_000, ImuSample(time_us, force, still)) for time_us in times_us)
     assert boot_us(replace(log, heard=heard), [heard[-1].at_us + 5000]).tolist() == [times_us[-1] + 5000]
 
 

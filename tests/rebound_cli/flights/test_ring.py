@@ -14,7 +14,7 @@ from rebound_cli.flights import kept as ring
 from rebound_cli.flights.kept import (
     LAST_BYTES,
     LOOK_EVERY_US,
-    Limits,
+    DiskLimits,
     Ring,
     kept_flights,
     limits_of,
@@ -54,11 +54,11 @@ def disk(monkeypatch):
     ("config", "disk_bytes", "limits"),
     [
         # A 32 GB card: a tenth of it for flights, and 300 MiB free.
-        ({}, 32 * 10**9, Limits(3_200_000_000, 300 * MIB)),
+        ({}, 32 * 10**9, DiskLimits(3_200_000_000, 300 * MIB)),
         # On a large disk no more than 4 GiB, on a small one a tenth is left free.
-        ({}, 1000 * GIB, Limits(4 * GIB, 300 * MIB)),
-        ({}, 1 * GIB, Limits(GIB // 10, GIB // 10)),
-        ({"max_use_mb": 500, "keep_free_mb": 50}, GIB, Limits(500 * MB, 50 * MB)),
+        ({}, 1000 * GIB, DiskLimits(4 * GIB, 300 * MIB)),
+        ({}, 1 * GIB, DiskLimits(GIB // 10, GIB // 10)),
+        ({"max_use_mb": 500, "keep_free_mb": 50}, GIB, DiskLimits(500 * MB, 50 * MB)),
     ],
 )
 def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_others(config, disk_bytes, limits):
@@ -69,7 +69,7 @@ def test_limits_are_those_of_journald_and_of_px4s_logger_unless_a_person_has_oth
     ("used", "free", "to_go"), [(900, 300, 0), (1000, 200, 0), (1200, 300, 200), (900, 150, 50), (1200, 150, 200)]
 )
 def test_what_has_to_go_is_what_passes_the_budget_or_what_the_disk_lacks(used, free, to_go):
-    assert Limits(max_use=1000, keep_free=200).to_go(used, free) == to_go
+    assert DiskLimits(max_use=1000, keep_free=200).to_go(used, free) == to_go
 
 
 def test_the_oldest_without_a_hit_go_first_those_with_one_last_and_the_present_one_never(tmp_path, disk):

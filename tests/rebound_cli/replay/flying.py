@@ -7,7 +7,7 @@ import numpy as np
 from bench.baselines.config import BaselineConfig
 from companion.messages import ExtendedState, Heartbeat, ImuSample, LandedState, LocalPosition
 from companion.px4_mode import OFFBOARD
-from rebound_cli.logs.log import Heard, Log
+from rebound_cli.logs.log import Log, LoggedSample
 
 LATERAL = BaselineConfig(detector="lateral")
 SECOND = 1_000_000
@@ -25,15 +25,19 @@ def position(time_us, height_m, speed_m_s=0.0):
 def flight(duration_s=10.0, interval_us=4000, hit_us=HIT_US, gap=None, push_m_s2=40.0):
     """Armed at 1 s, in the air from 2 s on, 1 m/s north; a push from ahead at `hit_us`, for 24 ms."""
     noise = np.random.default_rng(1).normal(0.0, 0.3, (round(duration_s * 1e6 / interval_us), 3))
-    heard = [Heard(0, beat(False)), Heard(0, ExtendedState(LandedState.ON_GROUND)), Heard(SECOND, beat(True))]
-    heard.append(Heard(2 * SECOND, ExtendedState(LandedState.IN_AIR)))
+    heard = [
+        LoggedSample(0, beat(False)),
+        LoggedSample(0, ExtendedState(LandedState.ON_GROUND)),
+        LoggedSample(SECOND, beat(True)),
+    ]
+    heard.append(LoggedSample(2 * SECOND, ExtendedState(LandedState.IN_AIR)))
     for index, (x, y, z) in enumerate(noise.tolist()):
         time_us = index * interval_us
         if gap is not None and gap[0] <= time_us < gap[1]:
             continue
         push = -push_m_s2 if hit_us is not None and hit_us < time_us <= hit_us + 24_000 else 0.0
-        heard.append(Heard(time_us, ImuSample(time_us, (x + push, y, -9.8 + z), (0.0, 0.0, 0.0))))
+        heard.append(LoggedSample(time_us, ImuSample(time_us, (x + push, y, -9.8 + z), (0.0, 0.0, 0.0))))
         if time_us % 20_000 == 0:
-            heard.append(Heard(time_us, position(time_us, 1.5 if time_us > 2 * SECOND else 0.0, 1.0)))
+            heard.append(LoggedSample(time_us, position(time_us, 1.5 if time_us > 2 * SECOND else 0.0, 1.0)))
     heard.sort(key=lambda item: item.at_us)
     return Log(Path("flight.tlog"), "PX4", 0, tuple(heard), ())

@@ -12,7 +12,7 @@ import pytest
 
 from companion.messages import ImuSample
 from companion.mission.config import CompanionConfig
-from rebound_cli.logs.log import Heard
+from rebound_cli.logs.log import LoggedSample
 from rebound_cli.logs.reader import read_log
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
@@ -35,7 +35,7 @@ def log_of(name):
 def scaled(log, factor):
     """The same flight of a vehicle that shakes, pushes and turns so many times as hard."""
     heard = [
-        Heard(
+        LoggedSample(
             item.at_us,
             replace(
                 item.sample,

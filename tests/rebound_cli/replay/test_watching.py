@@ -9,7 +9,7 @@ from companion.detection.interface import Situation
 from companion.messages import ExtendedState, LandedState, LocalPosition
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND
-from rebound_cli.logs.log import Demand, Heard
+from rebound_cli.logs.log import Demand, LoggedSample
 from rebound_cli.logs.shaking import Stage, shaking
 from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import DESCENT_M_S, Circumstances, thinned, watch_log
@@ -66,7 +66,7 @@ def test_a_hit_between_the_samples_of_a_slow_stream_is_not_seen_by_its_force():
 def situation_after(*samples):
     circumstances = Circumstances()
     for sample in samples:
-        circumstances.hear(Heard(0, sample))
+        circumstances.hear(LoggedSample(0, sample))
     return circumstances.situation
 
 
@@ -109,15 +109,15 @@ def test_a_setpoint_counts_in_a_mode_that_flies_it(mode):
 
 def test_a_setpoint_that_nobody_renews_is_not_flown_for_longer_than_px4_would():
     circumstances = Circumstances()
-    circumstances.hear(Heard(0, beat(True)))
-    circumstances.hear(Heard(5 * SECOND, DOWN))
+    circumstances.hear(LoggedSample(0, beat(True)))
+    circumstances.hear(LoggedSample(5 * SECOND, DOWN))
     circumstances.wait(6 * SECOND - 1)
     assert circumstances.situation.descent_commanded
     # COM_OF_LOSS_T is 1 s
     circumstances.wait(6 * SECOND)
     assert not circumstances.situation.descent_commanded
     # A stream of them goes on counting, though each is old in its turn
-    circumstances.hear(Heard(7 * SECOND, DOWN))
+    circumstances.hear(LoggedSample(7 * SECOND, DOWN))
     circumstances.wait(7 * SECOND + SECOND // 2)
     assert circumstances.situation.descent_commanded
 
@@ -131,11 +131,11 @@ def test_one_old_setpoint_does_not_make_a_crash_a_landing():
         else item
         for item in log.heard
     ]
-    log = replace(log, heard=(Heard(-44 * SECOND, DOWN), *low))
+    log = replace(log, heard=(LoggedSample(-44 * SECOND, DOWN), *low))
     findings = watch_log(log, CompanionConfig(detector="fused"))
     assert [finding.is_collision for finding in findings.impacts] == [True]
     # The same with a setpoint that is renewed is one that was asked for
-    told = [Heard(time_us, DOWN) for time_us in range(2 * SECOND, 10 * SECOND, SECOND // 5)]
+    told = [LoggedSample(time_us, DOWN) for time_us in range(2 * SECOND, 10 * SECOND, SECOND // 5)]
     log = replace(log, heard=tuple(sorted([*log.heard, *told], key=lambda item: item.at_us)))
     findings = watch_log(log, CompanionConfig(detector="fused"))
     assert [finding.is_collision for finding in findings.impacts] == [False]

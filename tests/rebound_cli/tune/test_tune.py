@@ -11,7 +11,7 @@ import yaml
 from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
 from rebound_cli.inputs import load_mission_document, mission_from
-from rebound_cli.logs.log import Heard
+from rebound_cli.logs.log import LoggedSample
 from rebound_cli.main import main
 from rebound_cli.replay.watching import watch_log
 from rebound_cli.tune.command import crash
@@ -190,7 +190,7 @@ def leaning(log, degrees):
     """From 5 s on it leans so far to the right."""
     half_rad = math.radians(degrees) / 2
     attitude = Attitude(5_000_000, (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0))
-    heard = sorted([*log.heard, Heard(5_000_000, attitude)], key=lambda item: item.at_us)
+    heard = sorted([*log.heard, LoggedSample(5_000_000, attitude)], key=lambda item: item.at_us)
     return replace(log, heard=tuple(heard))
 
 
