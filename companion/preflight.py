@@ -536,18 +536,6 @@ class Preflight:
         return tuple(packet for message in outgoing for packet in self._encoder.packets(message))
 
     def set_parameter(self, name: str, value: int | float, now_us: int) -> tuple[bytes, ...]:
-        """What sets it; `parameter` shows the vehicle's answer after further steps."""
+        """Packets that set it. `survey.parameters` has the vehicle's answer after further steps."""
         self.survey.parameters.pop(name, None)
         return (*self._encoder.packets(messages.SetParameter(name, value)), *self.step(b"", now_us))
-
-    def parameter(self, name: str) -> int | float | None:
-        """As the vehicle last told it."""
-        return self.survey.parameters.get(name)
-
-    @property
-    def finished(self) -> bool:
-        return self.survey.finished
-
-    def findings(self) -> list[PreflightItem]:
-        """All items; complete once `finished` without a refusal."""
-        return findings(self.survey)

@@ -1,4 +1,4 @@
-"""What every state machine's table gives: the next state, and its own picture."""
+"""The table of a state machine: the next state for each trigger."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -24,22 +24,3 @@ class StateTable(Generic[StateT, TriggerT]):
 
     def next_state(self, state: StateT, trigger: TriggerT) -> StateT:
         return self.rows[state].get(trigger, state)
-
-    def mermaid_diagram(self) -> str:
-        """As a Mermaid state diagram; a state's words are one name there."""
-        lines = ["stateDiagram-v2", f"    [*] --> {_name(next(iter(self.rows)))}"]
-        for state, row in self.rows.items():
-            lines += [f"    {_name(state)} --> {_name(target)}: {trigger.value}" for trigger, target in row.items()]
-        lines += [f"    {_name(state)} --> [*]" for state in self.rows if state in self.final]
-        return "\n".join(lines) + "\n"
-
-    def markdown_table(self) -> str:
-        """In Markdown, one row a transition."""
-        lines = ["| state | trigger | next state |", "|---|---|---|"]
-        for state, row in self.rows.items():
-            lines += [f"| {state.value} | {trigger.value} | {target.value} |" for trigger, target in row.items()]
-        return "\n".join(lines) + "\n"
-
-
-def _name(state: Enum) -> str:
-    return str(state.value).replace(" ", "_")

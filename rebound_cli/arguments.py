@@ -259,7 +259,7 @@ def add_logs(commands: Commands) -> None:
 
 def add_report(commands: Commands) -> None:
     text = "One file that any browser opens, without a network; see docs/how-to/report.md."
-    report = _command(commands, "report", "report.command:run_report", "a recorded flight as a page to look at", text)
+    report = _command(commands, "report", "report.writer:run_report", "a recorded flight as a page to look at", text)
     _option(report, "flight", "a run's folder, or a flight's name (default: last)", "RUN", nargs="?", default="last")
     _add_runs(report)
     _option(report, "--out", "the page (default: report.html in the run's folder)", "FILE")

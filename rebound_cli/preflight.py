@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from companion.errors import ConfigurationError
-from companion.preflight import Preflight, PreflightItem, SerialLine, Verdict
+from companion.preflight import Preflight, PreflightItem, SerialLine, Verdict, findings
 from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
@@ -34,13 +34,13 @@ def run_preflight(options: Namespace) -> int:
     try:
         preflight = Preflight(config, clock.now_us(), serial_line(options.connect))
         console.print(f"Listening on {options.connect}; this takes 11 s from the vehicle's first heartbeat on.")
-        while not preflight.finished:
+        while not preflight.survey.finished:
             _exchange(preflight, connection, clock)
             if (news := connection.news()) is not None:
                 console.print(news)
         if preflight.survey.refusal is not None:
             raise ConfigurationError(preflight.survey.refusal[:1].upper() + preflight.survey.refusal[1:] + ".")
-        found = preflight.findings()
+        found = findings(preflight.survey)
         _show(console, preflight, found)
         if options.json:
             print(json.dumps([{**asdict(finding), "verdict": finding.verdict.value} for finding in found], indent=2))
@@ -115,8 +115,8 @@ def _fix(
         for frame in preflight.set_parameter(name, value, clock.now_us()):
             connection.send(frame)
         until_us = clock.now_us() + round(SETTING_TAKES_S * 1e6)
-        while preflight.parameter(name) is None and clock.now_us() < until_us:
+        while name not in preflight.survey.parameters and clock.now_us() < until_us:
             _exchange(preflight, connection, clock)
-        answer = preflight.parameter(name)
+        answer = preflight.survey.parameters.get(name)
         console.print(f"  {name} is {'not told' if answer is None else format(answer, 'g')} now")
-    return preflight.findings()
+    return findings(preflight.survey)

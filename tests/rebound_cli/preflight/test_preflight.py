@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from companion.mission.config import CompanionConfig
-from companion.preflight import Preflight, SerialLine, Verdict
+from companion.preflight import Preflight, SerialLine, Verdict, findings
 from rebound_cli.card import card
 from rebound_cli.preflight import serial_line
 from sim_vehicle.airframe import load_built_in
@@ -18,7 +18,7 @@ from tests.rebound_cli.command import run_here
 def surveyed(damaged: Callable[[bytes], bytes] = bytes) -> tuple[Preflight, SimulatedVehicle]:
     vehicle = SimulatedVehicle(load_built_in("foldable"), Scene(), seed=1, keeps_path=False)
     preflight = Preflight(CompanionConfig(), vehicle.time_boot_us)
-    while not preflight.finished:
+    while not preflight.survey.finished:
         exchange(preflight, vehicle, damaged=damaged)
     return preflight, vehicle
 
@@ -37,7 +37,7 @@ def exchange(
 
 def test_the_simulated_vehicle_is_found_ready_but_for_what_a_fresh_px4_leaves_open():
     preflight, _ = surveyed()
-    found = {finding.item: finding for finding in preflight.findings()}
+    found = {finding.item: finding for finding in findings(preflight.survey)}
     assert preflight.survey.vehicle.identity is not None
     assert not [item for item, finding in found.items() if finding.verdict is Verdict.BAD]
     assert [item for item, finding in found.items() if finding.fix] == [
@@ -64,7 +64,7 @@ def test_packets_that_are_lost_or_damaged_on_the_way_are_counted():
     delivery = preflight.survey.delivery
     assert delivery.lost == pytest.approx(0.11 * (delivery.received + delivery.lost), rel=0.03)
     assert delivery.unreadable_bytes > 10 * delivery.lost / 11
-    finding = {finding.item: finding for finding in preflight.findings()}["packets"]
+    finding = {finding.item: finding for finding in findings(preflight.survey)}["packets"]
     assert finding.verdict is Verdict.DOUBTFUL
     assert "(11." in finding.found or "(10." in finding.found
 
@@ -80,7 +80,7 @@ def test_what_the_line_goes_through_is_read_where_linux_tells_it(tmp_path):
 
 def test_the_card_of_the_first_flight_has_what_was_found_and_fits_a_page():
     preflight, _ = surveyed()
-    lines = card(preflight.survey, preflight.findings(), "serial:///dev/ttyAMA0:921600").splitlines()
+    lines = card(preflight.survey, findings(preflight.survey), "serial:///dev/ttyAMA0:921600").splitlines()
     assert len(lines) < 66 and max(map(len, lines)) <= 100
     text = "\n".join(lines)
     assert "quadrotor, battery 100 %" in text and "Link serial:///dev/ttyAMA0:921600" in text
@@ -92,8 +92,8 @@ def test_a_remedy_that_is_taken_is_taken_by_the_vehicle():
     exchange(preflight, vehicle, preflight.set_parameter("COM_RCL_EXCEPT", 4, vehicle.time_boot_us))
     for _ in range(25):
         exchange(preflight, vehicle)
-    assert preflight.parameter("COM_RCL_EXCEPT") == 4
-    assert {finding.item: finding for finding in preflight.findings()}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
+    assert preflight.survey.parameters["COM_RCL_EXCEPT"] == 4
+    assert {finding.item: finding for finding in findings(preflight.survey)}["COM_RCL_EXCEPT"].verdict is Verdict.GOOD
 
 
 def test_an_address_that_is_none_is_one_sentence():
