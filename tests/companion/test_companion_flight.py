@@ -427,6 +427,7 @@ def test_a_hit_in_the_middle_of_a_turn_stops_the_turn():
     f = flight(items=[{"takeoff": {"height_m": 1.5}}, {"go_to": turn}, {"land": {}}])
     f.run_to("mission")
     f.run_for(1.0)
+    f.vehicle.yaw_rad = math.radians(45)
     strike(f, 12.0, 0.0)
     f.run_for(0.1)
     assert f.vehicle.setpoints[-1][1].yaw == pytest.approx(math.radians(45), abs=0.05)
