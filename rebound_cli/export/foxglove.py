@@ -17,7 +17,7 @@ from mcap.writer import Writer
 
 from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
 from rebound_cli import __version__
-from rebound_cli.export.ulog import boot_us
+from rebound_cli.export.ulog import boot_us, positions_us, true_rows
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.content import finite, surfaces
@@ -106,19 +106,13 @@ def _heard(log: Log) -> Iterator[Message]:
 
 
 def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
-    """As often as the vehicle tells where it is."""
     if flight.truth is None:
         return
     series = flight.truth.series
-    rows = np.searchsorted(series["time_boot_us"], boot_us(log, _positions_us(log)))
-    for row in np.unique(rows[rows < len(series["time_boot_us"])]).tolist():
+    for row in true_rows(flight.truth, log):
         at_us = float(flight.truth.at_us(float(series["time_boot_us"][row])))
         pose = _pose(series["position_ned_m"][row].tolist(), series["attitude_wxyz"][row].tolist())
         yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": pose}
-
-
-def _positions_us(log: Log) -> list[int]:
-    return [heard.at_us for heard in log.heard if isinstance(heard.sample, LocalPosition)]
 
 
 def _told(flight: ShownFlight, log: Log) -> Iterator[Message]:
@@ -144,7 +138,7 @@ def _scene(flight: ShownFlight, log: Log) -> Iterator[Message]:
     places = [_xyz(x, y, 0.0) for x in (aside_m, -aside_m) for y in (aside_m, -aside_m)]
     hoops = [_cylinder({"position": place, "orientation": _wxyz(*_LEVEL)}, size, _BLUE) for place in places]
     yield _entity(began_us, "vehicle", "vehicle", cylinders=hoops)
-    moving_us = _positions_us(log)
+    moving_us = positions_us(log)
     clock_s = (boot_us(log, moving_us) * 1e-6).tolist()
     for _, obstacle in () if flight.scene is None else flight.scene.obstacles():
         name, motion = f"obstacle {obstacle.name}", obstacle.motion

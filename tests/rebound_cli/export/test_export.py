@@ -15,10 +15,10 @@ import pytest
 from mcap.reader import make_reader
 from pyulog import ULog
 
-from companion.messages import GlobalPosition, ImuSample, LocalPosition
+from companion.messages import Attitude, GlobalPosition, Heartbeat, ImuSample, LocalPosition, Sticks
 from rebound_cli.export.foxglove import write_mcap
 from rebound_cli.export.merging import merge
-from rebound_cli.export.ulog import Row, boot_us, with_rows
+from rebound_cli.export.ulog import Row, boot_us, new_ulog, with_rows
 from rebound_cli.logs.log import LogError, LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
@@ -67,6 +67,10 @@ def mcap_of(flight, log):
     content = BytesIO()
     write_mcap(replace(flight, truth=None), log, content)
     return read_mcap(content.getvalue())
+
+
+def ulog_of(flight, log):
+    return ULog(BytesIO(new_ulog(replace(flight, truth=None), log)))
 
 
 # --- MCAP -------------------------------------------------------------------------------------------------------
@@ -180,6 +184,61 @@ def test_a_ulog_is_read_back_by_pyulog_and_searched_as_px4s_own(exported, flight
     # and the same hit is found in it
     assert main(["replay", str(exported / "wall.ulg"), "--expect", "1", "--out", str(tmp_path)]) == 0
     assert "HIT: wall" in capsys.readouterr().out
+
+
+def test_a_ulog_has_what_flight_review_draws_beside_the_path(exported, flight):
+    # Flight Review takes distance and speeds from places that are valid, angular rates from a topic of their own
+    _, log = flight
+    written = ULog(str(exported / "wall.ulg"))
+    path = written.get_dataset("vehicle_local_position").data
+    assert all(path[field].all() for field in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid"))
+    turning = written.get_dataset("vehicle_angular_velocity").data
+    told = [heard.sample for heard in log.heard if isinstance(heard.sample, Attitude)]
+    assert turning["xyz[1]"] == pytest.approx([sample.angular_velocity_frd_rad_s[1] for sample in told])
+    # motors that turn in the air alone, and a battery that is less full than it was
+    motors = written.get_dataset("actuator_outputs").data
+    in_air = (motors["timestamp"] > 10e6) & (motors["timestamp"] < 20e6)
+    assert motors["output[3]"][in_air].min() > motors["output[3]"][0] and set(motors["noutputs"]) == {4}
+    charge = written.get_dataset("battery_status").data["remaining"]
+    assert charge[0] == pytest.approx(1.0) and 0.0 < charge[-2] < 0.9
+    # The simulator's truth is PX4's ground truth, at the same times and near the estimate
+    truth = written.get_dataset("vehicle_local_position_groundtruth").data
+    assert np.abs(np.interp(path["timestamp"], truth["timestamp"], truth["x"]) - path["x"]).max() < 0.3
+    turned = written.get_dataset("vehicle_attitude_groundtruth").data
+    assert len(turned["q[0]"]) == len(truth["x"]) == pytest.approx(len(path["x"]), rel=0.1)
+
+
+def test_a_mode_of_the_ulog_begins_when_it_was_told(exported, flight):
+    shown, log = flight
+    modes = ULog(str(exported / "wall.ulg")).get_dataset("vehicle_status").list_value_changes("nav_state")
+    # AUTO.LOITER, OFFBOARD, AUTO.LAND, each when the companion heard of it, and OFFBOARD again on the ground
+    assert [state for _, state in modes] == [4, 14, 18, 14]
+    events = [event["time_us"] for event in shown.events if event["kind"] == "mode"]
+    assert [at_us for at_us, _ in modes[:3]] == boot_us(log, events[:3]).tolist()
+
+
+@pytest.mark.parametrize(
+    ("main", "sub", "nav_state"),
+    [(4, 11, 23), (4, 18, 30), (4, 10, 22), (3, 2, 6), (3, 1, 21), (11, 0, 8), (10, 0, 13), (4, 7, 31), (99, 0, 31)],
+)
+def test_each_mode_of_px4s_has_its_state_and_no_other_passes_for_manual(flight, main, sub, nav_state):
+    shown, log = flight
+    beat = next(heard for heard in log.heard if isinstance(heard.sample, Heartbeat))
+    strange = replace(beat, sample=replace(beat.sample, custom_mode=main << 16 | sub << 24))
+    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), strange)))
+    assert written.get_dataset("vehicle_status").data["nav_state"].tolist() == [nav_state]
+
+
+def test_a_failsafe_and_the_pilots_sticks_are_in_the_ulog(flight):
+    # Given a vehicle that calls its state critical, and a pilot who pushes forward, right, up and clockwise
+    shown, log = flight
+    beat = next(heard for heard in log.heard if isinstance(heard.sample, Heartbeat))
+    critical = replace(beat, sample=replace(beat.sample, system_status=5))
+    sticks = LoggedSample(beat.at_us, Sticks((0.1, 0.2, 0.3, 0.4)))
+    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), critical, sticks)))
+    assert written.get_dataset("vehicle_status").data["failsafe"].tolist() == [1]
+    pushed = written.get_dataset("manual_control_setpoint").data
+    assert [pushed[axis][0] for axis in ("pitch", "roll", "throttle", "yaw")] == pytest.approx([0.1, 0.2, 0.3, 0.4])
 
 
 def test_places_are_not_left_out_of_a_file_full_of_them(wall_flight, tmp_path, capsys):
