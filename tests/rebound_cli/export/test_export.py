@@ -22,6 +22,7 @@ from rebound_cli.export.ulog import Row, boot_us, new_ulog, with_rows
 from rebound_cli.logs.log import LogError, LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
+from rebound_cli.replay.watching import Findings
 from rebound_cli.report.shown_flight import recorded_flight
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT
@@ -133,8 +134,7 @@ def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
     )
     topics = mcap_of(replace(shown, scene=scene), log)
     drawn = {}
-    for _, at_ns, data in topics["/scene"]:
-        (entity,) = data["entities"]
+    for at_ns, entity in entities_of(topics["/scene"] + topics["/scene/moving"]):
         drawn.setdefault(entity["id"], []).append((at_ns, entity))
     names = [obstacle.name for _, obstacle in scene.obstacles()]
     ((_, wall),), ((_, pole),), cart = (drawn[f"obstacle {name}"] for name in names)
@@ -152,6 +152,40 @@ def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
     east = {round((at_ns - began_ns) * 1e-9, 2): e["cubes"][0]["pose"]["position"]["x"] for at_ns, e in cart}
     assert east[min(east)] == 0.0 and east[max(east)] == 2.0
     assert min(abs(place - 1.0) for at_s, place in east.items() if abs(at_s - 10.0) < 0.05) < 0.01
+
+
+def test_the_latest_message_of_a_topic_draws_all_of_it(flight):
+    # Foxglove gives whoever jumps to a time no more than that: given two walls, two carts, two hits, a surface touched
+    # twice
+    shown, log = flight
+    walls = [{"point_ned_m": [n, 0, -2], "normal_ned": [-1, 0, 0]} for n in (4, 9)]
+    cart = {"size_m": [1, 2, 3], "motion": {"velocity_ned_m_s": [0, 0.2, 0], "from_s": 5, "until_s": 15}}
+    carts = [{**cart, "centre_ned_m": [2, e, -1], "name": f"cart {e}"} for e in (1, 3)]
+    scene = Scene.model_validate({"walls": walls, "boxes": carts})
+    (hit,) = shown.findings.impacts
+    findings = Findings([hit, replace(hit, at_us=hit.at_us + 1_000_000)])
+    told = next(event for event in shown.events if event["kind"] == "obstacle")
+    events = [*shown.events, {**told, "time_us": told["time_us"] + 1_000_000}]
+    topics = mcap_of(replace(shown, scene=scene, findings=findings, events=events), log)
+    latest = {
+        topic: [entity["id"] for entity in rows[-1][2]["entities"]]
+        for topic, rows in topics.items()
+        if "/scene" in topic
+    }
+    obstacles = [f"obstacle {obstacle.name}" for _, obstacle in scene.obstacles()]
+    assert latest["/scene"] == ["vehicle", *obstacles[:2]] and latest["/scene/moving"] == obstacles[2:]
+    assert latest["/scene/hits"] == ["hit 1", "hit 2"] and latest["/scene/surfaces"] == ["surface 1", "surface 2"]
+    # and what is told again is what was told before: a hit stands where it was, a surface ends when it is known better
+    for name in ("hits", "surfaces"):
+        found = {}
+        for _, entity in entities_of(topics[f"/scene/{name}"]):
+            assert found.setdefault(entity["id"], entity) == entity
+    first, second = topics["/scene/surfaces"][-1][2]["entities"]
+    assert first["lifetime"] == {"sec": 1, "nsec": 0} and second["lifetime"] == {"sec": 0, "nsec": 0}
+
+
+def entities_of(rows):
+    return [(at_ns, entity) for _, at_ns, data in rows for entity in data["entities"]]
 
 
 def test_a_position_on_earth_becomes_a_fix(flight):
@@ -387,7 +421,7 @@ def test_every_path_of_foxgloves_layout_is_in_the_file(topics):
         name, _, index = field.partition("[")
         value = topics[topic][0][2][name]
         assert not index or isinstance(value[int(index.rstrip("]"))], float), path
-    assert set(layout["configById"]["3D!flight"]["topics"]) <= set(topics)
+    assert set(layout["configById"]["3D!flight"]["topics"]) <= set(topics) | {"/scene/moving"}
 
 
 def test_every_curve_of_plotjugglers_layout_is_in_the_file(exported):
