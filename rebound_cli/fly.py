@@ -4,6 +4,7 @@ import json
 import time
 from argparse import Namespace
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from companion.companion import Companion
@@ -44,7 +45,7 @@ class Flight:
     recorder: FlightRecorder
     console: Console
     interrupts: Interrupts
-    followed: Followed | None = None  # in lockstep, where nobody waits for it
+    followed: Followed | None = None  # where the vehicle is simulated: a drone records, and does no more
 
 
 def run_fly(options: Namespace) -> int:
@@ -88,7 +89,7 @@ def run_fly(options: Namespace) -> int:
             folder, None if options.lockstep else Background("log"), ring.make_room if ring else None
         )
         with Interrupts() as interrupts:
-            followed = Followed(Listener()) if options.lockstep else None
+            followed = Followed(Listener()) if is_simulated else None
             flight = Flight(mission, world, folder, recorder, console, interrupts, followed)
             try:
                 flown = _fly(flight, connection, options)
@@ -130,6 +131,8 @@ def _fly_connected(
 ) -> Flown:
     companion, started_s, fault = Companion(flight.mission), time.monotonic(), None
     loop = Loop(companion, connection, Clock(), flight.recorder, flight.console, flight.interrupts, server, computer)
+    if flight.followed is not None:
+        loop.step = partial(flight.followed.step, companion)
     try:
         fly_realtime(companion, loop, confirmation)
     except FlightFaultError as error:

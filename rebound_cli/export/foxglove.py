@@ -17,7 +17,7 @@ from mcap.writer import Writer
 
 from companion.messages import Attitude, GlobalPosition, ImuSample, LocalPosition, Quaternion, Vector3
 from rebound_cli import __version__
-from rebound_cli.export.ulog import boot_us
+from rebound_cli.export.ulog import boot_us, positions_us, true_rows
 from rebound_cli.logs.log import Log
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.content import finite, surfaces
@@ -35,7 +35,7 @@ _FOXGLOVE = {
     "/tf": "FrameTransform",
     "/pose": "PoseInFrame",
     "/truth": "PoseInFrame",
-    "/scene": "SceneUpdate",
+    **dict.fromkeys(("/scene", "/scene/moving", "/scene/surfaces", "/scene/hits"), "SceneUpdate"),
     "/location": "LocationFix",
     "/log": "Log",
 }
@@ -106,19 +106,13 @@ def _heard(log: Log) -> Iterator[Message]:
 
 
 def _truth(flight: ShownFlight, log: Log) -> Iterator[Message]:
-    """As often as the vehicle tells where it is."""
     if flight.truth is None:
         return
     series = flight.truth.series
-    rows = np.searchsorted(series["time_boot_us"], boot_us(log, _positions_us(log)))
-    for row in np.unique(rows[rows < len(series["time_boot_us"])]).tolist():
+    for row in true_rows(flight.truth, log):
         at_us = float(flight.truth.at_us(float(series["time_boot_us"][row])))
         pose = _pose(series["position_ned_m"][row].tolist(), series["attitude_wxyz"][row].tolist())
         yield at_us, "/truth", {"timestamp": _time(at_us), "frame_id": "local", "pose": pose}
-
-
-def _positions_us(log: Log) -> list[int]:
-    return [heard.at_us for heard in log.heard if isinstance(heard.sample, LocalPosition)]
 
 
 def _told(flight: ShownFlight, log: Log) -> Iterator[Message]:
@@ -138,34 +132,39 @@ def _told(flight: ShownFlight, log: Log) -> Iterator[Message]:
 
 
 def _scene(flight: ShownFlight, log: Log) -> Iterator[Message]:
-    """Obstacles, moving ones again and again; the vehicle and its setpoint; hits; remembered surfaces."""
+    """Whoever jumps to a time gets the latest message of each topic, so each has all that its topic draws by then:
+    what stands and the vehicle, what moves, remembered surfaces, hits.
+    """
     began_us, guards = flight.started_at_us, flight.config.estimate.guards
     size, aside_m = _xyz(2 * guards.radius_m, 2 * guards.radius_m, guards.height_m), math.sqrt(0.5) * guards.centre_m
     places = [_xyz(x, y, 0.0) for x in (aside_m, -aside_m) for y in (aside_m, -aside_m)]
     hoops = [_cylinder({"position": place, "orientation": _wxyz(*_LEVEL)}, size, _BLUE) for place in places]
-    yield _entity(began_us, "vehicle", "vehicle", cylinders=hoops)
-    moving_us = _positions_us(log)
-    clock_s = (boot_us(log, moving_us) * 1e-6).tolist()
-    for _, obstacle in () if flight.scene is None else flight.scene.obstacles():
-        name, motion = f"obstacle {obstacle.name}", obstacle.motion
-        if motion is None:
-            yield _entity(began_us, name, **_shape(obstacle, (0.0, 0.0, 0.0)))
-            continue
-        for at_us, boot_s in zip(moving_us, clock_s, strict=True):
-            yield _entity(at_us, name, **_shape(obstacle, motion.offset_ned_m(boot_s)))
+    obstacles = [] if flight.scene is None else [obstacle for _, obstacle in flight.scene.obstacles()]
+    standing = [_obstacle(began_us, one, (0.0, 0.0, 0.0)) for one in obstacles if one.motion is None]
+    yield _update(began_us, "/scene", [_entity(began_us, "vehicle", "vehicle", cylinders=hoops), *standing])
+    moving = [(one, one.motion) for one in obstacles if one.motion is not None]
+    moving_us = positions_us(log) if moving else []
+    for at_us, boot_s in zip(moving_us, (boot_us(log, moving_us) * 1e-6).tolist(), strict=True):
+        moved = [_obstacle(at_us, one, motion.offset_ned_m(boot_s)) for one, motion in moving]
+        yield _update(at_us, "/scene/moving", moved)
+    drawn = list[Json]()
     for number, surface in enumerate(surfaces(flight), start=1):
         corners = [_enu(corner) for corner in (*surface["corners"], surface["corners"][0])]
+        at_us = began_us + 1e6 * surface["t"]
         until_us = None if surface["until"] is None else began_us + 1e6 * surface["until"]
         pose = {"position": _xyz(0.0, 0.0, 0.0), "orientation": _wxyz(*_LEVEL)}
         line = {"type": _STRIP, "pose": pose, "thickness": 3, "scale_invariant": True}
-        drawn = {**line, "points": corners, "color": _PURPLE, "colors": [], "indices": []}
-        yield _entity(began_us + 1e6 * surface["t"], f"surface {number}", until_us=until_us, lines=[drawn])
+        line |= {"points": corners, "color": _PURPLE, "colors": [], "indices": []}
+        drawn.append(_entity(at_us, f"surface {number}", until_us=until_us, lines=[line]))
+        yield _update(at_us, "/scene/surfaces", drawn)
+    arrows = list[Json]()
     for number, impact in enumerate(flight.findings.impacts, start=1):
         # The arrow points out of the surface, as long as the speed before the contact.
         speed_m_s = math.hypot(*impact.first.velocity_ned_m_s)
         sizes = {"shaft_length": speed_m_s, "shaft_diameter": 0.04, "head_length": 0.12, "head_diameter": 0.1}
         pose = {"position": _enu(impact.first.position_ned_m), "orientation": _along(impact.final.normal_ned, 0)}
-        yield _entity(impact.at_us, f"hit {number}", arrows=[{"pose": pose, **sizes, "color": _RED}])
+        arrows.append(_entity(impact.at_us, f"hit {number}", arrows=[{"pose": pose, **sizes, "color": _RED}]))
+        yield _update(impact.at_us, "/scene/hits", arrows)
 
 
 # --- Foxglove's own messages --------------------------------------------------------------------------------------
@@ -190,9 +189,13 @@ def _location(at_us: float, sample: GlobalPosition) -> Json:
     return {"timestamp": _time(at_us), "frame_id": "vehicle", **place, **error}
 
 
-def _entity(at_us: float, name: str, frame: str = "local", until_us: float | None = None, **drawn: Any) -> Message:
+def _update(at_us: float, topic: str, entities: Sequence[Json]) -> Message:
+    return at_us, topic, {"deletions": [], "entities": list(entities)}
+
+
+def _entity(at_us: float, name: str, frame: str = "local", until_us: float | None = None, **drawn: Any) -> Json:
     """One thing of the scene, in the place of what it was before; without `until_us` it stays."""
-    entity = {
+    return {
         "timestamp": _time(at_us),
         "frame_id": frame,
         "id": name,
@@ -201,19 +204,19 @@ def _entity(at_us: float, name: str, frame: str = "local", until_us: float | Non
         "frame_locked": True,
         **{primitive: drawn.get(primitive, []) for primitive in _PRIMITIVES},
     }
-    return at_us, "/scene", {"deletions": [], "entities": [entity]}
 
 
-def _shape(obstacle: Obstacle, moved_ned_m: Vector3) -> Json:
-    """Its primitive, so far from where it was described."""
+def _obstacle(at_us: float, obstacle: Obstacle, moved_ned_m: Vector3) -> Json:
+    """So far from where it was described."""
+    name = f"obstacle {obstacle.name}"
     if isinstance(obstacle, Pole):
         middle = np.array(obstacle.foot_ned_m) + 0.5 * obstacle.height_m * np.array(obstacle.axis_ned) + moved_ned_m
         pose = {"position": _enu(middle.tolist()), "orientation": _along(obstacle.axis_ned, 2)}
         size = _xyz(2 * obstacle.radius_m, 2 * obstacle.radius_m, obstacle.height_m)
-        return {"cylinders": [_cylinder(pose, size, _ORANGE)]}
+        return _entity(at_us, name, cylinders=[_cylinder(pose, size, _ORANGE)])
     box = obstacle.box()
     pose = {"position": _enu((np.array(box.centre_ned_m) + moved_ned_m).tolist()), "orientation": _turn(box.axes_ned)}
-    return {"cubes": [{"pose": pose, "size": _xyz(*box.sizes_m), "color": _ORANGE}]}
+    return _entity(at_us, name, cubes=[{"pose": pose, "size": _xyz(*box.sizes_m), "color": _ORANGE}])
 
 
 def _cylinder(pose: Json, size: Json, color: Json) -> Json:

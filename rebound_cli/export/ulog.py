@@ -7,7 +7,7 @@ import math
 import struct
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -15,11 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from companion import messages
-from rebound_cli.logs.log import Demand, Log, LogError
+from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample
 from rebound_cli.logs.ulog import NAV_STATES
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.run_folder import HIT_KINDS
+from rebound_cli.truth_match import FlightTruth
 
 Floats = npt.NDArray[np.float64]
 
@@ -31,56 +32,97 @@ _LETTERS = {"float": "f", "double": "d", "uint8_t": "B", "uint32_t": "I", "uint6
 # Of a logged message: Linux's levels, as digits.
 _WARNING, _INFO = b"4", b"6"
 _UNSET = (math.nan,) * 3
+# MAV_STATE of a failsafe; vehicle_status.NAVIGATION_STATE_MAX, which is no mode; MAV_TYPE.
+_CRITICAL, _NO_MODE, _QUADROTOR = 5, 31, 2
 
-# Each sample as PX4 logs it: topic, fields after the timestamp, values. A quaternion turns body to NED.
-_TOPICS: Mapping[type, tuple[str, str, Any]] = {
-    messages.ImuSample: (
+_POSITION = "float x;float y;float z;float vx;float vy;float vz"
+_VALID = "bool xy_valid;bool z_valid;bool v_xy_valid;bool v_z_valid"
+# Each sample as PX4 logs it: topic, fields after the timestamp, values. A quaternion turns body to NED. What the link
+# does not carry is NaN; a place and a velocity that it carries are valid.
+_TOPICS: Sequence[tuple[type, str, str, Any]] = (
+    (
+        messages.ImuSample,
         "sensor_combined",
         "float[3] gyro_rad;float[3] accelerometer_m_s2",
         lambda s: (*s.angular_velocity_frd_rad_s, *s.specific_force_frd_m_s2),
     ),
-    messages.LocalPosition: (
+    (
+        messages.LocalPosition,
         "vehicle_local_position",
-        "float x;float y;float z;float vx;float vy;float vz",
-        lambda s: (*s.position_ned_m, *s.velocity_ned_m_s),
+        f"{_POSITION};{_VALID}",
+        lambda s: (*s.position_ned_m, *s.velocity_ned_m_s, *(True,) * 4),
     ),
-    messages.Attitude: ("vehicle_attitude", "float[4] q", lambda s: s.attitude_wxyz),
-    messages.AttitudeTarget: (
+    (messages.Attitude, "vehicle_attitude", "float[4] q", lambda s: s.attitude_wxyz),
+    (
+        messages.Attitude,
+        "vehicle_angular_velocity",
+        "float[3] xyz",
+        lambda s: s.angular_velocity_frd_rad_s or _UNSET,
+    ),
+    (
+        messages.AttitudeTarget,
         "vehicle_attitude_setpoint",
         "float[4] q_d;float[3] thrust_body",
         lambda s: (*(s.attitude_wxyz or (*_UNSET, math.nan)), 0.0, 0.0, -s.thrust_fraction),
     ),
-    messages.Odometry: (
+    (
+        messages.Odometry,
         "vehicle_odometry",
         "float[3] position;float[3] velocity;uint8_t reset_counter",
         lambda s: (*s.position_ned_m, *s.velocity_ned_m_s, s.reset_counter),
     ),
-    messages.Vibration: (
+    (
+        messages.Vibration,
         "vehicle_imu_status",
         "uint32_t[3] accel_clipping;float gyro_vibration_metric;float accel_vibration_metric",
         lambda s: (*s.clipping_counts, s.gyroscope_rad_s, s.accelerometer_m_s2),
     ),
-    messages.Heartbeat: (
+    (
+        messages.Heartbeat,
         "vehicle_status",
-        "uint8_t arming_state;uint8_t nav_state;uint8_t system_type",
-        lambda s: (2 if s.armed else 1, NAV_STATES.get(s.custom_mode, 0), s.vehicle_type),
+        "uint8_t arming_state;uint8_t nav_state;uint8_t system_type;bool failsafe",
+        lambda s: (
+            2 if s.armed else 1,
+            NAV_STATES.get(s.custom_mode, _NO_MODE),
+            s.vehicle_type,
+            s.system_status == _CRITICAL,
+        ),
     ),
-    messages.ExtendedState: (
+    (
+        messages.ExtendedState,
         "vehicle_land_detected",
         "bool landed",
         lambda s: (s.landed_state is messages.LandedState.ON_GROUND,),
     ),
-    messages.GlobalPosition: (
+    (
+        messages.GlobalPosition,
         "vehicle_global_position",
         "double lat;double lon;float alt",
         lambda s: (s.latitude_deg, s.longitude_deg, s.altitude_m),
     ),
-    Demand: (
+    (
+        messages.Sticks,
+        "manual_control_setpoint",
+        "float pitch;float roll;float throttle;float yaw;float aux1;float aux2",
+        lambda s: (*s.deflections, math.nan, math.nan),
+    ),
+    (messages.MotorOutputs, "actuator_outputs", "uint32_t noutputs;float[4] output", lambda s: (4, *s.outputs)),
+    (
+        messages.Battery,
+        "battery_status",
+        "float voltage_v;float current_a;float discharged_mah;float remaining",
+        lambda s: (*_UNSET, 0.01 * s.remaining_percent),
+    ),
+    (
+        Demand,
         "vehicle_local_position_setpoint",
-        "float x;float y;float z;float vx;float vy;float vz",
+        _POSITION,
         lambda s: (*(s.position_ned_m or _UNSET), *(s.velocity_ned_m_s or _UNSET)),
     ),
-}
+)
+# As PX4 logs what a simulator knows.
+_TRUE_POSITION = ("vehicle_local_position_groundtruth", _POSITION)
+_TRUE_ATTITUDE = ("vehicle_attitude_groundtruth", "float[4] q")
 _SETPOINT = ("rebound_setpoint", "float[3] position_ned_m")
 
 
@@ -102,6 +144,18 @@ def boot_us(log: Log, at_us: Sequence[float] | Floats) -> npt.NDArray[np.int64]:
     newest = np.maximum(np.searchsorted(heard, wanted, side="right") - 1, 0)
     times: npt.NDArray[np.int64] = sampled[newest] + wanted - heard[newest]
     return times
+
+
+def true_rows(truth: FlightTruth, log: Log) -> Sequence[int]:
+    """Which rows of the simulator's truth are kept: as many as the vehicle says where it is."""
+    times_us = truth.series["time_boot_us"]
+    rows = np.unique(np.searchsorted(times_us, boot_us(log, positions_us(log))))
+    return [int(row) for row in rows if row < len(times_us)]
+
+
+def positions_us(log: Log) -> list[int]:
+    """When the vehicle said where it is."""
+    return [heard.at_us for heard in log.heard if isinstance(heard.sample, messages.LocalPosition)]
 
 
 def own_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
@@ -132,24 +186,48 @@ def _several(value: Any) -> Sequence[Any]:
 
 def new_ulog(flight: ShownFlight, log: Log) -> bytes:
     """A whole log of what was heard on the link, and of what the companion made of it."""
-    heard = [one for one in log.heard if type(one.sample) in _TOPICS]
+    heard = list(_with_modes(log))
     clock = boot_us(log, [one.at_us for one in heard])
     rows = [
         Row(getattr(one.sample, "time_boot_us", int(time_us)), (name, fields), values(one.sample))
         for one, time_us in zip(heard, clock, strict=True)
-        for name, fields, values in (_TOPICS[type(one.sample)],)
+        for kind, name, fields, values in _TOPICS
+        if type(one.sample) is kind
     ]
     said = flight.log.texts
     times_us = boot_us(log, [at_us for at_us, _ in said])
     rows += [Row(int(time_us), None, (_INFO, text)) for time_us, (_, text) in zip(times_us, said, strict=True)]
     rows += own_rows(flight, log)
+    rows += _true_rows(flight, log)
     started_us = min(row.boot_us for row in rows)
-    kind = next(
-        (s.vehicle_type for _, s in ((h.at_us, h.sample) for h in heard) if isinstance(s, messages.Heartbeat)), 2
-    )
     head = _MAGIC + struct.pack("<Q", started_us) + _message("B", bytes(_FLAG_BITS_SIZE))
-    head += _keyed("I", "char[7] sys_name", b"Rebound") + _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
+    head += _keyed("I", "char[7] sys_name", b"Rebound")
+    kinds = (one.sample.vehicle_type for one in heard if isinstance(one.sample, messages.Heartbeat))
+    kind = next(kinds, _QUADROTOR)
+    head += _keyed("P", "int32_t MAV_TYPE", struct.pack("<i", kind))
     return with_rows(head, rows)
+
+
+def _with_modes(log: Log) -> Iterator[LoggedSample]:
+    """A mode that is told between two heartbeats is a state of the vehicle like theirs."""
+    beat: messages.Heartbeat | None = None
+    for heard in log.heard:
+        if isinstance(heard.sample, messages.Heartbeat):
+            beat = heard.sample
+        if isinstance(heard.sample, messages.CurrentMode) and beat is not None:
+            beat = replace(beat, custom_mode=heard.sample.custom_mode)
+            heard = LoggedSample(heard.at_us, beat)
+        yield heard
+
+
+def _true_rows(flight: ShownFlight, log: Log) -> Iterator[Row]:
+    if flight.truth is None:
+        return
+    series = flight.truth.series
+    for row in true_rows(flight.truth, log):
+        time_us = int(series["time_boot_us"][row])
+        yield Row(time_us, _TRUE_POSITION, (*series["position_ned_m"][row], *series["velocity_ned_m_s"][row]))
+        yield Row(time_us, _TRUE_ATTITUDE, series["attitude_wxyz"][row].tolist())
 
 
 def with_rows(content: bytes, rows: Sequence[Row]) -> bytes:

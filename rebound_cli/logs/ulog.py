@@ -54,14 +54,15 @@ _ARMED, _TAKEOFF, _LAND = 2, 3, 4
 # counts beside rotary wings: fixed wings and rovers.
 _QUADROTOR, _VTOL, _OTHER_TYPES = 2, 19, {2: 1, 3: 10}
 # vehicle_status.nav_state to the parts of HEARTBEAT.custom_mode (px4_custom_mode.h, get_px4_custom_mode): main modes
-# MANUAL 1, ALTCTL 2, POSCTL 3, ACRO 5, OFFBOARD 6, STABILIZED 7; under AUTO 4 TAKEOFF 2, LOITER 3, MISSION 4, RTL 5,
-# LAND 6, FOLLOW 8, PRECLAND 9. DESCEND (12) shows as LAND, TERMINATION (13) as MANUAL, ORBIT (21) under POSCTL.
-_MAIN = {0: 1, 1: 2, 2: 3, 10: 5, 13: 1, 14: 6, 15: 7}
-_AUTO = {3: 4, 4: 3, 5: 5, 12: 6, 17: 2, 18: 6, 19: 8, 20: 9}
-_MODES = {state: main << 16 for state, main in _MAIN.items()} | {21: 3 << 16 | 1 << 24}
+# MANUAL 1, ALTCTL 2, POSCTL 3, ACRO 5, OFFBOARD 6, STABILIZED 7, ALTITUDE_CRUISE 11; under AUTO 4 TAKEOFF 2, LOITER 3,
+# MISSION 4, RTL 5, LAND 6, FOLLOW 8, PRECLAND 9, VTOL_TAKEOFF 10, EXTERNAL1 to 8 from 11 on; under POSCTL ORBIT 1,
+# SLOW 2. DESCEND (12) shows as LAND, TERMINATION (13) as MANUAL, as until v1.14.
+_MAIN = {0: 1, 1: 2, 2: 3, 8: 11, 10: 5, 13: 1, 14: 6, 15: 7}
+_AUTO = {3: 4, 4: 3, 5: 5, 12: 6, 17: 2, 18: 6, 19: 8, 20: 9, 22: 10} | {state: state - 12 for state in range(23, 31)}
+_MODES = {state: main << 16 for state, main in _MAIN.items()} | {21: 3 << 16 | 1 << 24, 6: 3 << 16 | 2 << 24}
 _MODES |= {state: 4 << 16 | sub << 24 for state, sub in _AUTO.items()}
 # The other way round, without what shows as another state's mode.
-NAV_STATES = {mode: state for state, mode in _MODES.items() if state not in (12, 13)}
+NAV_STATES = {mode: state for state, mode in _MODES.items() if state not in (12, 13)} | {10 << 16: 13}
 
 
 class _Topic:

@@ -1,12 +1,16 @@
-"""What the companion's own detector makes of every IMU sample: listened to while a recording goes through it again.
+"""What the companion's own detector makes of every IMU sample: listened to while it is flown, or flown once more.
 
 Nothing is judged here: all numbers are the detector's state and the answers of its own functions.
 """
 
 import math
+from array import array
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, cast
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+import numpy.typing as npt
 
 from companion.detection.force_signs import side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
@@ -14,25 +18,31 @@ from companion.detection.interface import Detector, DetectorState, Impact, Phase
 from companion.messages import ImuSample, MessageId, Sample
 from companion.reflex.monitor import CollisionMonitor
 
+# Of one sample, or of many.
+Numbers: TypeAlias = float | npt.NDArray[np.float64]
+
+PHASES = tuple(Phase)
+_NUMBERS = {phase: float(number) for number, phase in enumerate(PHASES)}
+
 
 @dataclass(frozen=True, slots=True)
 class Tested:
-    """One IMU sample just before its test, m/s^2. `beyond_thrust_m_s2`: f_z outside what propellers can do; negative
+    """IMU samples just before their test, m/s^2. `beyond_thrust_m_s2`: f_z outside what propellers can do; negative
     inside. NaN where the detector does not say.
     """
 
-    time_boot_us: int
-    phase: Phase
-    side_m_s2: float
-    side_threshold_m_s2: float
-    beyond_thrust_m_s2: float
-    beyond_threshold_m_s2: float
+    time_boot_us: Numbers
+    phase: Numbers  # its place in PHASES
+    side_m_s2: Numbers
+    side_threshold_m_s2: Numbers
+    beyond_thrust_m_s2: Numbers
+    beyond_threshold_m_s2: Numbers
 
     @property
-    def ratio(self) -> float:
+    def ratio(self) -> Numbers:
         """The larger of both over its threshold: a sample shows a contact from 1 on. NaN where nothing is known."""
         side, beyond = self.side_m_s2 / self.side_threshold_m_s2, self.beyond_thrust_m_s2 / self.beyond_threshold_m_s2
-        return max(side, beyond)
+        return np.fmax(side, beyond)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +53,23 @@ class Shown:
     may_be_hand: bool
 
 
+_COLUMNS = len(fields(Tested))
+
+
 @dataclass(slots=True)
 class Listener:
-    """Grows with the recording. `shown` by the boot time of the impact's sample."""
+    """Grows with the recording, by six numbers a sample. `shown` by the boot time of the impact's sample."""
 
-    tested: list[Tested] = field(default_factory=list)
+    numbers: "array[float]" = field(default_factory=lambda: array("d"))
     shown: dict[int, Shown] = field(default_factory=dict)
+
+    @property
+    def tested(self) -> Tested:
+        """All samples, in the order heard."""
+        return Tested(*np.array(self.numbers).reshape(-1, _COLUMNS).T)
+
+    def one_tested(self, row: int) -> Tested:
+        return Tested(*self.numbers[_COLUMNS * row : _COLUMNS * (row + 1)])
 
     def listen(self, monitor: CollisionMonitor) -> None:
         """To this watch, from now on."""
@@ -73,24 +94,27 @@ class _ListenedTo:
         tested, may_be_hand = None, False
         if isinstance(sample, ImuSample):
             tested = _tested(state, sample, self._config)
-            self._listener.tested.append(tested)
+            self._listener.numbers.extend(tested)
             may_be_hand = isinstance(state, FusedState) and state.soft.may_be_hand(sample.time_boot_us)
         state, impact = self._detector.step(state, sample, situation)
         if impact is not None:
-            self._listener.shown[impact.sample_time_boot_us] = Shown(tested, may_be_hand)
+            one = None if tested is None else Tested(*tested)
+            self._listener.shown[impact.sample_time_boot_us] = Shown(one, may_be_hand)
         return state, impact
 
 
-def _tested(state: DetectorState, sample: ImuSample, config: Any) -> Tested:
+def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float, ...]:
+    """Its row of numbers."""
+    now_us, phase = sample.time_boot_us, _NUMBERS[state.phase]
     if not isinstance(state, FusedState):
         threshold_m_s2 = state.threshold_m_s2
-        return Tested(sample.time_boot_us, state.phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2)
+        return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
     f_x, f_y, f_z = sample.specific_force_frd_m_s2
-    return Tested(
-        sample.time_boot_us,
-        state.phase,
+    return (
+        now_us,
+        phase,
         math.hypot(f_x - state.floor.x, f_y - state.floor.y),
         side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s),
-        max(f_z, -f_z - state.thrust.most_m_s2(sample.time_boot_us)),
+        max(f_z, -f_z - state.thrust.most_m_s2(now_us)),
         vertical_threshold_m_s2(state, config),
     )

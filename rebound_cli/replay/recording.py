@@ -134,7 +134,7 @@ class Reproduction:
 
 
 class Followed:
-    """What a companion's watch finds, noted step by step: in lockstep, and when a flight is flown again."""
+    """What a companion's monitor finds, noted step by step: of a simulated flight, and of one that is flown again."""
 
     def __init__(self, listener: Listener | None = None) -> None:
         self.listener, self.findings = listener, Findings()

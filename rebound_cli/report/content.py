@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.interface import Phase
 from companion.memory.patch import Patch
 from companion.memory.surroundings import outline
 from rebound_cli.flights.archive import without_places
+from rebound_cli.replay.listening import PHASES
 from rebound_cli.report.moments import Moment, moments_of
 from rebound_cli.report.packing import kept_rows, packed
 from rebound_cli.report.shown_flight import ShownFlight, patch_of
@@ -30,7 +30,6 @@ _ROWS, _ROWS_PER_S = 7_000, 10.0
 AROUND_S = 1.0
 
 NED = ("n", "e", "d")
-_PHASES = tuple(Phase)
 
 
 def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
@@ -45,7 +44,7 @@ def content(flight: ShownFlight, no_position: bool = False) -> dict[str, Any]:
         "averaging_ms": flight.config.estimate.imu_averaging_interval_s * 1e3,
         "tables": _tables(flight, moments, no_position),
         "moments": [_moment(flight, moment, no_position) for moment in moments],
-        "phases": [phase.value for phase in _PHASES],
+        "phases": [phase.value for phase in PHASES],
         "modes": _modes(flight),
         "recovering": _recovering(flight),
         "obstacles": [] if no_position else _obstacles(flight),
@@ -139,17 +138,23 @@ def _vector(names: Sequence[str], rows: Floats, resolution: float) -> dict[str, 
 
 def _tested_columns(flight: ShownFlight) -> dict[str, Floats]:
     """What the detector made of each IMU sample of the log; NaN of those it never got."""
-    boot_us = flight.log.imu_time_boot_us
-    heard = {one.time_boot_us: one for one in flight.listener.tested}
-    rows = np.full((len(boot_us), 5), np.nan)
-    for row, time_us in enumerate(boot_us):
-        one = heard.get(int(time_us))
-        if one is not None:
-            rows[row] = (
-                *(_PHASES.index(one.phase), one.side_m_s2, one.side_threshold_m_s2),
-                *(one.beyond_thrust_m_s2, one.beyond_threshold_m_s2),
-            )
-    return dict(zip(("phase", "side", "side_threshold", "beyond", "beyond_threshold"), rows.T, strict=True))
+    tested, boot_us = flight.listener.tested, flight.log.imu_time_boot_us
+    # Of a stamp that came twice, after a reboot, the last.
+    order = np.argsort(tested.time_boot_us, kind="stable")
+    stamps_us = np.append(-1.0, np.take(tested.time_boot_us, order))
+    places = np.searchsorted(stamps_us, boot_us, side="right") - 1
+    never = stamps_us[places] != boot_us
+    columns = {
+        "phase": tested.phase,
+        "side": tested.side_m_s2,
+        "side_threshold": tested.side_threshold_m_s2,
+        "beyond": tested.beyond_thrust_m_s2,
+        "beyond_threshold": tested.beyond_threshold_m_s2,
+    }
+    return {
+        name: np.where(never, np.nan, np.append(np.nan, np.take(column, order))[places])
+        for name, column in columns.items()
+    }
 
 
 def _packed(

@@ -9,18 +9,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from companion.detection.interface import Evidence, ImpactKind, Phase
 from companion.memory.patch import CLIPPED_ERROR_RAD, ERROR_RAD
 from companion.messages import Vector3
 from rebound_cli.ending import impact_text
-from rebound_cli.replay.listening import Shown, Tested
+from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.truth_match import index_of_hit
 
 if TYPE_CHECKING:
     from sim_vehicle.truth import Hit
+
+Floats = npt.NDArray[np.float64]
 
 # A page of more is read by nobody, and 40 of them at PX4's fastest stream are still half a megabyte.
 MOST_MOMENTS = 40
@@ -207,27 +210,28 @@ def _why_missed(flight: ShownFlight, hit: "Hit") -> Iterator[str]:
             if span.start_us <= at_us <= span.end_us:
                 yield f"The detector was {word}: {span.reason}."
     until_us = hit.ended_at_boot_us + flight.config.estimate.imu_averaging_interval_s * 1e6
-    near = [one for one in flight.listener.tested if hit.contact_at_boot_us <= one.time_boot_us <= until_us]
-    if not near:
+    tested = flight.listener.tested
+    rows = np.flatnonzero((hit.contact_at_boot_us <= tested.time_boot_us) & (tested.time_boot_us <= until_us))
+    if not len(rows):
         yield "No IMU sample came while it lasted."
-    elif any(one.phase is Phase.CONTACT for one in near):
+    elif np.any(np.take(tested.phase, rows) == PHASES.index(Phase.CONTACT)):
         yield "It belonged to the contact before: one contact is told once."
-    elif near:
-        loudest = max(near, key=lambda one: one.ratio)
+    else:
+        loudest = flight.listener.one_tested(rows[_loudest(np.take(tested.ratio, rows))])
         yield _side_text(loudest)
         yield _thrust_text(loudest)
 
 
 def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Moment]:
     """The sample that came nearest to being taken for a hit, and was not; none where nothing was watched."""
-    loudest: Tested | None = None
-    for one in flight.listener.tested:
-        if one.phase is not Phase.ARMED or (loudest is not None and not one.ratio > loudest.ratio):
-            continue
-        if not any(abs(one.time_boot_us - boot_us) < _BESIDE_US for boot_us in others_boot_us):
-            loudest = one
-    if loudest is None or math.isnan(loudest.ratio):
+    tested = flight.listener.tested
+    watched = tested.phase == PHASES.index(Phase.ARMED)
+    for boot_us in others_boot_us:
+        watched &= np.abs(tested.time_boot_us - boot_us) >= _BESIDE_US
+    ratios = np.where(watched, tested.ratio, np.nan)
+    if np.all(np.isnan(ratios)):
         return []
+    loudest = flight.listener.one_tested(_loudest(ratios))
     row = int(np.argmax(flight.log.imu_time_boot_us == loudest.time_boot_us))
     at_us = float(flight.log.imu_at_us[row])
     return [
@@ -235,7 +239,7 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
             kind="closest",
             title=f"Closest call: {100 * loudest.ratio:.0f} % of a hit",
             at_us=at_us,
-            boot_us=loudest.time_boot_us,
+            boot_us=float(loudest.time_boot_us),
             facts=[("At", f"{flight.seconds(at_us):.3f} s")],
             reasons=[
                 _side_text(loudest),
@@ -244,6 +248,11 @@ def _closest(flight: ShownFlight, others_boot_us: Sequence[float]) -> list[Momen
             ],
         )
     ]
+
+
+def _loudest(ratios: Floats) -> int:
+    """NaN is never the loudest."""
+    return int(np.argmax(np.nan_to_num(ratios, nan=-np.inf)))
 
 
 def _bearing(normal_ned: Vector3) -> str:

@@ -7,6 +7,7 @@ import json
 import resource
 import sys
 import threading
+from functools import partial
 from typing import Any
 
 import pytest
@@ -161,9 +162,9 @@ class EverySecond:
         return ComputerStatus(now_us, 90_500, (5, 50), 61, 812, 3792, 9_000, 30_000)
 
 
-def fly(folder, stream=sys.stderr, confirm=None, computer=None):
+def fly(folder, stream=sys.stderr, confirm=None, computer=None, followed=None, mission_file=SQUARE):
     """A hop in virtual time through the loop of real flights."""
-    document = load_mission_document(SQUARE, HOP_SETS)
+    document = load_mission_document(mission_file, HOP_SETS if mission_file == SQUARE else ())
     scene = world_from(document)
     mission = mission_from(document, scene)
     companion = Companion(mission)
@@ -176,6 +177,7 @@ def fly(folder, stream=sys.stderr, confirm=None, computer=None):
     problem = None
     try:
         loop = Loop(companion, world, world, recorder, console, Interrupts(), None, computer)
+        loop.step = None if followed is None else partial(followed.step, companion)
         fly_realtime(companion, loop, confirmation)
     except FlightFaultError as error:
         problem = str(error)

@@ -15,13 +15,14 @@ import pytest
 from mcap.reader import make_reader
 from pyulog import ULog
 
-from companion.messages import GlobalPosition, ImuSample, LocalPosition
+from companion.messages import Attitude, GlobalPosition, Heartbeat, ImuSample, LocalPosition, Sticks
 from rebound_cli.export.foxglove import write_mcap
 from rebound_cli.export.merging import merge
-from rebound_cli.export.ulog import Row, boot_us, with_rows
+from rebound_cli.export.ulog import Row, boot_us, new_ulog, with_rows
 from rebound_cli.logs.log import LogError, LoggedSample
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.main import main
+from rebound_cli.replay.watching import Findings
 from rebound_cli.report.shown_flight import recorded_flight
 from sim_vehicle.scene import Scene
 from tests.docs.pages import ROOT
@@ -67,6 +68,10 @@ def mcap_of(flight, log):
     content = BytesIO()
     write_mcap(replace(flight, truth=None), log, content)
     return read_mcap(content.getvalue())
+
+
+def ulog_of(flight, log):
+    return ULog(BytesIO(new_ulog(replace(flight, truth=None), log)))
 
 
 # --- MCAP -------------------------------------------------------------------------------------------------------
@@ -129,8 +134,7 @@ def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
     )
     topics = mcap_of(replace(shown, scene=scene), log)
     drawn = {}
-    for _, at_ns, data in topics["/scene"]:
-        (entity,) = data["entities"]
+    for at_ns, entity in entities_of(topics["/scene"] + topics["/scene/moving"]):
         drawn.setdefault(entity["id"], []).append((at_ns, entity))
     names = [obstacle.name for _, obstacle in scene.obstacles()]
     ((_, wall),), ((_, pole),), cart = (drawn[f"obstacle {name}"] for name in names)
@@ -148,6 +152,40 @@ def test_the_scene_has_each_obstacle_where_it_is_and_what_moves_goes_on(flight):
     east = {round((at_ns - began_ns) * 1e-9, 2): e["cubes"][0]["pose"]["position"]["x"] for at_ns, e in cart}
     assert east[min(east)] == 0.0 and east[max(east)] == 2.0
     assert min(abs(place - 1.0) for at_s, place in east.items() if abs(at_s - 10.0) < 0.05) < 0.01
+
+
+def test_the_latest_message_of_a_topic_draws_all_of_it(flight):
+    # Foxglove gives whoever jumps to a time no more than that: given two walls, two carts, two hits, a surface touched
+    # twice
+    shown, log = flight
+    walls = [{"point_ned_m": [n, 0, -2], "normal_ned": [-1, 0, 0]} for n in (4, 9)]
+    cart = {"size_m": [1, 2, 3], "motion": {"velocity_ned_m_s": [0, 0.2, 0], "from_s": 5, "until_s": 15}}
+    carts = [{**cart, "centre_ned_m": [2, e, -1], "name": f"cart {e}"} for e in (1, 3)]
+    scene = Scene.model_validate({"walls": walls, "boxes": carts})
+    (hit,) = shown.findings.impacts
+    findings = Findings([hit, replace(hit, at_us=hit.at_us + 1_000_000)])
+    told = next(event for event in shown.events if event["kind"] == "obstacle")
+    events = [*shown.events, {**told, "time_us": told["time_us"] + 1_000_000}]
+    topics = mcap_of(replace(shown, scene=scene, findings=findings, events=events), log)
+    latest = {
+        topic: [entity["id"] for entity in rows[-1][2]["entities"]]
+        for topic, rows in topics.items()
+        if "/scene" in topic
+    }
+    obstacles = [f"obstacle {obstacle.name}" for _, obstacle in scene.obstacles()]
+    assert latest["/scene"] == ["vehicle", *obstacles[:2]] and latest["/scene/moving"] == obstacles[2:]
+    assert latest["/scene/hits"] == ["hit 1", "hit 2"] and latest["/scene/surfaces"] == ["surface 1", "surface 2"]
+    # and what is told again is what was told before: a hit stands where it was, a surface ends when it is known better
+    for name in ("hits", "surfaces"):
+        found = {}
+        for _, entity in entities_of(topics[f"/scene/{name}"]):
+            assert found.setdefault(entity["id"], entity) == entity
+    first, second = topics["/scene/surfaces"][-1][2]["entities"]
+    assert first["lifetime"] == {"sec": 1, "nsec": 0} and second["lifetime"] == {"sec": 0, "nsec": 0}
+
+
+def entities_of(rows):
+    return [(at_ns, entity) for _, at_ns, data in rows for entity in data["entities"]]
 
 
 def test_a_position_on_earth_becomes_a_fix(flight):
@@ -180,6 +218,61 @@ def test_a_ulog_is_read_back_by_pyulog_and_searched_as_px4s_own(exported, flight
     # and the same hit is found in it
     assert main(["replay", str(exported / "wall.ulg"), "--expect", "1", "--out", str(tmp_path)]) == 0
     assert "HIT: wall" in capsys.readouterr().out
+
+
+def test_a_ulog_has_what_flight_review_draws_beside_the_path(exported, flight):
+    # Flight Review takes distance and speeds from places that are valid, angular rates from a topic of their own
+    _, log = flight
+    written = ULog(str(exported / "wall.ulg"))
+    path = written.get_dataset("vehicle_local_position").data
+    assert all(path[field].all() for field in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid"))
+    turning = written.get_dataset("vehicle_angular_velocity").data
+    told = [heard.sample for heard in log.heard if isinstance(heard.sample, Attitude)]
+    assert turning["xyz[1]"] == pytest.approx([sample.angular_velocity_frd_rad_s[1] for sample in told])
+    # motors that turn in the air alone, and a battery that is less full than it was
+    motors = written.get_dataset("actuator_outputs").data
+    in_air = (motors["timestamp"] > 10e6) & (motors["timestamp"] < 20e6)
+    assert motors["output[3]"][in_air].min() > motors["output[3]"][0] and set(motors["noutputs"]) == {4}
+    charge = written.get_dataset("battery_status").data["remaining"]
+    assert charge[0] == pytest.approx(1.0) and 0.0 < charge[-2] < 0.9
+    # The simulator's truth is PX4's ground truth, at the same times and near the estimate
+    truth = written.get_dataset("vehicle_local_position_groundtruth").data
+    assert np.abs(np.interp(path["timestamp"], truth["timestamp"], truth["x"]) - path["x"]).max() < 0.3
+    turned = written.get_dataset("vehicle_attitude_groundtruth").data
+    assert len(turned["q[0]"]) == len(truth["x"]) == pytest.approx(len(path["x"]), rel=0.1)
+
+
+def test_a_mode_of_the_ulog_begins_when_it_was_told(exported, flight):
+    shown, log = flight
+    modes = ULog(str(exported / "wall.ulg")).get_dataset("vehicle_status").list_value_changes("nav_state")
+    # AUTO.LOITER, OFFBOARD, AUTO.LAND, each when the companion heard of it, and OFFBOARD again on the ground
+    assert [state for _, state in modes] == [4, 14, 18, 14]
+    events = [event["time_us"] for event in shown.events if event["kind"] == "mode"]
+    assert [at_us for at_us, _ in modes[:3]] == boot_us(log, events[:3]).tolist()
+
+
+@pytest.mark.parametrize(
+    ("main", "sub", "nav_state"),
+    [(4, 11, 23), (4, 18, 30), (4, 10, 22), (3, 2, 6), (3, 1, 21), (11, 0, 8), (10, 0, 13), (4, 7, 31), (99, 0, 31)],
+)
+def test_each_mode_of_px4s_has_its_state_and_no_other_passes_for_manual(flight, main, sub, nav_state):
+    shown, log = flight
+    beat = next(heard for heard in log.heard if isinstance(heard.sample, Heartbeat))
+    strange = replace(beat, sample=replace(beat.sample, custom_mode=main << 16 | sub << 24))
+    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), strange)))
+    assert written.get_dataset("vehicle_status").data["nav_state"].tolist() == [nav_state]
+
+
+def test_a_failsafe_and_the_pilots_sticks_are_in_the_ulog(flight):
+    # Given a vehicle that calls its state critical, and a pilot who pushes forward, right, up and clockwise
+    shown, log = flight
+    beat = next(heard for heard in log.heard if isinstance(heard.sample, Heartbeat))
+    critical = replace(beat, sample=replace(beat.sample, system_status=5))
+    sticks = LoggedSample(beat.at_us, Sticks((0.1, 0.2, 0.3, 0.4)))
+    written = ulog_of(shown, replace(log, heard=(LoggedSample(*log.imu()[0]), critical, sticks)))
+    assert written.get_dataset("vehicle_status").data["failsafe"].tolist() == [1]
+    pushed = written.get_dataset("manual_control_setpoint").data
+    assert [pushed[axis][0] for axis in ("pitch", "roll", "throttle", "yaw")] == pytest.approx([0.1, 0.2, 0.3, 0.4])
 
 
 def test_places_are_not_left_out_of_a_file_full_of_them(wall_flight, tmp_path, capsys):
@@ -328,7 +421,7 @@ def test_every_path_of_foxgloves_layout_is_in_the_file(topics):
         name, _, index = field.partition("[")
         value = topics[topic][0][2][name]
         assert not index or isinstance(value[int(index.rstrip("]"))], float), path
-    assert set(layout["configById"]["3D!flight"]["topics"]) <= set(topics)
+    assert set(layout["configById"]["3D!flight"]["topics"]) <= set(topics) | {"/scene/moving"}
 
 
 def test_every_curve_of_plotjugglers_layout_is_in_the_file(exported):

@@ -2,30 +2,46 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from companion.detection.interface import Phase
 from companion.mission.config import CompanionConfig
-from rebound_cli.replay.listening import Listener
-from rebound_cli.replay.recording import read_recording, reproduce
+from rebound_cli.replay.listening import PHASES, Listener
+from rebound_cli.replay.recording import Followed, read_recording, reproduce
 from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import Findings
 from rebound_cli.report.content import content
 from rebound_cli.report.moments import moments_of
-from rebound_cli.report.shown_flight import replayed_flight
+from rebound_cli.report.page import page
+from rebound_cli.report.shown_flight import followed_flight, recorded_flight, replayed_flight
+from tests.rebound_cli.command import WALL
 from tests.rebound_cli.replay.flying import HIT_US, flight
+from tests.rebound_cli.test_control_path import fly
 
 
 def test_a_flight_that_is_listened_to_comes_again_to_the_bit(wall_folder):
     listener = Listener()
     assert reproduce(read_recording(wall_folder), listener).first_difference is None
-    assert len(listener.tested) > 6000
+    assert np.size(listener.tested.ratio) > 6000
 
 
 def test_a_sample_beyond_its_threshold_is_a_hit_and_no_other_is(wall):
     fired = {finding.first.impact.sample_time_boot_us for finding in wall.findings.impacts}
-    beyond = {one.time_boot_us for one in wall.listener.tested if one.phase is Phase.ARMED and one.ratio >= 1.0}
-    assert beyond == fired and len(fired) == 1
+    tested = wall.listener.tested
+    beyond = tested.time_boot_us[(tested.phase == PHASES.index(Phase.ARMED)) & (tested.ratio >= 1.0)]
+    assert set(beyond) == fired and len(fired) == 1
     (shown,) = wall.listener.shown.values()
     assert shown.tested is not None and not shown.may_be_hand
+
+
+def test_a_simulated_flight_has_its_page_without_being_flown_again(wall, wall_folder, tmp_path):
+    # In lockstep
+    assert (wall_folder / "report.html").read_text() == page(wall)
+    # and by the loop of real flights
+    followed = Followed(Listener())
+    fly(tmp_path, followed=followed, mission_file=WALL)
+    shown = replace(followed_flight(tmp_path, followed), versions={})
+    assert followed.findings.collisions and page(shown) == page(recorded_flight(tmp_path))
 
 
 def of_a_log(log):
