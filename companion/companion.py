@@ -20,9 +20,9 @@ from companion.report import Event, ExpectationReport, FlightReport, Status
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """`received_frames` holds the packets found in what was received, in order; bad bytes as they came, as `Stray`.
+    """Packets and events of one step. `received_frames` are in order; bytes of no packet are `Stray`.
 
-    A packet that is not complete yet appears in the step that completes it.
+    An incomplete packet appears in the step that completes it.
     """
 
     received_frames: tuple[bytes, ...]
@@ -49,7 +49,7 @@ class Stepped(ABC, Generic[CoreT]):
         """The core before its first step."""
 
     def step(self, received: bytes, now_us: int) -> StepResult:
-        """Call with the bytes received since the last call, or b"" when only time has passed."""
+        """Take the bytes received since the last call, or b"" when only time has passed."""
         if self._core is None:
             self._core = self._begun(now_us)
             self._core.stop_reason = self._stop_reason
@@ -71,36 +71,34 @@ class Stepped(ABC, Generic[CoreT]):
         return 0 if self._core is None else self._core.next_deadline_us()
 
     def stop(self, reason: str) -> None:
-        """End: the vehicle is handed to hold or land first where it is held; done when `finished`."""
+        """End the flight: a vehicle under control is handed to hold or land first. Done when `finished`."""
         self._stop_reason = reason
         if self._core is not None:
             self._core.stop_reason = reason
 
     @property
     def stop_reason(self) -> str | None:
-        """What `stop` was last called with; None as long as nobody has."""
+        """The reason of the last `stop`; None before."""
         return self._stop_reason
 
     @property
     def core(self) -> CoreT | None:
-        """What is remembered between steps, for whoever studies a flight; None before the first."""
+        """The core, for studies; None before the first step."""
         return self._core
 
     def note(self, kind: str, text: str) -> None:
-        """An event of the program around this one, told with the next step's; nothing before the first."""
+        """Add an event of the surrounding program to the next step. Without effect before the first step."""
         if self._core is not None:
             self._core.flight.report(self._core.now_us, kind, text)
 
     def tell_computer(self, computer: ComputerStatus) -> None:
-        """Take this computer's load, sent to the ground station with the next step. Nothing is sent before the first
-        call.
-        """
+        """Send this computer's load to the ground station with the next step. Without effect before the first step."""
         if self._core is not None:
             self._core.flight.outbox.append(computer)
 
     @property
     def armed(self) -> bool | None:
-        """As the vehicle says; None as long as it has not."""
+        """Whether the vehicle reports that it is armed; None before its first report."""
         return None if self._core is None else self._core.flight.vehicle.armed
 
     @property
@@ -129,7 +127,7 @@ class Companion(Stepped[FlightCore]):
         return core
 
     def confirm_plan(self) -> None:
-        """The person agrees to the plan; may be said beforehand."""
+        """Confirm the plan, also before the first step."""
         self._confirmed = True
         if self._core is not None:
             self._core.flight.plan_confirmed = True

@@ -1,4 +1,4 @@
-"""The pure heart of a flight and of a guard: (core, samples, now) -> messages to send and events. No bytes, no clock.
+"""The pure core of a flight and of a guard: (core, samples, now) -> messages to send and events. No bytes, no clock.
 
 A core is changed only by `advance`: the same samples at the same times give the same outputs, so that a flight can be
 replayed.
@@ -35,15 +35,15 @@ HEARTBEAT_INTERVAL_US = 1_000_000
 # All timeouts are noticed within this, when nothing arrives.
 POLL_INTERVAL_US = 50_000
 
-# Between take-off and landing: the floor counts.
+# States between take-off and landing, in which the fence's floor counts.
 ON_THE_WAY = frozenset({State.MISSION, State.RECOVERING, State.HOLDING, State.RETURNING})
-# Off the ground, which is the detector's affair by height, a hit in the climb or the descent is a hit too.
+# States in which hits are detected. Climb and descent belong to them; the height decides about the ground.
 DETECTING_STATES = ON_THE_WAY | {State.TAKEOFF, State.LANDING}
 
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """What leaves a step."""
+    """Messages to send and events of one step."""
 
     messages: tuple[Outgoing, ...]
     events: tuple[Event, ...]
@@ -57,7 +57,7 @@ MachineT = TypeVar("MachineT", bound=StateMachine)
 
 
 class Core(ABC, Generic[FlightT, MachineT]):
-    """All that is remembered between steps, and what a flight's step and a guard's have in common."""
+    """The state between two steps, and the part of a step that a flight and a guard share."""
 
     def __init__(self, flight: FlightT, machine: MachineT, monitor: CollisionMonitor, now_us: int) -> None:
         self.flight, self.machine, self.monitor = flight, machine, monitor
@@ -69,16 +69,16 @@ class Core(ABC, Generic[FlightT, MachineT]):
     @property
     @abstractmethod
     def _is_active(self) -> bool:
-        """As our own HEARTBEAT tells it."""
+        """Whether the companion's own HEARTBEAT reports it as active."""
 
     @property
     @abstractmethod
     def _off_state(self) -> str | None:
-        """Why nothing is detected in this state, whatever the height; None where something is."""
+        """Why hits are not detected in this state at any height; None in a state that detects."""
 
     @property
     def _goes_down(self) -> bool:
-        """Whether the vehicle is to meet the ground."""
+        """Whether the vehicle descends to land."""
         return False
 
     @property
@@ -91,7 +91,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         return self.flight.mission.companion.flight.setpoint_hz
 
     def advance(self, samples: Sequence[Sample], now_us: int) -> Outputs:
-        """One step: what was heard, whether it shows a hit, what follows from it, what is due to be sent."""
+        """One step: update from the samples, detect hits, run the state machine, send what is due."""
         self.now_us = now_us
         moved = self._react(samples, now_us)
         self._stream_setpoint(moved, now_us)
@@ -108,14 +108,14 @@ class Core(ABC, Generic[FlightT, MachineT]):
         return outputs
 
     def fault(self, error: Exception, now_us: int) -> None:
-        """A fault in what leaves a step. The first gives the vehicle away; later ones find that under way."""
+        """Handle a fault after the state machine. The first hands the vehicle over; later ones change nothing."""
         if not self.flight.fault:
             self.machine.fail(error, now_us)
 
     def _react(self, samples: Sequence[Sample], now_us: int) -> bool:
-        """All that a fault in this program could be in: whatever is raised, the vehicle is given away, and it is told.
+        """Detection and the state machine. Any exception hands the vehicle over and is reported.
 
-        Heartbeats, setpoints and the log go on meanwhile. After a fault nothing is detected any more.
+        Heartbeats, setpoints and the log go on meanwhile. After a fault hits are not detected any more.
         """
         flight, monitor = self.flight, self.monitor
         try:
@@ -136,15 +136,15 @@ class Core(ABC, Generic[FlightT, MachineT]):
         return samples, update_vehicle(self.flight, samples, now_us)
 
     def _act(self, samples: Sequence[Sample], inputs: Inputs, now_us: int) -> bool:
-        """Let the state machine act; whether it moved."""
+        """Run the state machine; whether its state changed."""
         return self.machine.step(inputs, now_us)
 
     def situation(self) -> Situation:
-        """What is known, for the detector; of a stranger's setpoints nothing is."""
+        """The detector's situation. The setpoints of others are not known."""
         flight = self.flight
         target = flight.target if self.machine.holds else None
         return Situation(
-            # The ground shakes a vehicle as a hit does, until it has left it and where it goes down to it.
+            # Contact with the ground looks like a hit, before take-off and in a descent.
             off_reason=self._off_state or too_low(flight, self._goes_down),
             armed=flight.vehicle.armed,
             landed_state=landed(flight, self._goes_down) if self.machine.holds else flight.vehicle.landed,
@@ -154,7 +154,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         )
 
     def _stream_setpoint(self, moved: bool, now_us: int) -> None:
-        """The one place setpoints leave from: at their rate, and at once when the state has changed."""
+        """Send the setpoint: at its rate, and at once when the state has changed. No other code sends one."""
         if not moved and now_us < self._setpoint_due_us:
             return
         interval_us, holds = round(1e6 / self._setpoint_hz), self.machine.holds
@@ -167,7 +167,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
             target = self.machine.handler.target(now_us)
             if target is None:
                 return
-            # What leads the way of one that others fly is the vehicle's own place, wherever they fly it.
+            # Without control the setpoint is the vehicle's own position, and is not limited.
             if holds:
                 target = limiter.passed(flight, target, self._has_floor, moved, now_us)
         except Exception as error:
@@ -181,16 +181,16 @@ class Core(ABC, Generic[FlightT, MachineT]):
         flight.outbox.append(self.resets.sent(target.setpoint(now_us - self.started_at_us)))
 
     def _note_sent(self, target: Target, now_us: int) -> None:
-        """A setpoint of a vehicle that is held."""
+        """Note a setpoint that was sent while the companion has the vehicle."""
 
     def _beat(self, now_us: int) -> None:
-        """Our own HEARTBEAT, for as long as there is anything to do."""
+        """Send the companion's HEARTBEAT until the end."""
         if now_us >= self._heartbeat_due_us and not self.machine.finished:
             self._heartbeat_due_us = now_us + HEARTBEAT_INTERVAL_US
             self.flight.outbox.append(OnboardHeartbeat(self._is_active))
 
     def _inform(self, now_us: int) -> None:
-        """The operator's texts, as things happen, and numbers, at their rate; once there is somebody to tell."""
+        """Send the operator's texts with their events, and numbers at their rate, once a vehicle is connected."""
         flight, texts = self.flight, self._texts
         if flight.vehicle.identity is None or not (flight.events or texts.waiting or now_us >= self._values_due_us):
             return
@@ -210,7 +210,7 @@ class Core(ABC, Generic[FlightT, MachineT]):
         return min(due_us, self._setpoint_due_us) if self._setpoint_due_us > self.now_us else due_us
 
     def status(self) -> Status:
-        """For the live line."""
+        """The live line's content."""
         vehicle = self.flight.vehicle
         latest = vehicle.history.latest()
         return Status(
@@ -224,12 +224,12 @@ class Core(ABC, Generic[FlightT, MachineT]):
         )
 
     def collisions(self) -> tuple[CollisionReport, ...]:
-        """So far."""
+        """All collisions so far."""
         return tuple(record.report() for record in self.flight.collisions)
 
 
 class FlightCore(Core[FlightContext, Machine]):
-    """Of one flight of a mission."""
+    """The core of one flight of a mission."""
 
     def __init__(self, mission: Mission, now_us: int) -> None:
         monitor = start_monitor(mission.companion, now_us)
@@ -254,7 +254,7 @@ class FlightCore(Core[FlightContext, Machine]):
         return self.machine.state in ON_THE_WAY
 
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
-        """The samples in a frame that goes on where the vehicle's own jumps."""
+        """The samples in a local frame that does not jump when the estimator resets its position."""
         before = self.resets.shift_ned_m
         samples = self.resets.follow(samples, self.flight.mission.limits.max_step_m)
         jump_m = math.dist(self.resets.shift_ned_m, before)
@@ -280,7 +280,7 @@ LEAST_BETWEEN_LIMITS_US = 1_000_000
 
 @dataclass(slots=True)
 class Limiter:
-    """What was last sent, and what was last said about it."""
+    """Limits setpoints by the envelope; remembers the last one sent and the last reason reported."""
 
     last: Target | None = None
     last_ned_m: Vector3 | None = None
@@ -289,9 +289,9 @@ class Limiter:
     told_us: int = 0
 
     def passed(self, flight: FlightContext, wanted: Target, has_floor: bool, moved: bool, now_us: int) -> Target:
-        """The setpoint as the fence and the limits let it pass. `moved`: the flight has turned to something else.
+        """The setpoint within the fence and the limits. `moved`: the state has changed, so a jump is allowed.
 
-        Raises SetpointError where it is not finite.
+        Raises SetpointError for one that is not finite.
         """
         latest = flight.vehicle.history.latest()
         around = Surroundings(
@@ -309,6 +309,6 @@ class Limiter:
             text = f"setpoint held back: {reason}" if reason else "setpoint free again"
             flight.report(now_us, "envelope", text, reason=reason)
         self.last = target
-        # A place that is not asked for is no step from it to the next.
+        # Without a position setpoint there is no step to the next one.
         self.last_ned_m, self.last_us = None if target.acceleration_only else target.position_ned_m, now_us
         return target

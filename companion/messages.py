@@ -14,13 +14,13 @@ Quaternion: TypeAlias = tuple[float, float, float, float]
 
 
 class Sample:
-    """Something that was heard."""
+    """A received message."""
 
     __slots__ = ()
 
 
 class Outgoing:
-    """Something that is to be sent."""
+    """A message to be sent."""
 
     __slots__ = ()
 
@@ -48,7 +48,7 @@ class LandedState(IntEnum):
 
 
 class Severity(IntEnum):
-    """MAV_SEVERITY, as far as the companion has something to say."""
+    """MAV_SEVERITY: the levels that the companion uses."""
 
     ERROR = 3
     WARNING = 4
@@ -110,7 +110,7 @@ class LocalPosition(Sample):
 
 @dataclass(frozen=True, slots=True)
 class Odometry(Sample):
-    """ODOMETRY: what LOCAL_POSITION_NED says, and how often the estimator has let it jump (modulo 256)."""
+    """ODOMETRY: position and velocity as in LOCAL_POSITION_NED, and the number of resets (modulo 256)."""
 
     time_boot_us: int
     position_ned_m: Vector3
@@ -129,7 +129,7 @@ class Attitude(Sample):
 
 @dataclass(frozen=True, slots=True)
 class AttitudeTarget(Sample):
-    """ATTITUDE_TARGET: what the vehicle's position control asks of its attitude control."""
+    """ATTITUDE_TARGET: the setpoint of the vehicle's attitude control."""
 
     time_boot_us: int
     thrust_fraction: float  # collective over the greatest, 0 to 1
@@ -138,7 +138,7 @@ class AttitudeTarget(Sample):
 
 @dataclass(frozen=True, slots=True)
 class PositionTarget(Sample):
-    """POSITION_TARGET_LOCAL_NED: the place that the vehicle's position control flies to; None where there is none."""
+    """POSITION_TARGET_LOCAL_NED: the setpoint of the vehicle's position control; None where there is none."""
 
     position_ned_m: Vector3 | None
 
@@ -154,7 +154,7 @@ class GlobalPosition(Sample):
 
 @dataclass(frozen=True, slots=True)
 class Sticks(Sample):
-    """MANUAL_CONTROL as PX4 tells it: the pilot's pitch, roll, throttle and yaw sticks, -1 to 1, 0 in the middle."""
+    """MANUAL_CONTROL as PX4 sends it: the pilot's pitch, roll, throttle and yaw sticks, -1 to 1, 0 in the middle."""
 
     deflections: tuple[float, float, float, float]
 
@@ -228,9 +228,9 @@ class Parameter(Sample):
 
 @dataclass(frozen=True, slots=True)
 class EstimatorStatus(Sample):
-    """ESTIMATOR_STATUS: innovations against their gates (1 is turned down), and what is estimated."""
+    """ESTIMATOR_STATUS: innovation test ratios (rejected above 1), and which states are estimated."""
 
-    ratios: tuple[float, ...]  # of velocity and place, as far as a sensor measures them
+    ratios: tuple[float, ...]  # of velocity and position, for each sensor that is used
     horizontal_velocity_is_good: bool
     accelerometer_is_faulty: bool
 

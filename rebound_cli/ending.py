@@ -72,7 +72,7 @@ def _counts(summary: Mapping[str, Any]) -> list[str]:
     counts = {
         "missed_contacts": "not seen",
         "recontacts": "before the vehicle had recovered from the one before",
-        "unconfirmed": "told by one message and borne out by nothing",
+        "unconfirmed": "shown by one message and confirmed by nothing",
     }
     return [
         f"{count} hit{'s' if count > 1 else ''} {what}." for key, what in counts.items() if (count := summary[key] or 0)

@@ -46,9 +46,9 @@ class FusedDetector:
 
     name = "fused"
     losses: ClassVar[Mapping[MessageId, str]] = {
-        MessageId.ATTITUDE_TARGET: "pushes from below are seen only beyond 5 g",
-        MessageId.VIBRATION: "a peak that the sensor clipped is told by its size alone",
-        MessageId.ODOMETRY: "the estimate's jumps look like unseen hits, which need a step twice as large",
+        MessageId.ATTITUDE_TARGET: "a force from below counts only beyond 5 g",
+        MessageId.VIBRATION: "a clipped peak is recognised by its size alone",
+        MessageId.ODOMETRY: "resets of the estimator look like hits, so a velocity jump must be twice as large",
     }
 
     def __init__(self, config: FusedConfig, averaging_interval_us: int) -> None:

@@ -93,8 +93,8 @@ def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude
 
 def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample: LocalPosition, now_us: int) -> None:
     lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
-    does = "leant" if held.normal_ned[2] == 0.0 else "pressed up"
-    text = f"something is in the way: {does} on it for {lasted_s:.1f} s, by {held.force_m_s2:.1f} m/s^2 more"
+    side = "horizontal" if held.normal_ned[2] == 0.0 else "downward"
+    text = f"something is in the way: {side} external force of {held.force_m_s2:.1f} m/s^2 for {lasted_s:.1f} s"
     flight.report(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
 
 

@@ -25,7 +25,7 @@ SETPOINTS = frozenset(
         "SET_ACTUATOR_CONTROL_TARGET",
     }
 )
-# Setpoints on their way at once; more than a few have been lost before they came by.
+# Own setpoints that are remembered until they pass the gate; more than a few were lost before.
 _MOST_ON_THE_WAY = 32
 
 Mark: TypeAlias = tuple[object, ...]
@@ -33,7 +33,7 @@ Mark: TypeAlias = tuple[object, ...]
 
 @dataclass(frozen=True, slots=True)
 class AttachedStep:
-    """What is to be sent, in order, and what is to be told."""
+    """Messages to send, in order, and events of one step."""
 
     sent: Sequence[tuple[str, Mapping[str, Any]]]
     events: Sequence[Event]
@@ -71,7 +71,7 @@ class AttachedGuard:
         return self.step(() if sample is None else (sample,), now_us)
 
     def step(self, samples: Sequence[Sample], now_us: int) -> AttachedStep:
-        """Samples that have been heard, or none when only time has passed."""
+        """Take received samples, or none when only time has passed."""
         if self._is_draining(now_us):
             self._arrived += samples
             return AttachedStep((), ())
@@ -113,7 +113,7 @@ class AttachedGuard:
 
 
 class Gate:
-    """Knows the guard's own setpoints again by what is in them, in the order in which they were sent."""
+    """Recognises the guard's own setpoints by their content, in the order in which they were sent."""
 
     def __init__(self) -> None:
         self._own: deque[Mark] = deque(maxlen=_MOST_ON_THE_WAY)

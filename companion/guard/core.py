@@ -31,7 +31,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
 
     @property
     def _off_state(self) -> str | None:
-        """Ground, take-off and landing shake a vehicle as a hit does."""
+        """Ground, take-off and landing look like a hit."""
         state = self.machine.state
         return None if state is State.WATCHING or state in HOLDING else why_not(self.flight) or state.value
 
@@ -67,7 +67,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         self.is_enabled = False
         moved = super()._act(samples, inputs, now_us)
         if moved and self.machine.state is State.CONNECTING:
-            # What was seen of a vehicle that was restarted, perhaps by a hit, says nothing of the one that it is now.
+            # After a restart of the vehicle, perhaps by a hit, nothing that was measured before is valid.
             run_search, self.monitor = self.monitor.estimator.run_search, start_monitor(guard.config.companion, now_us)
             self.monitor.estimator.run_search = run_search
         return moved

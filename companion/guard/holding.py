@@ -1,4 +1,4 @@
-"""States in which the vehicle flies by the guard's setpoints, or is about to, and stood down, which may end so."""
+"""The guard's states with its own setpoints: take over, recover, give back, and stand down for a pilot."""
 
 import math
 

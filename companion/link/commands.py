@@ -13,7 +13,7 @@ ACK_TIMEOUT_US = 500_000
 CONFIRMATION_TIMEOUT_US = 2_500_000
 # A temporary refusal (a check still failing) is worth asking about once a second, PX4's own rhythm of checks.
 REFUSAL_PAUSE_US = 1_000_000
-# Answers that promise an effect.
+# Answers after which the effect is expected.
 TAKEN_UP = (CommandResult.ACCEPTED, CommandResult.IN_PROGRESS)
 # Five lost or refused in a row are no accident.
 ATTEMPTS = 5
@@ -31,9 +31,9 @@ class Pending:
 
 @dataclass(frozen=True, slots=True)
 class CommandOutcome:
-    """How it ended; `text` names the command and, when it failed, the vehicle's last answer.
+    """The end of a command. `text` names it and, after a failure, the vehicle's last answer.
 
-    `refused`: it failed and the last that the vehicle said was no, rather than nothing.
+    `refused`: it failed with a refusal, and not for lack of an answer.
     """
 
     succeeded: bool
@@ -64,7 +64,7 @@ def needs_confirmation(command: messages.VehicleCommand) -> bool:
 
 
 def is_final(command: messages.VehicleCommand, result: CommandResult) -> bool:
-    """Whether asking again is useless; a disarm is refused because the vehicle flies, which will not pass soon."""
+    """Whether repeating is useless. A refused disarm is final: the vehicle flies."""
     if result in (CommandResult.DENIED, CommandResult.UNSUPPORTED, CommandResult.FAILED):
         return True
     return result is CommandResult.TEMPORARILY_REJECTED and command == messages.SetArmed(False)
@@ -82,7 +82,7 @@ class CommandClient:
 
     @property
     def requested_mode(self) -> int | None:
-        """The mode asked for and not yet confirmed."""
+        """The requested mode that is not confirmed yet."""
         command = None if self._pending is None else self._pending.command
         if isinstance(command, messages.SetMode):
             return command.custom_mode
@@ -90,7 +90,7 @@ class CommandClient:
 
     @property
     def is_unsaid(self) -> bool:
-        """Whether there is a command that has not been sent once."""
+        """Whether there is a command that has not been sent yet."""
         return self._pending is not None and self._pending.attempts == 0
 
     def begin(self, command: messages.VehicleCommand) -> None:

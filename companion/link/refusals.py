@@ -1,4 +1,4 @@
-"""Messages of the vehicle's that were not accepted: counted, and reported when they go on."""
+"""Refused messages of the vehicle: counted, and reported when they go on."""
 
 from dataclasses import dataclass, field
 
@@ -25,7 +25,7 @@ class Refusals:
     _runs: dict[str, Run] = field(default_factory=dict)
 
     def add(self, refused: Refused, now_us: int) -> str | None:
-        """One more; what is to be told of it, once a run."""
+        """Count one more; returns the report, once a run."""
         name = refused.message
         self.counts[name] = self.counts.get(name, 0) + 1
         run = self._runs.get(name)

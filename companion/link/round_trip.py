@@ -1,4 +1,4 @@
-"""How long a message takes to the vehicle and back, by TIMESYNC. Times are on the companion's clock.
+"""The round trip to the vehicle and back, by TIMESYNC. Times are on the companion's clock.
 
 A hit is answered a round trip late: the sample that shows it comes late, and so does the setpoint that answers it.
 """
@@ -25,7 +25,7 @@ _RESOLUTION_US = 100
 
 @dataclass(slots=True)
 class RoundTrip:
-    """Asks, matches answers with what was asked, and judges. An answer to nobody's question is counted, and no more."""
+    """Sends TIMESYNC, matches the answers, and measures. An answer without a request is only counted."""
 
     worst_us: int | None = None
     ignored: int = 0
@@ -36,7 +36,7 @@ class RoundTrip:
     _is_told: bool = False
 
     def ask(self, now_us: int) -> TimeSyncAsk | None:
-        """The question, where one is due."""
+        """The next request, when it is due."""
         if self._due_us is not None and now_us < self._due_us:
             return None
         self._due_us = now_us + (INTERVAL_US if self._recent_us else FIRST_INTERVAL_US)
@@ -44,7 +44,7 @@ class RoundTrip:
         return TimeSyncAsk(now_us * 1000)
 
     def update(self, answer: TimeSyncAnswer, now_us: int) -> None:
-        """An answer; the first to each question counts."""
+        """Take an answer; only the first to each request counts."""
         asked_ns = answer.companion_time_ns
         if asked_ns not in self._asked_ns:
             self.ignored += 1
@@ -69,7 +69,7 @@ class RoundTrip:
         return RoundTripReport(self.median_us, self.worst_us, self.ignored)
 
     def complaint(self) -> str | None:
-        """One sentence where it takes too long to begin; None before an answer, as nothing is known then."""
+        """One sentence when the round trip is too long to begin; None before the first answer."""
         present_us = self.present_us
         if present_us is None or present_us <= MOST_US:
             return None
@@ -79,7 +79,7 @@ class RoundTrip:
         )
 
     def alarm(self) -> str | None:
-        """What is to be told of one that has become too long, once while it lasts: until the last few are all short."""
+        """The report of a round trip that has become too long, once until the last few are all short."""
         present_us = self.present_us
         if present_us is None or present_us <= MOST_US:
             self._is_told = self._is_told and any(trip_us > MOST_US for trip_us in self._recent_us)

@@ -1,4 +1,4 @@
-"""The streams the companion needs: what it asks for, and what really arrives."""
+"""The streams that the companion requests, and their measured rates."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class RequestedStream:
 
 
 def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -> tuple[RequestedStream, ...]:
-    """Mode and landed state are wished for, not required: HEARTBEAT tells the mode too, if more slowly.
+    """All streams to request. Mode and landed state are optional: HEARTBEAT has the mode, too, more slowly.
 
-    What the detector makes use of beyond that is wished for, too: it says what it loses without.
+    The detector's additional streams are optional, too: it reports what it loses without them.
     """
     always = (
         RequestedStream(MessageId.HIGHRES_IMU, messages.ImuSample, config.highres_imu_hz, config.min_highres_imu_hz),
@@ -44,7 +44,7 @@ def wanted_streams(config: StreamsConfig, for_detector: Collection[MessageId]) -
 
 
 class StreamMonitor:
-    """Counts what arrives. Rates are means over companion time, so packets lost on the way count as missing."""
+    """Counts received messages. Rates are means over the companion's time, so lost packets lower them."""
 
     __slots__ = ("_counts", "_started_us", "_until_us", "streams")
 

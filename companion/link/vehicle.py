@@ -1,4 +1,4 @@
-"""Who the vehicle is, what it has last said about itself, and when."""
+"""The vehicle's identity and its last reported state, with the times of the reports."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ MAV_AUTOPILOT_PX4 = 12
 
 # MAV_TYPE: hover, sideways force and land detection are the same for all of these.
 MULTICOPTERS = {2: "quadrotor", 13: "hexarotor", 14: "octorotor", 15: "tricopter", 29: "dodecarotor", 35: "decarotor"}
-# The ones most often met by mistake, named so that the message helps.
+# Types that are connected by mistake most often, with names for the error message.
 OTHER_TYPES = {
     1: "fixed-wing aircraft",
     3: "coaxial helicopter",
@@ -36,7 +36,7 @@ def is_autopilot(heartbeat: messages.Heartbeat) -> bool:
 
 
 def identify(heartbeat: messages.Heartbeat) -> Identity | str:
-    """The vehicle, or one sentence saying why it is not one that can be flown."""
+    """The vehicle's identity, or one sentence why it cannot be flown."""
     if heartbeat.autopilot != MAV_AUTOPILOT_PX4:
         name = OTHER_AUTOPILOTS.get(heartbeat.autopilot, "unknown autopilot")
         return f"the vehicle's autopilot is not PX4 but {name} (MAV_AUTOPILOT {heartbeat.autopilot})"
@@ -53,21 +53,21 @@ FAILSAFE_STATUS = 5
 
 @dataclass(frozen=True, slots=True)
 class ModeReport:
-    """One message's account of the mode. `intended` is what the user last asked for, where the message says."""
+    """The mode in one message. `intended` is the user's last request, where the message has it."""
 
     custom_mode: int
     intended_custom_mode: int | None
     failsafe: bool
 
 
-# After this silence the last reported mode is old. PX4 leaves OFFBOARD by itself after as long without a setpoint
-# (COM_OF_LOSS_T). A setpoint that comes later would take the vehicle back from whoever has it then.
+# After this silence the last reported mode is old. PX4 leaves OFFBOARD after the same time without a setpoint
+# (COM_OF_LOSS_T). A later setpoint would take the vehicle away from whoever has it then.
 OLD_NEWS_US = 1_000_000
 
 
 @dataclass(slots=True)
 class Vehicle:
-    """The vehicle as heard. Ages are in the companion's clock, motion in the vehicle's.
+    """The vehicle's reported state. Receive times are on the companion's clock, motion on the vehicle's.
 
     A mode that is not the companion's, and a disarm in the air, count from the second report on: one forged or broken
     packet ends no flight. After the first report they are unconfirmed, and no command is sent.
@@ -93,7 +93,7 @@ class Vehicle:
 
     @property
     def is_mode_known(self) -> bool:
-        """Whether it may be commanded: its mode was heard since the last silence, and nothing speaks against it."""
+        """Whether the vehicle may be commanded: its mode is new and not contradicted."""
         is_new = self.mode_received_us > self.unsure_since_us
         return is_new and self.unconfirmed_mode is None and not self.is_disarm_unexplained
 

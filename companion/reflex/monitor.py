@@ -218,7 +218,7 @@ def _update_stream_health(
     monitor.stream_health = health if reason == health.no_data_reason else health._replace(no_data_reason=reason)
     if not monitor.threshold_reported and monitor.state.phase is Phase.ARMED:
         monitor.threshold_reported = True
-        text = f"detector '{monitor.detector.name}' on the watch: a hit is {threshold_m_s2:.1f} m/s^2 or more"
+        text = f"detector '{monitor.detector.name}' armed: a hit is {threshold_m_s2:.1f} m/s^2 or more"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
     if (
         not monitor.losses_reported
@@ -227,7 +227,7 @@ def _update_stream_health(
     ):
         monitor.losses_reported = True
         if monitor.config.estimate.fits_arms and not monitor.estimator.fits_normal:
-            text = "an obstacle's normal comes from its push alone: install px4-rebound[fit]"
+            text = "an obstacle's normal is its contact force's direction: install px4-rebound[fit] to fit it"
             notices.append(Notice("loss", text, {}))
         for message, loss in monitor.detector.losses.items():
             if message not in monitor.heard:

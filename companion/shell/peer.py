@@ -86,7 +86,7 @@ class Peer:
     def _pin(self, sender: Address, now_us: int) -> None:
         if self._pinned is not None:
             self.moves += 1
-            self._news = f"the vehicle speaks from {sender[0]}:{sender[1]} by now, and is answered there"
+            self._news = f"the vehicle now sends from {sender[0]}:{sender[1]}, and answers go there"
         self._before = None if sender == self._before else self._pinned
         self._pinned = self.answered = sender
         self._last_us, self._moved = now_us, None

@@ -209,7 +209,7 @@ def watch_log(
     """
     heard = log.heard if rate_hz is None else tuple(thinned(log.heard, rate_hz))
     circumstances, findings = Circumstances(), Findings()
-    # A log begins with old news of every topic: until the first IMU sample nobody was on the watch.
+    # A log begins with old news of every topic: until the first IMU sample no detector was armed.
     start_us = last_us = next(item.at_us for item in heard if isinstance(item.sample, messages.ImuSample))
     monitor = start_monitor(config, start_us)
     if listen is not None:
