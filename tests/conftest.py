@@ -4,6 +4,11 @@ import gc
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# On a busy machine an example takes as long as it takes.
+settings.register_profile("rebound", deadline=None)
+settings.load_profile("rebound")
 
 _TESTS = Path(__file__).parent
 _COMPILES, _COMPILES_NOTHING = _TESTS / "missions" / "test_confirming.py", _TESTS / "companion"

@@ -55,21 +55,21 @@ def read_or_refused(path, content):
         watch_log(log, CompanionConfig())
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes, cuts)
 @example([], 1.0)
 def test_a_damaged_px4_log(tmp_path, spots, kept):
     read_or_refused(tmp_path / "log.ulg", damaged(ULOG, spots, kept))
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes, cuts)
 @example([], 1.0)
 def test_a_damaged_telemetry_log(tmp_path, spots, kept):
     read_or_refused(tmp_path / "log.tlog", damaged(TELEMETRY, spots, kept))
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.binary(max_size=300), st.sampled_from(["log.ulg", "log.tlog"]))
 def test_bytes_from_anywhere(tmp_path, content, name):
     read_or_refused(tmp_path / name, content)
