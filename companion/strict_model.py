@@ -17,7 +17,7 @@ PositionNed = tuple[Coordinate, Coordinate, Coordinate]
 class StrictModel(BaseModel):
     """Base of everything a person writes: unknown keys are errors, values never change afterwards."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
     retired: ClassVar[frozenset[str]] = frozenset()
     """Keys of earlier versions: files that have them are taken, with a warning."""

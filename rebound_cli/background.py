@@ -8,6 +8,9 @@ from typing import Any
 # Half a minute of steps at PX4's fastest stream, 250 to 500 a second: longer than a card that tidies up stops, and with
 # some 500 bytes a step a few megabytes.
 MOST_WAITING = 10_000
+# To wake a thread for each of 250 steps a second takes a tenth of a guard's time, and a thread between steps delays the
+# next one.
+REST_S = 0.05
 
 
 def at_once(call: Callable[..., object], *arguments: Any) -> None:
@@ -16,12 +19,16 @@ def at_once(call: Callable[..., object], *arguments: Any) -> None:
 
 
 class Background:
-    """Makes calls in order on its own thread. What fails, or finds too many waiting, is dropped, counted and told."""
+    """Makes calls in order on its own thread. What fails, or finds too many waiting, is dropped, counted and told.
+
+    The first is made at once. Whenever all are made it rests: what comes meanwhile is made together.
+    """
 
     def __init__(self, what: str) -> None:
         """`what` is lost when a call is: the subject of the sentence that says so."""
         self._what = what
         self._waiting: SimpleQueue[Callable[[], object] | None] = SimpleQueue()
+        self._is_closing = threading.Event()
         self._is_told = False
         # Counted by the giver and by the thread, each its own.
         self._dropped, self._failed = 0, 0
@@ -57,6 +64,7 @@ class Background:
     def close(self, timeout_s: float | None = None) -> None:
         """Return when all that was given has been tried, or after `timeout_s`."""
         self._waiting.put(None)
+        self._is_closing.set()
         self._thread.join(timeout_s)
 
     @property
@@ -71,3 +79,5 @@ class Background:
             except Exception as error:
                 self._failed += 1
                 self.error = self.error or error
+            if self._waiting.empty():
+                self._is_closing.wait(REST_S)

@@ -214,7 +214,10 @@ def write_json(path: Path, data: Any) -> None:
 
 def versions() -> dict[str, str]:
     """What a replay needs to match: the program, Python, the machine and the packages."""
-    found = {"px4-rebound": __version__, "python": platform.python_version(), "machine": platform.platform()}
+    system = os.uname()
+    # As platform.platform() has it, which starts a process to ask.
+    machine = f"{system.sysname}-{system.release}-{system.machine}-with-{''.join(platform.libc_ver())}"
+    found = {"px4-rebound": __version__, "python": platform.python_version(), "machine": machine}
     for package in _VERSIONED.split():
         with suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)

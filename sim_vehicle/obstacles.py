@@ -17,7 +17,7 @@ Length = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 class Part(BaseModel):
     """What a person writes: no unknown keys, no changes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Waypoint(Part):

@@ -13,6 +13,8 @@ LEFT_OUT = (
     *("mavsdk", "pyulog", "mcap", "pygeomag", "ambiance", "pytest", "rich"),
 )
 WITHOUT = f"import sys\nsys.modules.update(dict.fromkeys({LEFT_OUT!r}))\n"
+# What Python tells its auditors of a process that is started.
+STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")
 QUICK = ("--set", "companion.link.heartbeat_wait_s=0.2")
 
 
@@ -75,3 +77,17 @@ def test_help_imports_nothing_that_is_slow():
     code = "import sys\nfrom rebound_cli.main import build_parser\nbuild_parser()\nprint(*sys.modules)"
     imported = alone(code, ROOT).stdout.split()
     assert not {"numpy", "pydantic", "pymavlink", "shapely", "sim_vehicle", "yaml"} & set(imported)
+
+
+def test_a_guards_start_reads_no_source_and_starts_no_process(tmp_path):
+    code = f"""
+import gc, linecache
+from rebound_cli.main import main
+sys.addaudithook(lambda event, _: event in {STARTS!r} and print("started:", event))
+main(["guard", "--connect", "udpin://127.0.0.1:0", "--out", {str(tmp_path / "guarded")!r}, *{QUICK!r}])
+print(*linecache.cache, gc.isenabled(), gc.get_freeze_count())
+"""
+    said = alone(code, tmp_path).stdout
+    assert "no HEARTBEAT" in said
+    # Then the collector is as it was, and no line tells of a file of source or of a process
+    assert said.splitlines()[-1] == "True 0" and "started:" not in said

@@ -21,6 +21,7 @@ from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
 from companion.reflex.config import RecoveryConfig
+from rebound_cli.check.schema import key_docstrings
 from sim_vehicle.airframe import BUILT_IN_FOLDER, Airframe, load_built_in
 from sim_vehicle.faults.spec import Fault
 from sim_vehicle.scene import Scene
@@ -219,17 +220,13 @@ def _own_notes(model: Model) -> dict[str, str]:
     }
     (body,) = (node.body for node in ast.parse(source).body if isinstance(node, ast.ClassDef))
     found = {}
-    for node, following in zip(body, [*body[1:], None], strict=True):
-        if not isinstance(node, ast.AnnAssign) or not isinstance(node.target, ast.Name):
-            continue
-        if isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
-            found[node.target.id] = " ".join(str(following.value.value).split())
-            continue
-        first = node.lineno
-        while first - 1 in comments:
-            first -= 1
-        found[node.target.id] = " ".join(comments[line] for line in range(first, node.lineno))
-    return found
+    for node in body:
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            first = node.lineno
+            while first - 1 in comments:
+                first -= 1
+            found[node.target.id] = " ".join(comments[line] for line in range(first, node.lineno))
+    return found | {name: " ".join(text.split()) for name, text in key_docstrings(model).items()}
 
 
 def _value(data: Any, path: str) -> Any:

@@ -183,8 +183,7 @@ class FlightContext:
         self.speeds = SpeedLimits.of(config)
         self.steps = self.steps or steps_to_fly(self.mission)
         self.patches = self.mission.obstacles.patches()
-        last = self.steps[-1].action
-        if isinstance(last, ReturnItem):
+        if self.steps and isinstance(last := self.steps[-1].action, ReturnItem):
             self.returning_as = last
 
     @property

@@ -6,7 +6,6 @@ from pydantic import Field, field_validator
 
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
-from companion.mission.items import LandItem, MissionItem, TakeoffItem
 from companion.mission.model import KnownRecovery, Mission
 from companion.mission.policy import SetpointLimits
 from companion.px4_mode import MODE_NAMES
@@ -63,7 +62,7 @@ class GuardConfig(StrictModel):
         """What the parts that the guard shares with a flight read: a mission of which nothing is ever flown."""
         return Mission.model_construct(
             name="guard",
-            items=(MissionItem(takeoff=TakeoffItem(height_m=1.0)), MissionItem(land=LandItem())),
+            items=(),
             fence=self.fence,
             limits=self.limits,
             recovery=self.recovery,

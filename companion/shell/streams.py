@@ -18,6 +18,7 @@ from queue import Empty, SimpleQueue
 from typing import Protocol
 
 from companion.errors import ConnectionSetupError
+from companion.mavlink.packet import packet_length
 from companion.shell.connection import READ_SIZE, LinkCounts, bound_socket, plain, readable
 
 # A local server answers within milliseconds and a radio link within a second; longer means nobody is there.
@@ -43,26 +44,36 @@ class Port(Protocol):
 
 
 class Stream:
-    """An open byte stream; broken once the other end has gone."""
+    """An open byte stream; broken once the other end has gone.
+
+    A UART's driver hands on a few bytes at a time. The beginning of a packet is kept back until the rest has come: a
+    step for it takes as long as for a whole packet, and decides nothing.
+    """
 
     def __init__(self, port: Port, at: str) -> None:
         """`at` is its address or device, for people."""
         self._port, self.at = port, at
         self._descriptor = port.fileno()
         self.broken = False
+        self._begun = b""
         os.set_blocking(self._descriptor, False)
 
     def receive(self, timeout_s: float) -> bytes:
-        if self.broken or not readable(self._descriptor, timeout_s):
-            return b""
-        try:
-            content = os.read(self._descriptor, READ_SIZE)
-        except BlockingIOError:
-            return b""
-        except OSError:
-            content = b""
-        self.broken = not content
-        return content
+        until_s = time.monotonic() + timeout_s
+        while not self.broken and readable(self._descriptor, until_s - time.monotonic()):
+            try:
+                content = os.read(self._descriptor, READ_SIZE)
+            except BlockingIOError:
+                return b""
+            except OSError:
+                content = b""
+            self.broken = not content
+            content = self._begun + content
+            end = _end_of_whole(content)
+            content, self._begun = content[:end], content[end:]
+            if content:
+                return content
+        return b""
 
     def send(self, frame: bytes) -> None:
         remaining = memoryview(frame)
@@ -80,6 +91,21 @@ class Stream:
 
     def close(self) -> None:
         self._port.close()
+
+
+def _end_of_whole(content: bytes) -> int:
+    """Where the last whole packet ends. All counts as whole where a packet should begin and none does: after a loss
+    whatever is there is handed on at once.
+    """
+    end = 0
+    while end < len(content):
+        length = packet_length(content, end)
+        if length == 0:
+            return len(content)
+        if end + length > len(content):
+            return end
+        end += length
+    return end
 
 
 class StreamConnection:

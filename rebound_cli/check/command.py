@@ -5,20 +5,16 @@ import sys
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-from companion.detection.registry import DETECTORS
 from companion.errors import ConfigurationError, ReboundError
 from companion.flight.plan import describe_item, describe_modifiers, mission_lines
 from companion.mission.model import Mission
-from companion.reflex.laws import RECOVERY_LAWS
 from rebound_cli.check.legs import FlownLeg, flown_legs
+from rebound_cli.check.schema import mission_schema
 from rebound_cli.extras import needed_text
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
 from sim_vehicle.errors import SimulationError
-from sim_vehicle.scene import Scene
 
-DRAFT = "https://json-schema.org/draft/2020-12/schema"
 # A repeat's laps are shown whole up to so many rows; a longer list hides what matters.
 _MOST_ROWS = 60
 
@@ -105,29 +101,3 @@ def _notes(flown: FlownLeg) -> Iterator[str]:
         yield f"{meets} '{flown.meets.name}' near [{north:.1f}, {east:.1f}, {down:.1f}]"
     if modifiers := describe_modifiers(flown.leg.step.item):
         yield modifiers
-
-
-def mission_schema() -> dict[str, Any]:
-    """For editors; what only a look at several values together shows is left to `rebound check MISSION`."""
-    schema = Mission.model_json_schema(by_alias=True)
-    scene = Scene.model_json_schema(ref_template="#/$defs/{model}")
-    definitions = schema["$defs"]
-    for name, definition in scene.pop("$defs", {}).items():
-        assert definitions.setdefault(name, definition) == definition, f"two parts of the schema are called {name}"
-    definitions["Scene"] = scene
-    schema["properties"]["sim"] = {"anyOf": [{"$ref": "#/$defs/Scene"}, {"type": "null"}], "default": None}
-    schema["properties"]["items"]["prefixItems"] = [{"$ref": "#/$defs/MissionItem", "required": ["takeoff"]}]
-    definitions["RecoveryConfig"]["properties"]["law"]["enum"] = sorted(RECOVERY_LAWS)
-    definitions["CompanionConfig"]["properties"]["detector"]["enum"] = sorted(DETECTORS)
-    for part in (schema, *definitions.values()):
-        for written in part.get("properties", {}).values():
-            _describe_by_part(written, part, definitions)
-    return {"$schema": DRAFT, **schema, "title": "Mission file of px4-rebound"}
-
-
-def _describe_by_part(written: dict[str, Any], part: dict[str, Any], definitions: dict[str, Any]) -> None:
-    """A key that is nothing but a part of its own, or names its kind, is described by what is said of that part."""
-    parts = [choice["$ref"] for choice in written.get("anyOf", [written]) if "$ref" in choice]
-    described = part if "const" in written else definitions[parts[0].rpartition("/")[2]] if len(parts) == 1 else {}
-    if "description" in described:
-        written.setdefault("description", described["description"])

@@ -4,6 +4,7 @@ import os
 import pty
 import socket
 import threading
+import tty
 
 import pytest
 from pymavlink.dialects.v20 import development as mav
@@ -200,6 +201,25 @@ def test_serial_port_carries_bytes_both_ways():
     connection.close()
     os.close(controller)
     os.close(device)
+
+
+def test_the_beginning_of_a_packet_is_kept_until_the_rest_has_come():
+    # Given a line whose driver hands on what it has
+    far, near = pty.openpty()
+    os.set_blocking(far, False)
+    tty.setraw(near)
+    with os.fdopen(near, "rb", buffering=0) as port:
+        stream = Stream(port, "the line")
+        # When a packet and the beginning of the next come, then the rest with a beginning of two bytes
+        os.write(far, HEARTBEAT + HEARTBEAT[:7])
+        assert stream.receive(1.0) == HEARTBEAT and stream.receive(0.0) == b""
+        os.write(far, HEARTBEAT[7:] + HEARTBEAT[:2])
+        # Then each packet comes whole
+        assert stream.receive(1.0) == HEARTBEAT and stream.receive(0.0) == b""
+        # And where seven bytes were lost, the next packet comes at once with what is left of this one
+        os.write(far, HEARTBEAT[9:] + HEARTBEAT)
+        assert stream.receive(1.0) == HEARTBEAT[:2] + HEARTBEAT[9:] + HEARTBEAT
+    os.close(far)
 
 
 def test_a_packet_that_a_full_pipe_cannot_take_does_not_stall_the_loop():

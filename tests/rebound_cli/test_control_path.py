@@ -7,6 +7,7 @@ import json
 import resource
 import sys
 import threading
+import time
 from functools import partial
 from typing import Any
 
@@ -18,8 +19,8 @@ from companion.messages import ComputerStatus
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from companion.shell.tlog import read_tlog
+from rebound_cli import background, run_folder
 from rebound_cli import fly as command
-from rebound_cli import run_folder
 from rebound_cli.background import MOST_WAITING, Background
 from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
@@ -305,16 +306,16 @@ def test_in_a_real_flight_neither_a_limit_of_size_nor_a_pipe_that_closes_matters
 def test_what_fails_or_waits_too_long_is_dropped_counted_and_told_once():
     # Given a disk that has stopped, and one write too many
     done, going_on = [], threading.Event()
-    background = Background("log")
-    background.give(going_on.wait)
+    writer = Background("log")
+    writer.give(going_on.wait)
     for number in range(MOST_WAITING + 50):
-        background.give(done.append, number)
-    assert background.loss == "log has gaps: writing takes too long" == background.news()
-    assert background.news() is None
+        writer.give(done.append, number)
+    assert writer.loss == "log has gaps: writing takes too long" == writer.news()
+    assert writer.news() is None
     # When it goes on, and one of the writes fails
-    dropped = background.lost
+    dropped = writer.lost
     going_on.set()
-    background.close()
+    writer.close()
     # Then what was kept is there in its order
     assert dropped >= 49 and done == list(range(len(done))) and len(done) + dropped == MOST_WAITING + 50
 
@@ -358,6 +359,23 @@ def exchanged(tmp_path, datagrams, late_us):
     Loop(stepping, queued, queued, recorder, Console(sys.stderr), Interrupts()).exchange()
     recorder.close()
     return stepping, queued
+
+
+def test_what_comes_while_a_writer_rests_is_made_together_and_the_end_waits_for_no_rest(monkeypatch):
+    monkeypatch.setattr(background, "REST_S", 60.0)
+    writer, done, first = Background("log"), [], threading.Event()
+    # Given one that has made its first call at once, and rests
+    writer.give(first.set)
+    assert first.wait(10.0)
+    time.sleep(0.2)
+    # When more comes, then it waits for the rest's end
+    for number in range(3):
+        writer.give(done.append, number)
+    time.sleep(0.1)
+    assert done == []
+    # And is made at the end, at once
+    writer.close(10.0)
+    assert done == [0, 1, 2]
 
 
 def test_after_a_stall_all_that_has_arrived_is_one_step(tmp_path):

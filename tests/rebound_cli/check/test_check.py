@@ -11,9 +11,9 @@ import yaml
 from matplotlib.figure import Figure
 
 from companion.mission.items import ACTIONS
-from rebound_cli.check.command import mission_schema
 from rebound_cli.check.legs import flown_legs
 from rebound_cli.check.picture import after_hits, ends
+from rebound_cli.check.schema import mission_schema
 from rebound_cli.documents import parse_document
 from rebound_cli.figure.ground import draw_obstacles, footprint
 from rebound_cli.inputs import mission_from, world_from
