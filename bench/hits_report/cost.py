@@ -56,7 +56,7 @@ def budget(flown: Flown) -> Iterator[str]:
         runs = [spent_ms(partial(fly, case)) for _ in range(REPEATS)]
         for name in spent:
             spent[name] += min(run[name] for run in runs)
-    yield f"{len(cases)} flown {REPEATS} times more, {intervals / len(cases):.0f} intervals a hit. Of each part the least:"
+    yield f"{len(cases)} flown {REPEATS} times, {intervals / len(cases):.0f} intervals a hit; of each part the least:"
     yield ""
     yield "| part | ms a hit | µs an interval |"
     yield "|---|---|---|"
