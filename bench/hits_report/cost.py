@@ -14,7 +14,7 @@ from bench.speed.parts import COMPANION, KERNEL, PLANT
 TWO_CORES_MS, WANTED, WANTED_WITHOUT_WIRE = 2 * 3_600_000.0, 300_000, 1_000_000
 # What is left without the wire and the autopilot: the companion and the body.
 BARE = (KERNEL, PLANT, COMPANION)
-BUDGETED, REPEATS = 30, 6
+BUDGETED, REPEATS = 20, 5
 
 
 def cost(flown: Flown) -> Iterator[str]:
