@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import dask
 from distributed import Client, LocalCluster, as_completed
 
 from bench.campaign.plan import Campaign, Json, Outcome, code_version, work_out
@@ -100,6 +101,8 @@ def _outcomes(campaign: Campaign, missing: Sequence[tuple[int, Any]], workers: W
 
 def _client(workers: Workers) -> Client:
     if workers.scheduler is None:
+        # A worker's profile of itself grows by a megabyte every ten seconds of work.
+        dask.config.set({"distributed.worker.profile.enabled": False})
         cluster = LocalCluster(
             n_workers=workers.jobs,
             threads_per_worker=1,

@@ -68,6 +68,9 @@ def cells(flown: Flown) -> Iterator[str]:
                 row, is_shown = _cell(hits)
                 yield f"| {name} | {speed} | {row} |"
                 open_cells += [] if is_shown else [f"{name}, {speed} m/s"]
+    noticed_m_s = BANDS_M_S[1][0]
+    row, _ = _cell(flown.hits(lambda case, one: one["closing_m_s"] >= noticed_m_s))
+    yield f"| all | from {noticed_m_s:g} on | {row} |"
     yield ""
     yield f"At most: with a confidence of {100 * CONFIDENCE:g} %, by Clopper and Pearson. Speeds are those into the"
     yield "surface. Again: the vehicle came back and touched again. Over: it leant beyond 90°. Tilt and height lost:"

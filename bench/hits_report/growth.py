@@ -33,7 +33,7 @@ def grown(most: int, first_seed: int, is_drawn: bool, workers: Workers) -> tuple
 
 def _rows(place: str, results: Mapping[int, Json]) -> list[str]:
     everyone = list(results.values())
-    sizes = [10**power for power in range(6) if 10**power <= len(everyone)]
+    sizes = sorted({10**power for power in range(6) if 10**power < len(everyone)} | {len(everyone)})
     return [f"| {place} | {size} | {_cells(everyone[size - max(1, size // 10) : size])} |" for size in sizes]
 
 

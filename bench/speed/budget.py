@@ -6,7 +6,7 @@ the least time of all flights is taken. What the machine does besides falls out.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter_ns, thread_time_ns
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
@@ -26,61 +26,41 @@ class Budget:
     """By part, without the parts that it calls; the timers, some 0.1 us each, count to whoever calls."""
     least_kernel_us: float
     """Of all intervals: the vehicle in the air, near nothing."""
+    intervals: int
 
     @property
     def total_us(self) -> float:
         return sum(self.mean_us.values())
 
 
-def measured_budget(flights: int) -> Budget:
-    least = 1e-3 * np.min([_timed_flight() for _ in range(flights)], axis=0)
-    spent = dict(zip((part.name for part in PARTS), map(float, least.mean(axis=0)), strict=True))
-    return Budget(_own(spent), float(least[:, [part.name for part in PARTS].index(KERNEL)].min()))
+def measured_budget(flights: int, run: Callable[[], object] = fly, last: str = LOG) -> Budget:
+    """Of what is flown, so many times. With the ``last`` part an interval ends."""
+    least = 1e-3 * np.min([_timed_flight(run, last) for _ in range(flights)], axis=0)
+    names = [part.name for part in PARTS]
+    spent = dict(zip(names, map(float, least.mean(axis=0)), strict=True))
+    mean = {name: us - sum(spent[part.name] for part in PARTS if part.caller == name) for name, us in spent.items()}
+    return Budget(mean, float(least[:, names.index(KERNEL)].min()), len(least))
 
 
-def spent_ms(run: Callable[[], object]) -> dict[str, float]:
-    """Of the processor, by part without the parts that it calls, in a run of any kind; the timers count, too."""
-    spent = _timed(run, lambda spent: None, thread_time_ns)
-    return _own({name: 1e-6 * ns for name, ns in spent.items()})
-
-
-def _own(spent: dict[str, float]) -> dict[str, float]:
-    return {name: one - sum(spent[part.name] for part in PARTS if part.caller == name) for name, one in spent.items()}
-
-
-def _timed_flight() -> Ints:
+def _timed_flight(run: Callable[[], object], last: str) -> Ints:
     """Nanoseconds of each part in each interval, with the parts that it calls (intervals, parts)."""
     rows: list[tuple[int, ...]] = []
-
-    def end_interval(spent: dict[str, int]) -> None:
-        rows.append(tuple(spent.values()))
-        spent.update(dict.fromkeys(spent, 0))
-
-    _timed(fly, end_interval)
-    return np.array(rows)
-
-
-def _timed(
-    run: Callable[[], object],
-    when_logged: Callable[[dict[str, int]], None],
-    clock_ns: Callable[[], int] = perf_counter_ns,
-) -> dict[str, int]:
-    """Nanoseconds of each part, with the parts that it calls; `when_logged` is told after each interval's log."""
     spent = {part.name: 0 for part in PARTS}
 
     def timed(part: Part, function: Function) -> Function:
-        name, is_last = part.name, part.name == LOG
+        name, is_last = part.name, part.name == last
 
         def call(*arguments: Any, **named: Any) -> Any:
-            begun = clock_ns()
+            begun = perf_counter_ns()
             result = function(*arguments, **named)
-            spent[name] += clock_ns() - begun
+            spent[name] += perf_counter_ns() - begun
             if is_last:
-                when_logged(spent)
+                rows.append(tuple(spent.values()))
+                spent.update(dict.fromkeys(spent, 0))
             return result
 
         return call
 
     with wrapped(timed):
         run()
-    return spent
+    return np.array(rows)
