@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from rebound_cli.run_folder import RunFolderError
+from rebound_cli.results.run_folder import RunFolderError
 
 
 def make_folder(folder: Path) -> None:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import TypeVar
 
-from rebound_cli.console import with_progress
+from rebound_cli.live.console import with_progress
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

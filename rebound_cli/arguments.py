@@ -228,7 +228,7 @@ def add_sim(commands: Commands) -> None:
 def add_preflight(commands: Commands) -> None:
     text = "Parameters, streams, time, estimate and vibration, each with its remedy; see docs/how-to/preflight.md."
     summary = "look at a connected vehicle before its first flight"
-    preflight = _command(commands, "preflight", "preflight:run_preflight", summary, text)
+    preflight = _command(commands, "preflight", "preflight.command:run_preflight", summary, text)
     _add_connect(preflight, required=True)
     _add_peer_and_key(preflight)
     _add_companion(preflight)
@@ -240,7 +240,7 @@ def add_preflight(commands: Commands) -> None:
 
 def add_status(commands: Commands) -> None:
     text = "Asks a running `guard` or `fly --connect` on this machine; see docs/how-to/flights.md."
-    status = _command(commands, "status", "status:run_status", "what a running guard or flight is doing", text)
+    status = _command(commands, "status", "live.status:run_status", "what a running guard or flight is doing", text)
     _option(status, "--socket", "where to ask (default: this session, then the service)", "PATH")
     _add_json(status, "status")
 

@@ -13,9 +13,9 @@ from typing import Any
 from companion.errors import ConfigurationError
 from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import kept_flights, runs_folder
-from rebound_cli.run_folder import read_text, versions
+from rebound_cli.live.status import StatusError, ask
+from rebound_cli.results.run_folder import read_text, versions
 from rebound_cli.service.files import FOLDER
-from rebound_cli.status import StatusError, ask
 
 SETTINGS = Path("/", FOLDER)
 # What a service's unit and the rule of its device are called.

@@ -13,23 +13,24 @@ from companion.mission.model import Mission
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection, udp_in
 from companion.shell.files import write_whole
-from rebound_cli import inputs, run_folder
+from rebound_cli import inputs
 from rebound_cli.background import Background
-from rebound_cli.compiling import prepare_companion, prepare_vehicle
-from rebound_cli.console import Console, console_for
-from rebound_cli.ending import ending_text
 from rebound_cli.flights.kept import make_room_for_next, room_for
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.offering import offer_report
-from rebound_cli.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
+from rebound_cli.live.console import Console, console_for
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import AskPerson, Computer, ConfirmAtOnce, FlightFaultError, Loop, fly_realtime, watched
+from rebound_cli.live.signed_connection import open_signed, refused_packets
+from rebound_cli.live.status import StatusServer, served
 from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import Followed
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.signed_connection import open_signed, refused_packets
-from rebound_cli.status import StatusServer, served
-from rebound_cli.summary import FlightFacts, Flown, build_summary
-from rebound_cli.truth_match import FlightTruth
-from rebound_cli.vehicle_process import READY_WORDS, VehicleProcess
+from rebound_cli.report.offering import offer_report
+from rebound_cli.results import run_folder
+from rebound_cli.results.ending import ending_text
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.simulation.compiling import prepare_companion, prepare_vehicle
+from rebound_cli.simulation.vehicle_process import READY_WORDS, VehicleProcess
 
 # Where PX4's SITL sends its onboard streams unasked, plus its instance.
 PX4_COMPANION_PORT = 14540
@@ -177,7 +178,7 @@ def _fly_beside_vehicle(flight: Flight, px4: Connection | None, instance: int) -
 
 
 def _fly_lockstep(flight: Flight) -> Flown:
-    from rebound_cli.lockstep import EPOCH_US, fly_mission_lockstep
+    from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
     from sim_vehicle.shell.truth_file import save_truth
 
     assert flight.world is not None, "a lockstep flight has a simulated world"

@@ -11,18 +11,18 @@ from companion.guard.guard import Guard
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from companion.shell.service_manager import ServiceManager, service_manager
-from rebound_cli import run_folder
 from rebound_cli.background import Background
-from rebound_cli.compiling import prepare_companion
-from rebound_cli.console import Console, console_for
 from rebound_cli.documents import Document, apply_overrides, load_document, validated
 from rebound_cli.flights.kept import make_room_for_next, room_for
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.offering import offer_report
-from rebound_cli.realtime import Loop, watched
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.signed_connection import open_signed, refused_packets
-from rebound_cli.status import served
+from rebound_cli.live.console import Console, console_for
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import Loop, watched
+from rebound_cli.live.signed_connection import open_signed, refused_packets
+from rebound_cli.live.status import served
+from rebound_cli.report.offering import offer_report
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.compiling import prepare_companion
 
 
 def run_guard(options: Namespace) -> int:

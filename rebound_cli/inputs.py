@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.errors import ConfigurationError
-from rebound_cli import documents, run_folder
+from rebound_cli import documents
 from rebound_cli.documents import Document, DocumentError, DocumentPath, load_document, validated
-from rebound_cli.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import RESOLVED_NAME, read_records, read_text, whole_lines
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 from sim_vehicle.errors import AirframeError, FaultError, SceneError
 from sim_vehicle.mavlink.restamp import check_messages

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 
 from companion.errors import ConfigurationError
-from rebound_cli.console import Console, console_for
 from rebound_cli.inputs import companion_settings
+from rebound_cli.live.console import Console, console_for
 from rebound_cli.logs.log import LogError
 from rebound_cli.logs.reader import read_log, read_telemetry
 from rebound_cli.replay.listening import Listener
@@ -17,7 +17,7 @@ from rebound_cli.replay.recording import is_run_folder, read_recording, settings
 from rebound_cli.replay.report import Replay, replay_flight, replay_log, report_data, report_text
 from rebound_cli.report.shown_flight import ShownFlight, decided_again, replayed_flight
 from rebound_cli.report.writer import write_page
-from rebound_cli.run_folder import REPORT_NAME, RUNS_FOLDER, TLOG_NAME, versions
+from rebound_cli.results.run_folder import REPORT_NAME, RUNS_FOLDER, TLOG_NAME, versions
 
 
 def run_replay(options: Namespace) -> int:

@@ -11,11 +11,11 @@ from pathlib import Path
 from companion.errors import ConfigurationError
 from companion.shell.signing_files import read_key
 from rebound_cli.background import Background
-from rebound_cli.compiling import prepare_vehicle
-from rebound_cli.console import Console, console_for
-from rebound_cli.ending import impact_text
 from rebound_cli.inputs import SimulatedWorld, load_world
-from rebound_cli.vehicle_process import READY_WORDS
+from rebound_cli.live.console import Console, console_for
+from rebound_cli.results.ending import impact_text
+from rebound_cli.simulation.compiling import prepare_vehicle
+from rebound_cli.simulation.vehicle_process import READY_WORDS
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.parameters.pace import time_outs_at
 from sim_vehicle.shell.addresses import COMPANION_PORT, GROUND_PORT, open_port, px4_ports

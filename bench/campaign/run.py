@@ -14,7 +14,7 @@ from bench.campaign.plan import Campaign, Json, Outcome, code_version, work_out
 from bench.campaign.record import Record
 from bench.processes import ctrl_c_waiting
 from companion.errors import ReboundError
-from rebound_cli.console import with_progress
+from rebound_cli.live.console import with_progress
 
 # Cases handed to a worker at a time: a task costs Dask a millisecond or two, a case takes 50 and more.
 CASES_PER_TASK = 8

@@ -6,7 +6,7 @@ from pathlib import Path
 from bench.random_missions.flight import fly
 from bench.random_missions.generator import MissionCase, airframe_data, random_mission
 from bench.random_missions.judge import failures
-from rebound_cli import run_folder
+from rebound_cli.results import run_folder
 
 AIRFRAME_AS_GIVEN = "airframe-as-given.yaml"
 

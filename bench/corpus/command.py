@@ -15,7 +15,7 @@ from bench.places import make_folder, make_place
 from bench.processes import in_processes
 from bench.random_missions.generator import AIRFRAMES, MissionCase
 from companion.errors import ReboundError
-from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME, write_json
+from rebound_cli.results.run_folder import TLOG_NAME, TRUTH_NAME, write_json
 
 # Each recorded impact so often, each time in another flight.
 ROUNDS = 4

@@ -6,9 +6,9 @@ from pathlib import Path
 from bench.random_missions.generator import MissionCase, airframe_of, random_mission
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, resolved, with_guards
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import EPOCH_US, fly_mission_lockstep
-from rebound_cli.run_folder import RESOLVED_NAME, TRUTH_NAME, FlightRecorder, write_yaml
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import RESOLVED_NAME, TRUTH_NAME, FlightRecorder, write_yaml
+from rebound_cli.simulation.lockstep import EPOCH_US, fly_mission_lockstep
 from sim_vehicle.scene import Scene
 from sim_vehicle.shell.truth_file import save_truth
 

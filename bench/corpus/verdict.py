@@ -11,8 +11,8 @@ from companion.estimate.impact import ImpactEstimate
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.watching import Findings, watch_log
-from rebound_cli.run_folder import RESOLVED_NAME, TLOG_NAME, TRUTH_NAME
-from rebound_cli.truth_match import index_of_hit
+from rebound_cli.results.run_folder import RESOLVED_NAME, TLOG_NAME, TRUTH_NAME
+from rebound_cli.results.truth_match import index_of_hit
 from sim_vehicle.shell.truth_file import load_truth
 from sim_vehicle.truth import Hit
 

@@ -27,9 +27,9 @@ from companion.companion import Companion
 from companion.mavlink.packet import message_id_of
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from rebound_cli.background import Background
-from rebound_cli.console import Console
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import EPOCH_US
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import FaultRequest
 from sim_vehicle.mavlink.link import Link, LinkOptions

@@ -1,7 +1,7 @@
 """All faults that are flown, in the table's order."""
 
-from bench.faults import clocks, estimator, files, hostile, link, machine, pilot, processes, sensors, weather
 from bench.faults.fault import Fault
+from bench.faults.kinds import clocks, estimator, files, hostile, link, machine, pilot, processes, sensors, weather
 
 _FAULTS: tuple[Fault, ...] = (
     *link.FAULTS,

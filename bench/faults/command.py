@@ -16,12 +16,12 @@ from bench.marked import checked_text, write_part
 from bench.processes import ctrl_c_waiting
 from bench.stamps import stamp_text
 from companion.errors import ConfigurationError
-from rebound_cli.console import with_progress
+from rebound_cli.live.console import with_progress
 
 FLOWN_CODE = (
     "companion",
     "sim_vehicle",
-    "rebound_cli/realtime.py",
+    "rebound_cli/live/realtime.py",
     "bench/faults/flight.py",
     "bench/faults/catalogue.py",
 )

@@ -24,15 +24,15 @@ from bench.random_missions.generator import AIRFRAMES
 from companion.companion import Companion, StepResult
 from companion.mission.model import Mission
 from companion.shell.tlog import may_be_logged, read_tlog
-from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.inputs import resolved, with_guards
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import EPOCH_US
-from rebound_cli.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import ConfirmAtOnce, FlightFaultError, Loop, fly_realtime
 from rebound_cli.replay.recording import read_recording, reproduce
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.scene import Scene

@@ -24,11 +24,11 @@ from companion.mavlink.packet import message_id_of
 from companion.shell.clock import Clock
 from companion.shell.connection import udp_out
 from rebound_cli.background import Background
-from rebound_cli.console import Console
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import EPOCH_US
-from rebound_cli.realtime import Loop
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import Loop
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.lockstep import EPOCH_US
 from rebound_cli.timing import undisturbed
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from bench.campaign.plan import Json
 from bench.faults.catalogue import FILES, FLOWN
-from bench.faults.files import tried
 from bench.faults.flight import fly, fly_from_one_take_off
+from bench.faults.kinds.files import tried
 
 
 def fly_seed(case: tuple[int, Sequence[str]]) -> Json:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bench.campaign.plan import Json
 from bench.faults.fault import Fault
-from bench.faults.files import FileFault
+from bench.faults.kinds.files import FileFault
 
 PART, TITLE = "faults", "Faults and attacks"
 _SHOWN = 3

@@ -29,8 +29,8 @@ from bench.speed.parse import parse_us
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.report import CollisionReport
-from rebound_cli.lockstep import EPOCH_US
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results.truth_match import FlightTruth
+from rebound_cli.simulation.lockstep import EPOCH_US
 from sim_vehicle.mavlink.link import LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import HIT_ACTIVE

@@ -13,7 +13,7 @@ from bench.recoveries.hits import AIRFRAMES, into_a_wall
 from companion.companion import Companion
 from companion.mission.model import Mission
 from rebound_cli.inputs import with_guards
-from rebound_cli.lockstep import EPOCH_US, virtual_time_limit_s
+from rebound_cli.simulation.lockstep import EPOCH_US, virtual_time_limit_s
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bench.marked import checked_text, write_part
-from bench.paper import (
+from bench.paper.arguments import DEFAULT_SEEDS
+from bench.paper.flights import fly
+from bench.paper.studies import (
     arm,
     causes,
     claims,
@@ -15,8 +17,6 @@ from bench.paper import (
     sample_scenario,
     simulation_experiment,
 )
-from bench.paper.arguments import DEFAULT_SEEDS
-from bench.paper.flights import fly
 from bench.paper.study import Study, StudyFindings, concluded
 from bench.paper.table import ClaimRow, rows_text
 from bench.places import make_folder

@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.baselines.config import BaselineMission
-from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.inputs import SimulatedWorld, with_guards
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
-from rebound_cli.summary import FlightFacts, Flown, build_summary
-from rebound_cli.truth_match import FlightTruth, match_contacts
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.flight_log import FlightLog, read_flight_log
+from rebound_cli.results.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.results.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.truth_match import FlightTruth, match_contacts
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import Airframe, with_base
 from sim_vehicle.scene import Scene
 from sim_vehicle.truth import Hit

@@ -16,13 +16,13 @@ from bench.processes import in_processes
 from bench.sensitivity import stop_sensitivity_text
 from bench.stamps import stamp_text
 from rebound_cli.documents import Document, validated
-from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import load_mission_document, with_guards, world_from
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import TLOG_NAME, FlightRecorder
-from rebound_cli.summary import FlightFacts, build_summary
-from rebound_cli.truth_match import match_contacts
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.flight_log import read_flight_log
+from rebound_cli.results.run_folder import TLOG_NAME, FlightRecorder
+from rebound_cli.results.summary import FlightFacts, build_summary
+from rebound_cli.results.truth_match import match_contacts
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 
 MISSION_FILE = Path("missions/wall.yaml")
 SPEED_PATH = "items.1.go_to.speed_m_s"

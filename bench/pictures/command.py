@@ -11,7 +11,7 @@ from bench.places import make_folder
 from bench.stamps import ROOT, stamped_anew
 from rebound_cli.main import main as rebound
 from rebound_cli.report.shown_flight import recorded_flight
-from rebound_cli.run_folder import FIGURE_NAME, REPORT_NAME
+from rebound_cli.results.run_folder import FIGURE_NAME, REPORT_NAME
 
 COMMAND = "python -m bench pictures"
 MISSION = ROOT / "missions" / "wall.yaml"

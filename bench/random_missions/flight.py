@@ -9,10 +9,10 @@ from bench.random_missions.generator import MissionCase, RandomMission, airframe
 from companion.mission.model import Mission
 from companion.report import Event, FlightReport
 from rebound_cli.inputs import SimulatedWorld, with_guards
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.truth_match import FlightTruth, Vector3
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.truth_match import FlightTruth, Vector3
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.scene import Scene
 from sim_vehicle.world import Obstacle
 

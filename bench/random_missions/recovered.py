@@ -15,8 +15,8 @@ from bench.random_missions.phases import phases_of
 from companion.flight.collision import LEAST_WAY_M
 from companion.reflex.halfspace import away_from
 from companion.report import CollisionReport
-from rebound_cli.summary import LONGEST_RECOVERY_S
-from rebound_cli.truth_match import Vector3
+from rebound_cli.results.summary import LONGEST_RECOVERY_S
+from rebound_cli.results.truth_match import Vector3
 from sim_vehicle.truth import Hit
 from sim_vehicle.world import Obstacle
 

@@ -12,11 +12,11 @@ import numpy as np
 from bench.campaign.plan import Campaign, Json
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.summary import LONGEST_RECOVERY_S, Flown
-from rebound_cli.truth_match import FlightTruth, match_contacts
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.summary import LONGEST_RECOVERY_S, Flown
+from rebound_cli.results.truth_match import FlightTruth, match_contacts
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 

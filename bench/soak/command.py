@@ -23,8 +23,8 @@ from bench.soak.cable import Cable
 from bench.stamps import FLOWN, ROOT, stamp_text
 from companion.mavlink.packet import message_id_of
 from rebound_cli.flights.kept import hits_in, kept_flights
+from rebound_cli.live.status import StatusError, ask
 from rebound_cli.replay.recording import read_recording, reproduce
-from rebound_cli.status import StatusError, ask
 from sim_vehicle.errors import ConditionNotMet
 from sim_vehicle.testing import RunningVehicle, start_vehicle
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from time import process_time
 
 from rebound_cli.inputs import load_mission_document, mission_from, world_from
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 
 MISSION = Path(__file__).parents[2] / "missions/wall.yaml"
 

@@ -31,7 +31,7 @@ PARTS = (
     Part(COMPANION, "companion.companion:Stepped.step"),
     Part("companion: MAVLink out", "companion.mavlink.encode:Encoder.all_packets", COMPANION),
     # The last of an interval of a flight that is logged.
-    Part(LOG, "rebound_cli.run_folder:FlightRecorder.record"),
+    Part(LOG, "rebound_cli.results.run_folder:FlightRecorder.record"),
 )
 
 

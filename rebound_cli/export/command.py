@@ -8,7 +8,7 @@ from companion.errors import ConfigurationError
 from companion.shell.files import write_whole
 from rebound_cli.flights.archive import add_flight, new_archive
 from rebound_cli.flights.kept import flight_named, runs_folder
-from rebound_cli.run_folder import TLOG_NAME
+from rebound_cli.results.run_folder import TLOG_NAME
 
 
 def run_export(options: Namespace) -> int:

@@ -22,7 +22,7 @@ from rebound_cli.logs.log import Log
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.content import finite, surfaces
 from rebound_cli.report.shown_flight import ShownFlight
-from rebound_cli.run_folder import HIT_KINDS
+from rebound_cli.results.run_folder import HIT_KINDS
 from sim_vehicle.mavlink.telemetry import quaternion_from_matrix
 from sim_vehicle.world import Obstacle, Pole
 

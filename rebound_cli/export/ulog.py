@@ -19,8 +19,8 @@ from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample
 from rebound_cli.logs.ulog import NAV_STATES
 from rebound_cli.replay.report import finding_data
 from rebound_cli.report.shown_flight import ShownFlight
-from rebound_cli.run_folder import HIT_KINDS
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results.run_folder import HIT_KINDS
+from rebound_cli.results.truth_match import FlightTruth
 
 Floats = npt.NDArray[np.float64]
 

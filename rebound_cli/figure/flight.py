@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from companion.mission.model import Mission
 from companion.report import CollisionReport, FlightReport
 from rebound_cli.figure.ground import OBSTACLE, draw_obstacles, draw_patches
-from rebound_cli.flight_log import FlightLog, read_flight_log
-from rebound_cli.run_folder import FIGURE_NAME, TLOG_NAME
-from rebound_cli.truth_match import FlightTruth, match_contacts
+from rebound_cli.results.flight_log import FlightLog, read_flight_log
+from rebound_cli.results.run_folder import FIGURE_NAME, TLOG_NAME
+from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from sim_vehicle.scene import Scene
 
 Floats = npt.NDArray[np.float64]

@@ -13,9 +13,9 @@ from typing import Any
 
 import yaml
 
-from rebound_cli import run_folder
 from rebound_cli.flights.kept import KeptFlight
-from rebound_cli.run_folder import read_text, whole_lines
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import read_text, whole_lines
 
 # The names of all quantities end in frame and unit: these are the places.
 _PLACE_KEYS = re.compile(r".*(_ned_m|_ne_m|latitude_deg|longitude_deg|altitude_m)|obstacles|polygon.*")

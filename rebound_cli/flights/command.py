@@ -4,9 +4,9 @@ import json
 from argparse import Namespace
 from typing import Any
 
-from rebound_cli.console import console_for
 from rebound_cli.flights.kept import KeptFlight, flight_named, hits_in, kept_flights, runs_folder
-from rebound_cli.run_folder import EVENTS_NAME, RunFolderError, read_records
+from rebound_cli.live.console import console_for
+from rebound_cli.results.run_folder import EVENTS_NAME, RunFolderError, read_records
 
 
 def run_list(options: Namespace) -> int:

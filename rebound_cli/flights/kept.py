@@ -17,8 +17,8 @@ from typing import Any
 
 from companion.errors import ReboundError
 from companion.mission.config import DiskConfig
-from rebound_cli import run_folder
-from rebound_cli.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_text, whole_lines
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import EVENTS_NAME, RUNS_FOLDER, TLOG_NAME, read_text, whole_lines
 
 # As `create_run_folder` names them. A folder that a person has named is that person's.
 _NAMED_BY_US = re.compile(r"(\d{8}T\d{6}Z)-.+")

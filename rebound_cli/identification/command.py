@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import mean
 
-from rebound_cli import run_folder
 from rebound_cli.documents import load_document, parse_document, validated, write_text
 from rebound_cli.identification import fit
 from rebound_cli.identification.capture import find_hit, read_table
 from rebound_cli.identification.fit import Identified, Number, Spring, identify, leave_one_out
 from rebound_cli.identification.flight import flight_hit
 from rebound_cli.identification.hit import Hit, IdentificationError
+from rebound_cli.results import run_folder
 from sim_vehicle.airframe import Airframe, load_built_in, with_base
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.motion.strapdown import Strapdown
-from rebound_cli.flight_log import FlightLog, read_flight_log
 from rebound_cli.identification.hit import Floats, Hit, IdentificationError, Push, guards_at
+from rebound_cli.results.flight_log import FlightLog, read_flight_log
 
 # A touch: above the lateral specific force of the detector's default, so that drag and vibration are none.
 _TOUCH_M_S2 = 4.0

@@ -22,12 +22,12 @@ from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.reflex.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
-from rebound_cli import run_folder
 from rebound_cli.documents import validated
 from rebound_cli.inputs import load_flown, mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.watching import Findings
+from rebound_cli.results import run_folder
 
 
 @dataclass(slots=True)

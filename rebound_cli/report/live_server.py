@@ -9,12 +9,12 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
-from rebound_cli import run_folder
+from rebound_cli.live.status import ask
 from rebound_cli.report.page import live_page
 from rebound_cli.report.shown_flight import unseen_flight
 from rebound_cli.report.tail import Tail, as_line
-from rebound_cli.run_folder import RunFolderError
-from rebound_cli.status import ask
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import RunFolderError
 
 # The log is written twice a second; looked at twice as often it is at most a quarter of a second older.
 LOOK_S = 0.25

@@ -14,11 +14,11 @@ import numpy.typing as npt
 from companion.detection.interface import Evidence, ImpactKind, Phase
 from companion.memory.patch import CLIPPED_ERROR_RAD, ERROR_RAD
 from companion.messages import Vector3
-from rebound_cli.ending import impact_text
 from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
-from rebound_cli.truth_match import index_of_hit
+from rebound_cli.results.ending import impact_text
+from rebound_cli.results.truth_match import index_of_hit
 
 if TYPE_CHECKING:
     from sim_vehicle.truth import Hit

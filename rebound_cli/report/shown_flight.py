@@ -14,9 +14,7 @@ from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from rebound_cli import run_folder
 from rebound_cli.documents import validated
-from rebound_cli.flight_log import FlightLog, flight_log_of, read_flight_log
 from rebound_cli.inputs import load_flown
 from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import (
@@ -30,7 +28,9 @@ from rebound_cli.replay.recording import (
 )
 from rebound_cli.replay.report import Replay
 from rebound_cli.replay.watching import Finding, Findings
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results import run_folder
+from rebound_cli.results.flight_log import FlightLog, flight_log_of, read_flight_log
+from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.scene import Scene
 
 

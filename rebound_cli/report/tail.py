@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.shell.tlog import packets_in
-from rebound_cli import run_folder
-from rebound_cli.flight_log import FlightLog, flight_log_of_packets
+from rebound_cli.results import run_folder
+from rebound_cli.results.flight_log import FlightLog, flight_log_of_packets
 
 # Columns of each table of the page, in the order of a row.
 COLUMNS = {

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from companion.detection.interface import ImpactKind
-from rebound_cli.ending import ending_text
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
+from rebound_cli.results.ending import ending_text
 
 # A sample later than so many usual intervals after the one before: one between them was lost.
 LOST_FROM = 1.5

@@ -10,7 +10,7 @@ from rebound_cli.flights.kept import flight_named, runs_folder
 from rebound_cli.replay.recording import Followed
 from rebound_cli.report.page import page
 from rebound_cli.report.shown_flight import ShownFlight, followed_flight, recorded_flight
-from rebound_cli.run_folder import REPORT_NAME
+from rebound_cli.results.run_folder import REPORT_NAME
 
 
 def run_report(options: Namespace) -> int:

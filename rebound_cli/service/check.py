@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from companion.errors import ConfigurationError
 from companion.preflight import PreflightItem, Verdict
-from rebound_cli.preflight import show_findings
+from rebound_cli.preflight.command import show_findings
 from rebound_cli.service.files import UNIT, UNIT_NAME, USER, PlannedFile, ServiceSettings
 from rebound_cli.service.system import System, answer, hidden_program
 

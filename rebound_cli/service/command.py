@@ -9,7 +9,7 @@ from companion.guard.config import GuardConfig
 from rebound_cli import documents
 from rebound_cli.documents import DocumentError, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from
-from rebound_cli.run_folder import read_text
+from rebound_cli.results.run_folder import read_text
 from rebound_cli.service import files
 from rebound_cli.service.check import run_check
 from rebound_cli.service.files import FOLDER, SYSUSERS, UDEV, UNIT, UNIT_NAME, PlannedFile, ServiceSettings

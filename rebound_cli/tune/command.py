@@ -15,15 +15,15 @@ import numpy as np
 from companion.errors import ConfigurationError
 from companion.messages import Attitude, Heartbeat, ImuSample
 from companion.mission.config import CompanionConfig
-from rebound_cli.console import console_for, with_progress
 from rebound_cli.documents import parse_document, validated, write_text
 from rebound_cli.inputs import companion_settings, load_world
+from rebound_cli.live.console import console_for, with_progress
 from rebound_cli.logs.log import Log, LogError
 from rebound_cli.logs.reader import read_log
 from rebound_cli.logs.shaking import FLYING, Shaking, Stage, clipped, shaking
 from rebound_cli.replay.recording import is_run_folder
 from rebound_cli.replay.watching import Findings, watch_log
-from rebound_cli.run_folder import SUMMARY_NAME, TLOG_NAME
+from rebound_cli.results.run_folder import SUMMARY_NAME, TLOG_NAME
 from rebound_cli.tune.hits import SPEEDS_M_S, HitSensitivity, hit_moments, sensitivity
 from rebound_cli.tune.settings import SHARES, Advice, Margin, advise, margins, settings_text
 

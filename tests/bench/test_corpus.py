@@ -13,7 +13,7 @@ from bench.corpus.verdict import verdict
 from bench.main import main
 from bench.random_missions.generator import MissionCase
 from rebound_cli.replay.watching import Findings
-from rebound_cli.run_folder import TLOG_NAME, TRUTH_NAME
+from rebound_cli.results.run_folder import TLOG_NAME, TRUTH_NAME
 from sim_vehicle.shell.truth_file import load_truth
 from tests.bench.random_missions.made_up import hit
 

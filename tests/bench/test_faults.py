@@ -13,17 +13,17 @@ from bench.faults.air import POSCTL, Air, Injector, When
 from bench.faults.catalogue import FILES, FLOWN
 from bench.faults.envelope import outside
 from bench.faults.fault import COMPLETED, HANDED_OVER, Expected, Fault
-from bench.faults.files import tried
 from bench.faults.flight import fly, fly_from_one_take_off
 from bench.faults.injectors import Rewritten, Simulated, setting
+from bench.faults.kinds.files import tried
+from bench.faults.kinds.pilot import Taken
 from bench.faults.latency import spread as spread_of
 from bench.faults.packets import ARM, IMU, SET_MODE, made
-from bench.faults.pilot import Taken
 from bench.faults.table import Row, text_of
 from bench.main import main
 from companion.mavlink.encode import COMPONENT_ID
 from rebound_cli.background import Background
-from rebound_cli.interrupts import Interrupts
+from rebound_cli.live.interrupts import Interrupts
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.bench.changeable import ChangeableVehicle
 from sim_vehicle.bench.faults import motor_failure, other

@@ -10,19 +10,19 @@ import pytest
 from bench.baselines.config import BaselineMission
 from bench.head_on import head_on
 from bench.main import main
-from bench.paper import (
+from bench.paper import command
+from bench.paper.approach import approach
+from bench.paper.flights import StudyContact, StudyFlight, StudyResult, fly, share_received
+from bench.paper.studies import (
     arm,
     causes,
     claims,
-    command,
     directions,
     flight_tests,
     imu_rate,
     sample_scenario,
     simulation_experiment,
 )
-from bench.paper.approach import approach
-from bench.paper.flights import StudyContact, StudyFlight, StudyResult, fly, share_received
 from bench.paper.table import ClaimRow, around, at_least, at_most, rows_text, within_factor
 from sim_vehicle.airframe import load_built_in
 from tests.rebound_cli.command import ROOT

@@ -9,9 +9,9 @@ from companion.flight.horizontal_force import HELD_M_S2, HorizontalForceMonitor,
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as mav
 from companion.link.round_trip import MOST_US, RoundTrip
 from companion.messages import TimeSyncAnswer, TimeSyncAsk
 from companion.report import RoundTripReport
-from rebound_cli.console import state_fields
+from rebound_cli.live.console import state_fields
 from tests.companion.fake_vehicle import EPOCH_US, FakeVehicle, Flight, flight
 
 TICK_US = 4_000

@@ -7,8 +7,8 @@ import pytest
 from bench.reference import events, summary
 from bench.reference.command import FOLDER, PAGES, page_text
 from rebound_cli import exit_codes
-from rebound_cli.summary import Flown, build_summary
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results.summary import Flown, build_summary
+from rebound_cli.results.truth_match import FlightTruth
 from tests.rebound_cli.test_truth_match import EPOCH_US, FACTS, collision, hit, path_of, report_of
 
 

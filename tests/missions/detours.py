@@ -11,9 +11,9 @@ from companion.memory.stored import KnownPatch
 from companion.memory.surroundings import core
 from companion.report import FlightReport
 from rebound_cli.inputs import mission_from, world_from
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from tests.missions.test_missions import FOLDER, load_document
 
 GOAL_NED_M = (7.0, 0.0, -1.5)

@@ -5,7 +5,7 @@ import pytest
 from companion.companion import Companion
 from companion.guard.states import State
 from rebound_cli.inputs import mission_from, world_from
-from rebound_cli.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.guard.flying import Air
 from tests.missions.test_missions import FOLDER, load_document

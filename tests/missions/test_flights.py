@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import fly_mission_lockstep
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.truth_match import match_contacts
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.truth_match import match_contacts
+from rebound_cli.simulation.lockstep import fly_mission_lockstep
 from tests.missions.test_missions import CONTACT_REACH_M, NAMES, WITHOUT_OBSTACLES, load
 
 pytestmark = [pytest.mark.flight, pytest.mark.slow]

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from rebound_cli.console import Console
-from rebound_cli.realtime import AskPerson
+from rebound_cli.live.console import Console
+from rebound_cli.live.realtime import AskPerson
 
 
 class Planned:

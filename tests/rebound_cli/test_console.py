@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from companion.report import Event, Status
-from rebound_cli.compiling import compiling_shown
-from rebound_cli.console import Console
-from rebound_cli.interrupts import Interrupts
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.simulation.compiling import compiling_shown
+from rebound_cli.simulation.vehicle_process import VehicleProcess, VehicleProcessError
 from rebound_cli.timing import LinkRate
-from rebound_cli.vehicle_process import VehicleProcess, VehicleProcessError
 
 ROOT = Path(__file__).parents[2]
 EVENTS = (Event(1_000_000, "mode", "mode OFFBOARD", {}), Event(2_500_000, "detection", "hit 1 at [3.76, 0.00]", {}))

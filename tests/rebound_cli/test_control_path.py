@@ -19,13 +19,13 @@ from companion.messages import ComputerStatus
 from companion.px4_mode import AUTO_LOITER, OFFBOARD
 from companion.shell.connection import MOST_DATAGRAMS, LinkCounts
 from companion.shell.tlog import read_tlog
-from rebound_cli import background, run_folder
+from rebound_cli import background
 from rebound_cli import fly as command
 from rebound_cli.background import MOST_WAITING, Background
-from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import (
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import (
     COMPUTER_EVERY_US,
     HANDING_OVER_US,
     Computer,
@@ -34,7 +34,8 @@ from rebound_cli.realtime import (
     Loop,
     fly_realtime,
 )
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.timing import TOO_LATE_US, Timing, undisturbed
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of, start, wait_for_event

@@ -4,7 +4,7 @@ import copy
 
 import pytest
 
-from rebound_cli.ending import ending_text
+from rebound_cli.results.ending import ending_text
 
 HIT = {
     "impact_speed_m_s": 1.98,

@@ -9,11 +9,11 @@ from pymavlink.dialects.v20 import development as dialect
 
 from companion.companion import Companion
 from rebound_cli.documents import load_document
-from rebound_cli.flight_log import read_flight_log
 from rebound_cli.inputs import mission_from, world_from
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.lockstep import EPOCH_US, run_lockstep, virtual_time_limit_s
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.flight_log import read_flight_log
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.simulation.lockstep import EPOCH_US, run_lockstep, virtual_time_limit_s
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import SQUARE, WALL, events_of, run_here
 

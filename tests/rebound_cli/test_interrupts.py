@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from rebound_cli.interrupts import Interrupts
+from rebound_cli.live.interrupts import Interrupts
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -7,7 +7,7 @@ import yaml
 
 from rebound_cli.inputs import load_mission_document, mission_from, resume_of
 from rebound_cli.main import main
-from rebound_cli.run_folder import EVENTS_NAME
+from rebound_cli.results.run_folder import EVENTS_NAME
 from tests.rebound_cli.command import QUICK, SQUARE, assert_comes_again, events_of
 
 pytestmark = [pytest.mark.flight, pytest.mark.usefixtures("without_pictures")]

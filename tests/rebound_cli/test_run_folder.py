@@ -8,7 +8,7 @@ import pytest
 
 from rebound_cli import fly, guard
 from rebound_cli.main import main
-from rebound_cli.run_folder import TLOG_NAME, check_place
+from rebound_cli.results.run_folder import TLOG_NAME, check_place
 from tests.rebound_cli.command import ROOT, WALL
 
 
@@ -50,7 +50,7 @@ def test_a_folder_that_nobody_may_write_to_is_refused(tmp_path):
     code = f"""
 import os
 from pathlib import Path
-from rebound_cli.run_folder import RunFolderError, check_place
+from rebound_cli.results.run_folder import RunFolderError, check_place
 os.chdir({str(tmp_path)!r})
 if os.geteuid() == 0:
     os.setresuid(65534, 65534, 65534)

@@ -13,14 +13,14 @@ from companion.mavlink.signing import Signing as CompanionsSigning
 from companion.mavlink.signing import stamp_at
 from companion.shell.signing_files import StampFile, write_new
 from companion.shell.tlog import read_tlog
-from rebound_cli import run_folder
 from rebound_cli.background import Background
-from rebound_cli.console import Console
 from rebound_cli.inputs import load_mission_document, mission_from, resolved, world_from
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import ConfirmAtOnce, Loop, fly_realtime
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.signed_connection import SignedConnection
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import ConfirmAtOnce, Loop, fly_realtime
+from rebound_cli.live.signed_connection import SignedConnection
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
 from sim_vehicle.mavlink.signing import Signing
 from sim_vehicle.vehicle import SimulatedVehicle
 from tests.rebound_cli.command import HOP, SQUARE, assert_comes_again, events_of

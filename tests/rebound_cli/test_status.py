@@ -11,8 +11,16 @@ import time
 import pytest
 
 from companion.report import Event, Status
+from rebound_cli.live.status import (
+    StatusError,
+    StatusServer,
+    ask,
+    served,
+    socket_of_this_program,
+    sockets_to_ask,
+    text_of,
+)
 from rebound_cli.main import main
-from rebound_cli.status import StatusError, StatusServer, ask, served, socket_of_this_program, sockets_to_ask, text_of
 
 WATCHING = Status("watching", "POSCTL", True, (1.0, 2.0, -3.0), 0.5, "armed", 12_000)
 ARMED = Event(500_000, "armed", "armed", {})

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from companion.report import CollisionReport, FlightReport
-from rebound_cli.summary import FlightFacts, Flown, build_summary
-from rebound_cli.truth_match import FlightTruth, match_contacts
+from rebound_cli.results.summary import FlightFacts, Flown, build_summary
+from rebound_cli.results.truth_match import FlightTruth, match_contacts
 from sim_vehicle.truth import Hit
 
 EPOCH_US = 1_600_000_000_000_000

@@ -5,7 +5,7 @@ import numpy as np
 from bench.random_missions.flight import JudgedFlight
 from companion.mission.model import Mission
 from companion.report import CollisionReport, Event, FlightReport
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.truth import Hit
 from sim_vehicle.world import Wall
 

@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import development as dialect
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.messages import ComputerStatus
-from rebound_cli import run_folder
-from rebound_cli.run_folder import FlightRecorder
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import FlightRecorder
 
 EPOCH_US = 1_600_000_000_000_000
 STEP_US = 50_000

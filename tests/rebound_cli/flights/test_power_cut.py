@@ -7,10 +7,10 @@ import pytest
 
 from companion.errors import ReboundError
 from companion.shell.tlog import TlogWriter
-from rebound_cli import run_folder
 from rebound_cli.background import Background
 from rebound_cli.replay.recording import read_recording, reproduce
-from rebound_cli.run_folder import EVENTS_NAME, INPUTS_NAME, TLOG_NAME
+from rebound_cli.results import run_folder
+from rebound_cli.results.run_folder import EVENTS_NAME, INPUTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import EPOCH_US, record
 
 

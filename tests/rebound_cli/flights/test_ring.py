@@ -21,7 +21,7 @@ from rebound_cli.flights.kept import (
     make_room_for_next,
     room_for,
 )
-from rebound_cli.run_folder import EVENTS_NAME, TLOG_NAME
+from rebound_cli.results.run_folder import EVENTS_NAME, TLOG_NAME
 from tests.rebound_cli.flights.flying import BLOCK, EPOCH_US, pretend, record
 
 GIB, MIB = 1 << 30, 1 << 20

@@ -14,11 +14,11 @@ import yaml
 from pymavlink import mavutil
 
 from companion.guard.config import GuardConfig
-from rebound_cli import run_folder
 from rebound_cli.flights import kept
 from rebound_cli.guard import run_guard
+from rebound_cli.live.status import ask
 from rebound_cli.main import build_parser
-from rebound_cli.status import ask
+from rebound_cli.results import run_folder
 from tests.rebound_cli.command import ROOT, assert_comes_again, events_of, run, start, wait_for_event
 
 pytestmark = pytest.mark.realtime

@@ -7,8 +7,8 @@ import pytest
 
 from companion.mission.config import CompanionConfig
 from companion.preflight import Preflight, SerialLine, Verdict, findings
-from rebound_cli.card import card
-from rebound_cli.preflight import serial_line
+from rebound_cli.preflight.card import card
+from rebound_cli.preflight.command import serial_line
 from sim_vehicle.airframe import load_built_in
 from sim_vehicle.scene import Scene
 from sim_vehicle.vehicle import SimulatedVehicle

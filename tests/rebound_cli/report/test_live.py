@@ -9,10 +9,10 @@ from contextlib import closing, contextmanager
 import numpy as np
 import pytest
 
-from rebound_cli.flight_log import read_flight_log
 from rebound_cli.main import main
 from rebound_cli.report.live_server import Told, WatchServer
 from rebound_cli.report.tail import COLUMNS, Tail, as_line
+from rebound_cli.results.flight_log import read_flight_log
 from tests.rebound_cli.report.opened import Opened
 
 PATIENCE_S = 60.0

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from rebound_cli import offering
-from rebound_cli.console import Console
+from rebound_cli.live.console import Console
+from rebound_cli.report import offering
 from tests.test_base_install import alone
 
 

@@ -14,11 +14,11 @@ import yaml
 
 import rebound_cli.report
 from companion.shell.tlog import read_tlog
-from rebound_cli.flight_log import read_flight_log
 from rebound_cli.main import main
 from rebound_cli.report.content import content
 from rebound_cli.report.page import SCRIPTS, file_text, page
 from rebound_cli.report.shown_flight import recorded_flight
+from rebound_cli.results.flight_log import read_flight_log
 from sim_vehicle.obstacles import WallSpec
 from tests.rebound_cli.report.opened import Opened, rows
 

@@ -7,7 +7,7 @@ import socket
 import pytest
 
 from companion.report import Status
-from rebound_cli.console import Console
+from rebound_cli.live.console import Console
 from tests.rebound_cli.test_control_path import fly
 
 

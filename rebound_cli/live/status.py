@@ -19,8 +19,8 @@ from typing import Any
 from companion.errors import ReboundError
 from companion.report import Event, Status
 from rebound_cli import __version__
-from rebound_cli.console import state_fields
-from rebound_cli.run_folder import HIT_KINDS
+from rebound_cli.live.console import state_fields
+from rebound_cli.results.run_folder import HIT_KINDS
 
 # Of a service that sets RuntimeDirectory=rebound; whoever asks has not that service's environment.
 SERVICE_SOCKET = Path("/run/rebound/status.sock")

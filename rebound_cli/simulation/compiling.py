@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from rebound_cli.console import Console
+from rebound_cli.live.console import Console
 
 if TYPE_CHECKING:
     from companion.mission.config import CompanionConfig

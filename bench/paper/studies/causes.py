@@ -10,13 +10,13 @@ from matplotlib.figure import Figure
 
 from bench.paper.approach import CRUISE_S, approach
 from bench.paper.figures import add_legend, draw_position, new_figure
-from bench.paper.flight_tests import (
+from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.studies.flight_tests import (
     NO_OVERSHOOT_M,
     is_lost,
     worst_overshoot_by_estimate_m,
     worst_overshoot_m,
 )
-from bench.paper.flights import StudyFlight, StudyResult
 from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, at_least, at_most, markdown, number
 

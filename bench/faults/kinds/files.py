@@ -105,7 +105,7 @@ def _noise(folder: Path, chance: random.Random) -> Path:
 
 def _spoiled(folder: Path, chance: random.Random) -> Path:
     """A good mission with ten bytes changed somewhere: it may still be one."""
-    text = bytearray((Path(__file__).parents[2] / "missions" / "wall.yaml").read_bytes())
+    text = bytearray((Path(__file__).parents[3] / "missions" / "wall.yaml").read_bytes())
     for _ in range(10):
         text[chance.randrange(len(text))] = chance.randrange(256)
     return _written(folder, bytes(text))

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rebound_cli.summary import BREAKING_FORCE_N
+from rebound_cli.results.summary import BREAKING_FORCE_N
 
 
 def ending_text(summary: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from bench.paper.figures import add_legend, draw_position, draw_velocity, new_fi
 from bench.paper.flights import StudyFlight, StudyResult
 from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, around, at_least, at_most, markdown, number
-from rebound_cli.summary import BREAKING_FORCE_N
+from rebound_cli.results.summary import BREAKING_FORCE_N
 
 PAPER_SPEEDS_M_S = (1.0, 1.5, 2.0, 2.5)
 BEYOND_M_S = (3.0, 4.0, 5.0)

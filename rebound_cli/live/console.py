@@ -10,7 +10,7 @@ from rebound_cli.background import Background, at_once
 
 if TYPE_CHECKING:
     from companion.report import Event, Status
-    from rebound_cli.terminal import Terminal
+    from rebound_cli.live.terminal import Terminal
 
 # Ten times a second looks continuous; in a file or a pipe a line every few seconds is enough to see life.
 LIVE_INTERVAL_S = 0.1
@@ -72,7 +72,7 @@ class Console:
         self._display: Plain | Terminal = Plain(stream)
         if self.is_terminal:
             # A companion that runs as a service has no terminal, and never loads what draws on one.
-            from rebound_cli import terminal
+            from rebound_cli.live import terminal
 
             self._display = terminal.Terminal(stream)
         self._live_due_s = 0.0

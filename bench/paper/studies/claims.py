@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from bench.head_on import head_on
 from bench.paper.approach import approach
 from bench.paper.figures import add_legend, draw_position, draw_velocity, finish, new_figure
-from bench.paper.flight_tests import safety_text
 from bench.paper.flights import Floats, StudyFlight, StudyResult
+from bench.paper.studies.flight_tests import safety_text
 from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, around, at_least, at_most, markdown, within_factor
-from rebound_cli.summary import BREAKING_FORCE_N
+from rebound_cli.results.summary import BREAKING_FORCE_N
 from sim_vehicle.airframe import Airframe, load_built_in
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene

@@ -14,10 +14,10 @@ from companion.shell.addresses import serial_device
 from companion.shell.clock import Clock
 from companion.shell.connection import Connection
 from companion.shell.files import write_whole
-from rebound_cli.card import card
-from rebound_cli.console import Console, console_for
 from rebound_cli.inputs import companion_settings
-from rebound_cli.signed_connection import open_signed
+from rebound_cli.live.console import Console, console_for
+from rebound_cli.live.signed_connection import open_signed
+from rebound_cli.preflight.card import card
 
 LONGEST_WAIT_S = 0.05
 # PX4 answers a parameter within 50 ms; after a second it has not taken it.

@@ -7,14 +7,14 @@ from functools import partial
 
 from companion.companion import Companion
 from companion.mission.model import Mission, longest_s
-from rebound_cli.console import Console
 from rebound_cli.inputs import SimulatedWorld
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.realtime import look_for_file
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.realtime import look_for_file
 from rebound_cli.replay.recording import Followed
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.summary import Flown
-from rebound_cli.truth_match import FlightTruth
+from rebound_cli.results.run_folder import FlightRecorder
+from rebound_cli.results.summary import Flown
+from rebound_cli.results.truth_match import FlightTruth
 from sim_vehicle.truth import TruthRecorder
 from sim_vehicle.vehicle import SimulatedVehicle
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from bench.faults.air import Air, Injector, When
 from bench.faults.fault import Fault
 from rebound_cli.background import Background
-from rebound_cli.console import Console
+from rebound_cli.live.console import Console
 
 
 class _DiskError:

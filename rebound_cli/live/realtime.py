@@ -17,10 +17,10 @@ from companion.shell.computer import ComputerReader
 from companion.shell.connection import MOST_DATAGRAMS, Connection
 from companion.shell.service_manager import ServiceManager, service_manager
 from rebound_cli.background import Background
-from rebound_cli.console import Console, state_fields
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.run_folder import FlightRecorder
-from rebound_cli.status import StatusServer
+from rebound_cli.live.console import Console, state_fields
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.live.status import StatusServer
+from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.timing import LinkRate, Timing, undisturbed
 
 # The loop looks at Ctrl-C, the person's answer and the live line at least this often.

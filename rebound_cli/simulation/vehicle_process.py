@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Self
 
 from companion.errors import ReboundError
-from rebound_cli.compiling import COMPILED
-from rebound_cli.console import Console
-from rebound_cli.interrupts import Interrupts
-from rebound_cli.run_folder import RESOLVED_NAME, TRUTH_NAME, VEHICLE_LOG_NAME
+from rebound_cli.live.console import Console
+from rebound_cli.live.interrupts import Interrupts
+from rebound_cli.results.run_folder import RESOLVED_NAME, TRUTH_NAME, VEHICLE_LOG_NAME
+from rebound_cli.simulation.compiling import COMPILED
 
 # Writing the truth of a long flight takes well under a second; a process that takes longer is stuck.
 STOP_TIMEOUT_S = 5.0

@@ -5,8 +5,8 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-from rebound_cli.console import Console
-from rebound_cli.run_folder import REPORT_NAME, TLOG_NAME
+from rebound_cli.live.console import Console
+from rebound_cli.results.run_folder import REPORT_NAME, TLOG_NAME
 
 
 def offer_report(folder: Path, console: Console) -> None:

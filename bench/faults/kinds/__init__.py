@@ -1,0 +1,1 @@
+"""The faults and attacks, one file a kind."""

@@ -1,0 +1,1 @@
+"""What runs beside a flight in real time: the loop, the terminal, the status, interrupts."""

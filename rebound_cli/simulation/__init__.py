@@ -1,0 +1,1 @@
+"""The simulated vehicle beside the companion: as a process, in lockstep, and compiled before."""
