@@ -9,6 +9,7 @@ from bench.paper.flights import StudyTrack
 
 CENTRE = {"color": "tab:blue", "linewidth": 1.8}
 ASKED = {"color": "tab:orange", "linewidth": 1.4, "linestyle": "--"}
+PAPER = {"color": "tab:purple", "linewidth": 1.3, "linestyle": "-."}
 WALL, CONTACT, DETECTED, TARGET = "tab:brown", "0.35", "tab:red", "tab:green"
 DPI = 100
 
@@ -59,6 +60,24 @@ def draw_fold(axis: Any, track: StudyTrack, title: str, start_s: float = -0.05, 
     axis.set_xlim(start_s, end_s)
     mark_moments(axis, track)
     finish(axis, title, "fold of the arm [mm]")
+
+
+def mark_paper(axis: Any, value: float, text: str, is_time: bool = False, above: bool = False) -> None:
+    """A number of the paper's own text, across the picture and in words below it; upright where it is a time."""
+    line = axis.axvline if is_time else axis.axhline
+    line(value, label="the paper's own number", **PAPER)
+    at, turn = ((value, 0.97), axis.get_xaxis_transform()) if is_time else ((0.98, value), axis.get_yaxis_transform())
+    axis.annotate(
+        text,
+        at,
+        xycoords=turn,
+        xytext=(4, 0) if is_time else (0, 3 if above else -3),
+        textcoords="offset points",
+        ha="left" if is_time else "right",
+        va="bottom" if above else "top",
+        color=PAPER["color"],
+        fontsize=8,
+    )
 
 
 def mark_moments(axis: Any, track: StudyTrack) -> None:

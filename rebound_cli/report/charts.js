@@ -30,7 +30,7 @@ function addChart(parent, { title, unit, across, x, series, height = 180, marks 
     height,
     scales: { x: { time: false, ...(range ? { min: range[0], max: range[1] } : {}) }, y: up },
     cursor: { drag: { x: true, y: false } },
-    axes: [axis(), { ...axis(), size: 56, ...(up === POWERS ? { splits: powersOfTen } : {}) }],
+    axes: [{ ...axis(), size: 34 }, { ...axis(), size: 56, ...(up === POWERS ? { splits: powersOfTen } : {}) }],
     series: [{ label: across }, ...series.map(lineOf)],
     hooks: {
       drawClear: [(plot) => shadeGaps(plot, gaps)],
@@ -138,7 +138,7 @@ function fitCharts() {
 // The whole flight: what there is to be seen of it, each as a chart with a function that gives its columns.
 function overviews() {
   const found = [];
-  const { path, imu, force } = tables;
+  const { path, setpoint, attitude, imu, force } = tables;
   if (path.length || flight.live) {
     const series = [{ label: "speed, m/s", colour: "--blue" }];
     if (path.has("d")) series.push({ label: "height, m", colour: "--orange" });
@@ -146,6 +146,25 @@ function overviews() {
       const { t, vn, ve, vd, d } = path.columns;
       const speed = Array.from(vn, (north, row) => Math.hypot(north, ve[row], vd[row]));
       return [t, speed, ...(d ? [d.map((down) => -down)] : [])].map(plotted);
+    } });
+  }
+  if (path.has("n") && (setpoint.length || flight.live)) {
+    const lines = [["north", "--blue"], ["east", "--orange"]].flatMap(([label, colour]) =>
+      [{ label, colour, number: 0 }, { label: "its setpoint", colour, number: 1 }]);
+    found.push({ title: "Place and setpoint", unit: "m", series: lines, columns: () => {
+      const { t, n, e } = path.columns;
+      const asked = Array.from(t, askedAt);
+      return [t, n, asked.map((place) => place[0]), e, asked.map((place) => place[1])].map(plotted);
+    } });
+  }
+  if (attitude.length || flight.live) {
+    const series = [{ label: "roll, right side down", colour: "--blue" }, { label: "pitch, nose up", colour: "--orange" }];
+    found.push({ title: "Lean", unit: "°", series, columns: () => {
+      const { t, qw, qx, qy, qz } = attitude.columns;
+      const turns = (angle) => Array.from(qw, (w, row) => (angle(w, qx[row], qy[row], qz[row]) * 180) / Math.PI);
+      const roll = turns((w, x, y, z) => Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)));
+      const pitch = turns((w, x, y, z) => Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - x * z)))));
+      return [t, roll, pitch].map(plotted);
     } });
   }
   if (imu.length) {
@@ -164,6 +183,13 @@ function overviews() {
     found.push({ title: "Specific force sideways", unit: "m/s²", series, columns: () => [force.columns.t, force.columns.peak].map(plotted) });
   }
   return found;
+}
+
+// North and east of the setpoint that was flown at a time; none where none came for a second.
+function askedAt(time) {
+  const { t, n, e } = tables.setpoint.columns;
+  const row = rowAt(t, time);
+  return row >= 0 && time - t[row] < 1 ? [n[row], e[row]] : [NaN, NaN];
 }
 
 // A click goes to its time. `showNow` marks a time, `refill` takes what a live flight has brought.

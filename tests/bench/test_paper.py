@@ -175,6 +175,34 @@ def results_like(sample, flights):
     return [dataclasses.replace(sample, flight=flight) for flight in flights]
 
 
+def papers_numbers(axis):
+    """In each line that is the paper's own: where it is drawn across, or upright."""
+    lines = [line for line in axis.get_lines() if line.get_label() == "the paper's own number"]
+    return [line.get_ydata()[0] if line.get_ydata()[0] != 0 else line.get_xdata()[0] for line in lines]
+
+
+def test_the_papers_own_numbers_are_drawn_where_its_text_gives_any(sample):
+    position, velocity, _, fold = sample_scenario.conclude([sample]).pictures["sample_scenario.png"].axes
+    assert papers_numbers(velocity) == [1.4, -0.28] and papers_numbers(fold) == [30.0]
+    assert papers_numbers(position) == []
+    # 1.05 m back in its simulation, 0.95 m in its experiment, at 2.1 m/s
+    pictures = simulation_experiment.conclude(results_like(sample, simulation_experiment.flights(1))).pictures
+    position, velocity = pictures["simulation_experiment.png"].axes
+    backs_m = [sample.track.touch_m - place_m for place_m in papers_numbers(position)]
+    assert backs_m == pytest.approx([1.05, 0.95]) and papers_numbers(velocity) == [2.1]
+    # 1 to 2.5 m/s, half of it back in metres; nothing at what it did not fly
+    pictures = flight_tests.conclude(results_like(sample, flight_tests.flights(1))).pictures
+    axes = pictures["flight_tests_rigid.png"].axes
+    assert sorted({speed for axis in axes[4:] for speed in papers_numbers(axis)}) == [1.0, 1.5, 2.0, 2.5]
+    assert papers_numbers(pictures["beyond_rigid.png"].axes[0]) == []
+    assert papers_numbers(arm.conclude([]).pictures["arm.png"].axes[0]) == [30.0]
+    times_ms = [
+        papers_numbers(axis)
+        for axis in claims.conclude(results_like(sample, claims.flights(1))).pictures["pulse.png"].axes
+    ]
+    assert times_ms == [[25.0], [1.0]]
+
+
 @pytest.mark.parametrize("study", [flight_tests, causes, directions, imu_rate, simulation_experiment])
 def test_each_study_states_how_the_sensor_was_received(sample, study):
     findings = study.conclude(results_like(sample, study.flights(1)))

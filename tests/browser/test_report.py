@@ -4,6 +4,7 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rebound_cli.report import content as report_content
@@ -12,8 +13,9 @@ from rebound_cli.report.writer import write_page
 from tests.browser.opened_page import drawn_share, line_share, pixels
 from tests.rebound_cli.report.test_page import HOSTILE
 
-# Speed and height, how near to a hit; six of the hit; lateness.
-CHART_COUNT = 9
+_OVERVIEWS = "overviews().map((one) => ({ title: one.title, columns: one.columns() }))"
+# Speed and height, place, lean, how near to a hit; six of the hit; lateness.
+CHART_COUNT = 11
 # A line one pixel high across a chart of 113.
 LINE = 0.5 / 113
 
@@ -40,6 +42,19 @@ def test_nothing_on_it_is_empty_covers_another_or_leaves_the_window(shown):
     # Then each legend stands below its data
     assert shown.overlaps() == []
     assert shown.page.evaluate("document.documentElement.scrollWidth") <= shown.page.viewport_size["width"]
+
+
+def test_it_leans_as_it_flew_and_each_place_has_the_setpoint_of_its_time(shown, flight):
+    columns = {one["title"]: one["columns"] for one in shown.page.evaluate(_OVERVIEWS)}
+    # Given a vehicle that pitches nose down to gain speed, and that the wall pushes nose up
+    t, roll, pitch = map(np.array, columns["Lean"])
+    assert -15.0 < pitch[(t > 8.0) & (t < 10.0)].min() < -5.0 and abs(roll).max() < 10.0
+    w, x, y, z = flight.log.attitude_wxyz[row := int(abs(pitch).argmax())]
+    assert pitch[row] == pytest.approx(np.degrees(np.arcsin(2 * (w * y - x * z))), abs=0.05)
+    # and setpoints 20 to 50 times a second, none before the first
+    t, north, asked, *_ = (np.array(one, float) for one in columns["Place and setpoint"])
+    is_flown = (t > 9.0) & (t < 11.0)
+    assert np.isnan(asked[0]) and abs(north - asked)[is_flown].max() < 0.3
 
 
 def test_every_moment_is_reached_by_keys_alone(shown, flight):

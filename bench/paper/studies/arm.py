@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bench.head_on import AFTER_S, HeadOnHit, head_on
-from bench.paper.figures import CONTACT, finish, new_figure
+from bench.paper.figures import CONTACT, finish, mark_paper, new_figure
 from bench.paper.flights import Floats, StudyFlight, StudyResult
 from bench.paper.study import StudyFindings
 from bench.paper.table import around
@@ -169,7 +169,7 @@ def _figure(single: HeadOnHit, arms: Any) -> Any:
         label="eq. 2, wall would have to pull",
     )
     axis.plot(single.time_s, 1e3 * single.fold_m, color="tab:blue", marker=".", label="simulated arm")
-    axis.axhline(1e3 * arms.fold_max_m, color="0.4", linestyle=":", label=f"stop, l_max = {1e3 * arms.fold_max_m:g} mm")
+    mark_paper(axis, 1e3 * FOLD_MAX_M, f"paper: l_max = {1e3 * FOLD_MAX_M:g} mm, the stop")
     axis.axhline(
         1e3 * arms.hysteresis_m, color="tab:green", linestyle=":", label=f"δl = {1e3 * arms.hysteresis_m:g} mm"
     )

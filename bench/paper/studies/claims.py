@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from bench.head_on import head_on
 from bench.paper.approach import approach
-from bench.paper.figures import add_legend, draw_position, draw_velocity, finish, new_figure
+from bench.paper.figures import add_legend, draw_position, draw_velocity, finish, mark_paper, new_figure
 from bench.paper.flights import Floats, StudyFlight, StudyResult
 from bench.paper.studies.flight_tests import safety_text
 from bench.paper.study import StudyFindings, sampling_text
@@ -232,14 +232,16 @@ and the arms fold by 3. Stopping in 3 cm takes at least m v² / (2 · 0.03 m): 4
 
 def _pulse_figure(pulses: dict[str, list[Pulse]]) -> Figure:
     figure, axes = new_figure(1, 2, "What an accelerometer feels of a head-on hit (8 kHz, not clipped)", width=6.0)
-    for axis, (name, of_airframe), shown_ms in zip(axes[0], pulses.items(), (120.0, 2.0), strict=True):
+    drawn = zip(axes[0], pulses.items(), (120.0, 3.0), (FOLDABLE_PULSE_S, RIGID_PULSE_S), strict=True)
+    for axis, (name, of_airframe), shown_ms, paper_s in drawn:
         for each in of_airframe[:-1]:
             label = f"{each.speed_m_s:g} m/s: {1e3 * each.width_s:.2g} ms above half of the peak"
             axis.plot(1e3 * each.time_s, each.deceleration_m_s2, label=label)
         axis.set_xlim(-0.1 * shown_ms, shown_ms)
         axis.axvline(0.0, color="0.35", linewidth=1.0)
+        mark_paper(axis, 1e3 * paper_s, f"paper: over after ≈ {1e3 * paper_s:g} ms", is_time=True)
         finish(axis, name, "deceleration [m/s²]", "time since the first contact [ms]")
-        axis.legend(fontsize=8)
+        axis.legend(fontsize=8, loc="center right")
     axes[0, 0].set_yscale("symlog", linthresh=50.0)
     return figure
 

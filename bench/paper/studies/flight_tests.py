@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.paper.approach import approach
-from bench.paper.figures import add_legend, draw_position, draw_velocity, new_figure
-from bench.paper.flights import StudyFlight, StudyResult
+from bench.paper.figures import add_legend, draw_position, draw_velocity, mark_paper, new_figure
+from bench.paper.flights import GAMMA_S, StudyFlight, StudyResult
 from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, around, at_least, at_most, markdown, number
 from rebound_cli.results.summary import BREAKING_FORCE_N
@@ -171,5 +171,9 @@ def _figure(results: Sequence[StudyResult], airframe: str, speeds: Sequence[floa
             seen = "" if result.first.is_detected else ", not seen: its sample was lost"
             draw_position(axes[0, column], result.track, f"v_c = {speed_m_s:g} m/s{seen}")
             draw_velocity(axes[1, column], result.track, "")
+            if speed_m_s in PAPER_SPEEDS_M_S:
+                back_m = GAMMA_S * speed_m_s
+                mark_paper(axes[0, column], result.track.touch_m - back_m, f"paper: {back_m:g} m back")
+                mark_paper(axes[1, column], speed_m_s, f"paper: v_c ≈ {speed_m_s:g} m/s")
     add_legend(figure, axes)
     return figure

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.paper.approach import pinned
+from bench.paper.arm import FOLD_MAX_M
 from bench.paper.figures import (
     add_legend,
     draw_fold,
@@ -14,6 +15,7 @@ from bench.paper.figures import (
     draw_velocity,
     finish,
     mark_moments,
+    mark_paper,
     new_figure,
 )
 from bench.paper.flights import GAMMA_S, StudyFlight, StudyResult, StudyTrack
@@ -89,6 +91,8 @@ def _figure(track: StudyTrack) -> Figure:
     figure, axes = new_figure(2, 2, "The paper's sample scenario: wall 0.3 m ahead, target 2 m ahead")
     draw_position(axes[0, 0], track, "b: position", -0.5, 3.0)
     draw_velocity(axes[0, 1], track, "c: velocity", -0.5, 3.0)
+    mark_paper(axes[0, 1], IMPACT_M_S, f"paper: hits at {IMPACT_M_S:g} m/s")
+    mark_paper(axes[0, 1], -REBOUND_M_S, f"paper: rebounds at {REBOUND_M_S:g} m/s")
     zoom = axes[1, 0]
     near = (track.time_s >= -0.05) & (track.time_s <= 0.3)
     zoom.plot(track.time_s[near], track.place_m[near], color="tab:blue", linewidth=1.8, label="vehicle's centre")
@@ -98,5 +102,7 @@ def _figure(track: StudyTrack) -> Figure:
     mark_moments(zoom, track)
     finish(zoom, "d: the centre while the arms fold and unfold", "distance from take-off point\ninto the wall [m]")
     draw_fold(axes[1, 1], track, "fold of each arm", -0.05, 0.3)
+    mark_paper(axes[1, 1], 1e3 * FOLD_MAX_M, f"paper: folds by {1e3 * FOLD_MAX_M:g} mm")
+    axes[1, 1].set_ylim(top=1e3 * FOLD_MAX_M + 4.0)
     add_legend(figure, axes)
     return figure

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.paper.approach import approach
-from bench.paper.figures import add_legend, draw_position, draw_velocity, new_figure
+from bench.paper.figures import add_legend, draw_position, draw_velocity, mark_paper, new_figure
 from bench.paper.flights import GAMMA_S, StudyFlight, StudyResult, StudyTrack, Vector3
 from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, around, at_most
@@ -105,5 +105,9 @@ def _figure(track: StudyTrack) -> Figure:
     figure, axes = new_figure(1, 2, "A hit at 2.1 m/s with γ = 0.5: the setpoint lies 1.05 m back")
     draw_position(axes[0, 0], track, "position")
     draw_velocity(axes[0, 1], track, "velocity")
+    flown_m = BACK_M - SETPOINT_ERROR_M
+    mark_paper(axes[0, 0], track.touch_m - BACK_M, f"paper: {BACK_M:g} m back")
+    mark_paper(axes[0, 0], track.touch_m - flown_m, f"its experiment: {flown_m:.2f} m", above=True)
+    mark_paper(axes[0, 1], SPEED_M_S, f"paper: v_c = {SPEED_M_S:g} m/s")
     add_legend(figure, axes)
     return figure
