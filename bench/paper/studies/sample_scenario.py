@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bench.paper.approach import pinned
-from bench.paper.arm import FOLD_MAX_M
 from bench.paper.figures import (
     add_legend,
     draw_fold,
@@ -19,6 +18,7 @@ from bench.paper.figures import (
     new_figure,
 )
 from bench.paper.flights import GAMMA_S, StudyFlight, StudyResult, StudyTrack
+from bench.paper.studies.arm import FOLD_MAX_M
 from bench.paper.study import StudyFindings, sampling_text
 from bench.paper.table import ClaimRow, around
 from rebound_cli.inputs import load_mission_document
