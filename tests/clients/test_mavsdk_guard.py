@@ -62,11 +62,11 @@ def in_hold(guard: CollisionGuard, system: object) -> tuple[Action, Telemetry]:
 def test_not_one_setpoint_of_the_program_reaches_the_vehicle_while_the_guard_holds(tmp_path, monkeypatch):
     threads = []
 
-    def improved(*arguments, inner=normal._improved):
+    def stepped(*arguments, inner=normal._levenberg_marquardt_step):
         threads.append(threading.current_thread().name)
         return inner(*arguments)
 
-    monkeypatch.setattr(normal, "_improved", improved)
+    monkeypatch.setattr(normal, "_levenberg_marquardt_step", stepped)
     folds = GuardConfig.model_validate({"companion": {"estimate": {"guards": {"travel_m": 0.03}}}})
     record, port = tmp_path / "wire", free_port()
     with (
