@@ -1,14 +1,17 @@
 """One worker compiles the simulated vehicle, which takes half a minute; the others begin with what needs none."""
 
 import gc
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
-# On a busy machine an example takes as long as it takes.
-settings.register_profile("rebound", deadline=None)
-settings.load_profile("rebound")
+with suppress(ImportError):  # the clients' environments have no hypothesis
+    from hypothesis import settings
+
+    # On a busy machine an example takes as long as it takes.
+    settings.register_profile("rebound", deadline=None)
+    settings.load_profile("rebound")
 
 _TESTS = Path(__file__).parent
 _COMPILES, _COMPILES_NOTHING = _TESTS / "missions" / "test_confirming.py", _TESTS / "companion"
