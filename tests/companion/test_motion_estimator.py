@@ -2,12 +2,13 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
 from companion.estimate.config import EstimateConfig
 from companion.flight.collision import CollisionRecord
-from companion.flight.context import FlightContext, Inputs
+from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.recovering import Recover, consistent_normal
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
@@ -321,6 +322,35 @@ def test_a_push_that_its_sensor_shows_one_axis_of_is_turned_back_by_the_velocity
     # Then the way off is along what the contact did to it, and not along what the vehicle's own thrust does later
     normal = recover._contact.normal_ned
     assert normal == pytest.approx((-0.857, -0.514, 0.0), abs=0.02)
+
+
+def test_a_normal_is_turned_by_the_velocity_that_is_known_late_too():
+    # Given a clipped hit of whose push the sensor shows the east alone, and an estimate that is right after 0.6 s
+    flight, record, recover = recovering(velocity=(1.2, 0.0, 0.0))
+    record.normal_ned, record.estimator.has_converged = (0.0, -1.0, 0.0), True
+    recover._contact = replace(record.contact, normal_ned=record.normal_ned)
+    # When the first velocity after that comes
+    recover.step(
+        flight, Inputs(positions=[LocalPosition(HIT_US + 600_000, (2.8, 0.0, -2.0), (-0.5, 0.0, 0.0))]), 600_000
+    )
+    # Then the way off is against the change of it
+    assert recover._contact.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
+
+
+def test_the_heading_of_before_the_first_hit_is_kept_through_the_second():
+    # Given a vehicle that was to head north, is turned by a hit, and is turned back
+    flight, record, recover = recovering()
+    flight.target, flight.yaw_rad = Target((3.0, 0.0, -2.0), 0.0), 0.0
+    recover = Recover(flight, 0)
+    flight.vehicle.attitude = Attitude(HIT_US, (math.cos(1.0), 0.0, 0.0, math.sin(1.0)))
+    recover.step(flight, Inputs(), 100_000)
+    flight.target = recover.target(100_000)
+    assert flight.target.yaw_rad > 1.0
+    # When it is hit again
+    flight.collisions.append(record)
+    Recover(flight, 200_000)
+    # Then north is where it is turned to
+    assert flight.yaw_rad == 0.0
 
 
 @pytest.mark.parametrize(
