@@ -28,4 +28,13 @@ def add_speed(commands: Commands) -> None:
         metavar="HITS",
         help="measure in real time, beside pymavlink and MAVSDK 4, how soon so many hits are answered; nothing else",
     )
+    speed.add_argument(
+        "--px4",
+        type=count,
+        metavar="PORT",
+        help="wait at this TCP port for a PX4 SITL that somebody starts, and measure its lockstep; nothing else",
+    )
+    speed.add_argument(
+        "--sensor-rate", type=count, default=1000, metavar="HZ", help="of the samples to that PX4 (default 1000)"
+    )
     speed.set_defaults(run=runs("bench.speed.command:run_speed"))

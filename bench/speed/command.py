@@ -14,6 +14,7 @@ from bench.speed.flight import fly
 from bench.speed.latency import compared, table
 from bench.speed.parse import median_us, parse_us
 from bench.speed.parts import KERNEL, PARTS, PLANT
+from bench.speed.px4 import lockstep_table
 from bench.stamps import FLOWN, stamp_text
 
 PART, LATENCY_PART = "speed", "latency"
@@ -47,6 +48,9 @@ def run_speed(options: Namespace) -> int:
         return 0
     if options.latency:
         return _run_latency(options)
+    if options.px4:
+        print("\n".join(lockstep_table(options.px4, options.sensor_rate)))
+        return 0
     checked_text(options.out, PART)
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     fly()

@@ -1,7 +1,7 @@
 """The parts of an interval: the functions that are measured, each with the one that calls it."""
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -36,10 +36,10 @@ PARTS = (
 
 
 @contextmanager
-def wrapped(wrap: Callable[[Part, Function], Function]) -> Iterator[None]:
+def wrapped(wrap: Callable[[Part, Function], Function], parts: Sequence[Part] = PARTS) -> Iterator[None]:
     """Each part's function replaced, for as long as this lasts, by what is made of it."""
     replaced = []
-    for part in PARTS:
+    for part in parts:
         module, _, names = part.place.partition(":")
         owner: Any = importlib.import_module(module)
         *classes, name = names.split(".")

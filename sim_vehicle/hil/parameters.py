@@ -154,6 +154,8 @@ def _flight_rules() -> Iterable[Parameter]:
     yield Parameter("COM_RCL_EXCEPT", 4, "no remote control needed in OFFBOARD")
     yield Parameter("NAV_DLL_ACT", 0, "no ground station needed")
     yield Parameter("CBRK_SUPPLY_CHK", 894281, "no power module in a simulation")
+    # As rcS starts it, its loop holds up the lockstep until EKF2 has run: with samples in between, for ever.
+    yield Parameter("SDLOG_BACKEND", 0, "no logger that waits for EKF2; `logger start -t -e` begins another")
 
 
 def as_environment(airframe: Airframe, position: Position = "mocap") -> str:

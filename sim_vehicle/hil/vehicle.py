@@ -59,6 +59,8 @@ class HilVehicle:
         self._cameras = Cameras(rng)
         self.interval_us = self._plant.interval_us
         self._downward = DownwardSensors(airframe, self._plant.seen_faces, self.interval_us, random.Random(~seed))
+        # Taken once: looking a record's field up costs microseconds.
+        self._body = self._plant.state.body
         self.time_boot_us = 0
 
     @property
@@ -70,7 +72,7 @@ class HilVehicle:
         """Advance one sample; the inertial sensor's sample comes last, because it sets PX4's clock going."""
         output = self._plant.drive(motor_fractions)
         now_us = self.time_boot_us = output.time_boot_us
-        px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = self._plant.state.body.tolist()
+        px, py, pz, vx, vy, vz, qw, qx, qy, qz, p, q, r = self._body.tolist()
         position_ned_m: Vector3 = (px, py, pz)
         velocity_ned_m_s: Vector3 = (vx, vy, vz)
         attitude_wxyz: Quadruple = (qw, qx, qy, qz)
@@ -80,7 +82,7 @@ class HilVehicle:
             messages.append(self._gps.sample(now_us, position_ned_m, velocity_ned_m_s))
         if self._is_due(MOTION_CAPTURE_PERIOD_US):
             messages.append(self._cameras.sample(now_us, position_ned_m, attitude_wxyz))
-        for sample in self._downward.observe(now_us, self._plant.state.body, self._plant.seen_faces):
+        for sample in self._downward.observe(now_us, self._body, self._plant.seen_faces):
             sensor = "optical_flow" if isinstance(sample, FlowSample) else "range_finder"
             if faults is None or not faults.is_lost(sensor, now_us / 1e6):
                 messages.append(sample)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -46,9 +46,13 @@ class ForeignPacket:
 class Decoder:
     """Finds the packets in a stream of bytes that may be split, damaged or anything else."""
 
-    def __init__(self, us: Identity, signing: Signing | None = None) -> None:
+    def __init__(
+        self, us: Identity, signing: Signing | None = None, readers: "Mapping[int, Reader] | None" = None
+    ) -> None:
+        """``readers``: of other messages than those that a vehicle reads."""
         self._us = us
         self._signing = signing or Signing()
+        self._readers = READERS if readers is None else readers
         self.signing_is_optional = False
         """MAV_SIGN_CFG = 0: unsigned packets are read although there is a key."""
         self._rest = b""
@@ -112,7 +116,7 @@ class Decoder:
 
     def _read(self, packet: dialect.MAVLink_message) -> object | None:
         message_id: int = packet.get_msgId()
-        read = READERS.get(message_id)
+        read = self._readers.get(message_id)
         if read is None or (message_id in _ADDRESSED and not self._us.is_addressed(*_target(packet))):
             return None
         return read(packet)

@@ -4,19 +4,19 @@ Source of units, frames and field bits: PX4's simulation/simulator_mavlink/Simul
 """
 
 import math
-from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sim_vehicle.autopilot.messages import Identity
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import ActuatorControls, HilGps, HilSensor, HilState, MotionCapture, ToPx4
-from sim_vehicle.mavlink.encode import diagonal_covariance
+from sim_vehicle.mavlink import framing
+from sim_vehicle.mavlink.decode import Decoder
+from sim_vehicle.mavlink.encode import Encoder, Message, diagonal_covariance
 from sim_vehicle.mavlink.streams import aiding
 
-Message: TypeAlias = Any
-
 # PX4 reads neither of them.
-_SIMULATOR_SYSTEM, _SIMULATOR_COMPONENT = 1, 51
+_SIMULATOR = Identity(1, 51)
 
 # HIL_SENSOR.fields_updated; PX4 takes a group only with all of its bits.
 _ACCELEROMETER, _GYROSCOPE, _MAGNETOMETER = 0x7, 0x38, 0x1C0
@@ -38,13 +38,12 @@ class HilEncoder:
     """Packets to PX4 in one sequence of numbers."""
 
     def __init__(self) -> None:
-        self._link = dialect.MAVLink(None, srcSystem=_SIMULATOR_SYSTEM, srcComponent=_SIMULATOR_COMPONENT)
+        self._encoder = Encoder(_SIMULATOR)
 
     def packet(self, message: ToPx4) -> bytes:
         """The message as a MAVLink 2 packet."""
-        link = self._link
-        packet: bytes = _filled(message).pack(link)
-        link.seq = (link.seq + 1) & 0xFF
+        packet = self._encoder.packet(_filled(message))
+        assert packet is not None, "MAVLink 2 has room for every message"
         return packet
 
 
@@ -52,13 +51,11 @@ class HilDecoder:
     """Finds PX4's answers in its stream, which TCP may have cut anywhere."""
 
     def __init__(self) -> None:
-        self._link = dialect.MAVLink(None)
-        self._link.robust_parsing = True
+        self._decoder = Decoder(_SIMULATOR, readers={dialect.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS: _answer})
 
     def push(self, data: bytes) -> list[ActuatorControls]:
         """The answers completed by ``data``; PX4's greeting (HEARTBEAT, COMMAND_LONG) is dropped."""
-        messages = self._link.parse_buffer(data) or []
-        return [_answer(m) for m in messages if isinstance(m, dialect.MAVLink_hil_actuator_controls_message)]
+        return [answer for answer in self._decoder.push(data) if isinstance(answer, ActuatorControls)]
 
 
 def _filled(message: ToPx4) -> Message:
@@ -85,7 +82,7 @@ def _sensor(sample: HilSensor) -> Message:
         fields |= _BAROMETER
         air = sample.air
         pressure_hpa, altitude_m, temperature_c = air.pressure_hpa, air.altitude_m, air.temperature_c
-    return dialect.MAVLink_hil_sensor_message(
+    return framing.HIL_SENSOR, framing.HIL_SENSOR.pack(
         sample.time_us,
         *sample.specific_force_frd_m_s2,
         *sample.angular_velocity_frd_rad_s,

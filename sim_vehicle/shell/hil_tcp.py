@@ -2,6 +2,7 @@
 
 import errno
 import socket
+import struct
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -93,11 +94,11 @@ class _Session:
             save_truth(truth_path, self._vehicle.truth, self._pace.epoch_at_boot_us(time_us), self._pace.stalls)
 
     def _send_if_due(self, now_us: int) -> int:
-        """Send the next sample if it may go; how long, in microseconds, to wait for PX4 then."""
+        """Send the next sample if it may go; how long, in microseconds, the vehicle's clock has to wait."""
         exchange, vehicle = self._exchange, self._vehicle
         allowed_us = exchange.next_sample_at_us()
         if allowed_us is None:
-            return round(1e6 * _LONGEST_WAIT_S)
+            return 0
         if exchange.phase is ExchangePhase.READY:
             if self._lockstep_from is None:
                 self._lockstep_from = (now_us, vehicle.time_boot_us)
@@ -111,14 +112,16 @@ class _Session:
         except ConnectionError:
             return 0
         exchange.sent(vehicle.time_boot_us, now_us)
-        return round(1e6 * _LONGEST_WAIT_S) if exchange.phase is ExchangePhase.AWAITING else 0
+        return 0
 
     def _receive(self, wait_us: int) -> bytes | None:
-        """What PX4 sent, b"" when it has gone, None when nothing came in time."""
-        self._link.settimeout(min(1e-6 * wait_us, _LONGEST_WAIT_S))
+        """What PX4 sent, b"" when it has gone, None when nothing came in time. An answer that is due is waited for."""
+        is_awaited = self._exchange.phase is ExchangePhase.AWAITING
+        if wait_us > 0:
+            time.sleep(min(1e-6 * wait_us, _LONGEST_WAIT_S))
         try:
-            return self._link.recv(_RECEIVE_BYTES)
-        except (TimeoutError, BlockingIOError):
+            return self._link.recv(_RECEIVE_BYTES, 0 if is_awaited else socket.MSG_DONTWAIT)
+        except BlockingIOError:
             return None
 
     def _tell_notices(self) -> None:
@@ -184,4 +187,7 @@ def _accept(listener: socket.socket) -> socket.socket | None:
     except TimeoutError:
         return None
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    # The kernel keeps the time, not Python: one call of the system for an answer instead of three.
+    link.settimeout(None)
+    link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("@ll", 0, round(1e6 * _LONGEST_WAIT_S)))
     return link

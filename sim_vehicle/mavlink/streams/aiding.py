@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sim_vehicle.estimator.samples import FlowSample, RangeSample
 from sim_vehicle.hil.messages import Place
+from sim_vehicle.mavlink import framing
 from sim_vehicle.mavlink.encode import Message
 from sim_vehicle.mavlink.telemetry import Telemetry
 from sim_vehicle.setpoint import Quaternion, Vector3
@@ -97,9 +98,9 @@ def hil_state(
     velocity_ned_m_s: Vector3,
 ) -> Message:
     """HIL_STATE_QUATERNION; accelerations and airspeed are left at zero."""
-    return dialect.MAVLink_hil_state_quaternion_message(
+    return framing.HIL_STATE_QUATERNION, framing.HIL_STATE_QUATERNION.pack(
         time_us,
-        attitude_wxyz,
+        *attitude_wxyz,
         *angular_velocity_frd_rad_s,
         round(1e7 * place.latitude_deg),
         round(1e7 * place.longitude_deg),
