@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
-from companion.motion.delay import DELAY_S
+from companion.motion.delay import DELAY_S, LATEST_S
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.reflex.config import (
@@ -38,6 +38,7 @@ from companion.reflex.config import (
     LEAD_S,
     LEAST_SPREAD_M_S,
     LEAST_UPRIGHT_COSINE,
+    LEAVING_M_S,
     MODEL_ERROR,
     MODEL_ERROR_S,
     MOST_VELOCITY_ERROR_M_S,
@@ -203,6 +204,7 @@ class MotionEstimator:
     _told_boot_us: int = 0  # newest report since convergence
     _pushed_boot_us: int = 0
     _is_shown: bool = False
+    _is_reported: bool = False  # the reports contain the hit
     _clock_boot_us: int = 0  # from here on the error is corrected
 
     def __post_init__(self) -> None:
@@ -268,7 +270,7 @@ class MotionEstimator:
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
         at_us = sample.time_boot_us - round(1e6 * DELAY_S)
-        if at_us <= self.hit_boot_us:
+        if at_us <= self.hit_boot_us or not self._shows_hit(sample):
             return
         if self.is_fully_measured:
             self.has_converged, self.position_error_m, self._hidden_error_m_s = True, REST, REST
@@ -276,6 +278,14 @@ class MotionEstimator:
             self._filter(sample, at_us)
         if self.has_converged:
             self._correct(sample)
+
+    def _shows_hit(self, sample: LocalPosition) -> bool:
+        """Whether the reports contain the hit by now. Late ones still have the velocity before it."""
+        if self.earlier is None and sample.time_boot_us - self.hit_boot_us < 1e6 * LATEST_S:
+            changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
+            self._is_reported = self._is_reported or changed_m_s > LEAVING_M_S
+            return self._is_reported
+        return True
 
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""

@@ -102,6 +102,32 @@ def test_an_estimate_that_knows_the_hit_is_believed_soon_and_one_that_flies_into
     assert lost_s > 0.9
 
 
+@pytest.mark.parametrize("late_us", [0, 20_000, 45_000])
+def test_reports_that_are_late_do_not_turn_the_motion_round(late_us):
+    # Given a hit at 3 m/s that leaves 1 m/s back, and reports from 45 ms before it, or less
+    found, strapdown = reckoned((3.0, 0.0, 0.0), restitution=0.45), Strapdown()
+    for tick in range(1, 31):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+        if tick % 5 == 0:
+            shown = -1.0 if 4_000 * tick > late_us else 3.0
+            found.update(said(shown, 4_000 * tick, (AT[0] - 0.004 * tick, 0.0, AT[2])))
+    # Then after 0.12 s the motion is known
+    assert found.motion.velocity_ned_m_s[0] == pytest.approx(-1.0, abs=0.3)
+
+
+@pytest.mark.parametrize("is_whole", [False, True])
+def test_a_report_from_before_the_hit_moves_no_estimate(is_whole):
+    found = reckoned((3.0, 0.0, 0.0))
+    found.note_contact(is_whole, HIT_US)
+    before = found.motion
+    found.update(said(2.9, 40_000))
+    assert found.motion == before and not found.has_converged
+    # A report that never shows the hit counts in the end: all of it was hidden.
+    found.update(said(2.9, 120_000))
+    assert found.motion != before
+
+
 def test_part_of_a_hit_that_is_missing_is_found_too():
     # Given arms that met their stops, of which 0.7 m/s of 2.4 m/s are missing
     *_, (_, true_m_s, _, found) = followed(PX4, 2.0, 0.2, hides=0.3, until_s=1.0)
