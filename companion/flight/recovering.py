@@ -308,11 +308,12 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     normal = behind or normal
     contact_normal, earlier = normal, None
     if law.follows:
-        if before is not None and not (before.estimator.has_converged or before.estimator.is_fully_measured):
+        if before is None:
+            contact_normal = blended_normal(normal, velocity)
+        elif not (before.estimator.has_converged or before.estimator.is_fully_measured):
             # The vehicle's estimate is still wrong from the hit before.
             earlier = before.estimator
             place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
-        contact_normal = behind or blended_normal(normal, velocity)
     contact = Contact(estimate.time_boot_us, place, velocity, contact_normal)
     expected = contact.rebound(mission.recovery.restitution)
     limits = Limits(mission.recovery.acceleration_m_s2)

@@ -377,7 +377,8 @@ def blended_normal(pushed_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
     """The normal of an obstacle whose contact force is clipped on each axis separately; unit vectors.
 
     The direction that the vehicle came from is free. The normal is half way between that direction and the force, or
-    that direction itself where the two are more than 60 degrees apart.
+    that direction itself where the two are more than 60 degrees apart. It is for a first hit alone: in the second one
+    the vehicle may slide along the obstacle.
     """
     n, e, _ = velocity_ned_m_s
     back = away_from((-n, -e, 0.0)) if math.hypot(n, e) >= LEAST_SPREAD_M_S else REST

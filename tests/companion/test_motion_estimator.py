@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from companion.detection.interface import Impact, ImpactKind
 from companion.estimate.config import EstimateConfig
+from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
-from companion.flight.recovering import Recover, consistent_normal
+from companion.flight.recovering import Recover, consistent_normal, record_collision
 from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition
@@ -361,6 +363,23 @@ def test_a_normal_is_turned_by_the_velocity_that_is_known_late_too():
     )
     # Then the way off is against the change of it
     assert recover._contact.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize(("is_second", "normal"), [(False, (-0.07, 1.0, 0.0)), (True, SOUTH)])
+def test_a_vehicle_that_slides_along_a_wall_is_not_sent_along_it_by_the_second_hit(is_second, normal):
+    # Given a vehicle that slides west along a wall, in a recovery or not
+    flight, _, _ = recovering(velocity=(1.5, 0.0, 0.0))
+    flight.collisions[-1].is_over = not is_second
+    flight.collisions[-1].estimator.has_converged = True
+    # When the wall pushes it south
+    impact = Impact(HIT_US + 200_000, HIT_US + 196_000, (-20.0, 0.0, 0.0))
+    sliding, kind = (0.1, -1.5, 0.0), ImpactKind.UNKNOWN
+    estimate = ImpactEstimate(
+        impact, HIT_US + 198_000, 2_000, AT, sliding, 0.1, SOUTH, 20.0, 0.1, False, True, kind, 1.0, False
+    )
+    record_collision(flight, estimate, 200_000)
+    # Then the way it came from says where off is in a first hit alone
+    assert flight.collisions[-1].contact.normal_ned == pytest.approx(normal, abs=0.1)
 
 
 def test_the_heading_of_before_the_first_hit_is_kept_through_the_second():
