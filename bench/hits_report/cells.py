@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from scipy.stats import binomtest
+from scipy.stats import beta
 
 from bench.campaign.plan import Json
 from bench.detectors.vehicles import AIRFRAMES
@@ -48,9 +48,9 @@ def missed(hits: Sequence[Json]) -> int:
     return sum(not one["found"] for one in hits)
 
 
-def at_most(events: int, of: int) -> float:
+def at_most(events: float, of: float) -> float:
     """The share that is not exceeded with the confidence, by Clopper and Pearson."""
-    return float(binomtest(events, of, alternative="less").proportion_ci(CONFIDENCE).high) if of else 1.0
+    return float(beta.ppf(CONFIDENCE, events + 1, of - events)) if events < of else 1.0
 
 
 def cells(flown: Flown) -> Iterator[str]:
