@@ -27,6 +27,7 @@ from bench.random_missions.contacts import SEEN_AFTER_US
 from bench.random_missions.crashes import tilts_deg
 from bench.recoveries.hits import returns
 from bench.speed.parse import parse_us
+from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.report import CollisionReport
@@ -112,12 +113,12 @@ class Flight:
     link: Link
     guard: Guard
 
-    def step(self) -> int:
-        """One interval, all bytes both ways; returns the vehicle's time."""
+    def step(self) -> StepResult:
+        """One interval, all bytes both ways."""
         self.vehicle.advance()
-        now_us = self.vehicle.time_boot_us
-        self.link.push(b"".join(self.guard.step(b"".join(self.link.take()), EPOCH_US + now_us).sent_frames))
-        return now_us
+        result = self.guard.step(b"".join(self.link.take()), EPOCH_US + self.vehicle.time_boot_us)
+        self.link.push(b"".join(result.sent_frames))
+        return result
 
 
 def begun(built: BenchVehicle, case: FlownHit, velocity: Floats, scene: Scene, keeps_path: bool) -> Flight:
@@ -146,7 +147,8 @@ def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
     touched_us = rest_us = None
     is_answered = False
     while vehicle.time_boot_us < until_us:
-        now_us = flight.step()
+        flight.step()
+        now_us = vehicle.time_boot_us
         count += 1
         if count % LOOK_EVERY:
             continue

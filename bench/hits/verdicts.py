@@ -147,9 +147,9 @@ def followed(flight: Flight, patience_s: float) -> Verdict:
     hit_row, truth = vehicle.state.hit, vehicle.truth
     until_us, is_touched, told_us = vehicle.time_boot_us + round(1e6 * patience_s), False, None
     while told_us is None and vehicle.time_boot_us < until_us:
-        now_us = flight.step()
+        flight.step()
         if not is_touched and (hit_row[HIT_ACTIVE] == 1.0 or truth.hits):
-            is_touched, until_us = True, now_us + round(1e6 * FOLLOWED_S)
+            is_touched, until_us = True, vehicle.time_boot_us + round(1e6 * FOLLOWED_S)
         told_us = next((collision.sample_time_boot_us for collision in guard.collisions()), None)
     vehicle.note_hit()
     if not truth.hits:

@@ -5,7 +5,7 @@ detector itself: the same hit is flown with other thresholds, from the same mome
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -20,6 +20,7 @@ from bench.hits.flight import APPROACHES, IMU_HZ, SPEEDS_M_S, FlownHit
 from bench.hits.verdicts import FREE_S, LEAD_S, PATIENCE_S, Approach, followed
 from bench.random_missions import vehicle as drawn
 from sim_vehicle.airframe import Airframe, with_base
+from sim_vehicle.scene import Scene
 
 # Margins are looked for between these, half of what is left each time: to 2.5 %.
 LEAST, MOST, HALVINGS = 1 / 8, 64.0, 8
@@ -100,15 +101,10 @@ def search(case: SearchCase) -> Json:
 
 def margin(case: SearchCase, values: Sequence[float] | Floats) -> tuple[float, float]:
     """Of one hit, and its speed into the surface."""
-    numbers = dict(zip((*MEETING, *VEHICLE), map(float, values), strict=True))
-    met = APPROACHES[round(numbers["approach"])]
-    hit = HitCase("worst", case.seed, case.airframe, met, numbers["speed_m_s"], ())
-    approach = Approach(FlownHit(hit, case.imu_hz), vehicle_with(case.airframe, numbers))
-    approach.fly_until(FREE_S)
+    approach, scene = begun_with(case, dict(zip((*MEETING, *VEHICLE), map(float, values), strict=True)))
     if approach.is_false:
         return NO_HIT, 0.0
-    rng = cast(np.random.Generator, _Given([numbers["first_share"], numbers["second_share"]]))
-    approach.flight.vehicle.meet(approach.scene(met, numbers["lead_s"], rng))
+    approach.flight.vehicle.meet(scene)
     moment, core = approach.moment(), approach.flight.guard.core
     assert core is not None
     monitor = core.monitor
@@ -134,7 +130,17 @@ def margin(case: SearchCase, values: Sequence[float] | Floats) -> tuple[float, f
     return math.exp(0.5 * (low + high)), closing_m_s
 
 
-def vehicle_with(kind: str, numbers: dict[str, float]) -> BenchVehicle:
+def begun_with(case: SearchCase, numbers: Mapping[str, float]) -> tuple[Approach, Scene]:
+    """The approach up to the moment from which the hit is flown, and what then stands before the vehicle."""
+    met = APPROACHES[round(numbers["approach"])]
+    hit = HitCase("worst", case.seed, case.airframe, met, numbers["speed_m_s"], ())
+    approach = Approach(FlownHit(hit, case.imu_hz), vehicle_with(case.airframe, numbers))
+    approach.fly_until(FREE_S)
+    rng = cast(np.random.Generator, _Given([numbers["first_share"], numbers["second_share"]]))
+    return approach, approach.scene(met, numbers["lead_s"], rng)
+
+
+def vehicle_with(kind: str, numbers: Mapping[str, float]) -> BenchVehicle:
     """The named airframe with other numbers, and its owner's settings."""
     rad_s = numbers["spring_rad_s"]
     springs = {"stiffness_per_s2": rad_s**2, "damping_per_s": 2.0 * numbers["spring_damping"] * rad_s}

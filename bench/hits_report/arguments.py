@@ -20,15 +20,18 @@ def add_hits(commands: Commands) -> None:
     instead.add_argument(
         "--verdicts",
         action="store_true",
-        help="fly each hit only until the guard tells of it, a hundred from one approach: a million an hour",
+        help="fly each hit only until the guard tells of it, dozens from one approach: a million an hour",
     )
     instead.add_argument(
         "--worst",
         action="store_true",
-        help="search the hits that are nearest to being missed, N tries for each airframe and rate of the IMU",
+        help="search the hits nearest to being missed, N tries for each airframe and rate, the vehicle included",
     )
     instead.add_argument(
         "--growth", action="store_true", help="write instead what a hit costs after 1, 10, 100 to N of them"
+    )
+    hits.add_argument(
+        "--corpus", type=Path, metavar="FOLDER", help="with --worst: keep their flights there, for `corpus judge`"
     )
     hits.add_argument("--out", type=Path, default=NOTES / "hits.md", metavar="FILE", help="default: %(default)s")
     hits.set_defaults(run=runs("bench.hits_report.command:run_hits"))

@@ -54,7 +54,7 @@ def at_most(events: float, of: float) -> float:
 
 
 def cells(flown: Flown) -> Iterator[str]:
-    yield from _head("airframe, IMU", "speed, m/s")
+    yield from head("airframe, IMU", "speed, m/s", *_COLUMNS)
     open_cells = []
     for airframe in AIRFRAMES:
         for imu_hz in IMU_HZ:
@@ -82,16 +82,16 @@ def cells(flown: Flown) -> Iterator[str]:
 
 
 def approaches(flown: Flown) -> Iterator[str]:
-    yield from _head("what was met")
+    yield from head("what was met", *_COLUMNS)
     for approach in APPROACHES:
         hits = flown.hits(lambda case, one, of=approach: case.hit.approach == of)  # type: ignore[misc]
         yield f"| {approach} | {_cell(hits)[0]} |"
     yield ""
 
 
-def _head(*first: str) -> Iterator[str]:
-    yield f"| {' | '.join((*first, *_COLUMNS))} |"
-    yield "|---" * len((*first, *_COLUMNS)) + "|"
+def head(*columns: str) -> Iterator[str]:
+    yield f"| {' | '.join(columns)} |"
+    yield "|---" * len(columns) + "|"
 
 
 def _cell(hits: Sequence[Json]) -> tuple[str, bool]:

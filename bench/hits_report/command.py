@@ -12,7 +12,7 @@ from bench.hits_report import verdicts
 from bench.hits_report.cells import Flown, approaches, cells, lead, seeds
 from bench.hits_report.cost import BUDGETED, budget, cost
 from bench.hits_report.growth import grown
-from bench.hits_report.worst import worst
+from bench.hits_report.worst import keep, worst
 from bench.marked import checked_text, write_part
 from bench.stamps import FLOWN, stamp_text
 
@@ -34,6 +34,10 @@ def run_hits(options: Namespace) -> int:
         results = run_campaign(campaign, workers)
         failed = failures_text(campaign, results)
         lines = [*_lines(part, campaign, results), failed]
+        if part == "worst" and options.corpus is not None:
+            for at, numbers in results.results.items():
+                case = campaign.cases[at]
+                keep(case, numbers, options.corpus / f"{case.airframe}-{case.imu_hz}")
         is_good = not failed and all(one.get("agrees", True) for one in results.results.values())
     write_part(options.out, part, "\n".join([f"{_stamp(options, part)}:", *lines, ""]), TITLE)
     print(f"Written to {options.out}.")

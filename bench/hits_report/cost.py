@@ -24,13 +24,17 @@ def cost(flown: Flown) -> Iterator[str]:
     yield f"{TWO_CORES_MS / WANTED:.0f} ms a hit, {lasts_s * 1e3 * WANTED / TWO_CORES_MS:.0f} times real time."
     yield "Each process also times pymavlink's parse of a HIGHRES_IMU, after each hit."
     yield ""
+    yield from costs("a second of flight", seconds_ms(everyone), lasts_s, parse_us)
+
+
+def costs(what: str, spent_ms: Sequence[float], in_a_hit: float, parse_us: Sequence[float]) -> Iterator[str]:
+    """Of a processor: for something that happens so often in a hit."""
     yield "| | the least disturbed tenth | median |"
     yield "|---|---|---|"
-    second = [percentile(seconds_ms(everyone), share) for share in (10, 50)]
-    parse = [percentile(parse_us, share) for share in (10, 50)]
+    spent, parse = ([percentile(values, share) for share in (10, 50)] for values in (spent_ms, parse_us))
     for name, values, digits in (
-        ("a second of flight, ms of a processor", second, 1),
-        ("hits an hour on two cores", [TWO_CORES_MS / (lasts_s * one) for one in second], 0),
+        (f"{what}, ms of a processor", spent, 2),
+        ("hits an hour on two cores", [TWO_CORES_MS / (in_a_hit * one) for one in spent], 0),
         ("a parse, µs", parse, 2),
     ):
         yield f"| {name} | {' | '.join(f'{value:,.{digits}f}' for value in values)} |"

@@ -1,7 +1,7 @@
 """Which of many hits a vehicle were missed, by airframe, rate of the IMU and speed."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from scipy.stats import chi2
@@ -11,8 +11,8 @@ from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors_report.numbers import per_cent, percentile, text_of
 from bench.hits.flight import APPROACHES, IMU_HZ, FlownHit
 from bench.hits.verdicts import FREE_S, HITS_AN_APPROACH, approach_of
-from bench.hits_report.cells import BANDS_M_S, BOUND, CONFIDENCE, NAMED_SEEDS, at_most
-from bench.hits_report.cost import TWO_CORES_MS
+from bench.hits_report.cells import BANDS_M_S, BOUND, CONFIDENCE, NAMED_SEEDS, at_most, head
+from bench.hits_report.cost import TWO_CORES_MS, costs
 
 WANTED = 1_000_000
 _COLUMNS = ("hits", "vehicles", "missed", "share", "at most", "vehicles with a miss", "found after", "95 % within")
@@ -73,7 +73,7 @@ def lead(results: Mapping[int, Json], hits: Sequence[Judged]) -> Iterator[str]:
 
 
 def cells(hits: Sequence[Judged]) -> Iterator[str]:
-    yield from _head("airframe, IMU", "speed, m/s")
+    yield from head("airframe, IMU", "speed, m/s", *_COLUMNS)
     open_cells = []
     for airframe in AIRFRAMES:
         for imu_hz in IMU_HZ:
@@ -91,15 +91,10 @@ def cells(hits: Sequence[Judged]) -> Iterator[str]:
     yield ""
     yield f"Not shown to miss fewer than {100 * BOUND:g} %: {'; '.join(open_cells) or 'none'}."
     yield ""
-    yield from _head("what was met, from 0.5 m/s on")
+    yield from head("what was met, from 0.5 m/s on", *_COLUMNS)
     for met in APPROACHES:
         yield f"| {met} | {_cell([one for one in noticed if approach_of(one.number) == met])[0]} |"
     yield ""
-
-
-def _head(*first: str) -> Iterator[str]:
-    yield f"| {' | '.join((*first, *_COLUMNS))} |"
-    yield "|---" * len((*first, *_COLUMNS)) + "|"
 
 
 def _cell(hits: Sequence[Judged]) -> tuple[str, float]:
@@ -110,53 +105,35 @@ def _cell(hits: Sequence[Judged]) -> tuple[str, float]:
         groups[one.case.hit.seed] = (missed + (one.late_ms is None), flown + 1)
     missed, most = sum(one.late_ms is None for one in hits), at_most_of_groups(list(groups.values()))
     late_ms = [one.late_ms for one in hits if one.late_ms is not None]
-    texts = [
-        f"{len(hits):,}",
-        f"{len(groups):,}",
-        f"{missed:,}",
-        f"{per_cent(missed / len(hits) if hits else math.nan, 3)} %",
-    ]
-    texts += [f"{per_cent(most, 3)} %", f"{sum(some > 0 for some, _ in groups.values()):,}"]
+    share = missed / len(hits) if hits else math.nan
+    texts = [f"{len(hits):,}", f"{len(groups):,}", f"{missed:,}", f"{per_cent(share, 3)} %", f"{per_cent(most, 3)} %"]
+    texts.append(f"{sum(some > 0 for some, _ in groups.values()):,}")
     return " | ".join([*texts, *(f"{text_of(percentile(late_ms, part), 1)} ms" for part in (50, 95))]), most
 
 
 def seeds(results: Mapping[int, Json], cases: Sequence[FlownHit], hits: Sequence[Judged]) -> Iterator[str]:
     """Of hits and approaches to look at again."""
-    missed = [f"{one.case.hit.seed}/{one.number} ({approach_of(one.number)})" for one in hits if _is_miss(one)]
+    missed = [one for one in hits if one.is_noticed and one.late_ms is None]
+    of = {at: str(cases[at].hit.seed) for at in results}
     for what, named in (
-        ("Missed at 0.5 m/s and more, by seed and number", missed),
-        ("With a false alarm, by seed", _named(cases, results, lambda one: bool(one["false"]))),
-        (
-            "With another verdict when flown again, by seed",
-            _named(cases, results, lambda one: not one.get("agrees", True)),
-        ),
+        ("Missed at 0.5 m/s and more, by seed/number", [f"{one.case.hit.seed}/{one.number}" for one in missed]),
+        ("With a false alarm, by seed", [of[at] for at, one in results.items() if one["false"]]),
+        ("With another verdict when flown again, by seed", [of[at] for at, one in results.items() if not _agrees(one)]),
     ):
         if named:
             yield f"- {what}: {', '.join(named[:NAMED_SEEDS])}{', ...' if len(named) > NAMED_SEEDS else ''}."
     yield ""
 
 
-def _is_miss(one: Judged) -> bool:
-    return one.is_noticed and one.late_ms is None
-
-
-def _named(cases: Sequence[FlownHit], results: Mapping[int, Json], which: Callable[[Json], bool]) -> list[str]:
-    return [str(cases[at].hit.seed) for at, one in results.items() if which(one)]
+def _agrees(one: Json) -> bool:
+    return bool(one.get("agrees", True))
 
 
 def cost(results: Mapping[int, Json]) -> Iterator[str]:
     flown = [one for one in results.values() if one["hits"]]
-    hit_ms = [1e3 * one["cost"]["processor_s"] / len(one["hits"]) for one in flown]
-    parse_us = [one["cost"]["parse_us"] for one in flown]
-    rows = (("a hit, ms of a processor", hit_ms, 2), ("a parse, µs", parse_us, 2))
     yield f"{WANTED:,} hits an hour on two cores are {TWO_CORES_MS / WANTED:.1f} ms a hit. A hit's time contains its"
     yield "share of the approach, and not what was flown again. Each process also times pymavlink's parse of a"
     yield "HIGHRES_IMU."
     yield ""
-    yield "| | the least disturbed tenth | median |"
-    yield "|---|---|---|"
-    for name, values, digits in rows:
-        yield f"| {name} | {' | '.join(f'{percentile(values, part):.{digits}f}' for part in (10, 50))} |"
-    rates = " | ".join(f"{TWO_CORES_MS / percentile(hit_ms, part):,.0f}" for part in (10, 50))
-    yield f"| hits an hour on two cores | {rates} |"
-    yield ""
+    hit_ms = [1e3 * one["cost"]["processor_s"] / len(one["hits"]) for one in flown]
+    yield from costs("a hit", hit_ms, 1.0, [one["cost"]["parse_us"] for one in flown])
