@@ -151,6 +151,8 @@ def followed(flight: Flight, patience_s: float) -> Verdict:
         if not is_touched and (hit_row[HIT_ACTIVE] == 1.0 or truth.hits):
             is_touched, until_us = True, vehicle.time_boot_us + round(1e6 * FOLLOWED_S)
         told_us = next((collision.sample_time_boot_us for collision in guard.collisions()), None)
+    if not is_touched and told_us is not None:
+        flight.step()  # of a touch at an interval's very end the truth is noted in the next
     vehicle.note_hit()
     if not truth.hits:
         return Verdict(None, 0.0, told_us)

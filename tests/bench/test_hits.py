@@ -13,7 +13,7 @@ from bench.corpus.verdict import work_out as work_out_bytes
 from bench.detectors.hits import HitCase
 from bench.hits.flight import FlownHit, draw_flown, flown_campaign, work_out_flown
 from bench.hits.rewind import Moment
-from bench.hits.verdicts import FREE_S, HITS_AN_APPROACH, Approach, again, verdict_campaign
+from bench.hits.verdicts import FREE_S, HITS_AN_APPROACH, Approach, Verdict, again, verdict_campaign
 from bench.hits.worst import MEETING, NO_HIT, VEHICLE, SearchCase, margin
 from bench.hits_report import verdicts
 from bench.hits_report.cells import Flown, at_most, cells, lead, seeds
@@ -202,3 +202,12 @@ def test_a_hit_that_is_kept_is_judged_from_its_bytes_as_it_was_flown(tmp_path):
         judgement = work_out_bytes(CorpusCase(str(tmp_path / name)))["rates"]["recorded"]
         (hit, *_) = judgement["hits"]
         assert ("latency_ms" in hit) is is_found and judgement["false_boot_us"] == []
+
+
+def test_a_touch_at_an_interval_s_very_end_is_no_false_alarm():
+    # Given a hit that begins with the last step of an interval, which the sensor's sample of it shows
+    verdict = [verdict for _, verdict in Approach(draw_flown(6000161, True)).hits()][34]
+    assert verdict.touched_us == verdict.told_us == 1_432_000
+    # Then it was found at once, and a microsecond earlier it would have been a false alarm
+    assert verdict.late_us == 0.0 and not verdict.is_early
+    assert Verdict(verdict.touched_us, 1.0, 1_431_999).is_early
