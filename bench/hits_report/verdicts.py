@@ -67,8 +67,7 @@ def lead(results: Mapping[int, Json], hits: Sequence[Judged]) -> Iterator[str]:
     yield ""
     false, hours = sum(one["false"] for one in everyone), sum(one["watched_s"] for one in everyone) / 3600.0
     most = float(chi2.ppf(CONFIDENCE, 2 * (false + 1))) / 2.0 / hours
-    yield f"{false} approaches had a false alarm, in {hours:.2f} h of free flight from then on: at most {most:.2f} an"
-    yield "hour."
+    yield f"False alarms: {false}, in {hours:.2f} h of free flight from then on; at most {most:.2f} an hour."
     yield ""
 
 
@@ -87,7 +86,8 @@ def cells(hits: Sequence[Judged]) -> Iterator[str]:
     yield f"| all | from {BANDS_M_S[1][0]:g} on | {_cell(noticed)[0]} |"
     yield ""
     yield f"At most: with a confidence of {100 * CONFIDENCE:g} %, by Korn and Graubard, which is Clopper and Pearson's"
-    yield "for hits of which several are one vehicle's. Found after: median."
+    yield "for hits of which several are one vehicle's. Where none is missed, each vehicle counts once. Found after:"
+    yield "median."
     yield ""
     yield f"Not shown to miss fewer than {100 * BOUND:g} %: {'; '.join(open_cells) or 'none'}."
     yield ""

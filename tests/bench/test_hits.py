@@ -175,7 +175,7 @@ def test_a_page_of_verdicts_counts_misses_by_cell_and_names_them():
     text += "\n".join(verdicts.seeds(results, campaign.cases, hits))
     case = campaign.cases[2]
     assert f"| {case.hit.airframe}, {case.imu_hz} Hz | 1 to 2 | 96 | 2 | 1 | 1.042 % |" in text
-    assert "8 in all" in text and "7 have the same verdict" in text and "1 approaches had a false alarm" in text
+    assert "8 in all" in text and "7 have the same verdict" in text and "False alarms: 1, in" in text
     assert f"by seed/number: {case.hit.seed}/7." in text
     assert f"when flown again, by seed: {campaign.cases[3].hit.seed}." in text
 
