@@ -16,22 +16,24 @@ from bench.detectors.hits import (
     HEIGHT_M,
     PATIENCE_S,
     POLE_OFFSET_SHARES,
+    Floats,
     HitCase,
     obstacle_before,
     vehicle_of_hit,
 )
 from bench.detectors.scoring import FOUND_WITHIN_US
-from bench.detectors.vehicles import AIRFRAMES
+from bench.detectors.vehicles import AIRFRAMES, BenchVehicle
 from bench.random_missions.contacts import SEEN_AFTER_US
 from bench.random_missions.crashes import tilts_deg
 from bench.recoveries.hits import returns
 from bench.speed.parse import parse_us
+from companion.companion import StepResult
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.report import CollisionReport
 from rebound_cli.results.truth_match import FlightTruth
 from rebound_cli.simulation.lockstep import EPOCH_US
-from sim_vehicle.mavlink.link import LinkOptions
+from sim_vehicle.mavlink.link import Link, LinkOptions
 from sim_vehicle.mavlink.streams.stream_rates import LinkKind
 from sim_vehicle.physics.layout import HIT_ACTIVE
 from sim_vehicle.scene import Scene
@@ -90,30 +92,63 @@ def work_out_flown(case: FlownHit) -> Json:
     return {**_judged(vehicle, guard.collisions(), rest_us), "cost": cost}
 
 
-def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
-    """To rest, or as long as may be; the boot time from which it rested."""
-    hit = case.hit
-    built = vehicle_of_hit(hit)
-    rng = np.random.default_rng([hit.seed, 1])
-    heading_rad, free_s = rng.uniform(-math.pi, math.pi), float(rng.uniform(*FREE_FLIGHT_S))
-    velocity = hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
-    start = np.array([0.0, 0.0, -HEIGHT_M])
-    share = POLE_OFFSET_SHARES[0]
-    scene = Scene.model_validate(obstacle_before(hit, built.airframe, start + free_s * velocity, velocity, rng, share))
-    vehicle = SimulatedVehicle(built.airframe, scene, hit.seed)
-    vehicle.begin_in_flight(tuple(start.tolist()), tuple(velocity.tolist()))
+class FlyingVehicle(SimulatedVehicle):
+    """The same vehicle; what it meets may be put there in flight."""
+
+    def meet(self, scene: Scene) -> None:
+        """Put its obstacles there, none of them through the vehicle."""
+        self._plant.change_world(scene.world())
+
+    def note_hit(self) -> None:
+        """Note the hit that still lasts as far as it goes."""
+        if self.state.hit[HIT_ACTIVE] == 1.0:
+            self.truth.add_hit(self.state.hit, self._plant.world)
+
+
+@dataclass(slots=True)
+class Flight:
+    """A vehicle in flight, and the guard that meets it over the wire."""
+
+    vehicle: FlyingVehicle
+    link: Link
+    guard: Guard
+
+    def step(self) -> StepResult:
+        """One interval, all bytes both ways."""
+        self.vehicle.advance()
+        result = self.guard.step(b"".join(self.link.take()), EPOCH_US + self.vehicle.time_boot_us)
+        self.link.push(b"".join(result.sent_frames))
+        return result
+
+
+def begun(built: BenchVehicle, case: FlownHit, velocity: Floats, scene: Scene, keeps_path: bool) -> Flight:
+    """At HEIGHT_M, steadily on the way with this velocity."""
+    vehicle = FlyingVehicle(built.airframe, scene, case.hit.seed, keeps_path)
+    vehicle.begin_in_flight((0.0, 0.0, -HEIGHT_M), (float(velocity[0]), float(velocity[1]), 0.0))
     link = vehicle.add_link(LinkOptions(LinkKind.ONBOARD))
     link.introduce()
     streams = {"highres_imu_hz": float(case.imu_hz), "window_s": WINDOW_S}
     guard = Guard(GuardConfig.model_validate({"companion": {**built.settings, "streams": streams}}))
+    return Flight(vehicle, link, guard)
+
+
+def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
+    """To rest, or as long as may be; the boot time from which it rested."""
+    hit, built = case.hit, vehicle_of_hit(case.hit)
+    rng = np.random.default_rng([hit.seed, 1])
+    heading_rad, free_s = rng.uniform(-math.pi, math.pi), float(rng.uniform(*FREE_FLIGHT_S))
+    velocity = hit.speed_m_s * np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
+    at, share = np.array([0.0, 0.0, -HEIGHT_M]) + free_s * velocity, POLE_OFFSET_SHARES[0]
+    scene = Scene.model_validate(obstacle_before(hit, built.airframe, at, velocity, rng, share))
+    flight = begun(built, case, velocity, scene, keeps_path=True)
+    vehicle, guard = flight.vehicle, flight.guard
     body, hit_row, truth = vehicle.state.body, vehicle.state.hit, vehicle.truth
     until_us, count = round(1e6 * (free_s + PATIENCE_S)), 0
     touched_us = rest_us = None
     is_answered = False
     while vehicle.time_boot_us < until_us:
-        vehicle.advance()
+        flight.step()
         now_us = vehicle.time_boot_us
-        link.push(b"".join(guard.step(b"".join(link.take()), EPOCH_US + now_us).sent_frames))
         count += 1
         if count % LOOK_EVERY:
             continue
@@ -130,8 +165,7 @@ def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
             break
     else:
         rest_us = None
-    if hit_row[HIT_ACTIVE] == 1.0:
-        truth.add_hit(hit_row, scene.world())
+    vehicle.note_hit()
     return vehicle, guard, rest_us
 
 

@@ -16,8 +16,22 @@ def add_hits(commands: Commands) -> None:
     hits.add_argument("--first-seed", type=count, default=1, metavar="SEED", help="of the first hit (default 1)")
     add_vehicles(hits, "every hit")
     add_workers(hits)
-    hits.add_argument(
+    instead = hits.add_mutually_exclusive_group()
+    instead.add_argument(
+        "--verdicts",
+        action="store_true",
+        help="fly each hit only until the guard tells of it, dozens from one approach: a million an hour",
+    )
+    instead.add_argument(
+        "--worst",
+        action="store_true",
+        help="search the hits nearest to being missed, N tries for each airframe and rate, the vehicle included",
+    )
+    instead.add_argument(
         "--growth", action="store_true", help="write instead what a hit costs after 1, 10, 100 to N of them"
+    )
+    hits.add_argument(
+        "--corpus", type=Path, metavar="FOLDER", help="with --worst: keep their flights there, for `corpus judge`"
     )
     hits.add_argument("--out", type=Path, default=NOTES / "hits.md", metavar="FILE", help="default: %(default)s")
     hits.set_defaults(run=runs("bench.hits_report.command:run_hits"))

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from scipy.stats import binomtest
+from scipy.stats import beta
 
 from bench.campaign.plan import Json
 from bench.detectors.vehicles import AIRFRAMES
@@ -48,13 +48,13 @@ def missed(hits: Sequence[Json]) -> int:
     return sum(not one["found"] for one in hits)
 
 
-def at_most(events: int, of: int) -> float:
+def at_most(events: float, of: float) -> float:
     """The share that is not exceeded with the confidence, by Clopper and Pearson."""
-    return float(binomtest(events, of, alternative="less").proportion_ci(CONFIDENCE).high) if of else 1.0
+    return float(beta.ppf(CONFIDENCE, events + 1, of - events)) if events < of else 1.0
 
 
 def cells(flown: Flown) -> Iterator[str]:
-    yield from _head("airframe, IMU", "speed, m/s")
+    yield from head("airframe, IMU", "speed, m/s", *_COLUMNS)
     open_cells = []
     for airframe in AIRFRAMES:
         for imu_hz in IMU_HZ:
@@ -82,16 +82,16 @@ def cells(flown: Flown) -> Iterator[str]:
 
 
 def approaches(flown: Flown) -> Iterator[str]:
-    yield from _head("what was met")
+    yield from head("what was met", *_COLUMNS)
     for approach in APPROACHES:
         hits = flown.hits(lambda case, one, of=approach: case.hit.approach == of)  # type: ignore[misc]
         yield f"| {approach} | {_cell(hits)[0]} |"
     yield ""
 
 
-def _head(*first: str) -> Iterator[str]:
-    yield f"| {' | '.join((*first, *_COLUMNS))} |"
-    yield "|---" * len((*first, *_COLUMNS)) + "|"
+def head(*columns: str) -> Iterator[str]:
+    yield f"| {' | '.join(columns)} |"
+    yield "|---" * len(columns) + "|"
 
 
 def _cell(hits: Sequence[Json]) -> tuple[str, bool]:

@@ -1,11 +1,26 @@
 """Hits alone: the same verdicts as whole flights, the same bits twice, and honest bounds."""
 
+import itertools
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
 import pytest
 
+from bench.corpus.verdict import CorpusCase
+from bench.corpus.verdict import work_out as work_out_bytes
 from bench.detectors.hits import HitCase
 from bench.hits.flight import FlownHit, draw_flown, flown_campaign, work_out_flown
+from bench.hits.rewind import Moment
+from bench.hits.verdicts import FREE_S, HITS_AN_APPROACH, Approach, Verdict, again, verdict_campaign
+from bench.hits.worst import MEETING, NO_HIT, VEHICLE, SearchCase, margin
+from bench.hits_report import verdicts
 from bench.hits_report.cells import Flown, at_most, cells, lead, seeds
+from bench.hits_report.verdicts import at_most_of_groups
+from bench.hits_report.worst import keep
 from bench.recoveries.hits import RecoveryCase, work_out
+from companion.companion import StepResult
 
 pytestmark = pytest.mark.slow
 
@@ -74,3 +89,125 @@ def test_a_cell_with_a_miss_too_many_is_named():
     open_cells = text.partition("false alarms:\n")[2]
     assert "rigid, 50 Hz, 1 to 2 m/s" in open_cells and "foldable, 50 Hz, 1 to 2 m/s" not in open_cells
     assert f"Missed at 0.5 m/s and more: 3, by seed {cases[missed].hit.seed}" in text
+
+
+def test_what_is_rewound_flies_on_to_the_same_bytes():
+    # Given a flight that goes on, with a hit and a recovery in it
+    approach = Approach(draw_flown(21, True))
+    approach.fly_until(FREE_S)
+    before = approach.moment()
+    flight = approach.flight
+
+    def flown() -> tuple[list[StepResult], bytes]:
+        flight.vehicle.meet(approach.scene("leaning wall", 0.02, np.random.default_rng(5)))
+        return [flight.step() for _ in range(200)], flight.vehicle.state.body.tobytes()
+
+    first = flown()
+    assert flight.guard.collisions()
+    # When it is put back, then there was no hit, and it comes again as it came
+    before.rewind()
+    assert not flight.guard.collisions() and not flight.vehicle.truth.hits
+    assert flown() == first
+
+
+def test_an_object_that_cannot_be_put_back_is_refused():
+    with pytest.raises(TypeError, match="count cannot be put back"):
+        Moment({"numbers": itertools.count()})
+
+
+def test_everything_that_changes_is_put_back():
+    @dataclass(slots=True)
+    class Slotted:
+        rows: np.ndarray
+
+    whole, draws = np.arange(6.0), np.random.default_rng(1)
+    things = {"view": Slotted(whole[2:4]), "queue": deque([1, 2], maxlen=3), "set": {1}, "list": [whole, (draws,)]}
+    moment = Moment(things)
+    first = draws.random()
+    whole += 1.0
+    things["view"].rows, things["new"] = None, 1
+    things["queue"].append(7)
+    things["set"].clear()
+    del things["list"][0]
+    moment.rewind()
+    assert list(things) == ["view", "queue", "set", "list"] and things["list"][0] is whole
+    assert things["view"].rows.tolist() == [2.0, 3.0] and things["view"].rows.base is whole
+    assert list(things["queue"]) == [1, 2] and things["set"] == {1} and draws.random() == first
+
+
+@pytest.mark.parametrize("seed", range(40, 52))
+def test_verdicts_are_those_of_hits_that_are_flown_from_the_beginning(seed):
+    case = draw_flown(seed, True)
+    flown = list(Approach(case).hits())
+    assert len(flown) == HITS_AN_APPROACH
+    for scene, verdict in flown[seed % 16 :: 16]:
+        assert again(case, scene) == (verdict, True)
+
+
+def test_a_miss_is_a_miss_from_the_beginning_too():
+    # Given a vehicle that shakes so much that it misses hits
+    case = FlownHit(HitCase("flown", 5, "foldable", "wall", 1.0, (), vibration_m_s2=3.0), 50)
+    flown = list(Approach(case).hits())
+    missed = [(scene, verdict) for scene, verdict in flown if verdict.touched_us and verdict.late_us is None]
+    assert 0 < len(missed) < len(flown)
+    # Then the same hits are missed, and the others found, without a rewind
+    for scene, verdict in [*missed[:4], *flown[:4]]:
+        assert again(case, scene) == (verdict, True)
+
+
+def test_hits_by_one_vehicle_count_as_fewer():
+    alone = [(1, 1), (0, 1), (0, 1), (0, 1)] * 100
+    together = [(4, 4), (0, 4), (0, 4), (0, 4)] * 25
+    assert at_most_of_groups(alone) == pytest.approx(at_most(100, 400), abs=1e-3)
+    assert at_most_of_groups(together) == pytest.approx(at_most(25, 100), abs=3e-3)
+    assert at_most_of_groups([(0, 50)] * 300) == at_most(0, 300)
+    assert at_most_of_groups([]) == at_most_of_groups([(3, 3)]) == 1.0
+
+
+def test_a_page_of_verdicts_counts_misses_by_cell_and_names_them():
+    campaign = verdict_campaign(8 * HITS_AN_APPROACH, 1, False)
+    one = {"watched_s": 1.5, "false": False, "agrees": True, "kept": True}
+    results = {at: {**one, "hits": [[n, 1.5, 8.0] for n in range(HITS_AN_APPROACH)]} for at in range(8)}
+    results[2]["hits"][7][2] = None
+    results[3] |= {"agrees": False, "false": True}
+    hits = verdicts.judged(campaign.cases, results)
+    text = "\n".join([*verdicts.lead(results, hits), *verdicts.cells(hits)])
+    text += "\n".join(verdicts.seeds(results, campaign.cases, hits))
+    case = campaign.cases[2]
+    assert f"| {case.hit.airframe}, {case.imu_hz} Hz | 1 to 2 | 96 | 2 | 1 | 1.042 % |" in text
+    assert "8 in all" in text and "7 have the same verdict" in text and "False alarms: 1, in" in text
+    assert f"by seed/number: {case.hit.seed}/7." in text
+    assert f"when flown again, by seed: {campaign.cases[3].hit.seed}." in text
+
+
+def test_a_margin_is_smaller_where_the_vehicle_shakes_more_and_below_one_the_hit_is_missed():
+    case = SearchCase("foldable", 50, 1, 1)
+    middle = {name: 0.5 * (low + high) for name, (low, high) in {**MEETING, **VEHICLE}.items()}
+    numbers = {**middle, "approach": 0, "speed_m_s": 1.0}
+    quiet, shaken = (
+        margin(case, list({**numbers, "vibration_log": math.log(noise)}.values()))[0] for noise in (0.2, 1.4)
+    )
+    assert 1.0 < shaken < quiet
+    slow = margin(case, list({**numbers, "speed_m_s": 0.45}.values()))
+    assert slow[0] == NO_HIT and slow[1] < 0.5
+
+
+def test_a_hit_that_is_kept_is_judged_from_its_bytes_as_it_was_flown(tmp_path):
+    # Given a hit that a vehicle found, and one that a vehicle that shakes too much missed
+    case = SearchCase("foldable", 50, 1, 1)
+    middle = {name: 0.5 * (low + high) for name, (low, high) in {**MEETING, **VEHICLE}.items()} | {"approach": 0}
+    for name, vibration_m_s2, is_found in (("found", 0.2, True), ("missed", 8.0, False)):
+        keep(case, {**middle, "speed_m_s": 1.0, "vibration_log": math.log(vibration_m_s2)}, tmp_path / name)
+        # When the corpus' judge reads its bytes, then it comes to the same
+        judgement = work_out_bytes(CorpusCase(str(tmp_path / name)))["rates"]["recorded"]
+        (hit, *_) = judgement["hits"]
+        assert ("latency_ms" in hit) is is_found and judgement["false_boot_us"] == []
+
+
+def test_a_touch_at_an_interval_s_very_end_is_no_false_alarm():
+    # Given a hit that begins with the last step of an interval, which the sensor's sample of it shows
+    verdict = [verdict for _, verdict in Approach(draw_flown(6000161, True)).hits()][34]
+    assert verdict.touched_us == verdict.told_us == 1_432_000
+    # Then it was found at once, and a microsecond earlier it would have been a false alarm
+    assert verdict.late_us == 0.0 and not verdict.is_early
+    assert Verdict(verdict.touched_us, 1.0, 1_431_999).is_early

@@ -1,0 +1,165 @@
+"""The hits nearest to being missed, by differential evolution over what is met, how, and the vehicle.
+
+A hit's margin is the factor by which all thresholds of the detector could grow until it is missed. It is found by the
+detector itself: the same hit is flown with other thresholds, from the same moment.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from bench.campaign.plan import Campaign, Json
+from bench.detectors.hits import Floats, HitCase
+from bench.detectors.vehicles import AIRFRAMES, BenchVehicle
+from bench.detectors.watching import FLOWN_WITH, configuration
+from bench.hits.flight import APPROACHES, IMU_HZ, SPEEDS_M_S, FlownHit
+from bench.hits.verdicts import FREE_S, LEAD_S, PATIENCE_S, Approach, followed
+from bench.random_missions import vehicle as drawn
+from sim_vehicle.airframe import Airframe, with_base
+from sim_vehicle.scene import Scene
+
+# Margins are looked for between these, half of what is left each time: to 2.5 %.
+LEAST, MOST, HALVINGS = 1 / 8, 64.0, 8
+# Into the surface; slower hits do not count.
+NOTICED_M_S = 0.5
+# Of nothing touched, or too slowly.
+NO_HIT = 2.0 * MOST
+# Members of a generation for each number that is varied: fewer than scipy's 15, for more generations.
+MEMBERS = 4
+
+# What is varied of the named airframe, within the ranges of drawn vehicles.
+_LOG_VIBRATION = tuple(math.log(value) for value in drawn.VIBRATION_M_S2)
+VEHICLE = {
+    "vibration_log": _LOG_VIBRATION,
+    "gyroscope_noise_rad_s": drawn.GYROSCOPE_NOISE_RAD_S,
+    "delay_s": drawn.DELAY_S,
+    "velocity_noise_m_s": drawn.VELOCITY_NOISE_M_S,
+    "velocity_correlation_s": drawn.VELOCITY_CORRELATION_S,
+    "guard_friction": drawn.FRICTION,
+    "spring_rad_s": drawn.SPRING_RAD_S,
+    "spring_damping": drawn.SPRING_DAMPING,
+    "stop_s_share": (0.0, 1.0),
+    "restitution_share": (0.0, 1.0),
+}
+MEETING = {
+    "approach": (0, len(APPROACHES) - 1),
+    "speed_m_s": SPEEDS_M_S,
+    "lead_s": LEAD_S,
+    "first_share": (0.0, 1.0),
+    "second_share": (0.0, 1.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SearchCase:
+    """Which hits are searched, and about how many of them are flown."""
+
+    airframe: str
+    imu_hz: int
+    seed: int
+    tries: int
+
+
+def worst_campaign(tries: int, seed: int) -> Campaign:
+    cases = [SearchCase(airframe, imu_hz, seed, tries) for airframe in AIRFRAMES for imu_hz in IMU_HZ]
+    uses = ("bench.detectors", "bench.random_missions")
+    return Campaign("worst-hits", {"tries": tries, "seed": seed}, cases, search, uses)
+
+
+class _Given:
+    """Stands for a generator of random numbers: its numbers are chosen."""
+
+    def __init__(self, shares: Sequence[float]) -> None:
+        self._shares = list(shares)
+
+    def uniform(self, low: float, high: float) -> float:
+        return low + (high - low) * self._shares.pop(0)
+
+
+def search(case: SearchCase) -> Json:
+    """The least margin, and all that makes its hit again."""
+    bounds = list({**MEETING, **VEHICLE}.values())
+    found = differential_evolution(
+        lambda values: margin(case, values)[0],
+        bounds,
+        popsize=MEMBERS,
+        maxiter=max(1, round(case.tries / (MEMBERS * len(bounds))) - 1),
+        integrality=[name == "approach" for name in (*MEETING, *VEHICLE)],
+        rng=case.seed,
+        polish=False,
+        tol=0.0,
+    )
+    values = [float(f"{value:.6g}") for value in found.x]
+    least, closing_m_s = margin(case, values)
+    numbers = dict(zip((*MEETING, *VEHICLE), values, strict=True))
+    return {"margin": round(least, 3), "closing_m_s": round(closing_m_s, 3), "flown": int(found.nfev), **numbers}
+
+
+def margin(case: SearchCase, values: Sequence[float] | Floats) -> tuple[float, float]:
+    """Of one hit, and its speed into the surface."""
+    approach, scene = begun_with(case, dict(zip((*MEETING, *VEHICLE), map(float, values), strict=True)))
+    if approach.is_false:
+        return NO_HIT, 0.0
+    approach.flight.vehicle.meet(scene)
+    moment, core = approach.moment(), approach.flight.guard.core
+    assert core is not None
+    monitor = core.monitor
+    low, high, closing_m_s = math.log(LEAST), math.log(MOST), 0.0
+    for _ in range(HALVINGS):
+        factor = math.exp(0.5 * (low + high))
+        config = configuration(FLOWN_WITH[0], approach.built.settings, factor)
+        averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
+        monitor.detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
+        monitor.state.threshold_m_s2 *= factor
+        verdict = followed(approach.flight, PATIENCE_S)
+        moment.rewind()
+        if verdict.is_early:
+            low = math.log(factor)
+            continue
+        closing_m_s = verdict.closing_m_s
+        if verdict.touched_us is None or closing_m_s < NOTICED_M_S:
+            return NO_HIT, closing_m_s
+        if verdict.late_us is None:
+            high = math.log(factor)
+        else:
+            low = math.log(factor)
+    return math.exp(0.5 * (low + high)), closing_m_s
+
+
+def begun_with(case: SearchCase, numbers: Mapping[str, float]) -> tuple[Approach, Scene]:
+    """The approach up to the moment from which the hit is flown, and what then stands before the vehicle."""
+    met = APPROACHES[round(numbers["approach"])]
+    hit = HitCase("worst", case.seed, case.airframe, met, numbers["speed_m_s"], ())
+    approach = Approach(FlownHit(hit, case.imu_hz), vehicle_with(case.airframe, numbers))
+    approach.fly_until(FREE_S)
+    rng = cast(np.random.Generator, _Given([numbers["first_share"], numbers["second_share"]]))
+    return approach, approach.scene(met, numbers["lead_s"], rng)
+
+
+def vehicle_with(kind: str, numbers: Mapping[str, float]) -> BenchVehicle:
+    """The named airframe with other numbers, and its owner's settings."""
+    rad_s = numbers["spring_rad_s"]
+    springs = {"stiffness_per_s2": rad_s**2, "damping_per_s": 2.0 * numbers["spring_damping"] * rad_s}
+    stop = {
+        "contact_time_s": _between(drawn.STOP_TIME_S[kind], numbers["stop_s_share"]),
+        "restitution": _between(drawn.RESTITUTION[kind], numbers["restitution_share"]),
+    }
+    data = {
+        "based_on": kind,
+        "imu": {
+            "accelerometer_noise_m_s2": math.exp(numbers["vibration_log"]),
+            "gyroscope_noise_rad_s": numbers["gyroscope_noise_rad_s"],
+        },
+        "estimate": {name: numbers[name] for name in ("delay_s", "velocity_noise_m_s", "velocity_correlation_s")},
+        "surface": {"guard_friction": numbers["guard_friction"]},
+        "arms": {**(springs if kind == "foldable" else {}), "stop": stop},
+    }
+    return BenchVehicle(Airframe.model_validate(with_base(data)), drawn.companion_settings(data))
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    return ends[0] + (ends[1] - ends[0]) * share
