@@ -61,9 +61,9 @@ RULES = (
     ),
     Rule(
         "second sample",
-        "a weak force on a shaking vehicle comes twice",
-        _DETECTION + "force_signs:pushes_on",
-        _says(True),
+        "a weak force on a shaking vehicle shows in two samples together",
+        _DETECTION + "force_signs:together_m_s2",
+        _says(0.0),
     ),
     Rule("leaning", "a lean that moves nothing is a hit", _HORIZONTAL + "step", _says(None)),
     Rule("pressing", "thrust that lifts nothing is a hit", _VERTICAL + "step", _says(None)),

@@ -9,8 +9,9 @@ from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.messages import Vector3
 
-# On a vibrating vehicle a single sample below this many thresholds may be noise (once in four public logs, with 1.2):
-# the next one must confirm it. Above MOST_THRESHOLD_M_S2 only larger forces count.
+# A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times.
+SHAKING = 2.0
+# On a vibrating vehicle one sample below this many thresholds may be noise (once in four public logs, with 1.2).
 CLEAR = 1.3
 
 
@@ -29,8 +30,9 @@ def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
     return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
 
 
-def pushes_on(s: FusedState, force_frd_m_s2: Vector3) -> bool:
-    """Whether the sample before had a force in the same direction, as in a contact; vibration alternates."""
-    x, y, z = s.soft.last
-    f_x, f_y, f_z = force_frd_m_s2
-    return (x - s.floor.x) * f_x + (y - s.floor.y) * f_y + (z - s.floor.z) * f_z > 0.0
+def together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
+    """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
+    noise of a sum grows. Vibration alternates, a contact does not."""
+    (f_x, f_y, _), (g_x, g_y, _), mean = force_frd_m_s2, s.soft.last, s.floor
+    x, y = f_x + g_x, f_y + g_y
+    return math.sqrt(0.5 * min((x - 2.0 * mean.x) ** 2 + (y - 2.0 * mean.y) ** 2, x * x + y * y))

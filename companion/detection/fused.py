@@ -19,18 +19,21 @@ from typing import ClassVar
 
 from companion.detection.classify import kind_of
 from companion.detection.force_noise import SETTLED_US
-from companion.detection.force_signs import CLEAR, pushes_on, side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import (
+    CLEAR,
+    SHAKING,
+    side_threshold_m_s2,
+    together_m_s2,
+    vertical_threshold_m_s2,
+)
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.detection.stream_health import MOST_THRESHOLD_M_S2
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import LEVEL
 
-# A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times.
-SHAKING = 2.0
 # A contact longer than springs take to bottom out, whose force then exceeds its peak by half, is another hit: a vehicle
 # scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
@@ -88,7 +91,12 @@ class FusedDetector:
         side = math.sqrt(min(x * x + y * y, f_x * f_x + f_y * f_y))
         room = vertical_threshold_m_s2(s, config)
         most = s.thrust.most_m_s2(now_us)
-        is_within = side < s.threshold_m_s2 and -most - room < f_z < room
+        below, above = f_z - room, -f_z - most - room
+        if s.threshold_m_s2 > SHAKING * config.side_threshold_m_s2:
+            together, side = together_m_s2(s, f), side / CLEAR
+            if together > side:
+                side, s.previous_sample_boot_us = together, s.soft.before_us
+        is_within = side < s.threshold_m_s2 and below < 0.0 and above < 0.0
         if is_within and off is None and s.phase is Phase.ARMED:
             # Nearly every sample ends here.
             s.soft.since_boot_us = None
@@ -98,7 +106,6 @@ class FusedDetector:
             s.phase, s.off_reason = Phase.OFF, off
             self._learn(s, f, before_us)
             return None
-        below, above = f_z - room, -f_z - most - room
         threshold = side_threshold_m_s2(s, config, w)
         if side < threshold and below < 0.0 and above < 0.0:
             self._quiet(s, f, before_us)
@@ -160,15 +167,10 @@ class FusedDetector:
         if soft.since_boot_us is not None:
             free_until_us = soft.free_until_us
         kind = None
-        is_doubtful = ratio < CLEAR and s.threshold_m_s2 > SHAKING * self._config.side_threshold_m_s2
         if size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps:
             if soft.looked_at_us(now_us, free_until_us) < self._soft_us:
                 return None
             kind = ImpactKind.CONTACT
-        elif is_doubtful:
-            is_first = soft.looked_at_us(now_us, free_until_us) == 0
-            if is_first or s.threshold_m_s2 > MOST_THRESHOLD_M_S2 or not pushes_on(s, force):
-                return None
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
     def _fire(
@@ -236,10 +238,10 @@ class FusedDetector:
         p, q, _ = jump.rates_frd_rad_s
         shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
         noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
+        unseen_m_s = jump.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
         if jump.no_motor_turns(time_us, config.rate_step_rad_s):
             # Two signs confirm each other: half the noise is enough, and the thrust has turned for a moment only.
-            noise_m_s, room = 0.5 * noise_m_s, 0.0
+            noise_m_s, unseen_m_s, room = 0.5 * noise_m_s, 0.5 * unseen_m_s, 0.0
         if jump.is_slow:
             least = config.velocity_step_slow_m_s
-        room += jump.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
-        return caution * max(least, noise_m_s) + room
+        return caution * max(least, noise_m_s) + unseen_m_s + room

@@ -13,7 +13,7 @@ from itertools import pairwise
 from companion.messages import Vector3
 from companion.motion.delay import Delay
 from companion.motion.inertial import VelocityFix, less_sum
-from companion.motion.strapdown import LONGEST_DELAY_US, LONGEST_GAP_US, MOTORS_RAD_S2, ZERO
+from companion.motion.strapdown import LONGEST_DELAY_US, LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO
 
 # Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
@@ -22,9 +22,8 @@ COMPARED = 3
 LONGEST_STEP_US = 75_000
 # 10 Hz with the jitter of a log. Velocities further apart are not compared.
 LONGEST_SLOW_STEP_US = 130_000
-# Number of steps before the standard deviation is used: two thirds of a second at 30 Hz.
-LEAST_STEPS = 20
-# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz.
+# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz. So many steps
+# make one good to a fifth, as each has three axes: before that it is not used.
 MEMORY, RISE = 100, 10
 # Weight of each sample in the share of unsampled time: ten samples are half a second at the slowest useful rate.
 UNSEEN_SHARE = 0.1
@@ -50,6 +49,7 @@ class VelocityJump:
     rates_frd_rad_s: Vector3 = ZERO
     newest_rate_step_rad_s: float = 0.0
     rate_step_rad_s: float = 0.0
+    rate_step_frd_rad_s: Vector3 = ZERO
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
     is_slow: bool = False
@@ -76,6 +76,7 @@ class VelocityJump:
             step = self.newest_rate_step_rad_s = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
             if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_rad_s = step
+                self.rate_step_frd_rad_s = _less(rates_frd_rad_s, self.rates_frd_rad_s)
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         self.rates_frd_rad_s = rates_frd_rad_s
 
@@ -122,8 +123,8 @@ class VelocityJump:
 
     @property
     def spread_m_s(self) -> float:
-        """Standard deviation of the steps on an axis, m/s; infinite before LEAST_STEPS."""
-        return math.sqrt(self.variance_m2_s2) if self.known >= LEAST_STEPS else math.inf
+        """Standard deviation of the steps on an axis, m/s; infinite before RISE steps."""
+        return math.sqrt(self.variance_m2_s2) if self.known >= RISE else math.inf
 
     def unseen_m_s(self, shaking_m_s2: float, thrust_change_m_s2: float) -> float:
         """Largest velocity step, m/s, from vibration between the samples and from the velocity's lag.
@@ -138,9 +139,12 @@ class VelocityJump:
         return self.rate_step_rad_s if velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US else 0.0
 
     def no_motor_turns(self, velocity_us: int, least_rad_s: float) -> bool:
-        """Whether that rate jump exceeds `least_rad_s` and what motors make between two samples."""
+        """Whether that rate jump exceeds `least_rad_s` and what motors make between two samples; a third about yaw."""
+        if not self.rate_step_near(velocity_us):
+            return False
         over_s = 1e-6 * (self.rate_step_until_us - self.rate_step_from_us)
-        return self.rate_step_near(velocity_us) >= least_rad_s + NO_MOTORS_RAD_S2 * over_s
+        p, q, r = self.rate_step_frd_rad_s
+        return math.hypot(p, q, r / YAW_SHARE) >= least_rad_s + NO_MOTORS_RAD_S2 * over_s
 
     def free_until_us(self, velocity_us: int, least_rad_s: float) -> int:
         """Latest time without contact before the velocity jump at ``velocity_us``."""

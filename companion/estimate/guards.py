@@ -23,7 +23,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.motion.strapdown import GRAVITY_M_S2, MOTORS_RAD_S2
+from companion.motion.strapdown import GRAVITY_M_S2, MOTORS_RAD_S2, YAW_SHARE
 
 try:
     import numba
@@ -60,7 +60,7 @@ ROUNDING_M = 1e-9
 # An arm at the end of its travel meets a stop that ends the motion within some milliseconds.
 STOP_PER_S2, STOP_DAMPING_PER_S = 60_000.0, 30.0
 # Motors follow within 20 ms.
-MOTORS_S, YAW_SHARE = 0.025, 0.3
+MOTORS_S = 0.025
 
 
 def _compiled(function: Kernel, inlined: bool = False) -> Kernel:

@@ -17,8 +17,8 @@ LONGEST_DELAY_US = 40_000
 # Cosine of 15 degrees: about the tilt error of a real PX4 after 7.8 m/s were clipped (bench/notes/px4.md). Beyond it
 # the gyroscopes are wrong.
 MOST_WRONG = 0.966
-# Largest angular acceleration by motors, rad/s^2.
-MOTORS_RAD_S2 = 100.0
+# Largest angular acceleration by motors, rad/s^2, and its share about yaw, where only their drag turns the vehicle.
+MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
 
 
 @dataclass(slots=True)
