@@ -64,6 +64,10 @@ def quaternion_from_matrix(rows: list[list[float]]) -> tuple[float, float, float
     squares = (1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i)
     largest = max(range(4), key=squares.__getitem__)
     n = 2 * math.sqrt(max(squares[largest], 1e-12))
-    sums = ((n / 4, (h - f) / n, (c - g) / n, (d - b) / n), ((h - f) / n, n / 4, (b + d) / n, (c + g) / n))
-    more = (((c - g) / n, (b + d) / n, n / 4, (f + h) / n), ((d - b) / n, (c + g) / n, (f + h) / n, n / 4))
-    return (*sums, *more)[largest]
+    if largest == 0:
+        return n / 4, (h - f) / n, (c - g) / n, (d - b) / n
+    if largest == 1:
+        return (h - f) / n, n / 4, (b + d) / n, (c + g) / n
+    if largest == 2:
+        return (c - g) / n, (b + d) / n, n / 4, (f + h) / n
+    return (d - b) / n, (c + g) / n, (f + h) / n, n / 4

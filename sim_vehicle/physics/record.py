@@ -44,4 +44,5 @@ def _layout(kind: Any) -> np.dtype[Any]:
             fields.append((name, np.int64 if int in rest else np.float64, shape))
         else:
             fields.append((name, np.int64 if hint is int else np.float64, ()))
-    return np.dtype(fields, align=True)
+    # A record already: else `view` makes a dtype for each, which numba compares with the first one's, field by field.
+    return np.dtype((np.record, np.dtype(fields, align=True)))

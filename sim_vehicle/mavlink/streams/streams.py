@@ -132,12 +132,13 @@ class Stream:
         "noted",
         "pace",
         "seen",
+        "topic",
     )
 
     def __init__(
         self, kind: StreamKind, now_us: int, default_interval_us: int = NOT_STREAMED_US, pace: StreamPace = FAST_PACE
     ) -> None:
-        self.kind = kind
+        self.kind, self.topic = kind, int(kind.topic)
         self.pace = pace
         self.seen = NEVER_SENT
         self.noted = [NEVER_SENT for _ in kind.notes]
@@ -235,13 +236,9 @@ class Streams:
             return
         versions, outbox, state = self._versions, self._outbox, self._state
         for stream in self._running:
-            if now_us <= stream.due_after_us:
+            if now_us <= stream.due_after_us or stream.seen == versions[stream.topic]:
                 continue
-            kind = stream.kind
-            version = versions[kind.topic]
-            if version == stream.seen:
-                continue
-            stream.seen = version
+            kind, stream.seen = stream.kind, versions[stream.topic]
             stream.sent(now_us)
             if kind.notes:
                 state.renewed = stream.renewed(versions)

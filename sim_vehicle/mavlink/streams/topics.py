@@ -60,18 +60,18 @@ class Topics:
         versions = self.versions
         versions[0] += 1
         versions[1] += 1
-        state = self._state
+        state, commander = self._state, self._state.autopilot.commander
         if state.true_body is not None:
             versions[6] += 1
         if not new_position:
             return
         # All else is slow enough to be looked at this often only.
         versions[2] += 1
-        channels = state.autopilot.radio_channels
+        channels = commander.sticks.channels
         if channels is not self._channels:
             self._channels = channels
             versions[12] += 1
-        sticks = state.autopilot.commander.sticks.sticks
+        sticks = commander.sticks.sticks
         if sticks is not self._sticks and sticks is not None:
             self._sticks = sticks
             versions[13] += 1
@@ -84,8 +84,8 @@ class Topics:
         if state.gps is not self._fix:
             self._fix = state.gps
             versions[7] += 1
-        if state.autopilot.battery.version != self._battery:
-            self._battery = state.autopilot.battery.version
+        if commander.battery.version != self._battery:
+            self._battery = commander.battery.version
             versions[9] += 1
         if state.flow is not self._flow:
             self._flow = state.flow
@@ -93,8 +93,8 @@ class Topics:
         if state.range is not self._range:
             self._range = state.range
             versions[Topic.RANGE] += 1
-        autopilot, now_us = state.autopilot, state.sample.time_boot_us
-        status = (autopilot.modes.flown, autopilot.arming.armed, autopilot.system_status)
+        now_us = state.sample.time_boot_us
+        status = (commander.modes.flown, commander.arming.armed, commander.system_status)
         if status[0] is Mode.ORBIT:
             versions[14] += 1
         if status != self._status or now_us - self._status_us >= STATUS_PERIOD_US:
