@@ -4,6 +4,7 @@ import itertools
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -121,7 +122,12 @@ def test_everything_that_changes_is_put_back():
         rows: np.ndarray
 
     whole, draws = np.arange(6.0), np.random.default_rng(1)
-    things = {"view": Slotted(whole[2:4]), "queue": deque([1, 2], maxlen=3), "set": {1}, "list": [whole, (draws,)]}
+    things: dict[str, Any] = {
+        "view": Slotted(whole[2:4]),
+        "queue": deque([1, 2], maxlen=3),
+        "set": {1},
+        "list": [whole, (draws,)],
+    }
     moment = Moment(things)
     first = draws.random()
     whole += 1.0
