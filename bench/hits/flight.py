@@ -54,6 +54,8 @@ WINDOW_S = 0.5
 REST_M_S, REST_S = 0.2, 0.3
 # A healthy recovery takes 2 to 4 s.
 MOST_RECOVERY_S = 5.0
+# A vehicle that leans by more is over.
+OVERTURNED_DEG = 90.0
 # How often the truth is looked at.
 LOOK_EVERY = 5
 PARSES = 100
@@ -89,7 +91,7 @@ def work_out_flown(case: FlownHit) -> Json:
     cost_s = process_time() - began_s
     used_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     cost = {"processor_s": round(cost_s, 4), "memory_mb": round(used_mb, 1), "parse_us": round(parse_us(PARSES), 2)}
-    return {**_judged(vehicle, guard.collisions(), rest_us), "cost": cost}
+    return {**judged(vehicle, guard.collisions(), rest_us), "cost": cost}
 
 
 class FlyingVehicle(SimulatedVehicle):
@@ -141,9 +143,14 @@ def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
     at, share = np.array([0.0, 0.0, -HEIGHT_M]) + free_s * velocity, POLE_OFFSET_SHARES[0]
     scene = Scene.model_validate(obstacle_before(hit, built.airframe, at, velocity, rng, share))
     flight = begun(built, case, velocity, scene, keeps_path=True)
+    return flight.vehicle, flight.guard, to_rest(flight, free_s + PATIENCE_S)
+
+
+def to_rest(flight: Flight, patience_s: float) -> int | None:
+    """On until the vehicle rests, or as long as may be; the boot time from which it rested."""
     vehicle, guard = flight.vehicle, flight.guard
     body, hit_row, truth = vehicle.state.body, vehicle.state.hit, vehicle.truth
-    until_us, count = round(1e6 * (free_s + PATIENCE_S)), 0
+    until_us, count = vehicle.time_boot_us + round(1e6 * patience_s), 0
     touched_us = rest_us = None
     is_answered = False
     while vehicle.time_boot_us < until_us:
@@ -166,22 +173,22 @@ def fly(case: FlownHit) -> tuple[SimulatedVehicle, Guard, int | None]:
     else:
         rest_us = None
     vehicle.note_hit()
-    return vehicle, guard, rest_us
+    return rest_us
 
 
-def _judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
+def judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_us: int | None) -> Json:
     """Found: the companion told of the first contact, or of one that a guard's bounce made soon after."""
     hits, series = vehicle.truth.hits, vehicle.truth.series()
     false = sum(not any(_tells_of(hit, collision) for hit in hits) for collision in told)
-    judged: Json = {"seconds": round(1e-6 * vehicle.time_boot_us, 3), "false": false, "touched": bool(hits)}
+    result: Json = {"seconds": round(1e-6 * vehicle.time_boot_us, 3), "false": false, "touched": bool(hits)}
     if not hits:
-        return judged
+        return result
     first = hits[0]
     touched_us = first.contact_at_boot_us
     after = series["time_boot_us"] >= touched_us
     late_us = [c.sample_time_boot_us - touched_us for c in told if c.sample_time_boot_us >= touched_us]
     is_found = bool(late_us) and late_us[0] <= FOUND_WITHIN_US
-    judged |= {
+    result |= {
         "found": is_found,
         "closing_m_s": round(first.closing_speed_m_s, 3),
         "tilt_deg": round(float(tilts_deg(series["attitude_wxyz"][after]).max()), 1),
@@ -190,9 +197,9 @@ def _judged(vehicle: SimulatedVehicle, told: tuple[CollisionReport, ...], rest_u
     }
     if is_found:
         until_s = MOST_RECOVERY_S if rest_us is None else 1e-6 * (rest_us - touched_us)
-        judged["latency_ms"] = round(1e-3 * late_us[0], 1)
-        judged["again"] = returns(FlightTruth(hits, series, EPOCH_US), np.array(first.normal_ned), until_s)
-    return judged
+        result["latency_ms"] = round(1e-3 * late_us[0], 1)
+        result["again"] = returns(FlightTruth(hits, series, EPOCH_US), np.array(first.normal_ned), until_s)
+    return result
 
 
 def _tells_of(hit: Hit, collision: CollisionReport) -> bool:

@@ -19,16 +19,26 @@ def add_hits(commands: Commands) -> None:
     instead = hits.add_mutually_exclusive_group()
     instead.add_argument(
         "--verdicts",
-        action="store_true",
+        dest="part",
+        action="store_const",
+        const="verdicts",
         help="fly each hit only until the guard tells of it, dozens from one approach: a million an hour",
     )
     instead.add_argument(
         "--worst",
-        action="store_true",
-        help="search the hits nearest to being missed, N tries for each airframe and rate, the vehicle included",
+        dest="part",
+        nargs="?",
+        const="margin",
+        choices=("margin", "recovery"),
+        help="search the hits nearest to being missed (default), or those with the worst recovery: N tries for each "
+        "airframe and rate, the vehicle included",
     )
     instead.add_argument(
-        "--growth", action="store_true", help="write instead what a hit costs after 1, 10, 100 to N of them"
+        "--growth",
+        dest="part",
+        action="store_const",
+        const="growth",
+        help="write instead what a hit costs after 1, 10, 100 to N of them",
     )
     hits.add_argument(
         "--corpus", type=Path, metavar="FOLDER", help="with --worst: keep their flights there, for `corpus judge`"

@@ -8,13 +8,12 @@ from scipy.stats import beta
 from bench.campaign.plan import Json
 from bench.detectors.vehicles import AIRFRAMES
 from bench.detectors_report.numbers import per_cent, percentile, text_of
-from bench.hits.flight import APPROACHES, FREE_FLIGHT_S, IMU_HZ, MOST_RECOVERY_S, FlownHit
+from bench.hits.flight import APPROACHES, FREE_FLIGHT_S, IMU_HZ, MOST_RECOVERY_S, OVERTURNED_DEG, FlownHit
 
 # Into the surface. The detectors' bars begin at 0.5 m/s.
 BANDS_M_S = ((0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 5.0))
 # Of hits missed, and of false alarms: three hundred hits without one show it.
 BOUND, CONFIDENCE = 0.01, 0.95
-OVERTURNED_DEG = 90.0
 NAMED_SEEDS = 12
 _COLUMNS = (
     *("hits", "missed", "at most", "false alarms", "at most"),

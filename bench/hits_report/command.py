@@ -7,7 +7,7 @@ from bench.campaign.plan import Campaign
 from bench.campaign.run import Results, Workers, failures_text, run_campaign
 from bench.hits.flight import flown_campaign, fly
 from bench.hits.verdicts import HITS_AN_APPROACH, Approach, verdict_campaign
-from bench.hits.worst import worst_campaign
+from bench.hits.worst import FIGURES, worst_campaign
 from bench.hits_report import verdicts
 from bench.hits_report.cells import Flown, approaches, cells, lead, seeds
 from bench.hits_report.cost import BUDGETED, budget, cost
@@ -17,14 +17,12 @@ from bench.marked import checked_text, write_part
 from bench.stamps import FLOWN, stamp_text
 
 PART, TITLE = "hits", "Hits alone"
-# In place of it, by option.
-OTHER_PARTS = ("growth", "verdicts", "worst")
 APPROACHES_BUDGETED = 4
 
 
 def run_hits(options: Namespace) -> int:
     """0 when it is written, whatever it says; 1 when a hit failed to be flown, or depends on who flies it."""
-    part = next((name for name in OTHER_PARTS if getattr(options, name)), PART)
+    part = options.part or PART
     checked_text(options.out, part, TITLE)
     workers, is_drawn = Workers(options.jobs, options.scheduler), options.vehicles == "drawn"
     if part == "growth":
@@ -34,7 +32,7 @@ def run_hits(options: Namespace) -> int:
         results = run_campaign(campaign, workers)
         failed = failures_text(campaign, results)
         lines = [*_lines(part, campaign, results), failed]
-        if part == "worst" and options.corpus is not None:
+        if part in FIGURES and options.corpus is not None:
             for at, numbers in results.results.items():
                 case = campaign.cases[at]
                 keep(case, numbers, options.corpus / f"{case.airframe}-{case.imu_hz}")
@@ -45,14 +43,14 @@ def run_hits(options: Namespace) -> int:
 
 
 def _campaign(part: str, hits: int, first_seed: int, is_drawn: bool) -> Campaign:
-    if part == "worst":
-        return worst_campaign(hits, first_seed)
+    if part in FIGURES:
+        return worst_campaign(part, hits, first_seed)
     return (verdict_campaign if part == "verdicts" else flown_campaign)(hits, first_seed, is_drawn)
 
 
 def _lines(part: str, campaign: Campaign, results: Results) -> Iterator[str]:
     cases, known = campaign.cases, results.results
-    if part == "worst":
+    if part in FIGURES:
         yield from worst(cases, known)
     elif part == "verdicts":
         hits = verdicts.judged(cases, known)
@@ -67,7 +65,8 @@ def _lines(part: str, campaign: Campaign, results: Results) -> Iterator[str]:
 
 
 def _stamp(options: Namespace, part: str) -> str:
-    other = f" --{part}" * (part != PART) + " --scheduler ADDRESS" * (options.scheduler is not None)
-    vehicles = f" --vehicles {options.vehicles}" * (part != "worst")
+    option = f" {'--worst ' if part in FIGURES else '--'}{part}" * (part != PART)
+    other = option + " --scheduler ADDRESS" * (options.scheduler is not None)
+    vehicles = f" --vehicles {options.vehicles}" * (part not in FIGURES)
     command = f"python -m bench hits --hits {options.hits} --first-seed {options.first_seed}"
     return stamp_text(f"{command}{vehicles}{other}", (*FLOWN, "bench/hits"))

@@ -12,18 +12,32 @@ import pytest
 from bench.corpus.verdict import CorpusCase
 from bench.corpus.verdict import work_out as work_out_bytes
 from bench.detectors.hits import HitCase
-from bench.hits.flight import FlownHit, draw_flown, flown_campaign, work_out_flown
+from bench.hits.flight import FlownHit, begun, draw_flown, flown_campaign, to_rest, work_out_flown
+from bench.hits.flight import judged as judged_by_truth
 from bench.hits.rewind import Moment
-from bench.hits.verdicts import FREE_S, HITS_AN_APPROACH, Approach, Verdict, again, verdict_campaign
-from bench.hits.worst import MEETING, NO_HIT, VEHICLE, SearchCase, margin
+from bench.hits.verdicts import (
+    FREE_S,
+    HITS_AN_APPROACH,
+    PATIENCE_S,
+    Approach,
+    Verdict,
+    again,
+    velocity_of,
+    verdict_campaign,
+)
+from bench.hits.worst import MEETING, NO_HIT, VEHICLE, SearchCase, begun_with, how_good, margin, recovery
 from bench.hits_report import verdicts
 from bench.hits_report.cells import Flown, at_most, cells, lead, seeds
+from bench.hits_report.command import _stamp
 from bench.hits_report.verdicts import at_most_of_groups
-from bench.hits_report.worst import keep
+from bench.hits_report.worst import keep, worst
+from bench.main import build_parser
 from bench.recoveries.hits import RecoveryCase, work_out
 from companion.companion import StepResult
 
 pytestmark = pytest.mark.slow
+
+MIDDLE = {name: 0.5 * (low + high) for name, (low, high) in {**MEETING, **VEHICLE}.items()} | {"approach": 0}
 
 
 def judged(case: FlownHit) -> dict:
@@ -188,22 +202,68 @@ def test_a_page_of_verdicts_counts_misses_by_cell_and_names_them():
 
 def test_a_margin_is_smaller_where_the_vehicle_shakes_more_and_below_one_the_hit_is_missed():
     case = SearchCase("foldable", 50, 1, 1)
-    middle = {name: 0.5 * (low + high) for name, (low, high) in {**MEETING, **VEHICLE}.items()}
-    numbers = {**middle, "approach": 0, "speed_m_s": 1.0}
-    quiet, shaken = (
-        margin(case, list({**numbers, "vibration_log": math.log(noise)}.values()))[0] for noise in (0.2, 1.4)
-    )
+    numbers = {**MIDDLE, "speed_m_s": 1.0}
+    quiet, shaken = (margin(case, {**numbers, "vibration_log": math.log(noise)})[0] for noise in (0.2, 1.4))
     assert 1.0 < shaken < quiet
-    slow = margin(case, list({**numbers, "speed_m_s": 0.45}.values()))
-    assert slow[0] == NO_HIT and slow[1] < 0.5
+    least, hit = margin(case, {**numbers, "speed_m_s": 0.45})
+    assert least == NO_HIT and hit["closing_m_s"] < 0.5
+
+
+def test_the_worst_recovery_is_a_fall_then_what_touches_again_or_never_rests_then_what_rests_late():
+    # Given what became of hits, from the worst to the best
+    one = {"found": True, "closing_m_s": 3.0, "tilt_deg": 20.0, "lost_m": 0.1, "again": 0, "rest_s": 2.0}
+    changes = (
+        {"lost_m": 8.0, "closing_m_s": 1.0, "rest_s": None},
+        {"tilt_deg": 95.0, "closing_m_s": 5.2, "rest_s": 1.0},
+        {"rest_s": None},
+        {"again": 1, "rest_s": 4.0},
+        {"again": 2, "rest_s": 1.0},
+        {"rest_s": 4.5},
+        {},
+        {"closing_m_s": 0.45, "lost_m": 8.0},
+    )
+    figures = [how_good({**one, **change}) for change in changes]
+    # Then the least figure is the worst, and a hit that is missed, too slow or never came is none
+    assert figures == sorted(set(figures)) and figures[-1] == NO_HIT
+    assert how_good({**one, "found": False, "lost_m": 8.0}) == how_good({"touched": False}) == NO_HIT
+
+
+def test_a_recovery_of_the_search_is_that_of_the_same_hit_flown_from_the_beginning():
+    case, numbers = SearchCase("rigid", 50, 1, 1, "recovery"), {**MIDDLE, "approach": 3, "speed_m_s": 3.0}
+    _, hit = recovery(case, numbers)
+    # When the obstacle is there from the first
+    approach, scene = begun_with(case, numbers)
+    flight = begun(approach.built, approach.case, velocity_of(approach.case.hit), scene, keeps_path=True)
+    while flight.vehicle.time_boot_us < approach.flight.vehicle.time_boot_us:
+        flight.step()
+    rest_us = to_rest(flight, PATIENCE_S)
+    assert hit["found"] and hit == judged_by_truth(flight.vehicle, flight.guard.collisions(), rest_us)
+
+
+def test_walls_that_lean_over_the_vehicle_are_no_part_of_the_search_and_others_are():
+    case, numbers = SearchCase("foldable", 250, 1, 1, "recovery"), {**MIDDLE, "approach": 2, "speed_m_s": 1.0}
+    away, over = (recovery(case, {**numbers, "second_share": share}) for share in (0.4, 0.6))
+    assert away[1]["found"] and over == (NO_HIT, {})
+
+
+def test_a_bare_worst_is_the_margin_and_its_page_names_all_that_makes_a_hit_again():
+    parse = build_parser().parse_args
+    for words, part in ((["--worst"], "margin"), (["--worst", "recovery"], "recovery"), (["--growth"], "growth")):
+        assert parse(["hits", *words]).part == part
+    options = parse(["hits", "--hits", "60", "--first-seed", "7", "--worst", "recovery"])
+    assert "--hits 60 --first-seed 7 --worst recovery`" in _stamp(options, options.part)
+    hit = {"closing_m_s": 1.234, "latency_ms": 4.0, "tilt_deg": 91.0, "lost_m": 3.0, "again": 1, "rest_s": None}
+    text = "\n".join(worst([SearchCase("rigid", 50, 7, 60, "recovery")], {0: {**hit, "flown": 60, **MIDDLE}}))
+    assert "its seed is 7." in text and "| rest_s | – |" in text and "| closing_m_s | 1.234 |" in text
+    assert "| approach | wall |" in text
+    assert all(f"| {name} | {value:.6g} |" in text for name, value in MIDDLE.items() if name != "approach")
 
 
 def test_a_hit_that_is_kept_is_judged_from_its_bytes_as_it_was_flown(tmp_path):
     # Given a hit that a vehicle found, and one that a vehicle that shakes too much missed
     case = SearchCase("foldable", 50, 1, 1)
-    middle = {name: 0.5 * (low + high) for name, (low, high) in {**MEETING, **VEHICLE}.items()} | {"approach": 0}
     for name, vibration_m_s2, is_found in (("found", 0.2, True), ("missed", 8.0, False)):
-        keep(case, {**middle, "speed_m_s": 1.0, "vibration_log": math.log(vibration_m_s2)}, tmp_path / name)
+        keep(case, {**MIDDLE, "speed_m_s": 1.0, "vibration_log": math.log(vibration_m_s2)}, tmp_path / name)
         # When the corpus' judge reads its bytes, then it comes to the same
         judgement = work_out_bytes(CorpusCase(str(tmp_path / name)))["rates"]["recorded"]
         (hit, *_) = judgement["hits"]
