@@ -53,7 +53,8 @@ class Recover:
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         self._spin_rad_s = 0.0
         self._is_known = not self._law.follows  # whether the motion after the hit is known
-        self._has_left, self._may_fall, self._hangs, self._comes_m_s = False, False, False, 0.0
+        self._has_left, self._may_fall, self._comes_m_s = False, False, 0.0
+        self._hangs, self._has_hung = False, False  # hangs on the obstacle; and has not left it since
         self._agreed: Vector3 | None = None  # the normal from the velocities before and after
         self._planned_for: object = None  # the state of the contact that the plan was made for
         self._plan: Plan | None = None  # None: only accelerations are setpoints
@@ -64,7 +65,7 @@ class Recover:
         if not self._law.follows:
             return Target(self._record.setpoint_ned_m, self._yaw_rad)
         elapsed_s = 1e-6 * (now_us - self._plan_began_us)
-        is_steady = self._is_known and not self._is_spinning and not self._tilts_into_surface()
+        is_steady = not (self._lets_go or self._is_spinning or self._tilts_into_surface()) and self._is_known
         return self._by_plan(elapsed_s) if is_steady else self._by_acceleration(elapsed_s)
 
     def _by_plan(self, elapsed_s: float) -> Target:
@@ -96,10 +97,11 @@ class Recover:
         north, east = (0.0, 0.0) if self._tilts_into_surface() else record.estimator.wind_m_s2
         a, b, c = safe_to_hold(asked, self._tilted_motion.velocity_ned_m_s)
         a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
-        falls = self._is_level and self._may_fall and self._hangs
-        is_free = falls or (self._is_level and not self._is_known)
+        is_free = self._lets_go or (self._is_level and not self._is_known)
         if is_free:
-            c = DESCENT_M_S2 if falls else self._height_m_s2(2.0)
+            c = self._height_m_s2(2.0)
+        if self._lets_go:
+            c = DESCENT_M_S2 if self._hangs else max(c, 0.0)
         # The velocity of the vehicle's own estimate: PX4's vertical loop then adds nothing to the acceleration.
         velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
         expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
@@ -109,6 +111,11 @@ class Recover:
     def _is_level(self) -> bool:
         """Whether the obstacle is upright: the height is then held separately."""
         return self._contact.normal_ned[2] == 0.0
+
+    @property
+    def _lets_go(self) -> bool:
+        """Whether it lets go of an upright obstacle that it hung on: no more thrust than in hover until it leaves."""
+        return self._is_level and self._may_fall and self._has_hung
 
     def _height_m_s2(self, loops: float) -> float:
         record, most_m_s2 = self._record, self._config.vertical_acceleration_m_s2
@@ -164,6 +171,8 @@ class Recover:
                 return self._leave(flight)
         # A vehicle that hangs does so until it no longer tilts into the surface.
         self._hangs = self._tilts_into_surface(PRESSING_TILT_M_S2 if self._hangs else HANGING_TILT_M_S2)
+        off_m_s = split(record.estimator.motion.velocity_ned_m_s, self._contact.normal_ned)[0]
+        self._has_hung = self._hangs or (self._has_hung and off_m_s < 0.0)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._first_hit_us > timeout_s * 1e6:
             record.is_over = True
@@ -247,7 +256,8 @@ class Recover:
         place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
         # Before its motion is known, a touched surface is at the vehicle's position: frames and arms fold.
         goes_along = is_carried or (is_touched and not self._is_known)
-        if goes_along and Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0:
+        is_off = Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0
+        if self._has_hung or (goes_along and is_off):
             place = motion.position_ned_m
         self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
 

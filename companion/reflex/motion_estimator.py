@@ -258,14 +258,12 @@ class MotionEstimator:
         self._summed_m_s, self._acceleration = plus(self._summed_m_s, elapsed_s, pushed), pushed
         self.tilt_m_s2 = tilt_ahead(strapdown, LEAD_S)
         if pushed is not REST:
-            a, b, _ = plus(pushed, -1.0, tilt_ahead(strapdown, 0.0))
-            self.external_m_s2 = plus(
-                self.external_m_s2,
-                elapsed_s / (EXTERNAL_FORCE_S + elapsed_s),
-                plus((a, b, 0.0), -1.0, self.external_m_s2),
-            )
-            (a, b), (n, e, _), share = self.wind_m_s2, self.tilt_m_s2, elapsed_s / (WIND_S + elapsed_s)
-            self.wind_m_s2 = (a + share * (n - pushed[0] - a), b + share * (e - pushed[1] - b))
+            down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
+            a, b, _ = split(plus(pushed, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
+            share = elapsed_s / (EXTERNAL_FORCE_S + elapsed_s)
+            self.external_m_s2 = plus(self.external_m_s2, share, plus((a, b, 0.0), -1.0, self.external_m_s2))
+            (n, e), share = self.wind_m_s2, elapsed_s / (WIND_S + elapsed_s)
+            self.wind_m_s2 = (n - share * (n + a), e - share * (e + b))
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""

@@ -16,7 +16,8 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition
 from companion.mission.model import Mission
-from companion.motion.strapdown import Strapdown
+from companion.motion.rotation import body_to_ned
+from companion.motion.strapdown import GRAVITY_M_S2, Strapdown
 from companion.reflex.config import CONVERGED_M_S, MOST_VELOCITY_ERROR_M_S, TILT_PER_S
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator, blended_normal, tilt_ahead
@@ -380,6 +381,23 @@ def test_a_vehicle_that_slides_along_a_wall_is_not_sent_along_it_by_the_second_h
     record_collision(flight, estimate, 200_000)
     # Then the way it came from says where off is in a first hit alone
     assert flight.collisions[-1].contact.normal_ned == pytest.approx(normal, abs=0.1)
+
+
+@pytest.mark.parametrize("thrust_m_s2", [2.0, 9.81, 15.0])
+@pytest.mark.parametrize("side_m_s2", [0.0, 1.5])
+def test_wind_is_what_pushes_across_the_thrust_however_little_that_is(thrust_m_s2, side_m_s2):
+    # Given a vehicle whose nose is down by 30 degrees, and which something pushes east
+    half_rad = math.radians(-15.0)
+    found, strapdown = reckoned(), Strapdown()
+    strapdown.attitude_wxyz = attitude_wxyz = (math.cos(half_rad), 0.0, math.sin(half_rad), 0.0)
+    n, e, d = body_to_ned(attitude_wxyz, (0.0, side_m_s2, -thrust_m_s2))
+    strapdown.acceleration_ned_m_s2 = (n, e, d + GRAVITY_M_S2)
+    for tick in range(1, 2_000):
+        strapdown.time_boot_us = HIT_US + 4_000 * tick
+        found.imu(strapdown)
+    # Then that is what is leant against, and no part of the thrust
+    assert found.wind_m_s2 == pytest.approx((0.0, -side_m_s2), abs=0.01)
+    assert found.external_m_s2 == pytest.approx((0.0, side_m_s2, 0.0), abs=0.01)
 
 
 def test_the_heading_of_before_the_first_hit_is_kept_through_the_second():

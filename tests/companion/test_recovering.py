@@ -26,17 +26,7 @@ def leans_m_s2(lean_deg: float) -> Vector3:
     return (GRAVITY_M_S2 * math.tan(math.radians(lean_deg)), 0.0, 0.0)
 
 
-def asked(
-    lean_deg: float,
-    height_m: float = 2.0,
-    down_m_s: float = 0.0,
-    attitude: Attitude | None = None,
-    is_fully_measured: bool = False,
-    told_off: bool = False,
-    leant_deg: tuple[float, ...] = (),
-) -> Target:
-    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much; before, by other
-    angles."""
+def begun(height_m: float, attitude: Attitude | None) -> tuple[Recover, FlightContext, MotionEstimator]:
     mission = Mission.model_validate(MISSION)
     flight = FlightContext(mission, Vehicle(), StreamMonitor(mission.companion.streams))
     flight.origin_ned_m = (0.0, 0.0, 0.0)
@@ -46,9 +36,25 @@ def asked(
     flight.collisions.append(
         CollisionRecord(0, HIT_US, "fused", contact, goal, contact.normal_ned, 20.0, HIT_US, estimator)
     )
-    recover, flight.vehicle.attitude = Recover(flight, 0), attitude
+    flight.vehicle.attitude = attitude
+    return Recover(flight, 0), flight, estimator
+
+
+def asked(
+    lean_deg: float,
+    height_m: float = 2.0,
+    down_m_s: float = 0.0,
+    attitude: Attitude | None = None,
+    is_fully_measured: bool = False,
+    told_off: bool = False,
+    leant_deg: tuple[float, ...] = (),
+    off_m_s: float = 0.0,
+) -> Target:
+    """Of a vehicle at a wall in the north that has just been hit, and leans towards it by so much; before, by other
+    angles."""
+    recover, flight, estimator = begun(height_m, attitude)
     estimator.note_contact(is_fully_measured, HIT_US)
-    sample = LocalPosition(HIT_US + SINCE_US, contact.position_ned_m, (0.0, 0.0, down_m_s))
+    sample = LocalPosition(HIT_US + SINCE_US, (3.0, 0.0, -height_m), (-off_m_s, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
     recover.step(flight, Inputs(positions=[sample]), SINCE_US)
     if told_off:
@@ -91,6 +97,37 @@ def test_a_vehicle_hangs_until_it_does_not_lean_on_the_obstacle_any_more(leant_d
     target = asked(lean_deg, is_fully_measured=True, leant_deg=leant_deg)
     assert target.acceleration_ned_m_s2 is not None
     assert (target.acceleration_ned_m_s2[2] == DESCENT_M_S2) is hangs
+
+
+@pytest.mark.parametrize(
+    ("leant_deg", "off_m_s", "climbs"), [((), -0.1, True), ((30.0,), -0.1, False), ((30.0,), 0.3, True)]
+)
+def test_what_has_hung_does_not_climb_before_it_leaves(leant_deg, off_m_s, climbs):
+    # Given a vehicle that falls beside the wall, level again
+    mission = Mission.model_validate(MISSION)
+    target = asked(0.0, 3.0, 1.0, is_fully_measured=True, leant_deg=leant_deg, off_m_s=off_m_s)
+    assert mission.recovery.vertical_acceleration_m_s2 == 3.0 and target.acceleration_ned_m_s2 is not None
+    # Then it is braked at once, or, where it hung, when it leaves by more than noise: an overhang is above it
+    assert target.acceleration_ned_m_s2[2] == pytest.approx(-3.0 if climbs else 0.0)
+    assert target.is_height_free is not climbs
+
+
+def test_the_surface_goes_along_with_what_hangs_on_it():
+    # Given a vehicle that slides down an overhang: at each report it is 0.15 m further in
+    mission = Mission.model_validate(MISSION)
+    for lean_deg, asks_off in ((30.0, True), (-5.0, False)):
+        recover, flight, estimator = begun(5.0, None)
+        estimator.note_contact(True, HIT_US)
+        for step in range(1, 7):
+            place = (3.0 + 0.15 * step, 0.0, -5.0)
+            estimator.tilt_m_s2 = leans_m_s2(lean_deg)
+            at_us = SINCE_US + 20_000 * step
+            recover.step(flight, Inputs(positions=[LocalPosition(HIT_US + at_us, place, (0.5, 0.0, 0.5))]), at_us)
+        target = recover.target(at_us)
+        assert target is not None and target.acceleration_ned_m_s2 is not None
+        # Then it is kept off where it is now. What it only passed counts for nothing.
+        hard_m_s2 = 2.0 * mission.recovery.acceleration_m_s2
+        assert (target.acceleration_ned_m_s2[0] == pytest.approx(-hard_m_s2)) is asks_off
 
 
 LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
