@@ -196,7 +196,9 @@ class Recover:
         since_us = sample.time_boot_us - record.sample_time_boot_us
         self._is_known = was_known or (record.estimator.has_converged and since_us >= MOTION_KNOWN_US)
         is_rebound = sample.time_boot_us <= record.contact_ended_boot_us + REBOUND_WINDOW_US
-        if self._is_known and (is_rebound or not was_known):
+        # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
+        is_measured = record.estimator.earlier is None
+        if self._is_known and is_measured and (is_rebound or not was_known):
             after = record.estimator.corrected(sample).velocity_ned_m_s
             self._agreed = consistent_normal(record.normal_ned, record.contact.velocity_ned_m_s, after)
         return self._is_known
