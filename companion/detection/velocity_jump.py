@@ -23,7 +23,7 @@ LONGEST_STEP_US = 75_000
 # 10 Hz with the jitter of a log. Velocities further apart are not compared.
 LONGEST_SLOW_STEP_US = 130_000
 # Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz. So many steps
-# make one good to a fifth, as each has three axes: before that it is not used.
+# make one good to an eighth, as each has three axes: before that it is not used.
 MEMORY, RISE = 100, 10
 # Weight of each sample in the share of unsampled time: ten samples are half a second at the slowest useful rate.
 UNSEEN_SHARE = 0.1
@@ -48,7 +48,6 @@ class VelocityJump:
     averaging_us: int
     rates_frd_rad_s: Vector3 = ZERO
     newest_rate_step_rad_s: float = 0.0
-    rate_step_rad_s: float = 0.0
     rate_step_frd_rad_s: Vector3 = ZERO
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
@@ -74,8 +73,7 @@ class VelocityJump:
             unseen = max(0.0, 1.0 - self.averaging_us / elapsed_us)
             self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
             step = self.newest_rate_step_rad_s = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
-            if step > self.rate_step_rad_s or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
-                self.rate_step_rad_s = step
+            if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_frd_rad_s = _less(rates_frd_rad_s, self.rates_frd_rad_s)
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
         self.rates_frd_rad_s = rates_frd_rad_s
@@ -136,7 +134,8 @@ class VelocityJump:
 
     def rate_step_near(self, velocity_us: int) -> float:
         """The largest rate jump, rad/s, that a velocity jump at ``velocity_us`` may belong to; 0 without one."""
-        return self.rate_step_rad_s if velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US else 0.0
+        is_near = velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US
+        return math.hypot(*self.rate_step_frd_rad_s) if is_near else 0.0
 
     def no_motor_turns(self, velocity_us: int, least_rad_s: float) -> bool:
         """Whether that rate jump exceeds `least_rad_s` and what motors make between two samples; a third about yaw."""

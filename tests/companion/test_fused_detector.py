@@ -8,7 +8,9 @@ import pytest
 
 from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
+from companion.detection.fused_state import FusedState
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
+from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
 from companion.motion.inertial import Inertial
 
@@ -157,6 +159,37 @@ def test_velocities_ten_times_a_second_show_a_large_step_that_no_sample_showed(s
     jump = (3_002_000, (step_m_s, 0.0, 0.0), 0)
     impacts = Flight(imu_every_us=20_000, slower=3, jump=jump).fly()
     assert [i.evidence for i in impacts] == [Evidence.VELOCITY_JUMP] * hits
+
+
+@pytest.mark.parametrize(("turn_frd_rad_s", "is_hit"), [((3.4, 0.0, 0.0), False), ((0.0, 0.0, 3.4), True)])
+def test_motors_turn_a_vehicle_a_third_as_fast_about_yaw(turn_frd_rad_s, is_hit):
+    jump = VelocityJump(averaging_us=1_000)
+    for time_us, rates in ((0, (0.0, 0.0, 0.0)), (20_000, turn_frd_rad_s)):
+        jump.imu(time_us - 20_000, time_us, rates)
+    assert jump.no_motor_turns(30_000, 2.0) is is_hit
+
+
+def test_a_spread_counts_when_it_is_good_to_an_eighth():
+    # Given ten steps on three axes: 1 / sqrt(2 * 3 * 10) is 0.13 of a standard deviation
+    jump = VelocityJump(averaging_us=1_000, variance_m2_s2=0.04)
+    for known, spread_m_s in ((9, math.inf), (10, 0.2)):
+        jump.known = known
+        assert jump.spread_m_s == spread_m_s
+
+
+def test_beside_a_turn_that_no_motor_makes_half_of_the_vibration_counts():
+    # Given a vehicle that shakes by 2 m/s^2 more than a calm one, and half of whose time no sample sees
+    detector, state = FusedDetector(FusedConfig(), 1_000), FusedState()
+    calm = FusedConfig().side_threshold_m_s2 / FusedConfig().noise_factor
+    state.floor.side_m_s2, state.jump.unseen_share = calm + 2.0, 0.5
+    seen_m_s = detector._least_jump_m_s(state, 30_000, 0.0, True)
+    unseen_m_s = state.jump.unseen_m_s(2.0, abs(state.soft.last[2] - state.floor.z))
+    # When it turns about yaw as no motor turns it
+    state.jump.rate_step_frd_rad_s = (0.0, 0.0, 1.9)
+    state.jump.rate_step_from_us, state.jump.rate_step_until_us = 16_000, 20_000
+    turned_m_s = detector._least_jump_m_s(state, 30_000, 0.0, True)
+    # Then the same step needs less room by half of that
+    assert unseen_m_s > 0.0 and seen_m_s - turned_m_s == pytest.approx(0.5 * unseen_m_s)
 
 
 @pytest.mark.parametrize(

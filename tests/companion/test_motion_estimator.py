@@ -131,6 +131,14 @@ def test_a_report_from_before_the_hit_moves_no_estimate(is_whole):
     assert found.motion != before
 
 
+def test_a_report_after_a_second_hit_counts_at_once():
+    # Given a second hit whose velocity before is an estimate: a report that is like it says nothing of being late
+    found = reckoned((3.0, 0.0, 0.0), earlier=reckoned())
+    before = found.motion
+    found.update(said(2.9, 40_000))
+    assert found.motion != before
+
+
 def test_part_of_a_hit_that_is_missing_is_found_too():
     # Given arms that met their stops, of which 0.7 m/s of 2.4 m/s are missing
     *_, (_, true_m_s, _, found) = followed(PX4, 2.0, 0.2, hides=0.3, until_s=1.0)
