@@ -30,6 +30,8 @@ class GuardsConfig(StrictModel):
 class EstimateConfig(StrictModel):
     """Numbers of the estimate of a collision."""
 
+    retired = frozenset({"jerk_density_m2_s5"})
+
     inertial: bool = True
     """v_c with the accelerometer's help (see estimate.approach); off: from velocities alone."""
 
@@ -47,9 +49,6 @@ class EstimateConfig(StrictModel):
     """+-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g."""
     position_noise_m: Positive = 0.03
     """Of a good flow or motion-capture estimate, within the half second that v_c is found from."""
-    jerk_density_m2_s5: Positive = 4.0
-    """White-jerk density: a go_to's 2 m/s^2 may come or go within any second, (2 m/s^2)^2 / 1 s. It leaves
-    0.02 m/s of noise in cruise and follows an acceleration that ended 0.1 s before the hit to 0.04 m/s."""
 
     @property
     def fits_arms(self) -> bool:

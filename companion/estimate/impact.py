@@ -2,12 +2,12 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.estimate.approach import ALONE_US, Approach, position_at, velocity_alone
+from companion.estimate.approach import ALONE_US, position_at, velocity_alone, velocity_at
 from companion.estimate.config import EstimateConfig
 from companion.estimate.contact_force import ContactForce, unit
 from companion.estimate.facing import final_normal, plausible_normal
@@ -15,7 +15,7 @@ from companion.estimate.normal import IS_AVAILABLE, Search, advance_search, begi
 from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
-from companion.motion.inertial import Inertial, VelocityFix
+from companion.motion.inertial import Inertial
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import ZERO
 
@@ -74,7 +74,6 @@ class ImpactEstimator:
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
     validity: VelocityValidity = field(default_factory=VelocityValidity)
-    approach: Approach = field(init=False)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
@@ -85,9 +84,6 @@ class ImpactEstimator:
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
     clipping_counts: tuple[int, int, int] | None = None
-
-    def __post_init__(self) -> None:
-        self.approach = Approach(self.config)
 
     @property
     def fits_normal(self) -> bool:
@@ -109,7 +105,6 @@ class ImpactEstimator:
             self.inertial.velocity(sample)
             if self.inertial.has_new_fix:
                 self.validity.update(self.inertial.fixes, self.inertial.strapdown.level_acceleration_m_s2)
-                self._approach(self.inertial.fixes)
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
@@ -121,18 +116,6 @@ class ImpactEstimator:
             return
         if self.contact is not None:
             self._advance_search(self.contact)
-
-    def _approach(self, fixes: Sequence[VelocityFix]) -> None:
-        """Take the newest velocity for v_c, unless it may contain the latest contact. A gap restarts the filter."""
-        if len(fixes) == 1:
-            self.approach = Approach(self.config)
-        if self.contact_ended_boot_us is None or fixes[-1].time_boot_us > self.contact_ended_boot_us + REST_US:
-            self.approach.take(fixes[-1])
-
-    def _note_contact(self, boot_us: int) -> None:
-        """The contact goes on: the filter of the next v_c restarts after it."""
-        if boot_us != self.contact_ended_boot_us:
-            self.contact_ended_boot_us, self.approach = boot_us, Approach(self.config)
 
     def _advance_search(self, contact: ContactForce) -> None:
         """Begin the search for the normal when its messages are complete; continue it with each message."""
@@ -173,7 +156,7 @@ class ImpactEstimator:
         self.situation = situation
         self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
         self.search, self.is_over = None, False
-        self._note_contact(sample_us)
+        self.contact_ended_boot_us = sample_us
         self.validity.invalidate(sample_us)
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
@@ -226,7 +209,7 @@ class ImpactEstimator:
         if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
         if not self.is_over:
-            self._note_contact(state.last_loud_boot_us)
+            self.contact_ended_boot_us = state.last_loud_boot_us
             self.is_over = state.phase is not Phase.CONTACT
             if contact is not None and sample.time_boot_us > contact.time_boot_us:
                 loud = state.last_loud_boot_us == sample.time_boot_us
@@ -300,4 +283,6 @@ class ImpactEstimator:
         time_us, u, a = before
         ahead_s = (contact_us - time_us) * 1e-6
         at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
-        return self.approach.velocity_at(contact_us, at_contact)
+        ended_us = self.contact_ended_boot_us
+        fixes = [fix for fix in self.inertial.fixes if ended_us is None or fix.time_boot_us > ended_us + REST_US]
+        return velocity_at(fixes, contact_us, at_contact, self.config)
