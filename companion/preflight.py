@@ -236,20 +236,12 @@ def _judged(
 
 def findings(survey: Survey) -> list[PreflightItem]:
     """All items, in the order in which they would be mended."""
-    found = [_frame(survey), *_rotors(survey), *_port(survey), *_delivery(survey), *_streams(survey)]
+    found = [*_rotors(survey), *_port(survey), *_delivery(survey), *_streams(survey)]
     for name, judge in _SETTINGS.items():
         value = survey.parameters.get(name)
         unread = PreflightItem(name, DOUBTFUL, "the vehicle did not tell it", "ask again over a better link")
         found.append(unread if value is None else judge(name, value, survey))
     return [*found, *_estimate(survey), *_vibration(survey), _time(survey), _battery(survey), *_sight(survey)]
-
-
-def _frame(survey: Survey) -> PreflightItem:
-    """HEARTBEAT tells how many arms there are, not where: a quadrotor is taken for an X."""
-    kind = "" if survey.vehicle.identity is None else survey.vehicle.identity.vehicle_type
-    remedy = "companion.estimate.fits_normal: false in the mission: the normal is the push's direction then"
-    is_fitted = kind != "quadrotor" and survey.config.estimate.fits_arms
-    return _judged("frame", kind, (is_fitted, DOUBTFUL, remedy), beyond=": a hit's normal is fitted for a quad-x")
 
 
 def _rotors(survey: Survey) -> Iterator[PreflightItem]:
@@ -268,12 +260,12 @@ def _rotors(survey: Survey) -> Iterator[PreflightItem]:
     off_m = max(math.dist((abs(x), abs(y)), (along_m, along_m)) for x, y in rotors)
     middle_m = sum(math.hypot(*rotor) for rotor in rotors) / count
     remedy = "measure; then correct CA_ROTORn_PX, _PY or companion.estimate.guards.centre_m"
-    # Further off than a guard is wide, a touch is taken for another arm's.
+    # Further off than a guard is wide, surfaces are remembered where they are not.
     yield _judged(
         "rotors",
         f"{middle_m:.2f} m from the middle by PX4, {guards.centre_m:g} m by companion.estimate.guards",
-        (survey.config.estimate.fits_arms and off_m > guards.radius_m, DOUBTFUL, remedy),
-        beyond=f"; one is {off_m:.2f} m from where the fit has it",
+        (off_m > guards.radius_m, DOUBTFUL, remedy),
+        beyond=f"; one is {off_m:.2f} m from where that has it",
     )
 
 

@@ -29,7 +29,7 @@ from rebound_cli.results.ending import ending_text
 from rebound_cli.results.run_folder import FlightRecorder
 from rebound_cli.results.summary import FlightFacts, Flown, build_summary
 from rebound_cli.results.truth_match import FlightTruth
-from rebound_cli.simulation.compiling import prepare_companion, prepare_vehicle
+from rebound_cli.simulation.compiling import prepare_vehicle
 from rebound_cli.simulation.vehicle_process import READY_WORDS, VehicleProcess
 
 # Where PX4's SITL sends its onboard streams unasked, plus its instance.
@@ -73,7 +73,6 @@ def run_fly(options: Namespace) -> int:
         raise ConfigurationError("--wait with --yes would arm a vehicle whenever it appears: leave one of them out.")
     run_folder.check_place(options.out)
     with console_for(options.json, Background("console")) as console:
-        prepare_companion(console, mission.companion)
         if world is not None and options.lockstep:
             prepare_vehicle(console, world)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.

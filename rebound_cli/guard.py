@@ -22,7 +22,6 @@ from rebound_cli.live.status import served
 from rebound_cli.report.offering import offer_report
 from rebound_cli.results import run_folder
 from rebound_cli.results.run_folder import FlightRecorder
-from rebound_cli.simulation.compiling import prepare_companion
 
 
 def run_guard(options: Namespace) -> int:
@@ -30,7 +29,6 @@ def run_guard(options: Namespace) -> int:
     config = guard_config(options)
     run_folder.check_place(options.out)
     with console_for(False, Background("console")) as console:
-        prepare_companion(console, config.companion)
         # The address is tried before anything is written: a wrong one leaves no empty folder behind.
         connection = open_signed(options, config.companion.link.wait)
         manager = service_manager()

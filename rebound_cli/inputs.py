@@ -1,6 +1,5 @@
 """From a mission file and the command line's options to validated models."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,19 +102,10 @@ def with_guards(data: Mapping[str, Any], airframe: Airframe) -> Mapping[str, Any
 
 
 def guards_of(airframe: Airframe) -> dict[str, Any]:
-    """What its owner writes into `companion.estimate.guards`, from a ruler and a scale: to a tenth of a millimetre."""
-    arms, frame = airframe.arms, airframe.geometry
-    guards = {
-        "centre_m": round(frame.motor_radius_m, 4),
-        "radius_m": frame.guard_radius_m,
-        "height_m": frame.guard_height_m,
-        "gyration_frd_m": [round(math.sqrt(inertia / airframe.mass_kg), 4) for inertia in airframe.inertia_kg_m2],
-    }
-    if not arms.fold_max_m or not arms.stiffness_per_s2:
-        return guards
-    # An airframe's are two arms'.
-    springs = {"stiffness_per_s2": arms.stiffness_per_s2 / 2.0, "damping_per_s": arms.damping_per_s / 2.0}
-    return {**guards, **springs, "travel_m": arms.fold_max_m}
+    """What its owner writes into `companion.estimate.guards`, from a ruler: to a tenth of a millimetre."""
+    frame = airframe.geometry
+    centre_m = round(frame.motor_radius_m, 4)
+    return {"centre_m": centre_m, "radius_m": frame.guard_radius_m, "height_m": frame.guard_height_m}
 
 
 def read_obstacles(document: Document) -> None:

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from companion.estimate.contact_force import unit
-from companion.estimate.facing import plausible_normal
 from companion.reflex.planner import REST
 
 Arguments = tuple[Any, ...]
@@ -67,7 +65,6 @@ RULES = (
     ),
     Rule("leaning", "a lean that moves nothing is a hit", _HORIZONTAL + "step", _says(None)),
     Rule("pressing", "thrust that lifts nothing is a hit", _VERTICAL + "step", _says(None)),
-    Rule("fit of arms", "the normal by a fit", _ESTIMATE + "impact:ImpactEstimator.fits_normal", _says(False)),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule(
         "attitude by rates",
@@ -81,15 +78,7 @@ RULES = (
         _ESTIMATE + "validity:VelocityValidity.is_valid",
         _says(True),
     ),
-    Rule(
-        "agreed normal", "the normal by the change of velocity", _FLIGHT + "recovering:consistent_normal", _argument(0)
-    ),
-    Rule(
-        "half way",
-        "the first normal half way to the way back",
-        _REFLEX + "motion_estimator:blended_normal",
-        _argument(0),
-    ),
+    Rule("change", "the normal by the change of velocity", _FLIGHT + "collision:with_change", _argument(0)),
     Rule(
         "comes after",
         "what comes after the vehicle is behind it",
@@ -118,15 +107,6 @@ RULES = (
         _says(REST),
     ),
     Rule("spinning", "gentle steering while it spins", _FLIGHT + "recovering:Recover._is_spinning", _says(False)),
-    Rule("way back", "the way back where a push has no direction", _ESTIMATE + "facing:plausible_normal", _argument(1)),
-    Rule(
-        "blurred push",
-        "the last normal half way to the way back",
-        _ESTIMATE + "facing:final_normal",
-        lambda arguments, found: plausible_normal(
-            arguments[0], arguments[1] or unit(arguments[0].impulse_ned_m_s), arguments[2]
-        ),
-    ),
     Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "obstacle_map:remembered_surfaces", _says([])),
     Rule("climb", "brakes a climb", _REFLEX + "planner:height_feedback", _says(0.0)),
 )

@@ -61,5 +61,5 @@ def _hit(hit: Hit, told: ImpactEstimate | None) -> dict[str, Any]:
     return row | {
         "latency_ms": round(1e-3 * (told.impact.sample_time_boot_us - hit.contact_at_boot_us), 3),
         "velocity_error_m_s": round(math.dist(told.velocity_ned_m_s, hit.impact_velocity_ned_m_s), 4),
-        "normal_error_deg": round(angle_deg(told.normal_ned, hit.normal_ned), 2),
+        "normal_error_deg": round(angle_deg(told.normal.direction_ned, hit.normal_ned), 2),
     }

@@ -13,7 +13,6 @@ from bench.detectors.vehicles import BenchVehicle, vehicle_of
 from bench.detectors.watching import (
     ASKED_HZ,
     SWEPT_FACTORS,
-    alarms_only,
     configuration,
     streams_asked_hz,
     watch_all,
@@ -74,7 +73,7 @@ def _reports(case: FlightCase, vehicle: BenchVehicle, flown: FlownHealthy, wire:
     index_at = {step.time_boot_us: step.index for step in arrived}
     detectors: dict[str, Any] = {}
     for name in case.detectors:
-        found, touches, blind = watch_all(alarms_only(name, vehicle.settings), arrived, situations)
+        found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, situations)
         entry: dict[str, Any] = {
             "alarms": [_told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.final.kind) for f in found],
             "touches": len(touches),

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bench.detectors.watching import alarms_only
+from bench.detectors.watching import configuration
 from companion.errors import ReboundError
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Vector3
 from companion.motion.rotation import body_to_ned
@@ -100,7 +100,7 @@ def work_out_healthy(case: HealthyCase) -> dict[str, Any]:
     for rate, asked_hz in RECORDED_RATES.items():
         detectors = {}
         for name in case.detectors:
-            findings = watch_log(log, alarms_only(name), asked_hz)
+            findings = watch_log(log, configuration(name), asked_hz)
             detectors[name] = {
                 "collisions": [[log.seconds(f.at_us), f.final.kind.value] for f in findings.collisions],
                 "touches": [[log.seconds(f.at_us), f.final.kind.value] for f in findings.contacts],
@@ -144,7 +144,7 @@ def work_out_injected(case: InjectedCase) -> dict[str, Any]:
     for rate, asked_hz in RECORDED_RATES.items():
         detectors: dict[str, Any] = {}
         for name in case.detectors:
-            collisions = watch_log(struck, alarms_only(name), asked_hz).collisions
+            collisions = watch_log(struck, configuration(name), asked_hz).collisions
             times = [f.at_us for f in collisions]
             late = [time - hit_us for time in times if 0 <= time - hit_us <= FOUND_WITHIN_S * 1e6]
             detectors[name] = {"false": sum(time < hit_us for time in times)}

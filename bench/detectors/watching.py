@@ -51,17 +51,11 @@ def configuration(detector: str, settings: Mapping[str, Any] = DEFAULTS, factor:
     """The vehicle's settings with the detector's name, and its thresholds times `factor`."""
     if factor == 1.0:
         return BaselineConfig.model_validate({**settings, "detector": detector})
-    config = alarms_only(detector, settings)
+    config = configuration(detector, settings)
     own = getattr(config, detector)
     changes = {name: factor * getattr(own, name) for name in swept_fields(detector)}
     swept = type(own).model_validate({**own.model_dump(), **changes})
     return config.model_copy(update={detector: swept})
-
-
-def alarms_only(detector: str, settings: Mapping[str, Any] = DEFAULTS) -> BaselineConfig:
-    """Its settings where nobody asks which way a collision pushed: some detectors report thousands."""
-    config = configuration(detector, settings)
-    return config.model_copy(update={"estimate": config.estimate.model_copy(update={"fits_normal": False})})
 
 
 def swept_fields(detector: str) -> tuple[str, ...]:

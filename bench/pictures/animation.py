@@ -25,7 +25,7 @@ FRAME_S = 0.05
 WIDTH_PX, HEIGHT_PX, DPI = 800, 460, 100
 # Shown of the surroundings of the touch, behind and beyond it and to either side: a vehicle and a half.
 VIEW_M = (0.75, 0.25, 0.45)
-# An arm that has folded by this share of its travel is drawn as folding: what it rests at after a hit is less.
+# An arm that has folded by this share of the most in the hit is drawn as folding: what it rests at after it is less.
 FOLDS = 0.1
 # Arms as PX4 counts the motors of a quad-x; body forward, right.
 _ARMS = np.array([(1, 1), (-1, -1), (1, -1), (-1, 1)]) / np.sqrt(2.0)
@@ -139,7 +139,7 @@ class Frame:
             reach_m = guards.centre_m - fold_m
             end = centre + self._in_world((reach_m * ahead, reach_m * aside, 0.0))
             axis.plot([centre[0], end[0]], [centre[up], end[up]], zorder=3, **_ARM)
-            colour = DETECTED if fold_m > FOLDS * guards.travel_m else "tab:blue"
+            colour = DETECTED if fold_m > FOLDS * self._hit.max_fold_m else "tab:blue"
             ring = [self._in_world((guards.radius_m * c, guards.radius_m * s, 0.0)) for c, s in _ROUND]
             outline = end + np.array(ring)
             axis.plot(outline[:, 0], outline[:, up], color=colour, linewidth=2.0, zorder=3)

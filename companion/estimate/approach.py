@@ -22,12 +22,12 @@ from companion.motion.inertial import VelocityFix, less_sum
 POSITIONS_US = 100_000
 # Standard deviation of the drift, m/s^2: 0.05 m/s^2 of bias and 3 mrad of g on each axis, with some reserve.
 BIAS_M_S2 = 0.08
-# Without the accelerometer: the acceleration is within the limits of a vehicle, about 0.3 g. Older velocities than this
-# are of no use; 25 are enough.
-LIMITS_M_S2, ALONE_US = 3.0, 500_000
+# Without the accelerometer: the acceleration is within the limits of a vehicle, about 0.3 g, and a straight line
+# follows its changes in this time. Errors last as long, so older velocities would hardly help.
+LIMITS_M_S2, ALONE_US = 3.0, 250_000
 # Accelerometer and velocities contradict each other where they differ by this many standard deviations (RMS): an
-# attitude or an accelerometer is wrong.
-CONTRADICTING = 3.0
+# attitude or an accelerometer is wrong. One of 236 hits of drawn vehicles comes to this.
+CONTRADICTING = 2.0
 
 
 def velocity_at(

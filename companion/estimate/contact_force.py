@@ -3,8 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-from companion.estimate.hypotheses import LOOKED_AT_US, Touch
-from companion.messages import Attitude, ImuSample, Quaternion, Vector3
+from companion.messages import ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import ZERO
 
@@ -20,8 +19,6 @@ CLIPPED_SHARE = 1.0 / 3.0
 # peak, or in another direction, does not count.
 SHORT = 2
 LASTING_SHARE = 1.0 / 3.0
-# Messages of one loop of the link come in any order, with time stamps some milliseconds apart.
-LATE_US = 3_000
 
 
 @dataclass(slots=True)
@@ -35,22 +32,13 @@ class ContactForce:
     range_m_s2: float
     started_boot_us: int
     """Latest time without contact."""
-    earlier: ImuSample | None = None
-    """The sample before the contact's first."""
-    attitudes: list[Attitude] = field(default_factory=list)
-    """From before the contact on."""
     time_boot_us: int = 0
     heard_boot_us: int = 0
     """Time of the latest IMU sample, also after the contact."""
-    told_boot_us: int = 0
-    """Time of the latest sample or attitude."""
-    first_boot_us: int = 0
     rates_frd_rad_s: Vector3 = ZERO
     first_rates_frd_rad_s: Vector3 = ZERO
     impulse_ned_m_s: Vector3 = ZERO
     unconfirmed_ned_m_s: Vector3 = ZERO
-    shown: list[ImuSample] = field(default_factory=list)
-    """Samples for the fit: those up to the first that may be clipped, or all where the first one may be."""
     last_ned_m_s2: Vector3 = ZERO
     peak_m_s2: float = 0.0
     loud_frd_m_s2: list[Vector3] = field(default_factory=list)
@@ -58,9 +46,7 @@ class ContactForce:
     loud_boot_us: int = 0
     closed: bool = False
     clipped: bool = False
-    clipped_late: bool = False
-    """Clipping in the whole contact, also after `closed`."""
-    clipped_at_once: bool = False
+    """In the whole contact, also after `closed`."""
     gap: bool = False
     begun_boot_us: int | None = None
 
@@ -72,9 +58,8 @@ class ContactForce:
         first = self.time_boot_us == 0
         elapsed_us = now_us - (self.started_boot_us if first else self.heard_boot_us)
         contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
-        self.heard_boot_us = self.told_boot_us = now_us
-        clips = max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
-        self.clipped_late = self.clipped_late or clips
+        self.heard_boot_us = now_us
+        self.clipped = self.clipped or max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
         if not first and now_us - self.loud_boot_us > max(QUIET_US, 2 * self.averaging_us):
             self.closed = True
         if self.closed:
@@ -95,32 +80,9 @@ class ContactForce:
             sums[2] + over_s * (last[2] + ned[2]),
         )
         self.rates_frd_rad_s = w
-        if first:
-            self.first_boot_us = now_us
-        self.clipped = self.clipped or clips
-        self.clipped_at_once = self.clipped_at_once or (first and self.clipped)
-        if (not self.clipped or self.clipped_at_once) and now_us - self.first_boot_us <= LOOKED_AT_US:
-            self.shown.append(sample)
         if loud:
             self._confirm(now_us, frd, contiguous)
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
-
-    def update(self, attitude: Attitude) -> None:
-        """Take one attitude."""
-        self.told_boot_us = attitude.time_boot_us
-        if attitude.time_boot_us - self.first_boot_us <= LOOKED_AT_US:
-            self.attitudes.append(attitude)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether all messages for the fit have come."""
-        return self.told_boot_us - self.first_boot_us > LOOKED_AT_US + LATE_US
-
-    @property
-    def touch(self) -> Touch:
-        """The messages for the fit of the normal."""
-        earlier = [] if self.earlier is None else [self.earlier]
-        return Touch(self.free_frd_m_s2, earlier + self.shown, self.attitudes, self.clipped_at_once)
 
     def _confirm(self, now_us: int, force_frd_m_s2: Vector3, contiguous: bool) -> None:
         """Count the sample, and all since the last one above the threshold, as contact."""
@@ -151,20 +113,9 @@ class ContactForce:
         x, y, z = max(self.loud_frd_m_s2, key=lambda force: math.hypot(*force), default=ZERO)
         least = LASTING_SHARE * (x * x + y * y + z * z)
         lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.loud_frd_m_s2)
-        return not self.clipped_late and lasting > SHORT
-
-    @property
-    def is_blurred(self) -> bool:
-        """Whether the force's direction is that of a few clipped samples."""
-        return self.clipped and len(self.loud_frd_m_s2) <= SHORT
+        return not self.clipped and lasting > SHORT
 
     def turn_rad_s(self) -> float:
         """Change of the body rates since the contact's first sample, rad/s."""
         w, first = self.rates_frd_rad_s, self.first_rates_frd_rad_s
         return math.sqrt((w[0] - first[0]) ** 2 + (w[1] - first[1]) ** 2 + (w[2] - first[2]) ** 2)
-
-
-def unit(vector: Vector3) -> Vector3:
-    """Unit vector; zero for a zero vector."""
-    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    return (vector[0] / length, vector[1] / length, vector[2] / length) if length > 1e-9 else (0.0, 0.0, 0.0)

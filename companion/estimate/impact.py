@@ -2,16 +2,14 @@
 
 import math
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.estimate.approach import ALONE_US, position_at, velocity_alone, velocity_at
 from companion.estimate.config import EstimateConfig
-from companion.estimate.contact_force import ContactForce, unit
-from companion.estimate.facing import final_normal, plausible_normal
-from companion.estimate.normal import IS_AVAILABLE, Search, advance_search, begin_search
+from companion.estimate.contact_force import ContactForce
+from companion.estimate.normal import Normal, normal_of
 from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
@@ -29,8 +27,6 @@ CLIPPING_TOLD_US = 2_100_000
 LATE_SAMPLES = 3
 # Integrals kept: the first velocity that shows a hit comes up to 0.17 s after it (see `approach`), at 400 Hz.
 SUMS_KEPT = 80
-# Enough for one from before the contact, at up to 250 Hz.
-ATTITUDES_KEPT = 16
 # Kinds that are not classified again: unknown, and a soft contact.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
@@ -40,7 +36,7 @@ class ImpactEstimate:
     """One impact. Times are the vehicle's boot clock, vectors local NED, SI.
 
     `time_boot_us` is t_c, good to `time_error_us` either way; `velocity_ned_m_s` is v_c, the velocity just before
-    it, and `velocity_error_m_s` its standard deviation on an axis. `normal_ned` is the unit direction out of the
+    it, and `velocity_error_m_s` its standard deviation on an axis. `normal` is the direction out of the
     obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
     IMU sample. `is_lower_bound`: the sensor clipped, or part of the contact was not seen, and both may be larger.
     `may_be_clipped`: the sensor's range may not have been enough, and then the vehicle's own estimate lacks what it did
@@ -53,7 +49,7 @@ class ImpactEstimate:
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
     velocity_error_m_s: float
-    normal_ned: Vector3
+    normal: Normal
     peak_specific_force_m_s2: float
     impulse_m_s: float
     is_lower_bound: bool
@@ -72,23 +68,16 @@ class ImpactEstimator:
     history: MotionHistory = field(default_factory=MotionHistory)
     inertial: Inertial = field(default_factory=Inertial)
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
-    attitudes: deque[Attitude] = field(default_factory=lambda: deque(maxlen=ATTITUDES_KEPT))
     validity: VelocityValidity = field(default_factory=VelocityValidity)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
     contact: ContactForce | None = None
-    search: Search | None = None
-    run_search: Callable[[Search], Search] = advance_search  # runs one piece of the search with each message
-    is_over: bool = False
+    came_ned_m_s: Vector3 = ZERO
+    """v_c, where the vehicle's estimate is valid: zero in a hit that follows another that clipping hid a part of."""
     situation: Situation | None = None
     contact_ended_boot_us: int | None = None
     clipping_counts: tuple[int, int, int] | None = None
-
-    @property
-    def fits_normal(self) -> bool:
-        """Whether the normal is fitted: the arms fold, and the extra [fit] is installed."""
-        return self.config.fits_arms and IS_AVAILABLE
 
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
@@ -109,33 +98,6 @@ class ImpactEstimator:
             self._clipped(sample)
         elif isinstance(sample, Attitude):
             self.inertial.attitude(sample, self.validity.is_attitude_valid(sample.time_boot_us))
-            self.attitudes.append(sample)
-            if self.contact is not None:
-                self.contact.update(sample)
-        else:
-            return
-        if self.contact is not None:
-            self._advance_search(self.contact)
-
-    def _advance_search(self, contact: ContactForce) -> None:
-        """Begin the search for the normal when its messages are complete; continue it with each message."""
-        estimate, search, config = self.estimate, self.search, self.config
-        if estimate is None or not self.fits_normal:
-            return
-        if search is None:
-            if contact.is_complete or self.is_over:
-                velocity, averaging_s = estimate.velocity_ned_m_s, config.imu_averaging_interval_s
-                self.search = begin_search(contact.touch, velocity, config.guards, averaging_s)
-        elif not search.is_over:
-            self.search = self.run_search(search)
-            if self.search.is_over:
-                self.estimate = replace(estimate, normal_ned=self._normal(contact, estimate.velocity_ned_m_s))
-
-    @property
-    def _is_searching(self) -> bool:
-        """Whether the fit of the normal has not ended yet."""
-        is_wanted = self.contact is not None and self.fits_normal
-        return is_wanted and (self.search is None or not self.search.is_over)
 
     def _clipped(self, sample: Vibration) -> None:
         """Take PX4's clipping counts. One that grew since before the contact makes its size a lower bound."""
@@ -155,7 +117,7 @@ class ImpactEstimator:
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
         self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
-        self.search, self.is_over = None, False
+        self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.contact_ended_boot_us = sample_us
         self.validity.invalidate(sample_us)
         self.estimate = estimate = ImpactEstimate(
@@ -165,7 +127,7 @@ class ImpactEstimator:
             position_ned_m=place,
             velocity_ned_m_s=velocity,
             velocity_error_m_s=error_m_s,
-            normal_ned=plausible_normal(self.contact, unit(force_ned), velocity),
+            normal=normal_of(force_ned, self.came_ned_m_s),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_lower_bound=True,
@@ -194,8 +156,6 @@ class ImpactEstimator:
             averaging_us=averaging_us,
             range_m_s2=self.config.accelerometer_range_m_s2,
             started_boot_us=impact.contact_free_until_boot_us,
-            earlier=self.earlier_imu,
-            attitudes=list(self.attitudes),
         )
         contact.add(sample, True)
         return contact
@@ -203,42 +163,22 @@ class ImpactEstimator:
     def follow(self, state: DetectorState) -> ImpactEstimate | None:
         """Take the detector's state after each IMU sample.
 
-        Returns the final estimate, once: when the contact is over and the fit has ended.
+        Returns the final estimate, once: when the contact is over.
         """
         estimate, contact, sample = self.estimate, self.contact, self.imu
         if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
-        if not self.is_over:
-            self.contact_ended_boot_us = state.last_loud_boot_us
-            self.is_over = state.phase is not Phase.CONTACT
-            if contact is not None and sample.time_boot_us > contact.time_boot_us:
-                loud = state.last_loud_boot_us == sample.time_boot_us
-                contact.add(sample, loud)
-                # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-                self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
-                if loud or self.is_over:
-                    self.estimate = self._refined(estimate, contact)
-        return self.close() if self.is_over and not self._is_searching else None
-
-    def close(self) -> ImpactEstimate | None:
-        """The final estimate of a contact that is over, if it was not returned yet; None otherwise.
-
-        Another hit does not wait: the rest of the search runs at once.
-        """
-        if self.estimate is None or self.estimate.is_final or not self.is_over:
-            return None
-        while self.contact is not None and self._is_searching:
-            self._advance_search(self.contact)
-        self.estimate = replace(self.estimate, is_final=True)
-        return self.estimate
-
-    def _normal(self, contact: ContactForce, velocity_ned_m_s: Vector3) -> Vector3:
-        found = None if self.search is None else self.search.normal_ned
-        explains_alone = found is not None and not contact.clipped_at_once
-        if self.is_over and not explains_alone:
-            return final_normal(contact, found, velocity_ned_m_s)
-        # A fit without clipped samples is not averaged with the direction that the vehicle came from.
-        return plausible_normal(contact, found or unit(contact.impulse_ned_m_s), velocity_ned_m_s)
+        self.contact_ended_boot_us = state.last_loud_boot_us
+        is_over = state.phase is not Phase.CONTACT
+        if contact is not None and sample.time_boot_us > contact.time_boot_us:
+            loud = state.last_loud_boot_us == sample.time_boot_us
+            contact.add(sample, loud)
+            # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
+            self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
+            if loud or is_over:
+                estimate = self._refined(estimate, contact)
+        self.estimate = replace(estimate, is_final=is_over)
+        return self.estimate if is_over else None
 
     def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
         velocity, impulse = estimate.velocity_ned_m_s, contact.impulse_ned_m_s
@@ -252,7 +192,7 @@ class ImpactEstimator:
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal_ned=self._normal(contact, velocity),
+            normal=normal_of(impulse, self.came_ned_m_s),
             peak_specific_force_m_s2=contact.peak_m_s2,
             impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
             is_lower_bound=contact.is_lower_bound,

@@ -7,6 +7,7 @@ from itertools import takewhile
 
 from companion.detection.interface import DetectorState
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
+from companion.estimate.normal import Normal, with_change
 from companion.flight.confirmation import DECIDED_US, ForceHypothesis, VelocityJumpHypothesis
 from companion.messages import LocalPosition, Vector3
 from companion.motion.history import MotionHistory
@@ -33,6 +34,11 @@ def horizontal_unit(vector: Vector3) -> Vector3:
     return (vector[0] / length, vector[1] / length, 0.0) if length > 0.0 else (0.0, 0.0, 0.0)
 
 
+def level(normal: Normal) -> Normal:
+    """The normal of an upright surface; of a steep one as it is."""
+    return Normal(away_from(normal.direction_ned), normal.error_rad)
+
+
 @dataclass(slots=True)
 class CollisionRecord:
     """Positions and velocities in local NED; boot times in the vehicle's clock."""
@@ -42,13 +48,13 @@ class CollisionRecord:
     detector: str
     contact: Contact
     setpoint_ned_m: Vector3
-    normal_ned: Vector3
+    contact_normal: Normal  # by the contact's force; level unless the obstacle is steep
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     estimator: MotionEstimator
     is_behind: bool = False  # the obstacle followed the vehicle: the normal is the earlier hit's
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
-    is_clipped: bool = False  # the force was larger than measured, its direction may differ
+    after_ned_m_s: Vector3 | None = None  # the velocity after the contact
     hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = None  # until it is confirmed or rejected
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
@@ -56,6 +62,16 @@ class CollisionRecord:
     estimated_down_m_s: float = 0.0  # the vehicle's own estimate now, right or wrong
     level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # of a vehicle that is level by its own attitude, NED
     _speeds_away: list[tuple[int, float]] = field(default_factory=list)
+
+    @property
+    def normal(self) -> Normal:
+        """The obstacle's normal by all that is known now."""
+        after, before = self.after_ned_m_s, self.contact.velocity_ned_m_s
+        if after is None:
+            return self.contact_normal
+        if self.contact_normal.direction_ned[2] == 0.0:
+            after = (after[0], after[1], before[2])  # an upright surface does not lift
+        return level(with_change(self.contact_normal, before, after))
 
     def follow_motion(self, strapdown: Strapdown) -> None:
         """Take the newest accelerometer and gyroscope sample."""
@@ -83,9 +99,8 @@ class CollisionRecord:
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         if not self.is_behind:
-            self.normal_ned = away_from(estimate.normal_ned)
+            self.contact_normal = level(estimate.normal)
         self.estimator.note_contact(not estimate.may_be_clipped, self.contact_ended_boot_us)
-        self.is_clipped = estimate.is_lower_bound
 
     def _is_seen_again(self, state: DetectorState, hypothesis: ForceHypothesis | VelocityJumpHypothesis) -> bool:
         """Whether another sample of the contact's force has come."""
@@ -117,13 +132,17 @@ class CollisionRecord:
         x, s = self.contact.position_ned_m, self.setpoint_ned_m
         length_m = math.dist(x, s)
         if length_m < LEAST_WAY_M:
-            return self.normal_ned
+            return self.normal.direction_ned
         return ((s[0] - x[0]) / length_m, (s[1] - x[1]) / length_m, (s[2] - x[2]) / length_m)
 
     def _direction_back(self) -> Vector3:
         """Against the approach; along the normal for a vehicle hit while it hovered."""
         v = self.contact.velocity_ned_m_s
-        return horizontal_unit((-v[0], -v[1], 0.0)) if math.hypot(v[0], v[1]) >= LEAST_SPEED_M_S else self.normal_ned
+        return (
+            horizontal_unit((-v[0], -v[1], 0.0))
+            if math.hypot(v[0], v[1]) >= LEAST_SPEED_M_S
+            else self.normal.direction_ned
+        )
 
     def rebound_speed_m_s(self) -> float | None:
         """Largest speed back, m/s, within REBOUND_WINDOW_US after the contact; None without a valid velocity."""
@@ -154,7 +173,7 @@ class CollisionRecord:
             position_ned_m=self.contact.position_ned_m,
             impact_velocity_ned_m_s=velocity,
             impact_speed_m_s=math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2),
-            normal_ned=self.normal_ned,
+            normal_ned=self.normal.direction_ned,
             peak_specific_force_m_s2=self.peak_specific_force_m_s2,
             recovery_setpoint_ned_m=self.setpoint_ned_m,
             settled_after_s=self.settled_after_s(),

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.flight.context import FlightContext
 from companion.flight.horizontal_force import SustainedForce
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
@@ -80,7 +81,7 @@ def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude
         position_ned_m=sample.position_ned_m,
         velocity_ned_m_s=sample.velocity_ned_m_s,
         velocity_error_m_s=0.0,
-        normal_ned=held.normal_ned,
+        normal=Normal(held.normal_ned, IMPULSE_RAD),
         peak_specific_force_m_s2=held.force_m_s2,
         impulse_m_s=0.5 * held.force_m_s2 * lasted_us * 1e-6,
         is_lower_bound=False,

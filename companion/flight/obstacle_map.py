@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from companion.estimate.normal import Normal
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface, touched
@@ -51,7 +52,7 @@ def remembered_surfaces(flight: FlightContext, contact: Contact) -> list[Surface
         return []
     place, clearance_m = flight.mission_ned_m(contact.position_ned_m), _clearance_m(flight)
     reach_m = flight.mission.companion.estimate.reach_m
-    touch = touch_of(place, contact.velocity_ned_m_s, contact.normal_ned, False, reach_m, 0)
+    touch = touch_of(place, contact.velocity_ned_m_s, Normal(contact.normal_ned, contact.normal_error_rad), reach_m, 0)
     return [
         Surface(_touching_ned_m(flight, patch), patch.normal_ned, flight.mission.obstacles.margin_m)
         for patch in flight.patches
@@ -91,9 +92,7 @@ def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[
     touches = []
     for record in records:
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
-        touch = touch_of(
-            centre, velocity, record.normal_ned, record.is_clipped, reach_m, record.detected_at_us, record.is_behind
-        )
+        touch = touch_of(centre, velocity, record.normal, reach_m, record.detected_at_us, record.is_behind)
         touches += [] if touch is None else [touch]
     return touches
 

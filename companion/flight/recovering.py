@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.normal import Normal
 from companion.flight.after_hit import afterwards, take_back
-from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery
+from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery, level
 from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.detection_event import report_detection
@@ -21,7 +22,6 @@ from companion.reflex.config import (
     CONTACT_LINGERS_US,
     DESCENT_M_S2,
     HANGING_TILT_M_S2,
-    LEAST_VELOCITY_CHANGE_M_S,
     LEAVING_M_S,
     LEFT_BELOW_M,
     MOTION_KNOWN_US,
@@ -32,9 +32,9 @@ from companion.reflex.config import (
     TOUCH_TOLERANCE_M,
     YAW_LEAD_RAD,
 )
-from companion.reflex.halfspace import FenceBounds, FreeSpace, Surface, away_from, plus, split
+from companion.reflex.halfspace import FenceBounds, FreeSpace, Surface, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
-from companion.reflex.motion_estimator import MotionEstimator, blended_normal
+from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.planner import REST, Limits, MotionState, Plan, height_feedback, kept_off, plan, safe_to_hold
 
 
@@ -55,7 +55,7 @@ class Recover:
         self._is_known = not self._law.follows  # whether the motion after the hit is known
         self._has_left, self._may_fall, self._comes_m_s = False, False, 0.0
         self._hangs, self._has_hung = False, False  # hangs on the obstacle; and has not left it since
-        self._agreed: Vector3 | None = None  # the normal from the velocities before and after
+        self._agreed: Normal | None = None  # the normal from the velocities before and after
         self._planned_for: object = None  # the state of the contact that the plan was made for
         self._plan: Plan | None = None  # None: only accelerations are setpoints
         self._plan_began_us = now_us
@@ -200,7 +200,8 @@ class Recover:
         is_measured = record.estimator.earlier is None
         if self._is_known and is_measured and (is_rebound or not was_known):
             after = record.estimator.corrected(sample).velocity_ned_m_s
-            self._agreed = consistent_normal(record.normal_ned, record.contact.velocity_ned_m_s, after)
+            record.after_ned_m_s = after
+            self._agreed = record.normal
         return self._is_known
 
     def _state(self) -> MotionState:
@@ -255,13 +256,15 @@ class Recover:
         self._comes_m_s = off_m_s if is_carried else 0.0
         has_left = self._has_left or off_m_s > 0.0 or off_m_s < -NO_CONTACT_APPROACH_M_S
         self._has_left = has_left and not (is_touched or is_carried)
-        place, normal = contact.position_ned_m, self._agreed or contact.normal_ned
+        place, normal = contact.position_ned_m, self._agreed or Normal(contact.normal_ned, contact.normal_error_rad)
         # Before its motion is known, a touched surface is at the vehicle's position: frames and arms fold.
         goes_along = is_carried or (is_touched and not self._is_known)
-        is_off = Surface(place, normal, 0.0).off_m(motion.position_ned_m) > 0.0
+        is_off = Surface(place, normal.direction_ned, 0.0).off_m(motion.position_ned_m) > 0.0
         if self._has_hung or (goes_along and is_off):
             place = motion.position_ned_m
-        self._contact = replace(contact, position_ned_m=place, normal_ned=normal)
+        self._contact = replace(
+            contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
+        )
 
     def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
         """Set the recovery setpoint again, from the present contact and motion."""
@@ -297,36 +300,19 @@ def _has_room_below(flight: FlightContext) -> bool:
     return height_m > LEFT_BELOW_M + 0.5 * down_m_s**2 / STOPPING_M_S2
 
 
-def consistent_normal(pushed_ned: Vector3, before_ned_m_s: Vector3, after_ned_m_s: Vector3) -> Vector3:
-    """The normal from the contact force, or from the change of velocity where the two contradict each other.
-
-    In a contact of 1 ms the force is one sample, with noise and clipping. The change of velocity contains all of it.
-    """
-    n, e, d = plus(after_ned_m_s, -1.0, before_ned_m_s)
-    change = (n, e, d if pushed_ned[2] != 0.0 else 0.0)
-    moved = away_from(change)
-    if math.hypot(*change) < LEAST_VELOCITY_CHANGE_M_S or split(pushed_ned, moved)[0] > AGREEMENT_COSINE:
-        return pushed_ned
-    return moved
-
-
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """Record a new collision: the motion just before it, and the recovery setpoint from that."""
     mission, impact, law = flight.mission, estimate.impact, _law(flight)
-    normal = away_from(estimate.normal_ned)
+    normal = level(estimate.normal)
     place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
     before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
     behind = None if before is None else _struck_from_behind(flight, before, impact.specific_force_frd_m_s2, velocity)
-    normal = behind or normal
-    contact_normal, earlier = normal, None
-    if law.follows:
-        if before is None:
-            contact_normal = blended_normal(normal, velocity)
-        elif not (before.estimator.has_converged or before.estimator.is_fully_measured):
-            # The vehicle's estimate is still wrong from the hit before.
-            earlier = before.estimator
-            place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
-    contact = Contact(estimate.time_boot_us, place, velocity, contact_normal)
+    normal, earlier = behind or normal, None
+    if law.follows and before is not None and not before.estimator.knows_motion:
+        # The vehicle's estimate is still wrong from the hit before.
+        earlier = before.estimator
+        place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
+    contact = Contact(estimate.time_boot_us, place, velocity, normal.direction_ned, normal.error_rad)
     expected = contact.rebound(mission.recovery.restitution)
     limits = Limits(mission.recovery.acceleration_m_s2)
     record = CollisionRecord(
@@ -335,7 +321,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         detector=mission.companion.detector,
         contact=contact,
         setpoint_ned_m=_setpoint(flight, contact, expected, limits, _surfaces(flight, contact, flight.collisions)),
-        normal_ned=normal,
+        contact_normal=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
         estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, earlier),
@@ -349,7 +335,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
 
 def _struck_from_behind(
     flight: FlightContext, before: CollisionRecord, push_frd_m_s2: Vector3, velocity_ned_m_s: Vector3
-) -> Vector3 | None:
+) -> Normal | None:
     """The earlier hit's normal, where its obstacle has followed the vehicle and struck it again from behind.
 
     A force in the direction in which the vehicle leaves comes from behind it.
@@ -358,7 +344,8 @@ def _struck_from_behind(
         return None
     normal, push = before.contact.normal_ned, body_to_ned(flight.vehicle.attitude.attitude_wxyz, push_frd_m_s2)
     leaves_m_s, pushed_m_s2 = split(velocity_ned_m_s, normal)[0], split(push, normal)[0]
-    return normal if leaves_m_s > LEAVING_M_S and pushed_m_s2 > AGREEMENT_COSINE * math.hypot(*push) else None
+    is_behind = leaves_m_s > LEAVING_M_S and pushed_m_s2 > AGREEMENT_COSINE * math.hypot(*push)
+    return replace(before.normal, direction_ned=normal) if is_behind else None
 
 
 def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
@@ -391,6 +378,6 @@ def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[Collisi
         if record.is_over:
             break
         if record.contact.time_boot_us < contact.time_boot_us:
-            touched = Surface(record.contact.position_ned_m, record.normal_ned, 0.0)
+            touched = Surface(record.contact.position_ned_m, record.normal.direction_ned, 0.0)
             surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))
     return surfaces + remembered_surfaces(flight, contact)

@@ -2,12 +2,11 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from companion.core import POLL_INTERVAL_US
-from companion.estimate.normal import Search, advance_search
 from companion.guard.config import GuardConfig
 from companion.guard.core import GuardCore
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID
@@ -46,15 +45,11 @@ class AttachedGuard:
     that is heard within POLL_INTERVAL_US becomes one step, and no silence is judged before it.
 
     The program's own heartbeats and its share of TIMESYNC are already there; none are added. A program would take an
-    answer to a question of the guard's for one to its own, so the round trip is not measured here. `run_search` takes
-    the search for a hit's normal on, with each message.
+    answer to a question of the guard's for one to its own, so the round trip is not measured here.
     """
 
-    def __init__(
-        self, config: GuardConfig, system_id: int, now_us: int, run_search: Callable[[Search], Search] = advance_search
-    ) -> None:
+    def __init__(self, config: GuardConfig, system_id: int, now_us: int) -> None:
         self.core = GuardCore(config, True, now_us)
-        self.core.monitor.estimator.run_search = run_search
         self._source = (system_id, AUTOPILOT_COMPONENT_ID)
         self._encoder = Encoder()
         self._encoder.speak_to(*self._source)

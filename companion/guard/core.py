@@ -68,8 +68,7 @@ class GuardCore(Core[GuardContext, GuardMachine]):
         moved = super()._act(samples, inputs, now_us)
         if moved and self.machine.state is State.CONNECTING:
             # After a restart of the vehicle, perhaps by a hit, nothing that was measured before is valid.
-            run_search, self.monitor = self.monitor.estimator.run_search, start_monitor(guard.config.companion, now_us)
-            self.monitor.estimator.run_search = run_search
+            self.monitor = start_monitor(guard.config.companion, now_us)
         return moved
 
     def _note_sent(self, target: Target, now_us: int) -> None:

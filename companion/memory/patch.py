@@ -7,7 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from companion.estimate.normal import FROM_BEHIND, Normal
 from companion.messages import Vector3
+from companion.motion.strapdown import ZERO
 from companion.reflex.config import STEEP
 from companion.reflex.halfspace import away_from
 
@@ -109,69 +111,38 @@ def _grown(touched: tuple[float, float], reaches_m: float) -> tuple[float, float
     return low - beyond_m, high + beyond_m
 
 
-# Of the normals that one whole contact gives, 61 % are within 10 degrees and 94 % within 20 (bench/notes/detection.md).
-ERROR_RAD = math.radians(15.0)
-# A clipped sample tilts the push by what it lacks; a stiff hit is one such sample, and has been 50 degrees off.
-CLIPPED_ERROR_RAD = math.radians(30.0)
-# Where nothing but the approach says from where the hit came.
-APPROACH_ERROR_RAD = math.radians(45.0)
-# A surface pushes against the way into it. Its normal lies at most this (cosine) beside square to the approach, which
-# is what its error makes of a grazing hit.
-LEAST_AGAINST = -0.2
-# A hit hard enough to clip the sensor goes into the surface, not along it: within 60 degrees of its normal.
-LEAST_CLIPPED = 0.5
 # Slower than this the obstacle came to the vehicle: it moves, and will not stand there as a wall does. The map keeps it
 # where it was, with no assumed extent.
 LEAST_SPEED_M_S = 0.3
-# The same holds for a force along the direction of flight: no obstacle at rest pushes within 60 degrees of it. A
-# clipped force without a direction was turned round before (see estimate.facing).
-FROM_BEHIND = -0.5
 
 
 def touch_of(
     centre_ned_m: Vector3,
     velocity_ned_m_s: Vector3,
-    normal_ned: Vector3,
-    is_clipped: bool,
+    normal: Normal,
     reach_m: float,
     found_at_us: int,
     is_behind: bool = False,
 ) -> Patch | None:
     """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known.
 
-    ``normal_ned`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
+    ``normal`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
     ``is_behind``: what was hit is known to have come after the vehicle.
     """
     n, e, d = velocity_ned_m_s
     is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
-    against = away_from((-n, -e, -d)) if is_fast else (0.0, 0.0, 0.0)
-    is_behind = is_behind or _agreement(normal_ned, against) < FROM_BEHIND
-    normal, error_rad = (normal_ned, ERROR_RAD) if is_behind else _direction(normal_ned, against, is_clipped)
-    if normal == (0.0, 0.0, 0.0):
+    against = away_from((-n, -e, -d)) if is_fast else ZERO
+    is_behind = is_behind or _agreement(normal.direction_ned, against) < FROM_BEHIND
+    if normal.direction_ned == ZERO:
         return None
-    n, e, d = (c - reach_m * x for c, x in zip(centre_ned_m, normal, strict=True))
+    n, e, d = (c - reach_m * x for c, x in zip(centre_ned_m, normal.direction_ned, strict=True))
     reaches_m = REACHES_M if is_fast and not is_behind else 0.0
-    return Patch(((n, e, d),), normal, error_rad, reaches_m, found_at_us)
+    return Patch(((n, e, d),), normal.direction_ned, normal.error_rad, reaches_m, found_at_us)
 
 
 def _agreement(a: Vector3, b: Vector3) -> float:
     """The cosine between unit vectors; 0 where one is zero."""
     return max(-1.0, min(1.0, sum(x * y for x, y in zip(a, b, strict=True))))
-
-
-def _direction(normal: Vector3, against: Vector3, is_clipped: bool) -> tuple[Vector3, float]:
-    """The normal to use, and its error: between the force and the direction back where clipping tilts the force."""
-    if against == (0.0, 0.0, 0.0):
-        return normal, CLIPPED_ERROR_RAD
-    agreement = _agreement(normal, against)
-    if normal == (0.0, 0.0, 0.0) or agreement < (LEAST_CLIPPED if is_clipped else LEAST_AGAINST):
-        return against, APPROACH_ERROR_RAD
-    if not is_clipped:
-        return normal, ERROR_RAD
-    # Either may be right: half way between both is at most half of the angle wrong.
-    middle = away_from((normal[0] + against[0], normal[1] + against[1], normal[2] + against[2]))
-    half_rad = 0.5 * math.acos(agreement)
-    return middle, max(CLIPPED_ERROR_RAD, half_rad)
 
 
 # Error of a touch's place: the position drifts by some centimetres between two hits, and the touching part of the guard

@@ -56,8 +56,6 @@ HELD_S, NOTICED_S = 1.0, 0.13
 HELD_TO_M_S = 1.0
 
 # --- half-spaces
-# Sine of 10 degrees: the error of the estimated normal after most hits (bench/notes/detection.md).
-NORMAL_SINE = 0.17
 # Sine of the normal's angle from the horizontal. Above it the obstacle is a ceiling, a floor or a steep roof. Below it
 # the obstacle counts as upright, because the vehicle's tilt and a clipped sample tilt the normal of a wall.
 STEEP = 0.7
@@ -112,8 +110,6 @@ RESTITUTION_SPREAD, FRICTION_SPREAD, VERTICAL_SPREAD, LEAST_SPREAD_M_S = 0.26, 0
 CLIPPED_PART = 0.5
 # A vehicle that approaches the obstacle faster than this does not touch it: arms fold by 5 cm only.
 NO_CONTACT_APPROACH_M_S = 0.3
-# A smaller change of velocity has no reliable direction: 0.08 s of flight and noise make as much.
-LEAST_VELOCITY_CHANGE_M_S = 1.0
 # Cosine of 30 degrees: friction turns the contact force by 17, and the normal is estimated to 10.
 AGREEMENT_COSINE = 0.87
 # Six times the noise of a good estimate.

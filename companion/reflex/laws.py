@@ -8,10 +8,10 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
 `adaptive`, as near as is safe. From the motion x, v, a that follows the contact, with v_t the part of v along it:
 
     r   = v T / 2 + a T^2 / 12,  r_t what of it is along the obstacle
-    D   = max(d_0 + sin(10 deg) |v_t| T / 2,  t_0 |v_c . n|,  (x - x(t_c) + r) . n)
+    D   = max(d_0 + sin(e) |v_t| T / 2,  t_0 |v_c . n|,  (x - x(t_c) + r) . n)
     x_d = x + (D - (x - x(t_c)) . n) n + r_t,  height x_3(t_c) unless the obstacle is steep
 
-that is d_0 (clearance_m), and what a normal good to 10 degrees may take of it along the obstacle, or t_0 |v_c . n|
+that is d_0 (clearance_m), and what a normal with the error e may take of it along the obstacle, or t_0 |v_c . n|
 (clearance_s) off the obstacle, further where the rebound would carry the vehicle further before it could stop, and
 along the obstacle where it comes to rest.
 """
@@ -21,7 +21,7 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.reflex.config import DURATION_STEP, NORMAL_SINE, RecoveryConfig
+from companion.reflex.config import DURATION_STEP, RecoveryConfig
 from companion.reflex.halfspace import plus, split
 from companion.reflex.planner import Limits, MotionState, Plan
 
@@ -37,6 +37,7 @@ class Contact:
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
     normal_ned: Vector3
+    normal_error_rad: float = 0.0
 
     def rebound(self, restitution: float) -> MotionState:
         """The motion after it, as far as that can be known before it has been measured."""
@@ -79,7 +80,7 @@ def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState, lim
     leant_m_s2, leant_along = split(motion.acceleration_ned_m_s2, normal)
     duration_s = limits.shortest_s
     while True:
-        clear_m = max(config.clearance_m + NORMAL_SINE * 0.5 * along_m_s * duration_s, harder_m)
+        clear_m = max(config.clearance_m + 0.5 * math.sin(contact.normal_error_rad) * along_m_s * duration_s, harder_m)
         stops_m = 0.5 * off_m_s * duration_s + leant_m_s2 * duration_s**2 / 12.0
         goal = plus(x, max(clear_m - off_m, stops_m), normal)
         goal = plus(plus(goal, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)

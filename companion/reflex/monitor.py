@@ -23,7 +23,6 @@ from companion.detection.stream_health import (
 )
 from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
-from companion.estimate.normal import prepare
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
 from companion.motion.history import REBOOT_US
 from companion.strict_model import StrictModel
@@ -142,8 +141,6 @@ NO_RESULT = MonitorResult((), (), ())
 
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
     """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
-    if config.estimate.fits_arms:
-        prepare()
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
     detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
     return CollisionMonitor(
@@ -187,9 +184,6 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             known = situation._replace(estimate_valid=False)
         monitor.state, impact = monitor.detector.step(monitor.state, sample, known)
         if impact is not None:
-            cut_short = monitor.estimator.close()
-            if cut_short is not None:
-                finished.append(cut_short)
             impacts.append(monitor.estimator.begin(impact, situation))
         elif type(sample) is ImuSample:
             final = monitor.estimator.follow(monitor.state)
@@ -226,9 +220,6 @@ def _update_stream_health(
         and now_us - monitor.started_us >= OPTIONAL_STREAMS_WAIT_US
     ):
         monitor.losses_reported = True
-        if monitor.config.estimate.fits_arms and not monitor.estimator.fits_normal:
-            text = "an obstacle's normal is its contact force's direction: install px4-rebound[fit] to fit it"
-            notices.append(Notice("loss", text, {}))
         for message, loss in monitor.detector.losses.items():
             if message not in monitor.heard:
                 notices.append(Notice("loss", f"no {message.name}: {loss}", {}))

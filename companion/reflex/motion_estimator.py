@@ -49,7 +49,7 @@ from companion.reflex.config import (
     VERTICAL_SPREAD,
     WIND_S,
 )
-from companion.reflex.halfspace import away_from, plus, split
+from companion.reflex.halfspace import plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.planner import REST, MotionState
 
@@ -234,6 +234,11 @@ class MotionEstimator:
         self._newest, self.has_converged = None, False
         self.position_error_m = self._hidden_error_m_s = self._position_rate_error_m_s = REST
 
+    @property
+    def knows_motion(self) -> bool:
+        """Whether the vehicle's own estimate is right."""
+        return self.has_converged or self.is_fully_measured
+
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
         """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
         self._is_shown, self.is_fully_measured = is_fully_measured, is_fully_measured and self.earlier is None
@@ -369,18 +374,3 @@ def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
     n, e, d = n + lead_s * (q * d - r * e), e + lead_s * (r * n - p * d), d + lead_s * (p * e - q * n)
     carrying_m_s2 = GRAVITY_M_S2 / max(-d, LEAST_UPRIGHT_COSINE)
     return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)
-
-
-def blended_normal(pushed_ned: Vector3, velocity_ned_m_s: Vector3) -> Vector3:
-    """The normal of an obstacle whose contact force is clipped on each axis separately; unit vectors.
-
-    The direction that the vehicle came from is free. The normal is half way between that direction and the force, or
-    that direction itself where the two are more than 60 degrees apart. It is for a first hit alone: in the second one
-    the vehicle may slide along the obstacle.
-    """
-    n, e, _ = velocity_ned_m_s
-    back = away_from((-n, -e, 0.0)) if math.hypot(n, e) >= LEAST_SPREAD_M_S else REST
-    if back == REST:
-        return pushed_ned
-    together = split(pushed_ned, back)[0]
-    return back if together < 0.5 else away_from(plus(pushed_ned, 1.0, back))

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
-from companion.estimate.normal import Search, advance_search
 from companion.guard.attached import SETPOINTS, AttachedGuard, AttachedStep
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
@@ -56,14 +55,11 @@ class CollisionGuard:
     ) -> None:
         self._link = MavsdkLink(mavsdk, system)
         self._clock = Clock()
-        self._guard = AttachedGuard(config or GuardConfig(), self._link.system_id, self._clock.now_us(), self._seek)
+        self._guard = AttachedGuard(config or GuardConfig(), self._link.system_id, self._clock.now_us())
         self._on_event = on_event
         # Guards all below. MAVSDK's I/O thread and the guard's own meet here, each for less than a millisecond, but for
         # the sample that shows a hit: its setpoint is made in 3 ms, and nothing is more urgent.
         self._changed = threading.Condition()
-        self._asked: Search | None = None  # to be taken on by the guard's own thread; that one is `_sought` meanwhile
-        self._sought: Search | None = None
-        self._found: Search | Exception | None = None
         self._untold: deque[Event] = deque()
         self._listeners: list[Callable[[Event], None]] = []
         self._is_over = False
@@ -189,34 +185,6 @@ class CollisionGuard:
                 self._guard.core.stop_reason = f"fault around the guard, please report it: {error!r}"
             self._changed.notify_all()
 
-    def _seek(self, search: Search) -> Search:
-        """A piece of a search takes milliseconds: with each message what the guard's own thread has found by then."""
-        if search is not self._sought:
-            self._ask(search)
-        elif isinstance(self._found, Exception):
-            raise self._found
-        elif self._found is not None:
-            search = self._found
-            if not search.is_over:
-                self._ask(search)
-        return search
-
-    def _ask(self, search: Search) -> None:
-        self._asked = self._sought = search
-        self._found = None
-        self._changed.notify_all()
-
-    def _work(self, search: Search) -> None:
-        """On the guard's own thread, which nobody waits for meanwhile. A fault is one of the step that asks for it."""
-        found: Search | Exception
-        try:
-            found = advance_search(search)
-        except Exception as error:
-            found = error
-        with self._changed:
-            if search is self._sought:
-                self._found = found
-
     def _outgoing(self, name: str, source: tuple[int, int], fields_json: bytes) -> bool:
         """On MAVSDK's thread, the last before the socket."""
         if name not in SETPOINTS:
@@ -245,7 +213,7 @@ class CollisionGuard:
             pass
 
     def _turn(self) -> bool:
-        """What is due when nothing arrives, what takes long, and telling; user code never runs on MAVSDK's thread.
+        """What is due when nothing arrives, and telling; user code never runs on MAVSDK's thread.
 
         Whether there is to be another.
         """
@@ -254,7 +222,7 @@ class CollisionGuard:
             if self._faulty_until_us is not None:
                 # A step that fails again leaves its deadline where it was.
                 wait_s = max(wait_s, TRIED_AGAIN_S)
-            if wait_s > 0.0 and not self._untold and self._asked is None:
+            if wait_s > 0.0 and not self._untold:
                 self._changed.wait(wait_s)
             if self._is_over:
                 return False
@@ -266,9 +234,6 @@ class CollisionGuard:
             self._untold.clear()
             self.events.extend(told)
             listeners = list(self._listeners)
-            asked, self._asked = self._asked, None
-        if asked is not None:
-            self._work(asked)
         for event in told:
             self._tell(event, listeners)
         return True

@@ -162,7 +162,8 @@ def _scene(flight: ShownFlight, log: Log) -> Iterator[Message]:
         # The arrow points out of the surface, as long as the speed before the contact.
         speed_m_s = math.hypot(*impact.first.velocity_ned_m_s)
         sizes = {"shaft_length": speed_m_s, "shaft_diameter": 0.04, "head_length": 0.12, "head_diameter": 0.1}
-        pose = {"position": _enu(impact.first.position_ned_m), "orientation": _along(impact.final.normal_ned, 0)}
+        away = _along(impact.final.normal.direction_ned, 0)
+        pose = {"position": _enu(impact.first.position_ned_m), "orientation": away}
         arrows.append(_entity(impact.at_us, f"hit {number}", arrows=[{"pose": pose, **sizes, "color": _RED}]))
         yield _update(impact.at_us, "/scene/hits", arrows)
 

@@ -1,7 +1,7 @@
 """What every reader gives: typed samples in the order heard, and what the log cannot tell."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self, TypeAlias
@@ -19,8 +19,6 @@ WANTED = {
     MessageId.ODOMETRY: messages.Odometry,
     MessageId.VIBRATION: messages.Vibration,
 }
-# Of a quad-x every rotor is as far aside as ahead, of a plus one of them is zero; half-way between them are 22.5 deg.
-_LEAST_DIAGONAL = math.tan(math.pi / 8)
 
 
 class LogError(ReboundError):
@@ -65,7 +63,6 @@ class Log:
 
     `clipped_at_us`: IMU samples known to hold clipped readings; None where nothing tells.
     `averaging_us`: the interval over which all but the longest hundredth of the samples are means, where it is told.
-    `other_arms`: what kind of vehicle it is, where its arms are not those of a quad-x.
     """
 
     path: Path
@@ -75,7 +72,6 @@ class Log:
     losses: tuple[str, ...]
     clipped_at_us: tuple[int, ...] | None = None
     averaging_us: float | None = None
-    other_arms: str | None = None
 
     def imu(self) -> list[tuple[int, ImuSample]]:
         """All IMU samples with the time each was heard at."""
@@ -88,14 +84,6 @@ class Log:
     def seconds(self, at_us: float) -> float:
         """Since the log's start."""
         return (at_us - self.started_at_us) * 1e-6
-
-
-def other_arms(name: str, rotors: Iterable[tuple[float, float]] = ()) -> str | None:
-    """The vehicle in a word, where its arms are not those of a quad-x; `rotors`: metres ahead and aside of each."""
-    if name != "quadrotor":
-        return name
-    is_plus = any(min(abs(x), abs(y)) < _LEAST_DIAGONAL * max(abs(x), abs(y)) for x, y in rotors)
-    return "quadrotor whose arms are no X" if is_plus else None
 
 
 def vector(row: Sequence[float]) -> Vector3:

@@ -10,7 +10,7 @@ from companion.mavlink.decode import Decoder
 from companion.mavlink.packet import message_id_of, payload_of, source_of
 from companion.messages import Heartbeat, MessageId
 from companion.shell.tlog import read_tlog
-from rebound_cli.logs.log import WANTED, Demand, Log, LogError, LoggedSample, other_arms
+from rebound_cli.logs.log import WANTED, Demand, Log, LogError, LoggedSample
 
 _ULOG_MAGIC = b"ULog"
 Packets = list[tuple[int, bytes]]
@@ -60,8 +60,8 @@ def read_telemetry(path: Path) -> Log:
     losses = [f"{wanted.name} is not in it" for wanted in WANTED if wanted not in kinds]
     if others:
         losses.append(f"more than one PX4 vehicle speaks in it: system {vehicle.system_id} was taken, not {others}")
-    name, arms = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}", other_arms(vehicle.vehicle_type)
-    return Log(path, name, packets[0][0], tuple(heard), tuple(losses), other_arms=arms)
+    name = f"PX4 {vehicle.vehicle_type}, system {vehicle.system_id}"
+    return Log(path, name, packets[0][0], tuple(heard), tuple(losses))
 
 
 def _vehicle(path: Path, packets: Packets) -> tuple[Identity, str]:

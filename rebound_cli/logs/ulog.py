@@ -18,7 +18,7 @@ from pyulog import ULog
 
 from companion import messages
 from companion.link.vehicle import AUTOPILOT_COMPONENT_ID, MAV_AUTOPILOT_PX4, MULTICOPTERS, identify
-from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, other_arms, vector
+from rebound_cli.logs.log import Demand, Log, LogError, LoggedSample, vector
 
 Floats = npt.NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def read_ulog(path: Path) -> Log:
         raise LogError(f"{path}: {text}.")
     imu = max(inertial, key=_Topic.rate_hz)
     parameters = {k: float(v) for k, v in log.initial_parameters.items() if isinstance(v, int | float)}
-    kind = _vehicle_type(path, topics.get(("vehicle_status", 0)), parameters)
+    _check_multicopter(path, topics.get(("vehicle_status", 0)), parameters)
     heard = list(_imu_samples(topics, imu))
     for names, convert in _CONVERSIONS.items():
         topic = next((topics[name, 0] for name in names if (name, 0) in topics), None)
@@ -160,7 +160,6 @@ def read_ulog(path: Path) -> Log:
         clipped_at_us=None if clipped is None else tuple(imu.time_us[clipped > 0].tolist()),
         # A driver that reads its sensor in blocks makes some of them longer.
         averaging_us=None if intervals is None else float(np.percentile(intervals, 99)),
-        other_arms=other_arms(MULTICOPTERS[kind], _rotors(parameters)),
     )
 
 
@@ -170,8 +169,8 @@ def _name(log: ULog) -> str:
     return f"PX4{version}{f' on {hardware}' if hardware else ''}"
 
 
-def _vehicle_type(path: Path, status: _Topic | None, parameters: Mapping[str, float]) -> int:
-    """MAV_TYPE. Raises LogError where the vehicle is no multicopter."""
+def _check_multicopter(path: Path, status: _Topic | None, parameters: Mapping[str, float]) -> None:
+    """Raise LogError where the vehicle is no multicopter by its MAV_TYPE."""
 
     def last(field: str) -> float | None:
         values = None if status is None else status.column(field)
@@ -188,16 +187,6 @@ def _vehicle_type(path: Path, status: _Topic | None, parameters: Mapping[str, fl
     identity = identify(messages.Heartbeat(1, AUTOPILOT_COMPONENT_ID, kind, MAV_AUTOPILOT_PX4, False, 0, 0))
     if isinstance(identity, str):
         raise LogError(f"{path}: {identity}; collisions are looked for in multicopters' logs alone.")
-    return kind
-
-
-def _rotors(parameters: Mapping[str, float]) -> list[tuple[float, float]]:
-    """Metres ahead and aside of each, as PX4's control allocation has them (v1.13 and later); empty without it."""
-    places = [
-        (parameters.get(f"CA_ROTOR{number}_PX"), parameters.get(f"CA_ROTOR{number}_PY"))
-        for number in range(int(parameters.get("CA_ROTOR_COUNT", 0)))
-    ]
-    return [(x, y) for x, y in places if x is not None and y is not None]
 
 
 def _losses(log: ULog, topics: _Topics, imu: _Topic) -> Iterator[str]:

@@ -77,8 +77,6 @@ def _losses(log: Log, config: CompanionConfig) -> tuple[str, ...]:
         for message, loss in detector.losses.items()
         if message in WANTED and WANTED[message] not in kinds
     ]
-    if log.other_arms is not None and config.estimate.fits_arms:
-        missing.append(f"a {log.other_arms}: a hit's normal is fitted for the four arms of a quad-x")
     return (*log.losses, *missing)
 
 
@@ -127,7 +125,7 @@ def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
     how = _HOW[first.impact.evidence]
     yield f"seen by {how}: {force:.1f} m/s^2, a hit from {finding.threshold_m_s2:.1f} on"
     v_c = f"{math.hypot(*first.velocity_ned_m_s):.2f} m/s {_vector(first.velocity_ned_m_s)}"
-    yield f"v_c {v_c} NED, normal {_vector(final.normal_ned)}"
+    yield f"v_c {v_c} NED, normal {_vector(final.normal.direction_ned)}"
     yield f"contact since {replay.log.seconds(_on_log(finding)):.3f} s +-{first.time_error_us / 1e3:.1f} ms"
     yield f"peak {at_least}{final.peak_specific_force_m_s2:.1f} m/s^2, impulse {at_least}{final.impulse_m_s:.2f} m/s"
     height = "height unknown" if situation.height_m is None else f"{situation.height_m:.2f} m up"
@@ -224,7 +222,7 @@ def finding_data(finding: Finding) -> dict[str, Any]:
         "threshold_m_s2": round(finding.threshold_m_s2, 4),
         "impact_velocity_m_s": _rounded(first.velocity_ned_m_s),
         "position_m": _rounded(first.position_ned_m),
-        "normal": _rounded(final.normal_ned),
+        "normal": _rounded(final.normal.direction_ned),
         "peak_specific_force_m_s2": round(final.peak_specific_force_m_s2, 4),
         "impulse_m_s": round(final.impulse_m_s, 4),
         "is_lower_bound": final.is_lower_bound,

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.detection.interface import Evidence, ImpactKind, Phase
-from companion.memory.patch import CLIPPED_ERROR_RAD, ERROR_RAD
+from companion.estimate.normal import Normal
 from companion.messages import Vector3
 from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.watching import Finding
@@ -62,7 +62,8 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
     first, final = finding.first, finding.final
     boot_us = first.impact.sample_time_boot_us
     touch = truth_of(flight, boot_us)
-    error_deg = math.degrees(_normal_error_rad(flight, finding))
+    normal = _normal(flight, finding)
+    error_deg = math.degrees(normal.error_rad)
     kind = "hit" if finding.is_collision else "contact"
     what = final.kind.value if final.kind is not ImpactKind.UNKNOWN else "something"
     speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
@@ -74,7 +75,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         ("Speed before it", speed),
         ("Largest force in a sample", f"{least}{final.peak_specific_force_m_s2:.1f} m/s²"),
         ("Impulse", f"{least}{final.impulse_m_s:.2f} m/s"),
-        ("Normal", f"{_bearing(final.normal_ned)} ± {error_deg:.0f}°"),
+        ("Normal", f"{_bearing(normal.direction_ned)} ± {error_deg:.0f}°"),
         ("Taken for", f"{what}, confidence {first.confidence:.2f}"),
     ]
     if touch is not None and flight.truth is not None:
@@ -91,7 +92,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         facts=facts,
         reasons=list(_reasons(flight, finding, touch)),
         position_ned_m=first.position_ned_m,
-        normal_ned=final.normal_ned,
+        normal_ned=normal.direction_ned,
         normal_error_deg=error_deg,
         touched_boot_us=None if touch is None else touch.contact_at_boot_us,
     )
@@ -105,12 +106,12 @@ def truth_of(flight: ShownFlight, boot_us: int) -> "Hit | None":
     return None if index is None else flight.truth.hits[index]
 
 
-def _normal_error_rad(flight: ShownFlight, finding: Finding) -> float:
-    """As the memory of this touch has it; before one is made, by whether the sensor clipped."""
+def _normal(flight: ShownFlight, finding: Finding) -> Normal:
+    """As the memory of this touch has it; before one is made, by the contact alone."""
     for patch in flight.patches:
         if patch.found_at_us == finding.at_us and patch.hits == 1:
-            return patch.normal_error_rad
-    return CLIPPED_ERROR_RAD if finding.final.is_lower_bound else ERROR_RAD
+            return Normal(patch.normal_ned, patch.normal_error_rad)
+    return finding.final.normal
 
 
 def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iterator[str]:

@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -112,7 +111,6 @@ def unit_text(settings: ServiceSettings, python: str, systemd: int | None, seria
         user=USER,
         state=STATE_FOLDER,
         link=_link(settings.device, serial_group),
-        no_machine_code="yes" if find_spec("numba") is None else "no",
         install="\n[Install]\nWantedBy=multi-user.target" if is_guard else "",
     )
     return unit.rstrip() + "\n"

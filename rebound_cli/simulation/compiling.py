@@ -8,22 +8,11 @@ from typing import TYPE_CHECKING, Any
 from rebound_cli.live.console import Console
 
 if TYPE_CHECKING:
-    from companion.mission.config import CompanionConfig
     from rebound_cli.inputs import SimulatedWorld
 
 _ROOMS = ("companion", "sim_vehicle")
 ONCE = "once for this machine"
 COMPILED = "Compiled code"
-
-
-def prepare_companion(console: Console, config: "CompanionConfig") -> None:
-    """What the companion calls after a hit; nothing where no arm folds, or without the extra [fit]."""
-    if not config.estimate.fits_arms:
-        return
-    from companion.estimate.normal import prepare
-
-    with compiling_shown(console, f"Compiling the fit of a touch, {ONCE}"):
-        prepare()
 
 
 def prepare_vehicle(console: Console, world: "SimulatedWorld") -> None:

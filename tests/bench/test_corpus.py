@@ -12,6 +12,7 @@ from bench.corpus.recording import record
 from bench.corpus.verdict import verdict
 from bench.main import main
 from bench.random_missions.generator import MissionCase
+from companion.estimate.normal import Normal
 from rebound_cli.replay.watching import Findings
 from rebound_cli.results.run_folder import TLOG_NAME, TRUTH_NAME
 from sim_vehicle.shell.truth_file import load_truth
@@ -56,7 +57,7 @@ def finding(at_s, is_collision=True):
     told = SimpleNamespace(
         impact=SimpleNamespace(sample_time_boot_us=round(at_s * 1e6)),
         velocity_ned_m_s=(2.0, 0.0, 0.0),
-        normal_ned=(-1.0, 0.0, 0.0),
+        normal=Normal((-1.0, 0.0, 0.0), 0.2),
     )
     return SimpleNamespace(is_collision=is_collision, first=told, final=told)
 

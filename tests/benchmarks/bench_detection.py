@@ -3,8 +3,6 @@
 From the decoded HIGHRES_IMU sample to the decision, through the whole watch (detector, estimate, sight), one sample a
 call as in flight, on one core: microseconds for each IMU sample, alone and with the other messages of a flight (30 to
 50 Hz each) charged to the IMU samples between them. The bar is 15 us for the first.
-
-And of a hit: the search for its normal, in all and by pieces, of which one is done with each message after it.
 """
 
 import os
@@ -14,15 +12,12 @@ import time
 
 from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Situation
-from companion.estimate.config import GuardsConfig
-from companion.estimate.hypotheses import Touch
-from companion.estimate.normal import advance_search, begin_search
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.reflex.monitor import advance, start_monitor
 
 INTERVAL_US = 4_000
 SAMPLES = 20_000
-ROUNDS, SEARCHES = 5, 25
+ROUNDS = 5
 IN_FLIGHT = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=5.0)
 
 
@@ -55,38 +50,6 @@ def microseconds(name: str, steps: list[tuple[int, list[Sample]]]) -> float:
     return 1e6 * (time.perf_counter() - begun) / len(steps)
 
 
-def pieces_us(interval_us: int) -> list[float]:
-    """Of one search: a front guard met a wall at 2 m/s, and the vehicle turns round it."""
-    samples = [ImuSample(0, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))]
-    attitudes = [Attitude(0, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
-    for t in range(interval_us, interval_us + 22_000, interval_us):
-        since_s = 1e-6 * (t - interval_us) + 0.003
-        force = (-24.0 - 900.0 * since_s, -8.0 - 300.0 * since_s, -9.81)
-        samples.append(ImuSample(t, force, (0.0, 0.0, 0.5 + 120.0 * since_s)))
-        attitudes.append(Attitude(t, (1.0, 0.0, 0.0, 30.0 * since_s**2), (0.0, 0.0, 120.0 * since_s)))
-    begun = time.process_time()
-    search = begin_search(
-        Touch((0.0, 0.0, -9.81), samples, attitudes), (2.0, 0.0, 0.0), GuardsConfig(travel_m=0.03), 0.005
-    )
-    pieces = [time.process_time() - begun]
-    while not search.is_over:
-        begun = time.process_time()
-        search = advance_search(search)
-        pieces.append(time.process_time() - begun)
-    return [1e6 * piece for piece in pieces]
-
-
-def print_search() -> None:
-    for interval_us in (4_000, 20_000):
-        pieces_us(interval_us)
-        rounds = [pieces_us(interval_us) for _ in range(SEARCHES)]
-        each = [statistics.median(figures) for figures in zip(*rounds, strict=True)]
-        print(
-            f"search for a normal, a sample every {interval_us // 1000} ms: {sum(each) / 1000:.1f} ms in {len(each)} "
-            f"pieces, of {statistics.median(each) / 1000:.2f} ms (median), {max(each) / 1000:.2f} ms (the largest)"
-        )
-
-
 def main() -> None:
     os.sched_setaffinity(0, {sorted(os.sched_getaffinity(0))[0]})
     alone, together = flight(False), flight(True)
@@ -94,7 +57,6 @@ def main() -> None:
     for name in sorted(BaselineConfig.detectors):
         figures = [statistics.median(microseconds(name, steps) for _ in range(ROUNDS)) for steps in (alone, together)]
         print(f"{name:10} {figures[0]:6.1f} {figures[1]:6.1f}")
-    print_search()
 
 
 if __name__ == "__main__":

@@ -209,13 +209,15 @@ class FakeVehicle:
         # The spring of a contact needs 0.1 ms; free flight is a lag of 1/6 s.
         steps = 40 if self.wall_north_m is not None and self.position[0] > self.wall_north_m - 0.1 else 1
         force, h = 0.0, dt / steps
+        # It is always level: of what its motors do to it the accelerometer shows no more than looks like no contact.
+        driven = max(-1.0, min(1.0, 6.0 * (command[0] - self.velocity[0])))
         for _ in range(steps):
             for i in range(3):
                 self.velocity[i] += max(-8.0, min(8.0, 6.0 * (command[i] - self.velocity[i]))) * h
             force += self.wall_force(h) / steps
             for i in range(3):
                 self.position[i] += self.velocity[i] * h
-        self.specific_force = [force, 0.0, -9.81]
+        self.specific_force = [force + driven, 0.0, -9.81]
         self.meet_ground()
 
     def wall_force(self, h: float) -> float:

@@ -32,7 +32,7 @@ def approach(speed_m_s=2.0, acceleration_m_s2=0.0, noise_m_s=0.0, seed=1, every_
 def test_a_clean_approach_is_extrapolated_to_the_contact(acceleration):
     samples = approach(2.0, acceleration)
     velocity, _ = velocity_alone(samples, CONTACT_US, CONFIG)
-    assert velocity == pytest.approx((2.0, 0.0, 0.0), abs=0.01)
+    assert velocity == pytest.approx((2.0, 0.0, 0.0), abs=0.03)
     assert position_at(samples, CONTACT_US, velocity) == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
 
 

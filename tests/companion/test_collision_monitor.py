@@ -7,15 +7,12 @@ import pytest
 
 from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Phase, Situation
-from companion.estimate import impact
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
-from companion.reflex import monitor as watching
 from companion.reflex.monitor import advance, start_monitor
 
 INTERVAL_US = 4_000
 WANTED = Situation()
-SPRING_ARMS = {"guards": {"travel_m": 0.03}}
 
 
 def lateral(**changes):
@@ -37,9 +34,6 @@ def fly(monitor, until_us, push=lambda t: 0.0, every_us=INTERVAL_US, situation=W
     return impacts, finished, notices
 
 
-SPARSE = [(1_040_000, 0.0), (1_070_000, 0.0), (1_084_000, -30.0)]
-
-
 def hit(t):
     return -30.0 if 1_000_000 <= t < 1_020_000 else 0.0
 
@@ -52,53 +46,8 @@ def test_an_impact_comes_at_its_first_sample_and_its_final_estimate_when_the_con
     assert not impacts[0].is_final
     assert impacts[0].velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.01)
     assert len(finished) == 1 and finished[0].is_final
-    assert finished[0].normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
+    assert finished[0].normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
     assert monitor.estimate == finished[0]
-
-
-def test_the_normal_is_sought_by_a_piece_with_each_message_and_known_before_the_recovery_asks_for_it():
-    """Given a hit of 20 ms, when samples come at 250 Hz, then its normal is there within 80 ms, and final with it; and
-    the same if a watch in the middle of the search is copied."""
-    monitor, told = start_monitor(lateral(estimate=SPRING_ARMS), 0), []
-    fly(monitor, 1_000_000)
-    for t in range(1_000_000, 1_200_000, INTERVAL_US):
-        if t == 1_032_000:
-            search = monitor.estimator.search
-            assert search is not None and not search.is_over
-            other = pickle.loads(pickle.dumps(monitor))
-        told += [(t, one.normal_ned) for one in fly(monitor, t + 1, hit, start_us=t)[1]]
-    ((told_us, normal_ned),) = told
-    assert monitor.estimator.search.is_over and told_us <= 1_080_000
-    (final,) = fly(other, 1_200_000, hit, start_us=1_032_000)[1]
-    assert final.normal_ned == normal_ned
-
-
-def test_of_a_frame_that_does_not_fold_the_normal_is_the_pushs(monkeypatch):
-    """Given a hit that friction turns the vehicle with, when no arm folds, then nothing is compiled or searched."""
-    monkeypatch.setattr(watching, "prepare", lambda: pytest.fail("compiled for no arm"))
-    monitor = start_monitor(lateral(), 0)
-    (final,) = fly(monitor, 1_200_000, hit)[1]
-    assert monitor.estimator.search is None
-    assert final.normal_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
-
-
-@pytest.mark.parametrize("estimate", [{}, SPRING_ARMS], ids=["stiff frame", "spring arms"])
-def test_only_a_vehicle_with_spring_arms_is_told_to_install_the_fit(estimate, monkeypatch):
-    monkeypatch.setattr(impact, "IS_AVAILABLE", False)
-    _, _, notices = fly(start_monitor(lateral(estimate=estimate), 0), 8_000_000)
-    assert any("px4-rebound[fit]" in notice.text for notice in notices) == bool(estimate)
-
-
-def test_a_second_hit_before_a_search_is_over_has_it_ended_and_the_first_estimate_told():
-    monitor = start_monitor(lateral(estimate=SPRING_ARMS), 0)
-    fly(monitor, 1_000_000, hit)
-    fly(monitor, 1_024_000, hit, start_us=1_000_000)
-    # Three bare samples in 60 ms: over, and no search has come to its end.
-    seen = [advance(monitor, [ImuSample(t, (force, 0.0, -9.81), (0.0, 0.0, 0.0))], WANTED, t) for t, force in SPARSE]
-    finished = [one for step in seen for one in step.finished]
-    assert [step.impacts != () for step in seen] == [False, False, True]
-    assert [one.impact.sample_time_boot_us for one in finished] == [1_000_000]
-    assert finished[0].is_final and not monitor.estimate.is_final
 
 
 def test_a_watch_survives_pickling_in_mid_flight():

@@ -171,13 +171,12 @@ def test_samples_that_are_held_back_are_told_with_the_timer_that_holds_them():
     ("changed", "companion", "verdict"),
     [
         ({"CA_ROTOR_COUNT": 6}, {}, Verdict.DOUBTFUL),
-        # A stretched frame, 10 cm from the X that the fit knows: a guard's radius is 8
-        ({"CA_ROTOR0_PX": 0.2025}, {"estimate": {"guards": {"travel_m": 0.03}}}, Verdict.DOUBTFUL),
-        ({"CA_ROTOR0_PX": 0.1525}, {"estimate": {"guards": {"travel_m": 0.03}}}, Verdict.GOOD),
-        ({"CA_ROTOR0_PX": 0.2025}, {}, Verdict.GOOD),
+        # A stretched frame, 10 cm from the guards' circle: a guard's radius is 8
+        ({"CA_ROTOR0_PX": 0.2025}, {}, Verdict.DOUBTFUL),
+        ({"CA_ROTOR0_PX": 0.1525}, {}, Verdict.GOOD),
     ],
 )
-def test_rotors_that_are_elsewhere_than_the_fit_has_them_are_told(changed, companion, verdict):
+def test_rotors_that_are_elsewhere_than_the_guards_are_told(changed, companion, verdict):
     assert verdicts(surveyed({**HEALTHY, **changed}, companion=companion))["rotors"] is verdict
 
 
@@ -250,19 +249,6 @@ def test_answers_that_nobody_asked_for_make_no_round_trip():
     # Then nothing is known of ours
     found = {finding.item: finding for finding in findings(survey)}["time"]
     assert (found.verdict, found.found) == (Verdict.DOUBTFUL, "TIMESYNC is not answered")
-
-
-def test_arms_that_are_no_quad_x_are_worth_a_look_where_the_normal_is_fitted_to_them():
-    def frame(kind, **estimate):
-        survey = start_survey(CompanionConfig(estimate=estimate), 0)
-        advance(survey, [Heartbeat(1, 1, kind, 12, False, 0, 3)], 0)
-        return verdicts(survey)["frame"]
-
-    arms = {"travel_m": 0.03}
-    assert frame(2, guards=arms) is Verdict.GOOD
-    assert frame(13, guards=arms) is Verdict.DOUBTFUL
-    assert frame(13, guards=arms, fits_normal=False) is Verdict.GOOD
-    assert frame(13) is Verdict.GOOD, "no arm folds"
 
 
 def test_what_the_vehicle_does_not_tell_is_asked_for_again_and_said():

@@ -6,6 +6,7 @@ from itertools import pairwise
 import pytest
 from shapely import LineString, Point
 
+from companion.estimate.normal import Normal
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
@@ -221,7 +222,7 @@ def explore(width_m: float, offset_m: float, error_deg: float, limit: int = 12) 
         lean = math.radians(error_deg) * (-1) ** len(touches)
         n, e, _ = normal
         seen = (n * math.cos(lean) - e * math.sin(lean), n * math.sin(lean) + e * math.cos(lean), 0.0)
-        touch = touch_of(place, velocity, seen, error_deg > 25.0, REACH_M, 0)
+        touch = touch_of(place, velocity, Normal(seen, math.radians(max(error_deg, 10.0))), REACH_M, 0)
         # Then no touch is made where a wall is remembered
         for patch in known.patches:
             assert core(patch).distance(Point(touch.centre_ned_m[:2])) > 0.1

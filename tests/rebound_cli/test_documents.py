@@ -166,13 +166,11 @@ def test_a_simulated_flight_takes_the_guards_of_its_airframe_where_the_mission_n
         given = document(sets=[f"sim.airframe={airframe}", *sets])
         return mission_from(given, world_from(given) if is_simulated else None).companion.estimate.guards
 
-    paper = {"stiffness_per_s2": 250.0, "damping_per_s": 15.0, "travel_m": 0.03}
-    assert guards("foldable") == GuardsConfig(**paper), "to the last digit, or no flight comes again"
-    assert guards("rigid") == GuardsConfig()
+    assert guards("foldable") == guards("rigid") == GuardsConfig(), "to the last digit, or no flight comes again"
     # The mission's own are all that it flies with, and a real vehicle is none of `sim:`
     assert guards("foldable", "companion.estimate.guards={centre_m: 0.2}") == GuardsConfig(centre_m=0.2)
     assert guards("foldable", is_simulated=False) == GuardsConfig()
-    assert guards("foldable", "companion.estimate={fits_normal: false}").travel_m == 0.03
+    assert guards("foldable", "companion.estimate={position_noise_m: 0.05}") == GuardsConfig()
 
 
 @pytest.mark.parametrize("wrong", ["companion=3", "companion.estimate=3", "companion.estimate=null"])

@@ -100,7 +100,7 @@ def test_a_person_reads_the_timeline_and_the_figures(tmp_path):
     assert "detection" in result.stdout and "Hit a wall at 1.9" in result.stdout and "landed safely" in result.stdout
     assert "rigid airframe, seed 2" in result.stdout and str(tmp_path / "run") in result.stdout
     resolved = yaml.safe_load((tmp_path / "run/resolved.yaml").read_text())
-    assert resolved["companion"]["estimate"]["guards"]["travel_m"] == 0 and resolved["sim"]["seed"] == 2
+    assert resolved["companion"]["estimate"]["guards"]["centre_m"] == 0.145 and resolved["sim"]["seed"] == 2
     # And nobody says what the rigid frame bears
     assert "not known" not in result.stdout and "broken" not in result.stdout
 

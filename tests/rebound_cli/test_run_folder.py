@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from rebound_cli import fly, guard
+from rebound_cli import fly
 from rebound_cli.main import main
 from rebound_cli.results.run_folder import TLOG_NAME, check_place
 from tests.rebound_cli.command import ROOT, WALL
@@ -17,9 +17,7 @@ def nothing_compiles(monkeypatch):
     def compiled(*_):
         raise AssertionError("minutes of compiling for a flight that cannot be kept")
 
-    monkeypatch.setattr(fly, "prepare_companion", compiled)
     monkeypatch.setattr(fly, "prepare_vehicle", compiled)
-    monkeypatch.setattr(guard, "prepare_companion", compiled)
 
 
 COMMANDS = [("fly", str(WALL), "--lockstep"), ("guard", "--connect", "udpin://127.0.0.1:0")]

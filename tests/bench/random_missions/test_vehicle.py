@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from bench.random_missions.generator import AIRFRAMES, MissionCase, airframe_of, random_mission
-from bench.random_missions.vehicle import companion_settings, drawn_vehicle
+from bench.random_missions.vehicle import drawn_vehicle
 from companion.mission.config import CompanionConfig
 from sim_vehicle.airframe import Airframe, with_base
 
@@ -74,11 +74,8 @@ def test_a_mission_with_a_drawn_vehicle_says_of_it_what_its_owner_can_measure():
     vehicle, settings = airframe_of(case), random_mission(case).data["companion"]
     config = CompanionConfig.model_validate(settings).estimate
     assert config.guards.centre_m == pytest.approx(vehicle.geometry.motor_radius_m)
-    assert config.guards.stiffness_per_s2 == vehicle.arms.stiffness_per_s2 / 2.0
+    assert config.guards.radius_m == pytest.approx(vehicle.geometry.guard_radius_m)
     assert config.accelerometer_range_m_s2 == vehicle.imu.accelerometer_range_m_s2
     # The room and the mission are those of the named vehicle
     named = random_mission(MissionCase(9, "foldable")).data
     assert {**named, "companion": 0} == {**random_mission(case).data, "companion": 0}
-    # A frame that does not fold has no spring to tell of
-    rigid = companion_settings(drawn_vehicle(9, "rigid"))["estimate"]["guards"]
-    assert "travel_m" not in rigid and "stiffness_per_s2" not in rigid

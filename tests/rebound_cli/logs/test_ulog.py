@@ -153,21 +153,6 @@ def test_a_log_of_no_multicopter_is_refused_by_name(tmp_path, status, parameters
         read(tmp_path, {**IMU, "vehicle_status": topic}, parameters=parameters)
 
 
-def test_arms_that_are_no_x_are_said(tmp_path):
-    def said(kind, *rotors):
-        places = [(f"CA_ROTOR{n}_P{'XY'[axis]}", place[axis]) for n, place in enumerate(rotors) for axis in (0, 1)]
-        topic = ([("uint8_t", "system_type")], [(START, kind)])
-        parameters = [("CA_ROTOR_COUNT", float(len(rotors))), *places]
-        return read(tmp_path, {**IMU, "vehicle_status": topic}, parameters=parameters).other_arms
-
-    # A square X, and PX4's own long-armed iris
-    assert said(2, (0.2, 0.2), (-0.2, -0.2), (0.2, -0.2), (-0.2, 0.2)) is None
-    assert said(2, (0.15, 0.245), (-0.15, -0.19), (0.15, -0.245), (-0.15, 0.19)) is None
-    # A plus, and six arms
-    assert said(2, (0.2, 0.0), (0.0, -0.2), (-0.2, 0.0), (0.0, 0.2)) == "quadrotor whose arms are no X"
-    assert said(13) == "hexarotor"
-
-
 def test_landed_state_is_what_px4_would_send(tmp_path):
     topics = {
         **IMU,

@@ -4,14 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Situation
 from companion.messages import ExtendedState, LandedState, LocalPosition
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND
 from rebound_cli.logs.log import Demand, LoggedSample
 from rebound_cli.logs.shaking import Stage, shaking
-from rebound_cli.replay.report import replay_log
 from rebound_cli.replay.watching import DESCENT_M_S, Circumstances, thinned, watch_log
 from tests.rebound_cli.replay.flying import HIT_US, LATERAL, SECOND, beat, flight, position
 
@@ -147,10 +145,3 @@ def test_noise_is_told_for_each_stage_of_a_flight():
     assert set(noise) == {Stage.GROUND, Stage.TAKEOFF, Stage.UNDER_WAY}
     for values in noise.values():
         assert values == pytest.approx([0.3, 0.3, 0.3], rel=0.15)
-
-
-def test_arms_that_are_no_quad_xs_are_noted_only_where_they_fold():
-    log = replace(flight(hit_us=None), other_arms="hexarotor")
-    folding = BaselineConfig(detector="lateral", estimate={"guards": {"travel_m": 0.03}})
-    stiff, springs = (replay_log(log, config, None).losses for config in (LATERAL, folding))
-    assert set(springs) - set(stiff) == {"a hexarotor: a hit's normal is fitted for the four arms of a quad-x"}

@@ -104,7 +104,7 @@ def test_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(wall_fold
     (hit,) = json.loads((wall_folder / "summary.json").read_text())["collisions"]
     (moment,) = (moment for moment in opened.data["moments"] if moment["kind"] == "hit")
     assert moment["t"] == hit["detected_at_s"]
-    assert np.allclose(moment["normal"], hit["normal_ned"], atol=0.05) and moment["error_deg"] == 30.0
+    assert np.allclose(moment["normal"], hit["normal_ned"], atol=0.05) and 10.0 < moment["error_deg"] < 20.0
     # The simulator's first touch, before the sample that shows it
     assert moment["touched_ms"] == pytest.approx(-hit["truth"]["detection_latency_ms"], abs=0.001)
     why = "\n".join(moment["reasons"])

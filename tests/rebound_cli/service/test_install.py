@@ -196,8 +196,7 @@ def test_a_step_that_systemd_refuses_is_named(system, monkeypatch):
         service(system, "install")
 
 
-def test_exit_codes_that_no_restart_mends_end_the_service(monkeypatch):
-    monkeypatch.setattr("rebound_cli.guard.prepare_companion", lambda *_: None)
+def test_exit_codes_that_no_restart_mends_end_the_service():
     assert values(unit(), "RestartPreventExitStatus") == ["2 78"]
     assert (exit_codes.USAGE, exit_codes.CONFIGURATION) == exit_codes.PERMANENT
     assert main(["guard", "--connect", "nowhere"]) == exit_codes.CONFIGURATION
