@@ -38,7 +38,7 @@ class EstimateConfig(StrictModel):
     accelerometer_range_m_s2: Positive = 156.9
     """+-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g."""
     position_noise_m: Positive = 0.03
-    """Of a good flow or motion-capture estimate, within the half second that v_c is found from."""
+    """Of a good flow or motion-capture estimate, within the second that v_c is found from."""
 
     @property
     def reach_m(self) -> float:

@@ -10,8 +10,7 @@ from rebound_cli.live.console import Console
 if TYPE_CHECKING:
     from rebound_cli.inputs import SimulatedWorld
 
-_ROOMS = ("companion", "sim_vehicle")
-ONCE = "once for this machine"
+_ROOM = "sim_vehicle."
 COMPILED = "Compiled code"
 
 
@@ -21,7 +20,7 @@ def prepare_vehicle(console: Console, world: "SimulatedWorld") -> None:
     from sim_vehicle.vehicle import SimulatedVehicle
 
     what = "Compiling the simulated vehicle's physics"
-    with compiling_shown(console, f"{what}, {ONCE}" if NOT_KEPT is None else what):
+    with compiling_shown(console, f"{what}, once for this machine" if NOT_KEPT is None else what):
         SimulatedVehicle(world.airframe, world.scene, world.seed, keeps_path=False)
     if NOT_KEPT is not None:
         console.print(f"{COMPILED} is not kept ({NOT_KEPT}): give NUMBA_CACHE_DIR a folder that can be written to.")
@@ -42,7 +41,7 @@ def compiling_shown(console: Console, what: str) -> Iterator[None]:
         def on_start(self, event: Any) -> None:
             dispatcher = event.data["dispatcher"]
             # Numba compiles functions of its own beside ours.
-            if dispatcher.py_func.__module__.partition(".")[0] in _ROOMS:
+            if dispatcher.py_func.__module__.startswith(_ROOM):
                 kernels[:] = kernels or _kernels_beside(dispatcher)
                 # They are compiled, or were kept by an earlier start.
                 console.progress(what, sum(bool(kernel.overloads) for kernel in kernels), len(kernels))
@@ -56,8 +55,7 @@ def compiling_shown(console: Console, what: str) -> Iterator[None]:
 
 
 def _kernels_beside(dispatcher: Any) -> list[Any]:
-    """With all of the same room, as far as it is loaded."""
-    room = dispatcher.py_func.__module__.partition(".")[0] + "."
-    modules = [module for name, module in sys.modules.items() if name.startswith(room)]
+    """With all of the simulated vehicle, as far as it is loaded."""
+    modules = [module for name, module in sys.modules.items() if name.startswith(_ROOM)]
     values = [dispatcher, *(value for module in modules for value in vars(module).values())]
     return list({id(value): value for value in values if type(value) is type(dispatcher)}.values())

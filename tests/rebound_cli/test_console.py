@@ -92,7 +92,7 @@ def test_only_what_is_compiled_has_a_progress():
     def kernel(value):
         return value + 1
 
-    kernel.__module__ = "companion.estimate.guards"
+    kernel.__module__ = "sim_vehicle.physics.contact"
     kernel = numba.njit(kernel)
     stream = io.StringIO()
     console = Console(stream)
