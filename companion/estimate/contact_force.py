@@ -9,9 +9,6 @@ from companion.motion.strapdown import ZERO
 
 # Samples at most 1.5 averaging windows apart are contiguous: that is nearer to one window than to two.
 CONTIGUOUS = 1.5
-# After this time without force another part of the rotated vehicle touches: the opposite guard or the hub. That force's
-# direction is not the hit's.
-QUIET_US = 20_000
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
 # is a third of the range in the mean.
 CLIPPED_SHARE = 1.0 / 3.0
@@ -33,8 +30,6 @@ class ContactForce:
     started_boot_us: int
     """Latest time without contact."""
     time_boot_us: int = 0
-    heard_boot_us: int = 0
-    """Time of the latest IMU sample, also after the contact."""
     rates_frd_rad_s: Vector3 = ZERO
     first_rates_frd_rad_s: Vector3 = ZERO
     impulse_ned_m_s: Vector3 = ZERO
@@ -43,10 +38,7 @@ class ContactForce:
     peak_m_s2: float = 0.0
     loud_frd_m_s2: list[Vector3] = field(default_factory=list)
     """The contact force in samples above the threshold."""
-    loud_boot_us: int = 0
-    closed: bool = False
     clipped: bool = False
-    """In the whole contact, also after `closed`."""
     gap: bool = False
     begun_boot_us: int | None = None
 
@@ -56,14 +48,9 @@ class ContactForce:
         f, free = sample.specific_force_frd_m_s2, self.free_frd_m_s2
         frd = (f[0] - free[0], f[1] - free[1], f[2] - free[2])
         first = self.time_boot_us == 0
-        elapsed_us = now_us - (self.started_boot_us if first else self.heard_boot_us)
+        elapsed_us = now_us - (self.started_boot_us if first else self.time_boot_us)
         contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
-        self.heard_boot_us = now_us
         self.clipped = self.clipped or max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
-        if not first and now_us - self.loud_boot_us > max(QUIET_US, 2 * self.averaging_us):
-            self.closed = True
-        if self.closed:
-            return
         if first:
             self.first_rates_frd_rad_s = w
         else:
@@ -81,17 +68,16 @@ class ContactForce:
         )
         self.rates_frd_rad_s = w
         if loud:
-            self._confirm(now_us, frd, contiguous)
+            self._confirm(frd, contiguous)
         self.last_ned_m_s2, self.time_boot_us = ned, now_us
 
-    def _confirm(self, now_us: int, force_frd_m_s2: Vector3, contiguous: bool) -> None:
+    def _confirm(self, force_frd_m_s2: Vector3, contiguous: bool) -> None:
         """Count the sample, and all since the last one above the threshold, as contact."""
         size_m_s2 = math.hypot(*force_frd_m_s2)
         total, more = self.impulse_ned_m_s, self.unconfirmed_ned_m_s
         self.impulse_ned_m_s = (total[0] + more[0], total[1] + more[1], total[2] + more[2])
         self.unconfirmed_ned_m_s = ZERO
         self.loud_frd_m_s2.append(force_frd_m_s2)
-        self.loud_boot_us = now_us
         self.peak_m_s2 = max(self.peak_m_s2, size_m_s2)
         self.gap = self.gap or not contiguous
         if len(self.loud_frd_m_s2) == 2 and contiguous and size_m_s2 > 0.0:

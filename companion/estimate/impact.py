@@ -85,7 +85,6 @@ class ImpactEstimator:
             now_us, strapdown = sample.time_boot_us, self.inertial.strapdown
             if not self.inertial.imu(sample):
                 self.sums.clear()
-            self.validity.age(now_us)
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
             self.earlier_imu, self.imu = self.imu, sample
         elif isinstance(sample, LocalPosition | Odometry):

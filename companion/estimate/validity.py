@@ -34,58 +34,42 @@ class VelocityValidity:
     """Changed only by its methods. Times: vehicle's boot clock."""
 
     invalid_since_boot_us: int | None = None
-    """Time of the latest hit; None when it was measured whole."""
-    earlier_invalid_since_boot_us: int | None = None
-    """Time of an earlier hit after which the velocity was not yet valid when the latest came."""
+    """Time of the latest hit that was not measured whole."""
+    _is_again: bool = False
+    """Whether the velocity was invalid already when the latest hit came: an earlier hit's part stays hidden."""
 
     @property
     def is_valid(self) -> bool:
-        return self._since_us is None
+        return self.invalid_since_boot_us is None
 
     def is_attitude_valid(self, time_us: int) -> bool:
         """Whether the attitude is valid: no hit is being corrected, or the correction cannot have begun."""
-        since_us = self._since_us
-        return since_us is None or (self.earlier_invalid_since_boot_us is None and time_us - since_us < UNCORRECTED_US)
-
-    @property
-    def _since_us(self) -> int | None:
-        return self.earlier_invalid_since_boot_us if self.invalid_since_boot_us is None else self.invalid_since_boot_us
+        since_us = self.invalid_since_boot_us
+        return since_us is None or (not self._is_again and time_us - since_us < UNCORRECTED_US)
 
     def invalidate(self, time_us: int) -> None:
         """A new hit: the velocity is not valid until the hit is known to be measured whole."""
-        self.earlier_invalid_since_boot_us, self.invalid_since_boot_us = self._since_us, time_us
+        self._is_again, self.invalid_since_boot_us = not self.is_valid, time_us
 
     def assess(self, is_fully_measured: bool, time_us: int) -> None:
-        """Take whether the latest hit was measured whole, as known by now. An earlier hit's part stays hidden."""
-        if is_fully_measured:
+        """Take whether the latest hit was measured whole, as known by now."""
+        if not is_fully_measured:
+            self.invalid_since_boot_us = self.invalid_since_boot_us or time_us
+        elif not self._is_again:
             self.invalid_since_boot_us = None
-        elif self.invalid_since_boot_us is None:
-            self.invalid_since_boot_us = time_us
-
-    def restore(self) -> None:
-        """The velocity is valid again."""
-        self.invalid_since_boot_us = self.earlier_invalid_since_boot_us = None
-
-    def age(self, now_us: int) -> None:
-        """The velocity is valid again after MOST_US in any case."""
-        since_us = self._since_us
-        if since_us is not None and now_us - since_us > MOST_US:
-            self.restore()
 
     def update(self, fixes: Sequence[VelocityFix], level_acceleration_m_s2: Vector3) -> None:
         """Take the newest velocity, and the acceleration of a vehicle that is level by its own attitude, NED.
 
-        While velocity and accelerometer agree, the velocity minus the accelerometer's integral is constant.
+        While velocity and accelerometer agree, the velocity minus the accelerometer's integral is constant. After
+        MOST_US the velocity is valid in any case.
         """
-        invalid_since_us, now_us = self._since_us, fixes[-1].time_boot_us
-        if (
-            invalid_since_us is None
-            or now_us - invalid_since_us <= LEAST_US
-            or math.hypot(*level_acceleration_m_s2) >= AGREE_M_S2
-        ):
+        since_us, now_us = self.invalid_since_boot_us, fixes[-1].time_boot_us
+        if since_us is None or now_us - since_us <= LEAST_US:
             return
         recent = [fix for fix in fixes if now_us - fix.time_boot_us <= AGREE_US]
         axes = zip(*map(less_sum, recent), strict=True)
         is_long = now_us - recent[0].time_boot_us >= AGREE_US // 2
-        if is_long and all(max(axis) - min(axis) < AGREE_M_S for axis in axes):
-            self.restore()
+        agrees = is_long and all(max(axis) - min(axis) < AGREE_M_S for axis in axes)
+        if (agrees and math.hypot(*level_acceleration_m_s2) < AGREE_M_S2) or now_us - since_us > MOST_US:
+            self.invalid_since_boot_us = None

@@ -153,7 +153,6 @@ def test_a_tilt_that_the_gyroscopes_deny_keeps_the_doubt(leans_m_s2, believed_s)
     validity.invalidate(0)
     fixes, believed_us = [], None
     for time_us in range(20_000, 6_000_000, 20_000):
-        validity.age(time_us)
         fixes.append(VelocityFix(time_us, (0.5, 0.0, 0.0), STILL, STILL))
         validity.update(fixes, (leans_m_s2, 0.0, 0.0))
         if validity.is_valid and believed_us is None:
