@@ -80,25 +80,17 @@ RULES = (
     ),
     Rule("change", "the normal by the change of velocity", _FLIGHT + "collision:with_change", _argument(0)),
     Rule(
-        "comes after",
-        "what comes after the vehicle is behind it",
-        _FLIGHT + "recovering:_struck_from_behind",
-        _says(None),
-    ),
-    Rule(
         "pressing on",
         "accelerations alone for one that leans on",
         _FLIGHT + "recovering:Recover._tilts_into_surface",
         _says(False),
     ),
     Rule("kept off", "no acceleration into what is near", _REFLEX + "planner:kept_off", _argument(0)),
-    Rule("harder", "brakes harder before a surface", _REFLEX + "planner:Plan.enters", _says(False)),
-    Rule("replanned", "a new plan for one that is off it", _REFLEX + "planner:Plan.holds", _says(True)),
     Rule(
         "known rest",
         "what is missing still is known and asked for",
-        _REFLEX + "motion_estimator:FilterBank.errors",
-        _says((REST, REST)),
+        _REFLEX + "motion_estimator:FilterBank.mean_error",
+        _says(REST),
     ),
     Rule(
         "velocity by places",
@@ -106,7 +98,6 @@ RULES = (
         _REFLEX + "motion_estimator:_rate_error",
         _says(REST),
     ),
-    Rule("spinning", "gentle steering while it spins", _FLIGHT + "recovering:Recover._is_spinning", _says(False)),
     Rule("remembered surfaces", "keeps off what it knows", _FLIGHT + "obstacle_map:remembered_surfaces", _says([])),
     Rule("climb", "brakes a climb", _REFLEX + "planner:height_feedback", _says(0.0)),
 )

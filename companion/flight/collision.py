@@ -52,7 +52,6 @@ class CollisionRecord:
     peak_specific_force_m_s2: float
     contact_ended_boot_us: int
     estimator: MotionEstimator
-    is_behind: bool = False  # the obstacle followed the vehicle: the normal is the earlier hit's
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     after_ned_m_s: Vector3 | None = None  # the velocity after the contact
     hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = None  # until it is confirmed or rejected
@@ -98,8 +97,7 @@ class CollisionRecord:
             return
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-        if not self.is_behind:
-            self.contact_normal = level(estimate.normal)
+        self.contact_normal = level(estimate.normal)
         self.estimator.note_contact(not estimate.may_be_clipped, self.contact_ended_boot_us)
 
     def _is_seen_again(self, state: DetectorState, hypothesis: ForceHypothesis | VelocityJumpHypothesis) -> bool:

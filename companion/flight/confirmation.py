@@ -8,7 +8,7 @@ the velocity. A broken or forged packet does not: the next rates and velocities 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import fmean, median
+from statistics import fmean, median, stdev
 
 from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
@@ -16,6 +16,8 @@ from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix, less_sum
 from companion.motion.strapdown import MOTORS_RAD_S2
+from companion.reflex.halfspace import plus, split
+from companion.reflex.planner import REST
 
 # A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
 STRUCK_M_S = 0.5
@@ -57,29 +59,19 @@ class ForceHypothesis:
         of the integral. After a true impulse the velocity is ahead of it by the whole impulse; otherwise both agree.
         """
         hit_us, later_us = self.time_boot_us, self.later_boot_us
-        before = [fix for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
-        after = [fix for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
+        was = [less_sum(fix) for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
+        came = [less_sum(fix) for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
         size_m_s2 = math.hypot(*self.force_ned_m_s2)
-        if len(before) < 2 or len(after) < 2 or later_us is None or size_m_s2 == 0.0:
+        if len(was) < 2 or len(came) < 2 or later_us is None or size_m_s2 == 0.0:
             return False
-        away = tuple(part / size_m_s2 for part in self.force_ned_m_s2)
-        was, came = [_ahead(fix, away) for fix in before], [_ahead(fix, away) for fix in after]
-        mean_was, mean_came = sum(was) / len(was), sum(came) / len(came)
-        noise = math.sqrt(sum((value - mean_was) ** 2 for value in was) / (len(was) - 1))
-        spread = noise * math.sqrt(1.0 / len(was) + 1.0 / len(came))
+        away = plus(REST, 1.0 / size_m_s2, self.force_ned_m_s2)
         in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - self.earlier.time_boot_us)
-        pushed_m_s = mean_came - mean_was + in_sum_m_s
+        change = plus(plus(_mean(came), -1.0, _mean(was)), in_sum_m_s, away)
+        spread = stdev(split(each, away)[0] for each in was) * math.sqrt(1.0 / len(was) + 1.0 / len(came))
         least_m_s = 0.5 * max(size_m_s2 * self.averaging_s, HIT_LEAVES_M_S)
-        is_unmoved = pushed_m_s < least_m_s and least_m_s > SURE * spread
-        return is_unmoved and self._any_push_m_s(before, after, in_sum_m_s, away) < STRUCK_M_S
-
-    @staticmethod
-    def _any_push_m_s(
-        before: Sequence[VelocityFix], after: Sequence[VelocityFix], in_sum_m_s: float, away: Sequence[float]
-    ) -> float:
-        """Velocity change in any direction, m/s: a stuck axis shows no force along itself."""
-        was, came = ([fmean(axis) for axis in zip(*map(less_sum, fixes), strict=True)] for fixes in (before, after))
-        return math.hypot(*(c - w + in_sum_m_s * a for c, w, a in zip(came, was, away, strict=True)))
+        is_unmoved = split(change, away)[0] < least_m_s and least_m_s > SURE * spread
+        # A stuck axis shows no force along itself.
+        return is_unmoved and math.hypot(*change) < STRUCK_M_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +91,8 @@ class VelocityJumpHypothesis:
         if len(before) < 2 or len(after) < 2:
             return False
         # The median: one of them may be forged.
-        was = tuple(median(axis) for axis in zip(*before, strict=True))
-        return all(self._departs_m_s(came, was) < 0.5 * self.change_m_s for came in after)
+        was = median(split(each, self.away)[0] for each in before)
+        return all(split(came, self.away)[0] - was < 0.5 * self.change_m_s for came in after)
 
     def stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
         """Whether the positions before and after show less than half of the jump, beyond their noise."""
@@ -117,11 +109,12 @@ class VelocityJumpHypothesis:
         if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
             return None
         over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
-        ends = zip(self.away, places[-1].position_ned_m, places[0].position_ned_m, strict=True)
-        return sum(a * (p - q) for a, p, q in ends) / over_s
+        return split(plus(places[-1].position_ned_m, -1.0, places[0].position_ned_m), self.away)[0] / over_s
 
-    def _departs_m_s(self, came: Sequence[float], was: Sequence[float]) -> float:
-        return sum(a * (c - w) for a, c, w in zip(self.away, came, was, strict=True))
+
+def _mean(vectors: Sequence[Vector3]) -> Vector3:
+    n, e, d = (fmean(axis) for axis in zip(*vectors, strict=True))
+    return (n, e, d)
 
 
 def hypothesis_of(
@@ -134,14 +127,8 @@ def hypothesis_of(
         size_m_s2 = math.hypot(*force_ned_m_s2)
         if size_m_s2 == 0.0:
             return None
-        n, e, d = force_ned_m_s2
-        away = (n / size_m_s2, e / size_m_s2, d / size_m_s2)
+        away = plus(REST, 1.0 / size_m_s2, force_ned_m_s2)
         return VelocityJumpHypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
     if estimate.is_final or estimate.earlier is None:
         return None
     return ForceHypothesis(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)
-
-
-def _ahead(fix: VelocityFix, away: Sequence[float]) -> float:
-    """Velocity minus the accelerometer's integral, along a direction, m/s."""
-    return sum(a * less for a, less in zip(away, less_sum(fix), strict=True))

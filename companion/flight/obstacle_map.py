@@ -92,7 +92,7 @@ def _touches(flight: FlightContext, records: Sequence[CollisionRecord]) -> list[
     touches = []
     for record in records:
         centre, velocity = flight.mission_ned_m(record.contact.position_ned_m), record.contact.velocity_ned_m_s
-        touch = touch_of(centre, velocity, record.normal, reach_m, record.detected_at_us, record.is_behind)
+        touch = touch_of(centre, velocity, record.normal, reach_m, record.detected_at_us)
         touches += [] if touch is None else [touch]
     return touches
 

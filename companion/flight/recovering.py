@@ -15,27 +15,20 @@ from companion.flight.obstacle_map import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
 from companion.motion.rotation import body_to_ned, yaw_rad
 from companion.motion.settling import SettlingMonitor
-from companion.reflex.config import (
-    ACCELERATION_GAIN,
-    AGREEMENT_COSINE,
-    BEHIND_M,
-    CONTACT_LINGERS_US,
-    DESCENT_M_S2,
-    HANGING_TILT_M_S2,
-    LEAVING_M_S,
-    LEFT_BELOW_M,
-    MOTION_KNOWN_US,
-    NO_CONTACT_APPROACH_M_S,
-    PRESSING_TILT_M_S2,
-    SPINNING_RAD_S,
-    STOPPING_M_S2,
-    TOUCH_TOLERANCE_M,
-    YAW_LEAD_RAD,
-)
-from companion.reflex.halfspace import FenceBounds, FreeSpace, Surface, plus, split
+from companion.reflex import config as reflex
+from companion.reflex.halfspace import FenceBounds, Surface, clear_goal, limited, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.motion_estimator import MotionEstimator
-from companion.reflex.planner import REST, Limits, MotionState, Plan, height_feedback, kept_off, plan, safe_to_hold
+from companion.reflex.planner import (
+    REST,
+    MotionState,
+    Plan,
+    height_feedback,
+    kept_off,
+    safe_to_hold,
+    shortest,
+    with_feedback,
+)
 
 
 class Recover:
@@ -45,63 +38,49 @@ class Recover:
         self._record = record = flight.collisions[-1]
         self._law, self._config = _law(flight), flight.mission.recovery
         self._contact = record.contact
-        self._limits = Limits(self._config.acceleration_m_s2)
-        self._first_hit_us = in_one_recovery(flight.collisions)[-1].detected_at_us
-        if flight.target is not None and len(in_one_recovery(flight.collisions)) == 1:
+        together = in_one_recovery(flight.collisions)
+        self._first_hit_us = together[-1].detected_at_us
+        if flight.target is not None and len(together) == 1:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
         self._surfaces = _surfaces(flight, self._contact, flight.collisions)
-        self._spin_rad_s = 0.0
         self._is_known = not self._law.follows  # whether the motion after the hit is known
-        self._has_left, self._may_fall, self._comes_m_s = False, False, 0.0
-        self._hangs, self._has_hung = False, False  # hangs on the obstacle; and has not left it since
+        self._has_left, self._may_fall = False, False
+        self._has_hung = False  # was pressed on the obstacle, and has not left it since
         self._agreed: Normal | None = None  # the normal from the velocities before and after
         self._planned_for: object = None  # the state of the contact that the plan was made for
-        self._plan: Plan | None = None  # None: only accelerations are setpoints
-        self._plan_began_us = now_us
+        self._plan, self._plan_began_us = self._plan_from(self._state()), now_us
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
         if not self._law.follows:
             return Target(self._record.setpoint_ned_m, self._yaw_rad)
-        elapsed_s = 1e-6 * (now_us - self._plan_began_us)
-        is_steady = not (self._lets_go or self._is_spinning or self._tilts_into_surface()) and self._is_known
-        return self._by_plan(elapsed_s) if is_steady else self._by_acceleration(elapsed_s)
+        is_steady = self._is_known and not (self._lets_go or self._tilts_into_surface())
+        planned = self._plan.at(1e-6 * (now_us - self._plan_began_us))
+        return self._by_plan(planned) if is_steady else self._by_acceleration(planned)
 
-    def _by_plan(self, elapsed_s: float) -> Target:
+    def _by_plan(self, planned: MotionState) -> Target:
         """A setpoint of position, velocity and acceleration: PX4's own loops follow the plan."""
-        record, estimator, goal = self._record, self._record.estimator, self._record.setpoint_ned_m
-        motion = MotionState(goal, REST) if self._plan is None else self._plan.at(elapsed_s)
-        a, b, c = self._kept_off(motion.acceleration_ned_m_s2)
+        record, estimator = self._record, self._record.estimator
+        a, b, c = self._kept_off(planned.acceleration_ned_m_s2)
         if self._is_level:
-            (n, e, _), (u, v, _) = motion.position_ned_m, motion.velocity_ned_m_s
-            motion, c = MotionState((n, e, goal[2]), (u, v, 0.0)), self._height_m_s2(1.0)
+            (n, e, _), (u, v, _) = planned.position_ned_m, planned.velocity_ned_m_s
+            planned, c = MotionState((n, e, record.setpoint_ned_m[2]), (u, v, 0.0)), self._height_m_s2(1.0)
         # The estimate's known errors of position, velocity and tilt are added, because PX4 controls its own estimate.
-        place = plus(motion.position_ned_m, 1.0, estimator.position_error_m)
-        velocity = plus(motion.velocity_ned_m_s, 1.0, estimator.velocity_error_m_s)
-        return Target(
-            place,
-            self._yaw_rad,
-            velocity,
-            plus((ACCELERATION_GAIN * a, ACCELERATION_GAIN * b, c), -1.0, record.level_acceleration_m_s2),
-        )
+        place = plus(planned.position_ned_m, 1.0, estimator.position_error_m)
+        velocity = plus(planned.velocity_ned_m_s, 1.0, estimator.velocity_error_m_s)
+        asked = (reflex.ACCELERATION_GAIN * a, reflex.ACCELERATION_GAIN * b, c)
+        return Target(place, self._yaw_rad, velocity, plus(asked, -1.0, record.level_acceleration_m_s2))
 
-    def _by_acceleration(self, elapsed_s: float) -> Target:
+    def _by_acceleration(self, planned: MotionState) -> Target:
         """A setpoint of acceleration alone: PX4's estimate is wrong, or its loops would harm this motion."""
         goal, record, state = self._record.setpoint_ned_m, self._record, self._state()
-        if self._plan is not None and not self._tilts_into_surface():
-            asked = self._plan.with_feedback(elapsed_s, state)
-        else:
-            limits = self._limits.spinning(self._spin_rad_s)
-            asked = plan(state, goal, self._surfaces, limits).at(0.0).acceleration_ned_m_s2
-        north, east = (0.0, 0.0) if self._tilts_into_surface() else record.estimator.wind_m_s2
-        a, b, c = safe_to_hold(asked, self._tilted_motion.velocity_ned_m_s)
-        a, b, c = self._kept_off((a + north, b + east, self._height_m_s2(1.0) if self._is_level else c))
+        a, b, c = safe_to_hold(with_feedback(planned, state), self._tilted_motion.velocity_ned_m_s)
         is_free = self._lets_go or (self._is_level and not self._is_known)
-        if is_free:
-            c = self._height_m_s2(2.0)
+        # Where the height is free, PX4's own loop adds nothing.
+        a, b, c = self._kept_off((a, b, self._height_m_s2(2.0 if is_free else 1.0) if self._is_level else c))
         if self._lets_go:
-            c = DESCENT_M_S2 if self._hangs else max(c, 0.0)
+            c = reflex.DESCENT_M_S2 if self._tilts_into_surface() else max(c, 0.0)
         # The velocity of the vehicle's own estimate: PX4's vertical loop then adds nothing to the acceleration.
         velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
         expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
@@ -119,27 +98,23 @@ class Recover:
 
     def _height_m_s2(self, loops: float) -> float:
         record, most_m_s2 = self._record, self._config.vertical_acceleration_m_s2
-        spread_m_s, told_m_s = record.estimator.spread_m_s[2], record.estimated_down_m_s
+        spread_m_s, told_m_s = record.estimator.spread_m_s, record.estimated_down_m_s
         return height_feedback(self._state(), spread_m_s, told_m_s, record.setpoint_ned_m[2], loops, most_m_s2)
 
     def _kept_off(self, acceleration_ned_m_s2: Vector3) -> Vector3:
-        spread = self._record.estimator.spread_m_s
-        surfaces = [replace(self._surfaces[0], comes_m_s=self._comes_m_s), *self._surfaces[1:]]
-        return kept_off(acceleration_ned_m_s2, self._tilted_motion, spread, surfaces, self._limits)
+        return kept_off(acceleration_ned_m_s2, self._tilted_motion, self._surfaces, self._config.acceleration_m_s2)
 
     @property
     def _tilted_motion(self) -> MotionState:
         """The present motion, with the acceleration of the present tilt."""
         return replace(self._record.estimator.motion, acceleration_ned_m_s2=self._record.estimator.tilt_m_s2)
 
-    def _tilts_into_surface(self, least_m_s2: float = PRESSING_TILT_M_S2) -> bool:
-        """Whether the vehicle tilts into a surface that it touches, by more than an acceleration.
-
-        The tilt that PX4's loops add against a wind, or have integrated against the surface, is then left out.
-        """
+    def _tilts_into_surface(self) -> bool:
+        """Whether the vehicle tilts into a surface that it touches: its own thrust presses it on."""
+        motion = self._tilted_motion
         return any(
-            -BEHIND_M <= surface.off_m(self._tilted_motion.position_ned_m) < TOUCH_TOLERANCE_M
-            and split(self._tilted_motion.acceleration_ned_m_s2, surface.normal_ned)[0] < -least_m_s2
+            -reflex.BEHIND_M <= surface.off_m(motion.position_ned_m) < reflex.TOUCH_TOLERANCE_M
+            and split(motion.acceleration_ned_m_s2, surface.normal_ned)[0] < -reflex.PRESSING_TILT_M_S2
             for surface in self._surfaces
         )
 
@@ -147,8 +122,6 @@ class Recover:
         record, attitude = self._record, flight.vehicle.attitude
         if attitude is not None:
             self._yaw_rad = heading_towards(yaw_rad(attitude.attitude_wxyz), flight.yaw_rad)
-            if attitude.angular_velocity_frd_rad_s is not None:
-                self._spin_rad_s = body_to_ned(attitude.attitude_wxyz, attitude.angular_velocity_frd_rad_s)[2]
         self._may_fall = _has_room_below(flight)
         for sample in inputs.positions:
             noise_m = flight.mission.companion.estimate.position_noise_m
@@ -158,46 +131,40 @@ class Recover:
                     return transition
             record.estimator.update(sample)
             is_known = self._knows(sample)
-            self._follow(flight, sample, now_us)
+            if self._law.follows:
+                self._follow(flight, sample, now_us)
             if not is_known:
                 continue
             right = record.estimator.corrected(sample)
             record.follow_recovery(right)
             since_us = self._monitor.settled_since(right)
-            if since_us is not None and not self._is_spinning:
-                record.settled_at_boot_us, record.is_over = since_us, True
+            if since_us is not None:
+                record.settled_at_boot_us = since_us
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.report(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
-        # A vehicle that hangs does so until it no longer tilts into the surface.
-        self._hangs = self._tilts_into_surface(PRESSING_TILT_M_S2 if self._hangs else HANGING_TILT_M_S2)
         off_m_s = split(record.estimator.motion.velocity_ned_m_s, self._contact.normal_ned)[0]
-        self._has_hung = self._hangs or (self._has_hung and off_m_s < 0.0)
+        self._has_hung = self._tilts_into_surface() or (self._has_hung and off_m_s < 0.0)
         timeout_s = flight.mission.companion.settled.timeout_s
         if now_us - self._first_hit_us > timeout_s * 1e6:
-            record.is_over = True
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.report(now_us, "recovered", text, settled_after_s=None)
             return self._leave(flight)
         return None
 
-    @property
-    def _is_spinning(self) -> bool:
-        return self._law.follows and abs(self._spin_rad_s) > SPINNING_RAD_S
-
     def _leave(self, flight: FlightContext) -> Transition:
         """What follows begins at rest at the setpoint."""
+        self._record.is_over = True
         flight.target = Target(self._record.setpoint_ned_m, flight.yaw_rad)
         return afterwards(flight)
 
     def _knows(self, sample: LocalPosition) -> bool:
         """Whether the vehicle's estimate shows the motion after the hit. Until then plans use the estimated motion."""
         record, was_known = self._record, self._is_known
-        since_us = sample.time_boot_us - record.sample_time_boot_us
-        self._is_known = was_known or (record.estimator.has_converged and since_us >= MOTION_KNOWN_US)
+        self._is_known = was_known or record.estimator.has_converged
         is_rebound = sample.time_boot_us <= record.contact_ended_boot_us + REBOUND_WINDOW_US
         # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        is_measured = record.estimator.earlier is None
+        is_measured = not record.estimator.is_second
         if self._is_known and is_measured and (is_rebound or not was_known):
             after = record.estimator.corrected(sample).velocity_ned_m_s
             record.after_ned_m_s = after
@@ -211,73 +178,49 @@ class Recover:
         """
         motion, normal = self._record.estimator.motion, self._contact.normal_ned
         velocity, acceleration, place = motion.velocity_ned_m_s, motion.acceleration_ned_m_s2, motion.position_ned_m
-        if self._is_spinning:
-            acceleration = REST  # a gyroscope's tilt does not stay in its direction
         if not self._has_left:
             off_m_s, along = split(velocity, normal)
-            velocity, acceleration = plus(along, max(0.0, off_m_s), normal), REST
-        size, most_m_s2 = math.hypot(*acceleration), self._limits.acceleration_m_s2
-        if size > most_m_s2:
-            acceleration = plus(REST, most_m_s2 / size, acceleration)
-        return MotionState(place, velocity, acceleration)
+            velocity = plus(along, max(0.0, off_m_s), normal)
+        return MotionState(place, velocity, limited(acceleration, self._config.acceleration_m_s2))
 
     def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """Update goal and plan from what is known by now; the plan alone where the vehicle is off it."""
-        record, law = self._record, self._law
-        if not law.follows:
-            return
-        elapsed_s = 1e-6 * (now_us - self._plan_began_us)
-        self._touch(sample, elapsed_s)
-        state = self._state()
+        """Update the goal and the plan from what is known of the contact by now."""
+        self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
-        is_on = self._plan is not None and self._plan.holds(elapsed_s, state)
-        if known != self._planned_for or not (self._is_known or is_on):
-            self._planned_for, is_on = known, False
-            self._aim(flight, state, now_us)
-        if self._is_spinning or not law.plans:
-            self._plan = None
-        elif not is_on:
-            self._plan, self._plan_began_us = plan(state, record.setpoint_ned_m, self._surfaces, self._limits), now_us
-
-    def _touch(self, sample: LocalPosition, elapsed_s: float) -> None:
-        """Update the surface. A surface that still pushes is at the vehicle's position, and moves with it.
-
-        A vehicle that leaves no faster than its setpoint is not pushed, even if it vibrates.
-        """
-        record, contact = self._record, self._contact
-        motion = record.estimator.motion
-        off_m_s = split(motion.velocity_ned_m_s, contact.normal_ned)[0]
-        is_touched = sample.time_boot_us - record.contact_ended_boot_us < CONTACT_LINGERS_US
-        is_pushed = self._is_known and split(record.estimator.external_m_s2, contact.normal_ned)[0] > PRESSING_TILT_M_S2
-        asked_m_s = 0.0
-        if self._is_known and self._plan is not None:
-            asked_m_s = split(self._plan.at(elapsed_s).velocity_ned_m_s, contact.normal_ned)[0]
-        is_carried = (is_touched or is_pushed) and off_m_s - asked_m_s > LEAVING_M_S
-        self._comes_m_s = off_m_s if is_carried else 0.0
-        has_left = self._has_left or off_m_s > 0.0 or off_m_s < -NO_CONTACT_APPROACH_M_S
-        self._has_left = has_left and not (is_touched or is_carried)
-        place, normal = contact.position_ned_m, self._agreed or Normal(contact.normal_ned, contact.normal_error_rad)
-        # Before its motion is known, a touched surface is at the vehicle's position: frames and arms fold.
-        goes_along = is_carried or (is_touched and not self._is_known)
-        is_off = Surface(place, normal.direction_ned, 0.0).off_m(motion.position_ned_m) > 0.0
-        if self._has_hung or (goes_along and is_off):
-            place = motion.position_ned_m
-        self._contact = replace(
-            contact, position_ned_m=place, normal_ned=normal.direction_ned, normal_error_rad=normal.error_rad
-        )
-
-    def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
-        """Set the recovery setpoint again, from the present contact and motion."""
-        record, before = self._record, self._record.setpoint_ned_m
-        limits = self._limits.spinning(self._spin_rad_s)
-        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
-        record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, limits, self._surfaces)
+        if known == self._planned_for:
+            return
+        record, state, self._planned_for = self._record, self._state(), known
+        before, self._surfaces = record.setpoint_ned_m, _surfaces(flight, self._contact, flight.collisions)
+        record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, self._surfaces)
         self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
         if math.dist(place, before) > flight.mission.companion.settled.distance_m:
             record.overshoot_m = 0.0  # measured past the earlier setpoint
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+        self._plan, self._plan_began_us = self._plan_from(state), now_us
+
+    def _plan_from(self, state: MotionState) -> Plan:
+        goal = self._record.setpoint_ned_m
+        if not self._law.plans:
+            return Plan(state, goal, 0.0)
+        return shortest(state, lambda _: goal, self._config.acceleration_m_s2)
+
+    def _touch(self, sample: LocalPosition) -> None:
+        """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""
+        is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < reflex.CONTACT_LINGERS_US
+        estimator, contact = self._record.estimator, self._contact
+        if self._agreed is not None:
+            contact = replace(contact, normal_ned=self._agreed.direction_ned, normal_error_rad=self._agreed.error_rad)
+        normal = contact.normal_ned
+        off_m_s = split(estimator.motion.velocity_ned_m_s, normal)[0]
+        is_pushed = split(estimator.external_m_s2, normal)[0] > reflex.PRESSING_TILT_M_S2
+        is_carried = self._is_known and is_pushed and off_m_s > reflex.LEAVING_M_S
+        self._has_left = (self._has_left or off_m_s > 0.0) and not (is_touched or is_carried)
+        # Before its motion is known, a touched surface is there too: frames and arms fold.
+        goes_along = self._has_hung or is_carried or (is_touched and not self._is_known)
+        place = estimator.motion.position_ned_m if goes_along else contact.position_ned_m
+        self._contact = replace(contact, position_ned_m=place)
 
 
 def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | None:
@@ -288,7 +231,8 @@ def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | Non
     if wanted_rad is None:
         return None
     short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
-    return wanted_rad if abs(short_rad) <= YAW_LEAD_RAD else heading_rad + math.copysign(YAW_LEAD_RAD, short_rad)
+    lead_rad = reflex.YAW_LEAD_RAD
+    return wanted_rad if abs(short_rad) <= lead_rad else heading_rad + math.copysign(lead_rad, short_rad)
 
 
 def _has_room_below(flight: FlightContext) -> bool:
@@ -297,7 +241,7 @@ def _has_room_below(flight: FlightContext) -> bool:
     if latest is None or height_m is None:
         return False
     down_m_s = max(0.0, latest.velocity_ned_m_s[2])
-    return height_m > LEFT_BELOW_M + 0.5 * down_m_s**2 / STOPPING_M_S2
+    return height_m > reflex.LEFT_BELOW_M + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
@@ -306,46 +250,27 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     normal = level(estimate.normal)
     place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
     before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
-    behind = None if before is None else _struck_from_behind(flight, before, impact.specific_force_frd_m_s2, velocity)
-    normal, earlier = behind or normal, None
-    if law.follows and before is not None and not before.estimator.knows_motion:
+    is_second = law.follows and before is not None and not before.estimator.knows_motion
+    if before is not None and is_second:
         # The vehicle's estimate is still wrong from the hit before.
-        earlier = before.estimator
         place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
     contact = Contact(estimate.time_boot_us, place, velocity, normal.direction_ned, normal.error_rad)
     expected = contact.rebound(mission.recovery.restitution)
-    limits = Limits(mission.recovery.acceleration_m_s2)
     record = CollisionRecord(
         detected_at_us=now_us,
         sample_time_boot_us=impact.sample_time_boot_us,
         detector=mission.companion.detector,
         contact=contact,
-        setpoint_ned_m=_setpoint(flight, contact, expected, limits, _surfaces(flight, contact, flight.collisions)),
+        setpoint_ned_m=_setpoint(flight, contact, expected, _surfaces(flight, contact, flight.collisions)),
         contact_normal=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
-        estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, earlier),
-        is_behind=behind is not None,
+        estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, is_second),
         hypothesis=_hypothesis(flight, estimate),
     )
     record.estimator.note_contact(estimate.is_final and not estimate.may_be_clipped, impact.sample_time_boot_us)
     flight.collisions.append(record)
     report_detection(flight, record, now_us)
-
-
-def _struck_from_behind(
-    flight: FlightContext, before: CollisionRecord, push_frd_m_s2: Vector3, velocity_ned_m_s: Vector3
-) -> Normal | None:
-    """The earlier hit's normal, where its obstacle has followed the vehicle and struck it again from behind.
-
-    A force in the direction in which the vehicle leaves comes from behind it.
-    """
-    if flight.vehicle.attitude is None:
-        return None
-    normal, push = before.contact.normal_ned, body_to_ned(flight.vehicle.attitude.attitude_wxyz, push_frd_m_s2)
-    leaves_m_s, pushed_m_s2 = split(velocity_ned_m_s, normal)[0], split(push, normal)[0]
-    is_behind = leaves_m_s > LEAVING_M_S and pushed_m_s2 > AGREEMENT_COSINE * math.hypot(*push)
-    return replace(before.normal, direction_ned=normal) if is_behind else None
 
 
 def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
@@ -361,14 +286,12 @@ def _law(flight: FlightContext) -> Law:
     return RECOVERY_LAWS[flight.mission.recovery.law]
 
 
-def _setpoint(
-    flight: FlightContext, contact: Contact, motion: MotionState, limits: Limits, surfaces: Sequence[Surface]
-) -> Vector3:
+def _setpoint(flight: FlightContext, contact: Contact, motion: MotionState, surfaces: Sequence[Surface]) -> Vector3:
     """The law's goal, moved clear of surfaces and into the fence."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion, limits)
-    room = FreeSpace(FenceBounds(flight.origin_ned_m, flight.mission.fence), surfaces[1:])
-    return room.goal(contact.position_ned_m, contact.normal_ned, goal)
+    goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion)
+    goal = clear_goal(surfaces[1:], contact.position_ned_m, contact.normal_ned, goal)
+    return FenceBounds(flight.origin_ned_m, flight.mission.fence).clamp(contact.position_ned_m, goal)
 
 
 def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[CollisionRecord]) -> list[Surface]:

@@ -10,19 +10,12 @@ from companion.strict_model import NotNegative, Positive, StrictModel
 # The thrust's direction lags behind the acceleration setpoint: two time constants of a critically damped attitude loop
 # of 12 rad/s, and a motor's 0.02 s.
 LEAD_S = 0.15
-# Bandwidth of that loop, rad/s. A spinning vehicle is a gyroscope: its tilt lags more, by the factor
-# sqrt(1 + (spin / bandwidth)^2).
-ATTITUDE_RAD_S = 12.0
 # A shorter plan ends before a vehicle of that bandwidth has tilted both ways.
 SHORTEST_S = 1.25
-# Shortest plan that brakes in front of a surface. The vehicle takes longer than this to tilt.
-SHORTEST_BRAKING_S = 0.2
 # Factor on the acceleration limit in front of a surface: a tilt of 31 degrees instead of 17.
 HARD_BRAKING = 2.0
 # Arms fold by this much, and a position estimate is noisy by it.
 TOUCH_TOLERANCE_M = 0.05
-# Cosine of 60 degrees between velocity and goal. A goal further aside is turned to; braking does not speed that up.
-AHEAD_COSINE = 0.5
 # Ratio of one tried duration to the next. The lag is known less precisely than to 5 %.
 DURATION_STEP = 1.05
 # PX4's velocity loop subtracts a share of the measured acceleration: MPC_XY_VEL_D_ACC, 0.2 at most.
@@ -31,20 +24,12 @@ ACCELERATION_GAIN = 1.1
 CLIMB_GAIN_PER_S = 4.0
 # PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
 HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
-# Largest error of a vehicle that follows its plan: LEAD_S behind 3 m/s^2, and the integral of that.
-OFF_PLAN_M_S = 0.45
-OFF_PLAN_M = 0.3
-# A tilt of 9 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
-PRESSING_TILT_M_S2 = 1.5
-# A tilt of 20 degrees into the obstacle. Thrust T at a tilt a presses with T sin(a). The motors' largest torque against
-# it is 0.1 m times T: from 48 degrees on no thrust turns the vehicle back; below that a small thrust does.
-HANGING_TILT_M_S2 = 3.6
+# A tilt of 14 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
+PRESSING_TILT_M_S2 = 2.5
 # Half of gravity, down. The other half is thrust to steer with.
 DESCENT_M_S2 = 4.9
 # Acceleration that stops a descent (hover at 78 % of the thrust, not yet level), and the least height after it.
 STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
-# rad/s. From here on a tilt that lags by LEAD_S points 45 degrees and more beside the setpoint of PX4's own loops.
-SPINNING_RAD_S = 6.0
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
 # A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
 YAW_LEAD_RAD = 0.28
@@ -75,20 +60,13 @@ SMOOTHED_S = 0.05
 CORRECTED_S = 0.1
 # Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5
-# Time constant of the estimate of wind and drag: slower than the steering, faster than the drift that they cause.
-WIND_S = 1.0
-# Time constant of the external force: slower than the tilt's response, faster than the force tips the vehicle.
-EXTERNAL_FORCE_S = 0.2
 # A contact counts for this long after its last sample: it may go on, or the estimate does not contain it yet.
 CONTACT_LINGERS_US = 50_000
-# From here on the estimate shows the motion after the hit. Spring arms push for 0.12 s at 1 m/s, mostly at the
-# beginning, and an estimate is 20 ms late.
-MOTION_KNOWN_US = 80_000
 # Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
 # 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.
-CORRECTION_DELAY_S = (0.04, 0.1, 0.16, 0.22)
+CORRECTION_DELAY_S = (0.08, 0.18)
 CORRECTION_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
-CORRECTION_DAMPING = (0.5, 0.67, 0.85)
+CORRECTION_DAMPING = (0.55, 0.8)
 # The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
 # Errors of this model on those hits, RMS over 3 s, per m/s of clipped velocity: of the velocity, of the position in s.
@@ -102,16 +80,9 @@ CONVERGED_M_S = 0.15
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice CONVERGED_M_S is a position that jumped.
 COMPARED_S, MOST_VELOCITY_ERROR_M_S = 0.5, 0.3
-# Standard deviations of the velocity after a hit about the expected one. Restitution: a share of the speed into the
-# obstacle (frames return 0.2 to 0.9 of it, and the normal is good to 20 degrees). Friction and vertical: shares of the
-# speed (0.6 m/s upwards at 5 m/s).
-RESTITUTION_SPREAD, FRICTION_SPREAD, VERTICAL_SPREAD, LEAST_SPREAD_M_S = 0.26, 0.1, 0.12, 0.1
-# Clipping hides between none and all of the change of velocity: its mean share.
-CLIPPED_PART = 0.5
-# A vehicle that approaches the obstacle faster than this does not touch it: arms fold by 5 cm only.
-NO_CONTACT_APPROACH_M_S = 0.3
-# Cosine of 30 degrees: friction turns the contact force by 17, and the normal is estimated to 10.
-AGREEMENT_COSINE = 0.87
+# Standard deviation of the velocity after a hit about the expected one: at least, and as a share of the speed. Frames
+# return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
+SPREAD, LEAST_SPREAD_M_S = 0.3, 0.1
 # Six times the noise of a good estimate.
 LEAVING_M_S = 0.2
 

@@ -36,17 +36,19 @@ def plus(vector: Vector3, factor: float, direction: Vector3) -> Vector3:
     )
 
 
+def limited(vector: Vector3, most: float) -> Vector3:
+    """The vector, no longer than that."""
+    size = math.hypot(*vector)
+    return vector if size <= most else plus((0.0, 0.0, 0.0), most / size, vector)
+
+
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """A keep-out half-space: the vehicle's centre when it touched, the unit normal out of the surface, the clearance.
-
-    `comes_m_s` is the surface's own speed along its normal.
-    """
+    """A keep-out half-space: the vehicle's centre when it touched, the unit normal out of it, the clearance."""
 
     point_ned_m: Vector3
     normal_ned: Vector3
     distance_m: float
-    comes_m_s: float = 0.0
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """Distance of a position from touching, m; negative behind the surface."""
@@ -74,31 +76,15 @@ class FenceBounds:
         return (north_m + end[0], east_m + end[1], min(max(setpoint_ned_m[2], top_m), floor_m))
 
 
-@dataclass(frozen=True, slots=True)
-class FreeSpace:
-    """A fence and the surfaces known besides the one just hit."""
-
-    envelope: FenceBounds
-    surfaces: Sequence[Surface] = ()
-
-    def goal(self, contact_ned_m: Vector3, normal_ned: Vector3, goal_ned_m: Vector3) -> Vector3:
-        """The law's goal, moved as little as possible to clear the surfaces and stay inside the fence."""
-        for _ in range(ROUNDS):
-            before = goal_ned_m
-            for surface in self.surfaces:
-                goal_ned_m = _clear_of(surface, contact_ned_m, normal_ned, goal_ned_m)
-            if goal_ned_m == before:
-                break
-        return self.envelope.clamp(contact_ned_m, goal_ned_m)
-
-
-def _clear_of(surface: Surface, contact: Vector3, normal: Vector3, goal: Vector3) -> Vector3:
-    """The goal, clear of the surface by its distance; between facing surfaces by at most half of the room."""
-    wanted_m, room_m = surface.distance_m, surface.off_m(contact)
-    if room_m < -BEHIND_M:
-        return goal
-    cosine = sum(a * b for a, b in zip(normal, surface.normal_ned, strict=True))
-    if cosine < FACING_COSINE:
-        wanted_m = min(wanted_m, 0.5 * max(0.0, room_m))
-    short_m = wanted_m - surface.off_m(goal)
-    return goal if short_m <= 0.0 else plus(goal, short_m, surface.normal_ned)
+def clear_goal(
+    surfaces: Sequence[Surface], contact_ned_m: Vector3, normal_ned: Vector3, goal_ned_m: Vector3
+) -> Vector3:
+    """The goal, clear of each surface by its distance; between facing surfaces by at most half of the room."""
+    for surface in list(surfaces) * ROUNDS:
+        wanted_m, room_m = surface.distance_m, surface.off_m(contact_ned_m)
+        if split(normal_ned, surface.normal_ned)[0] < FACING_COSINE:
+            wanted_m = min(wanted_m, 0.5 * max(0.0, room_m))
+        short_m = wanted_m - surface.off_m(goal_ned_m)
+        if room_m >= -BEHIND_M and short_m > 0.0:
+            goal_ned_m = plus(goal_ned_m, short_m, surface.normal_ned)
+    return goal_ned_m

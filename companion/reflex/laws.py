@@ -21,9 +21,9 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.reflex.config import DURATION_STEP, RecoveryConfig
+from companion.reflex.config import RecoveryConfig
 from companion.reflex.halfspace import plus, split
-from companion.reflex.planner import Limits, MotionState, Plan
+from companion.reflex.planner import MotionState, shortest
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,42 +51,41 @@ class Law:
     """`follows`: goal and plan are found anew as more is known of the contact. `plans`: else the goal is asked for at
     once, from the first moment on."""
 
-    goal_ned_m: Callable[[RecoveryConfig, Contact, MotionState, Limits], Vector3]
+    goal_ned_m: Callable[[RecoveryConfig, Contact, MotionState], Vector3]
     follows: bool
     plans: bool
 
 
-def _paper(config: RecoveryConfig, contact: Contact, motion: MotionState, limits: Limits) -> Vector3:
+def _paper(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
     (gamma_1_s, gamma_2_s), (x_1, x_2, x_3) = config.gamma_per_axis, contact.position_ned_m
     v_c1, v_c2, _ = contact.velocity_ned_m_s
     return (x_1 - gamma_1_s * v_c1, x_2 - gamma_2_s * v_c2, x_3)
 
 
-def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState, limits: Limits) -> Vector3:
+def _normal(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
     gamma_s = config.gamma_per_axis[0]
     along_m_s, tangential = split(contact.velocity_ned_m_s, contact.normal_ned)
     goal = plus(contact.position_ned_m, gamma_s * abs(along_m_s), contact.normal_ned)
     return plus(goal, gamma_s, (tangential[0], tangential[1], 0.0)) if config.tangential == "kept" else goal
 
 
-def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState, limits: Limits) -> Vector3:
+def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> Vector3:
     normal, x = contact.normal_ned, motion.position_ned_m
     off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
     off_m = split(plus(x, -1.0, contact.position_ned_m), normal)[0]
-    harder_m = config.clearance_s * max(0.0, -split(contact.velocity_ned_m_s, normal)[0])
-    along_m_s = math.hypot(*tangential)
+    harder_m = -config.clearance_s * split(contact.velocity_ned_m_s, normal)[0]
+    along_m_s, error = math.hypot(*tangential), math.sin(contact.normal_error_rad)
     if normal[2] == 0.0:
         tangential = (tangential[0], tangential[1], 0.0)
     leant_m_s2, leant_along = split(motion.acceleration_ned_m_s2, normal)
-    duration_s = limits.shortest_s
-    while True:
-        clear_m = max(config.clearance_m + 0.5 * math.sin(contact.normal_error_rad) * along_m_s * duration_s, harder_m)
+
+    def goal_after(duration_s: float) -> Vector3:
+        clear_m = max(config.clearance_m + 0.5 * error * along_m_s * duration_s, harder_m)
         stops_m = 0.5 * off_m_s * duration_s + leant_m_s2 * duration_s**2 / 12.0
         goal = plus(x, max(clear_m - off_m, stops_m), normal)
-        goal = plus(plus(goal, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)
-        if Plan(motion, goal, duration_s).most_m_s2() <= limits.acceleration_m_s2:
-            break
-        duration_s *= DURATION_STEP
+        return plus(plus(goal, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)
+
+    goal = shortest(motion, goal_after, config.acceleration_m_s2).goal_ned_m
     if config.tangential == "kept":
         goal = plus(goal, config.gamma_per_axis[0], tangential)
     return (goal[0], goal[1], contact.position_ned_m[2] if normal[2] == 0.0 else goal[2])

@@ -11,7 +11,6 @@ estimators. A bank of filters has one hypothesis each, one of them e = 0; each i
 innovations (Magill 1965). Before the first report v is the expected rebound, with a wide standard deviation.
 """
 
-import copy
 import math
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -24,52 +23,27 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import DELAY_S, LATEST_S
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
-from companion.reflex.config import (
-    CLIPPED_PART,
-    COMPARED_S,
-    CONVERGED_M_S,
-    CORRECTED_S,
-    CORRECTION_DAMPING,
-    CORRECTION_DELAY_S,
-    CORRECTION_RAD_S,
-    DRIFT_M2_S3,
-    EXTERNAL_FORCE_S,
-    FRICTION_SPREAD,
-    LEAD_S,
-    LEAST_SPREAD_M_S,
-    LEAST_UPRIGHT_COSINE,
-    LEAVING_M_S,
-    MODEL_ERROR,
-    MODEL_ERROR_S,
-    MOST_VELOCITY_ERROR_M_S,
-    PLACE_SPREAD_M,
-    RESTITUTION_SPREAD,
-    SMOOTHED_S,
-    TILT_PER_S,
-    VERTICAL_SPREAD,
-    WIND_S,
-)
-from companion.reflex.halfspace import plus, split
+from companion.reflex import config as reflex
+from companion.reflex.halfspace import limited, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.planner import REST, MotionState
 
 Floats = npt.NDArray[np.float64]
 
 # Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping.
-_MODELS = np.array(list(product(CORRECTION_DELAY_S, CORRECTION_RAD_S, CORRECTION_DAMPING)))
+_MODELS = np.array(list(product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)))
 
 
 @dataclass(slots=True)
 class FilterBank:
-    """Kalman filters of x, v, e: states (models, axes, 3), covariances (models, axes, 3, 3); the last model has e = 0.
+    """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); the last has e = 0.
 
     Local NED, SI. Changed only by its methods.
     """
 
     start: MotionState
-    spread_m_s: Vector3
     error_m_s: Vector3
-    error_spread_m_s: Vector3
+    spreads: tuple[float, float, float]  # standard deviations of x, v and e
     state: Floats = field(init=False)
     covariance: Floats = field(init=False)
     log_likelihoods: Floats = field(init=False)  # twice the logarithm of each model's likelihood
@@ -77,69 +51,43 @@ class FilterBank:
     def __post_init__(self) -> None:
         models = len(_MODELS) + 1
         state = np.stack([self.start.position_ned_m, self.start.velocity_ned_m_s, self.error_m_s], axis=1)
-        spread = np.stack([np.full(3, PLACE_SPREAD_M), self.spread_m_s, self.error_spread_m_s], axis=1)
         self.state = np.tile(state, (models, 1, 1))
-        self.covariance = np.tile(np.einsum("ai,ij->aij", spread**2, np.eye(3)), (models, 1, 1, 1))
+        self.covariance = np.tile(np.diag(np.square(self.spreads)), (models, 1, 1))
         self.log_likelihoods = np.zeros(models)
         self.log_likelihoods[-1] = 2.0 * math.log(len(_MODELS))  # as likely as all others together
 
-    def with_hit(self, faster_m_s: Vector3, spread_m_s: Vector3, error_spread_m_s: Vector3) -> "FilterBank":
-        """The bank after another hit, while the error of the first one is still being corrected."""
-        bank = copy.deepcopy(self)
-        bank.state[:, :, 1] += np.array(faster_m_s)
-        bank.covariance[:, :, 1, 1] += np.array(spread_m_s) ** 2
-        bank.covariance[:, :, 2, 2] += np.array(error_spread_m_s) ** 2
-        return bank
-
     def predict(self, elapsed_s: float, faster_m_s: Vector3) -> None:
         """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong."""
-        leads = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-        self.state = self.state @ leads.T
-        added = np.array(faster_m_s)
-        self.state[:, :, 0] += 0.5 * elapsed_s * added
-        self.state[:, :, 1] += added
+        leads, added = np.array([[1.0, elapsed_s, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array(faster_m_s)
+        self.state = self.state @ leads.T + added[:, None] * [0.5 * elapsed_s, 1.0, 0.0]
         self.covariance = leads @ self.covariance @ leads.T
-        self.covariance[:, :, 1, 1] += DRIFT_M2_S3 * elapsed_s
+        self.covariance[:, 1, 1] += reflex.DRIFT_M2_S3 * elapsed_s
 
-    def update(
-        self, since_s: float, velocity_m_s: Vector3, place_m: Vector3, spread_m_s: float, spread_m: float, colour: float
-    ) -> None:
-        """Take a reported velocity and position, `since_s` after the hit, with their standard deviations.
+    def update(self, which: int, share: Floats, measured: Vector3, variance: float) -> None:
+        """Take a reported position (0) or velocity (1), with each model's share of e in it."""
+        missed = np.array(measured) - self.state[..., which] - share[:, None] * self.state[..., 2]
+        with_it = self.covariance[:, which] + share[:, None] * self.covariance[:, 2]
+        size = with_it[:, which] + share * with_it[:, 2] + variance
+        gain = with_it / size[:, None]
+        self.state = self.state + missed[..., None] * gain[:, None]
+        self.covariance = self.covariance - with_it[..., None] * gain[:, None]
+        self.log_likelihoods = self.log_likelihoods - (missed**2).sum(axis=1) / size - 3.0 * np.log(size)
 
-        No estimator follows one of the models exactly; the difference is a share of the hidden velocity. ``colour`` is
-        the number of samples that share one error.
+    def estimate(self, left: Floats) -> tuple[MotionState, float, float]:
+        """Motion, largest standard deviation of its velocity, largest further swing of the reported velocity.
+
+        `left` is each model's remaining amplitude.
         """
-        g, way_s, _ = error_response(since_s)
-        hidden2 = np.array(self.error_m_s) ** 2
-        self._update(
-            0, way_s, place_m, colour * (spread_m**2 + min(MODEL_ERROR * since_s, MODEL_ERROR_S) ** 2 * hidden2)
-        )
-        self._update(1, g, velocity_m_s, colour * (spread_m_s**2 + MODEL_ERROR**2 * hidden2))
-
-    def _update(self, which: int, of_e: Floats, measured: Vector3, variance: Floats) -> None:
-        """One measurement on each axis: the position (0) or the velocity (1), with the share `of_e` of e in it."""
-        share = of_e[:, None]
-        missed = np.array(measured) - self.state[:, :, which] - share * self.state[:, :, 2]
-        with_it = self.covariance[..., which] + share[..., None] * self.covariance[..., 2]
-        size = with_it[..., which] + share * with_it[..., 2] + variance
-        self.state = self.state + with_it * (missed / size)[..., None]
-        self.covariance = self.covariance - with_it[..., :, None] * with_it[..., None, :] / size[..., None, None]
-        self.log_likelihoods = self.log_likelihoods - (missed**2 / size + np.log(size)).sum(axis=1)
-
-    def estimate(self, since_s: float) -> tuple[MotionState, Vector3, float]:
-        """Motion, standard deviation of its velocity, and the largest further swing of the reported velocity, m/s."""
-        share, left = self._probabilities(), error_response(since_s)[2]
+        share = self._probabilities()
         (x, y, z), (u, v, w), _ = np.einsum("w,wai->ia", share, self.state).tolist()
-        spread2 = self.covariance[..., 1, 1] + (self.state[..., 1] - [u, v, w]) ** 2
-        p, q, r = np.sqrt(share @ spread2).tolist()
-        left2 = left**2 * (self.covariance[..., 2, 2] + self.state[..., 2] ** 2).sum(axis=1)
-        return MotionState((x, y, z), (u, v, w)), (p, q, r), math.sqrt(share @ left2)
+        spread2 = (share @ (self.covariance[:, 1, 1, None] + (self.state[..., 1] - [u, v, w]) ** 2)).max()
+        left2 = share @ (left**2 * (3.0 * self.covariance[:, 2, 2] + (self.state[..., 2] ** 2).sum(axis=1)))
+        return MotionState((x, y, z), (u, v, w)), math.sqrt(spread2), math.sqrt(left2)
 
-    def errors(self, since_s: float) -> tuple[Vector3, Vector3]:
-        """Errors of the reported position (m) and velocity (m/s)."""
-        share, (g, way_s, _) = self._probabilities(), error_response(since_s)
-        (x, y, z), (u, v, w) = np.einsum("ow,wa->oa", share * np.stack([way_s, g]), self.state[..., 2]).tolist()
-        return (x, y, z), (u, v, w)
+    def mean_error(self, each: Floats) -> Vector3:
+        """Mean of e, times each model's factor."""
+        n, e, d = np.einsum("w,wa->a", self._probabilities() * each, self.state[..., 2]).tolist()
+        return (n, e, d)
 
     def _probabilities(self) -> Floats:
         """Probability of each model."""
@@ -155,7 +103,7 @@ def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
     p = late_s, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
     s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
     """
-    (late_s, rad_s, damping), slow = _MODELS.T, TILT_PER_S
+    (late_s, rad_s, damping), slow = _MODELS.T, reflex.TILT_PER_S
     slowing, turning = damping * rad_s, rad_s * np.sqrt(1.0 - damping**2)
     k, h = 2.0 * slowing + slow, rad_s**2 + 2.0 * slowing * slow
     x = np.maximum(since_s - late_s, 0.0)
@@ -182,14 +130,13 @@ class MotionEstimator:
     hit_boot_us: int  # its first sample
     start: MotionState  # the expected motion after it
     config: EstimateConfig
-    earlier: "MotionEstimator | None" = None  # of an earlier hit whose error is still being corrected
+    is_second: bool = False  # the error of an earlier hit was still being corrected
     motion: MotionState = field(init=False)
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
     tilt_m_s2: Vector3 = REST  # horizontal acceleration of the thrust, LEAD_S ahead
-    wind_m_s2: tuple[float, float] = (0.0, 0.0)  # slow external force per mass, wind and drag
-    external_m_s2: Vector3 = REST  # fast external force per mass, horizontal: a gust or a contact
-    spread_m_s: Vector3 = REST  # standard deviation of the motion's velocity
+    external_m_s2: Vector3 = REST  # external force per mass across the thrust, horizontal: wind, a gust or a contact
+    spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = REST  # remaining error of the reported position, once it has converged
     _bank: FilterBank = field(init=False)
     _summed_m_s: Vector3 = REST
@@ -198,14 +145,10 @@ class MotionEstimator:
     _moved_m_s: Vector3 = REST  # the integral up to that time
     _time_boot_us: int = 0
     _hidden_error_m_s: Vector3 = REST  # remaining error of the reported velocity
-    _position_rate_error_m_s: Vector3 = REST  # its difference from the positions' rate
+    _rate_error_m_s: Vector3 = REST  # its difference from the positions' rate
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
-    _heard_boot_us: int = 0  # newest report that the bank has taken
-    _told_boot_us: int = 0  # newest report since convergence
     _pushed_boot_us: int = 0
-    _is_shown: bool = False
     _is_reported: bool = False  # the reports contain the hit
-    _clock_boot_us: int = 0  # from here on the error is corrected
 
     def __post_init__(self) -> None:
         self.motion = self.start
@@ -213,26 +156,14 @@ class MotionEstimator:
 
     def _begin(self) -> None:
         before, after = self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s
-        into_m_s = max(0.0, -split(before, self.contact.normal_ned)[0])
-        speed_m_s = math.hypot(*before)
-        flat_m_s = LEAST_SPREAD_M_S + RESTITUTION_SPREAD * into_m_s + FRICTION_SPREAD * speed_m_s
-        spread = (flat_m_s, flat_m_s, LEAST_SPREAD_M_S + VERTICAL_SPREAD * speed_m_s)
-        if self.contact.normal_ned[2] != 0.0:
-            spread = (flat_m_s, flat_m_s, flat_m_s)
-        lost = plus(before, -1.0, after)
-        self.spread_m_s = REST if self.is_fully_measured else spread
-        half = plus(REST, CLIPPED_PART, lost)
-        n, e, d = (abs(each) + one for each, one in zip(half, spread, strict=True))
-        self._clock_boot_us = self._at_boot_us = self.hit_boot_us
-        self._bank, self._moved_m_s = FilterBank(self.start, spread, half, (n, e, d)), REST
-        if self.earlier is not None:
-            self._clock_boot_us, self._at_boot_us = self.earlier._clock_boot_us, self.earlier._at_boot_us
-            self._bank = self.earlier._bank.with_hit(
-                plus(after, -1.0, before), spread, REST if self._is_shown else (n, e, d)
-            )
-        self._heard_boot_us = self._told_boot_us = 0
+        spread_m_s = reflex.LEAST_SPREAD_M_S + reflex.SPREAD * math.hypot(*before)
+        # Clipping hides between none and all of the change of velocity.
+        half = plus(REST, 0.5, plus(before, -1.0, after))
+        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*half) + spread_m_s)
+        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, REST, FilterBank(self.start, half, spreads)
         self._newest, self.has_converged = None, False
-        self.position_error_m = self._hidden_error_m_s = self._position_rate_error_m_s = REST
+        self.spread_m_s = 0.0 if self.is_fully_measured else spread_m_s
+        self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
 
     @property
     def knows_motion(self) -> bool:
@@ -241,7 +172,7 @@ class MotionEstimator:
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
         """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
-        self._is_shown, self.is_fully_measured = is_fully_measured, is_fully_measured and self.earlier is None
+        self.is_fully_measured = is_fully_measured and not self.is_second
         if pushed_boot_us != self._pushed_boot_us:
             self._pushed_boot_us = pushed_boot_us
             if not self.is_fully_measured:
@@ -256,19 +187,15 @@ class MotionEstimator:
         pushed = strapdown.acceleration_ned_m_s2
         if math.hypot(*pushed) >= GRAVITY_M_S2:
             pushed = REST
-        was, weight = self.motion, elapsed_s / (SMOOTHED_S + elapsed_s)
+        was, weight = self.motion, elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
         mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
         self._summed_m_s, self._acceleration = plus(self._summed_m_s, elapsed_s, pushed), pushed
-        self.tilt_m_s2 = tilt_ahead(strapdown, LEAD_S)
-        if pushed is not REST:
-            down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
-            a, b, _ = split(plus(pushed, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
-            share = elapsed_s / (EXTERNAL_FORCE_S + elapsed_s)
-            self.external_m_s2 = plus(self.external_m_s2, share, plus((a, b, 0.0), -1.0, self.external_m_s2))
-            (n, e), share = self.wind_m_s2, elapsed_s / (WIND_S + elapsed_s)
-            self.wind_m_s2 = (n - share * (n + a), e - share * (e + b))
+        self.tilt_m_s2 = tilt_ahead(strapdown, reflex.LEAD_S)
+        down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
+        n, e, _ = split(plus(mean, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
+        self.external_m_s2 = (n, e, 0.0)
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
@@ -284,9 +211,9 @@ class MotionEstimator:
 
     def _shows_hit(self, sample: LocalPosition) -> bool:
         """Whether the reports contain the hit by now. Late ones still have the velocity before it."""
-        if self.earlier is None and sample.time_boot_us - self.hit_boot_us < 1e6 * LATEST_S:
+        if not self.is_second and sample.time_boot_us - self.hit_boot_us < 1e6 * LATEST_S:
             changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
-            self._is_reported = self._is_reported or changed_m_s > LEAVING_M_S
+            self._is_reported = self._is_reported or changed_m_s > reflex.LEAVING_M_S
             return self._is_reported
         return True
 
@@ -296,21 +223,25 @@ class MotionEstimator:
         if is_ahead or at_us <= self._at_boot_us:
             # The report's time is outside the integrated interval.
             return
-        config, bank, before_us = self.config, self._bank, self._heard_boot_us
-        self._heard_boot_us, since_s = sample.time_boot_us, 1e-6 * (at_us - self._clock_boot_us)
-        every_s = 1e-6 * (sample.time_boot_us - before_us) if before_us else config.velocity_correlation_s
+        config, bank, elapsed_s = self.config, self._bank, 1e-6 * (at_us - self._at_boot_us)
+        since_s = 1e-6 * (at_us - self.hit_boot_us)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
-        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(every_s, 1e-3))
+        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-3))
         behind_s = 1e-6 * (self._time_boot_us - at_us)
         summed = plus(self._summed_m_s, -behind_s, self._acceleration)
-        bank.predict(1e-6 * (at_us - self._at_boot_us), plus(summed, -1.0, self._moved_m_s))
+        bank.predict(elapsed_s, plus(summed, -1.0, self._moved_m_s))
         self._at_boot_us, self._moved_m_s = at_us, summed
-        v, x = sample.velocity_ned_m_s, sample.position_ned_m
-        bank.update(since_s, v, x, config.velocity_noise_m_s, config.position_noise_m, colour)
-        estimate, spread_m_s, left_m_s = bank.estimate(since_s)
-        self.has_converged = self.has_converged or left_m_s <= CONVERGED_M_S
+        g, way_s, left = error_response(since_s)
+        # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
+        hidden_m_s = math.hypot(*bank.error_m_s)
+        off_m = hidden_m_s * min(reflex.MODEL_ERROR * since_s, reflex.MODEL_ERROR_S)
+        off_m_s = hidden_m_s * reflex.MODEL_ERROR
+        bank.update(0, way_s, sample.position_ned_m, colour * (config.position_noise_m**2 + off_m**2))
+        bank.update(1, g, sample.velocity_ned_m_s, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
+        estimate, spread_m_s, left_m_s = bank.estimate(left)
+        self.has_converged = self.has_converged or left_m_s <= reflex.CONVERGED_M_S
         if self.has_converged:
-            self.position_error_m, self._hidden_error_m_s = bank.errors(since_s)
+            self.position_error_m, self._hidden_error_m_s = bank.mean_error(way_s), bank.mean_error(g)
             return
         velocity = plus(estimate.velocity_ned_m_s, behind_s, self._acceleration)
         place = plus(estimate.position_ned_m, behind_s, velocity)
@@ -319,30 +250,23 @@ class MotionEstimator:
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""
-        elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - self._told_boot_us))
-        share = elapsed_s / (CORRECTED_S + elapsed_s) if self._told_boot_us else 1.0
-        was, self._told_boot_us = self.motion, sample.time_boot_us
-        self._compare(sample)
+        before, self._newest = self._newest, _without(sample, self.position_error_m, self._hidden_error_m_s)
+        was, share = self.motion, 1.0
+        if before is not None:
+            elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
+            share = elapsed_s / (reflex.CORRECTED_S + elapsed_s)
+            if 0.0 < elapsed_s < reflex.COMPARED_S:
+                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, self._newest, elapsed_s)
         measured = self.corrected(sample)
         place = plus(was.position_ned_m, share, plus(measured.position_ned_m, -1.0, was.position_ned_m))
         velocity = plus(was.velocity_ned_m_s, share, plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
-        self.spread_m_s = REST
-
-    def _compare(self, sample: LocalPosition) -> None:
-        """Compare the reported velocity with the rate of the reported positions, whose errors are shorter."""
-        before, self._newest = self._newest, _without(sample, self.position_error_m, self._hidden_error_m_s)
-        if before is not None:
-            elapsed_s = 1e-6 * (sample.time_boot_us - before.time_boot_us)
-            if 0.0 < elapsed_s < COMPARED_S:
-                self._position_rate_error_m_s = _rate_error(
-                    self._position_rate_error_m_s, before, self._newest, elapsed_s
-                )
+        self.spread_m_s = 0.0
 
     @property
     def velocity_error_m_s(self) -> Vector3:
         """Remaining error of the reported velocity, m/s, NED."""
-        return plus(self._hidden_error_m_s, 1.0, self._position_rate_error_m_s)
+        return plus(self._hidden_error_m_s, 1.0, self._rate_error_m_s)
 
     def corrected(self, sample: LocalPosition) -> LocalPosition:
         """The report without its known errors."""
@@ -350,21 +274,22 @@ class MotionEstimator:
 
 
 def _without(sample: LocalPosition, position_error_m: Vector3, velocity_error_m_s: Vector3) -> LocalPosition:
-    place, velocity = (
-        plus(sample.position_ned_m, -1.0, position_error_m),
-        plus(sample.velocity_ned_m_s, -1.0, velocity_error_m_s),
+    place = plus(sample.position_ned_m, -1.0, position_error_m)
+    return replace(
+        sample, position_ned_m=place, velocity_ned_m_s=plus(sample.velocity_ned_m_s, -1.0, velocity_error_m_s)
     )
-    return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
 
 
 def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
-    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited."""
+    """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
+
+    The errors of positions are shorter than those of velocities.
+    """
     half_s = 0.5 * elapsed_s
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
     further_m = plus(led, -1.0, measured.position_ned_m)
-    estimate = plus(was_m_s, 1.0 / (COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
-    size = math.hypot(*estimate)
-    return estimate if size <= MOST_VELOCITY_ERROR_M_S else plus(REST, MOST_VELOCITY_ERROR_M_S / size, estimate)
+    estimate = plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
+    return limited(estimate, reflex.MOST_VELOCITY_ERROR_M_S)
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
@@ -372,5 +297,5 @@ def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
     n, e, d = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, -1.0))
     p, q, r = body_to_ned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s)
     n, e, d = n + lead_s * (q * d - r * e), e + lead_s * (r * n - p * d), d + lead_s * (p * e - q * n)
-    carrying_m_s2 = GRAVITY_M_S2 / max(-d, LEAST_UPRIGHT_COSINE)
+    carrying_m_s2 = GRAVITY_M_S2 / max(-d, reflex.LEAST_UPRIGHT_COSINE)
     return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)

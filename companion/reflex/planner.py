@@ -1,37 +1,18 @@
-"""Plan a minimum-jerk stop from the present motion, within acceleration limits and clear of surfaces.
+"""Plan a minimum-jerk stop from the present motion, within an acceleration.
 
     x(s T) = x_0 + v_0 T (s - s^3 + s^4 / 2) + a_0 T^2 (s^2 / 2 - 2 s^3 / 3 + s^4 / 4)
              + e (10 s^3 - 15 s^4 + 6 s^5),          e = x_1 - x_0 - v_0 T / 2 - a_0 T^2 / 12
 
 The first part brakes, the second levels the present tilt, the last covers the remaining distance e. T is the shortest
-duration within the limits. A plan made anew from any motion on it is the same plan.
+duration within that acceleration. A plan made anew from any motion on it is the same plan.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.reflex.config import (
-    AHEAD_COSINE,
-    ATTITUDE_RAD_S,
-    BEHIND_M,
-    CLIMB_GAIN_PER_S,
-    DURATION_STEP,
-    HARD_BRAKING,
-    HEIGHT_PER_S,
-    HELD_S,
-    HELD_TO_M_S,
-    LEAD_S,
-    NOTICED_S,
-    OFF_PLAN_M,
-    OFF_PLAN_M_S,
-    PLACE_PER_S,
-    SHORTEST_BRAKING_S,
-    SHORTEST_S,
-    TOUCH_TOLERANCE_M,
-    VELOCITY_PER_S,
-)
+from companion.reflex import config as reflex
 from companion.reflex.halfspace import Surface, plus, split
 
 REST: Vector3 = (0.0, 0.0, 0.0)
@@ -49,18 +30,6 @@ class MotionState:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits of a plan: its largest acceleration and its shortest duration, in which the vehicle can tilt both ways."""
-
-    acceleration_m_s2: float
-    shortest_s: float = SHORTEST_S
-
-    def spinning(self, spin_rad_s: float) -> "Limits":
-        """The limits of a vehicle that spins about the vertical, rad/s: as a gyroscope it tilts later."""
-        return Limits(self.acceleration_m_s2, self.shortest_s * math.hypot(1.0, spin_rad_s / ATTITUDE_RAD_S))
-
-
-@dataclass(frozen=True, slots=True)
 class Plan:
     """A trajectory from a motion to rest at the goal, within a duration."""
 
@@ -68,7 +37,7 @@ class Plan:
     goal_ned_m: Vector3
     duration_s: float
 
-    def at(self, elapsed_s: float, lead_s: float = LEAD_S) -> MotionState:
+    def at(self, elapsed_s: float, lead_s: float = reflex.LEAD_S) -> MotionState:
         """The motion after `elapsed_s`, with the acceleration of `lead_s` later, because the thrust lags."""
         if elapsed_s >= self.duration_s:
             return MotionState(self.goal_ned_m, REST)
@@ -87,25 +56,6 @@ class Plan:
         """The plan's largest acceleration, m/s^2."""
         return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in _LOOKED_AT)
 
-    def enters(self, surface: Surface) -> bool:
-        """Whether the plan goes through the surface. One that begins or ends behind the surface never does."""
-        if min(surface.off_m(self.start.position_ned_m), surface.off_m(self.goal_ned_m)) < -TOUCH_TOLERANCE_M:
-            return False
-        return any(surface.off_m(self.at(s * self.duration_s).position_ned_m) < -TOUCH_TOLERANCE_M for s in _LOOKED_AT)
-
-    def with_feedback(self, elapsed_s: float, motion: MotionState) -> Vector3:
-        """The plan's acceleration, plus the feedback of PX4's loops for a vehicle that is off the plan."""
-        planned = self.at(elapsed_s)
-        slower = plus(planned.velocity_ned_m_s, -1.0, motion.velocity_ned_m_s)
-        short = plus(planned.position_ned_m, -1.0, motion.position_ned_m)
-        return plus(planned.acceleration_ned_m_s2, VELOCITY_PER_S, plus(slower, PLACE_PER_S, short))
-
-    def holds(self, elapsed_s: float, motion: MotionState) -> bool:
-        """Whether the vehicle follows the plan, as closely as PX4's loops do."""
-        planned = self.at(elapsed_s)
-        off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
-        return off_m_s <= OFF_PLAN_M_S and math.dist(planned.position_ned_m, motion.position_ned_m) <= OFF_PLAN_M
-
 
 def _axis(
     x_0: float, v_0: float, a_0: float, x_1: float, total_s: float, s: float, ahead: float
@@ -120,50 +70,40 @@ def _axis(
     return x, v / total_s, (a + lean * (1.0 - ahead) * (1.0 - 3.0 * ahead)) / total_s**2
 
 
-def plan(state: MotionState, goal_ned_m: Vector3, surfaces: Sequence[Surface], limits: Limits) -> Plan:
-    """The shortest plan within the limits. It brakes harder where it would pass its goal or enter a surface."""
-    found = Plan(state, goal_ned_m, limits.shortest_s)
-    longest_s = _longest_s(state, goal_ned_m)
-    while found.duration_s < longest_s and found.most_m_s2() > limits.acceleration_m_s2:
-        found = Plan(state, goal_ned_m, found.duration_s * DURATION_STEP)
-    found = Plan(state, goal_ned_m, min(found.duration_s, longest_s))
-    harder = found
-    while harder.most_m_s2() <= HARD_BRAKING * limits.acceleration_m_s2 and any(
-        harder.enters(each) for each in surfaces
-    ):
-        found, harder = harder, Plan(state, goal_ned_m, harder.duration_s / DURATION_STEP)
-    return found
+def shortest(state: MotionState, goal_ned_m: Callable[[float], Vector3], most_m_s2: float) -> Plan:
+    """The shortest plan within an acceleration, to a goal that depends on its duration."""
+    duration_s = reflex.SHORTEST_S
+    while True:
+        found = Plan(state, goal_ned_m(duration_s), duration_s)
+        if found.most_m_s2() <= most_m_s2:
+            return found
+        duration_s *= reflex.DURATION_STEP
 
 
-def _longest_s(state: MotionState, goal_ned_m: Vector3) -> float:
-    """The longest duration that does not pass a goal ahead: e >= 0 along the velocity keeps the speed above zero."""
-    n, e, d = (goal - start for goal, start in zip(goal_ned_m, state.position_ned_m, strict=True))
-    (u, v, w), (a, b, c) = state.velocity_ned_m_s, state.acceleration_ned_m_s2
-    ahead, speed2 = n * u + e * v + d * w, u * u + v * v + w * w
-    if ahead <= AHEAD_COSINE * math.sqrt(speed2 * (n * n + e * e + d * d)):
-        return math.inf
-    stops2 = 0.25 * speed2**2 + ahead * (a * u + b * v + c * w) / 3.0
-    return max(SHORTEST_BRAKING_S, 2.0 * ahead / (0.5 * speed2 + math.sqrt(stops2))) if stops2 >= 0.0 else math.inf
+def with_feedback(planned: MotionState, motion: MotionState) -> Vector3:
+    """The plan's acceleration, plus the feedback of PX4's loops for a vehicle that is off the plan."""
+    slower = plus(planned.velocity_ned_m_s, -1.0, motion.velocity_ned_m_s)
+    short = plus(planned.position_ned_m, -1.0, motion.position_ned_m)
+    return plus(planned.acceleration_ned_m_s2, reflex.VELOCITY_PER_S, plus(slower, reflex.PLACE_PER_S, short))
 
 
 def kept_off(
-    acceleration_ned_m_s2: Vector3, state: MotionState, spread_m_s: Vector3, surfaces: Sequence[Surface], limits: Limits
+    acceleration_ned_m_s2: Vector3,
+    state: MotionState,
+    surfaces: Sequence[Surface],
+    most_m_s2: float,
 ) -> Vector3:
     """The acceleration setpoint without any part that leads into a surface nearer than its clearance.
 
     `state` has the acceleration of the present tilt. Levelling takes 2 LEAD_S. The speed away from the surface then is
     not below zero: braking a vehicle that leaves is allowed, and one that tilts or flies into the surface tilts away.
-    A vehicle that leaves by no more than the standard deviation of its velocity does not brake.
     """
     for surface in surfaces:
-        if not -BEHIND_M <= surface.off_m(state.position_ned_m) < surface.distance_m:
+        if not -reflex.BEHIND_M <= surface.off_m(state.position_ned_m) < surface.distance_m:
             continue
-        normal, most_m_s2 = surface.normal_ned, HARD_BRAKING * limits.acceleration_m_s2
-        leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * LEAD_S, state.acceleration_ned_m_s2), normal)[0]
-        leaving_m_s -= surface.comes_m_s
-        least_m_s2 = min(-leaving_m_s / LEAD_S, most_m_s2)
-        if leaving_m_s < math.hypot(*(s * n for s, n in zip(spread_m_s, normal, strict=True))):
-            least_m_s2 = max(least_m_s2, 0.0)
+        normal = surface.normal_ned
+        leaving_m_s = split(plus(state.velocity_ned_m_s, 2.0 * reflex.LEAD_S, state.acceleration_ned_m_s2), normal)[0]
+        least_m_s2 = min(-leaving_m_s / reflex.LEAD_S, reflex.HARD_BRAKING * most_m_s2)
         short_m_s2 = least_m_s2 - split(acceleration_ned_m_s2, normal)[0]
         if short_m_s2 > 0.0:
             acceleration_ned_m_s2 = plus(acceleration_ned_m_s2, short_m_s2, normal)
@@ -176,11 +116,11 @@ def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> V
     Held for HELD_S + NOTICED_S it makes no vehicle faster than it is, or than HELD_TO_M_S.
     """
     (a, b, c), (u, v, _) = acceleration_ned_m_s2, velocity_ned_m_s
-    most_m_s, asked2 = max(math.hypot(u, v), HELD_TO_M_S), a * a + b * b
+    most_m_s, asked2 = max(math.hypot(u, v), reflex.HELD_TO_M_S), a * a + b * b
     # |v + share a t| = most, of which the larger root.
     along = (a * u + b * v) / max(asked2, 1e-9)
     most_s = math.sqrt(max(0.0, along * along + (most_m_s**2 - u * u - v * v) / max(asked2, 1e-9))) - along
-    share = min(1.0, max(0.0, most_s) / (HELD_S + NOTICED_S))
+    share = min(1.0, max(0.0, most_s) / (reflex.HELD_S + reflex.NOTICED_S))
     return (share * a, share * b, c)
 
 
@@ -193,5 +133,5 @@ def height_feedback(
     """
     reckoned_m_s = state.velocity_ned_m_s[2]
     speed_m_s = min(max(told_m_s, reckoned_m_s - spread_m_s), reckoned_m_s + spread_m_s)
-    asked = loops * CLIMB_GAIN_PER_S * (HEIGHT_PER_S * (down_m - state.position_ned_m[2]) - speed_m_s)
+    asked = loops * reflex.CLIMB_GAIN_PER_S * (reflex.HEIGHT_PER_S * (down_m - state.position_ned_m[2]) - speed_m_s)
     return min(max(asked, -most_m_s2), most_m_s2)

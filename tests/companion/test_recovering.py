@@ -1,4 +1,4 @@
-"""What a recovery asks of a vehicle that hangs on what it hit, and of one that spins."""
+"""What a recovery asks of a vehicle that hangs on what it hit, beside its plan."""
 
 import math
 
@@ -92,7 +92,7 @@ def test_a_vehicle_falls_only_as_far_as_it_can_be_stopped(height_m, down_m_s, fa
 
 @pytest.mark.parametrize(
     ("leant_deg", "lean_deg", "hangs"),
-    [((30.0,), 15.0, True), ((30.0,), 5.0, False), ((15.0,), 19.0, False), ((30.0, -10.0), 15.0, False)],
+    [((), 15.0, True), ((30.0,), 15.0, True), ((30.0,), 13.0, False), ((30.0, -10.0), 10.0, False)],
 )
 def test_a_vehicle_hangs_until_it_does_not_lean_on_the_obstacle_any_more(leant_deg, lean_deg, hangs):
     target = asked(lean_deg, is_fully_measured=True, leant_deg=leant_deg)
@@ -105,9 +105,8 @@ def test_a_vehicle_hangs_until_it_does_not_lean_on_the_obstacle_any_more(leant_d
 )
 def test_what_has_hung_does_not_climb_before_it_leaves(leant_deg, off_m_s, climbs):
     # Given a vehicle that falls beside the wall, level again
-    mission = Mission.model_validate(MISSION)
     target = asked(0.0, 3.0, 1.0, is_fully_measured=True, leant_deg=leant_deg, off_m_s=off_m_s)
-    assert mission.recovery.vertical_acceleration_m_s2 == 3.0 and target.acceleration_ned_m_s2 is not None
+    assert target.acceleration_ned_m_s2 is not None
     # Then it is braked at once, or, where it hung, when it leaves by more than noise: an overhang is above it
     assert target.acceleration_ned_m_s2[2] == pytest.approx(-3.0 if climbs else 0.0)
     assert target.is_height_free is not climbs
@@ -129,26 +128,6 @@ def test_the_surface_goes_along_with_what_hangs_on_it():
         # Then it is kept off where it is now. What it only passed counts for nothing.
         hard_m_s2 = 2.0 * mission.recovery.acceleration_m_s2
         assert (target.acceleration_ned_m_s2[0] == pytest.approx(-hard_m_s2)) is asks_off
-
-
-LEVEL, NOSE_UP = (1.0, 0.0, 0.0, 0.0), (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
-
-
-@pytest.mark.parametrize(
-    ("attitude", "rates", "spins"),
-    [
-        (LEVEL, None, False),
-        (LEVEL, (0.0, 0.0, -7.0), True),
-        (LEVEL, (7.0, 0.0, 0.0), False),
-        # Nose up by a right angle, the body's x axis is upright.
-        (NOSE_UP, (7.0, 0.0, 0.0), True),
-        (NOSE_UP, (0.0, 0.0, -7.0), False),
-    ],
-)
-def test_the_spin_that_counts_is_that_about_the_vertical(attitude, rates, spins):
-    # Given a hit that the vehicle's estimate knows whole: without a spin places are asked for
-    target = asked(-10.0, attitude=Attitude(HIT_US, attitude, rates), is_fully_measured=True)
-    assert target.acceleration_only is spins
 
 
 def less(a, b):
