@@ -59,7 +59,7 @@ RULES = (
     ),
     Rule(
         "second sample",
-        "a weak force on a shaking vehicle shows in two samples together",
+        "a weak force shows in two samples together",
         _DETECTION + "force_signs:together_m_s2",
         _says(0.0),
     ),

@@ -32,7 +32,6 @@ SWEPT_FIELDS = {
         "vertical_threshold_m_s2",
         "noise_factor",
         "velocity_step_m_s",
-        "velocity_step_turned_m_s",
         "rate_step_rad_s",
     ),
 }

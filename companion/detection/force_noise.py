@@ -11,34 +11,22 @@ SPREAD_MEMORY_S = 2.0
 LEARNT_S = 1.0
 # After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
 SETTLED_US = 300_000
-# Vibration grows within a second of more throttle. So the jitter, the change from sample to sample, rises fast and
-# falls slowly. For normal noise it then reads 1.5 standard deviations.
-JITTER_RISE_S = 0.3
-JITTER_EXCESS = 1.5
-# A sample after a gap has the weight of an interval of this length.
+# The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt.
+EXCESS = 1.5
+# A sample after a gap or a reboot has the weight of an interval of this length.
 LONGEST_STEP_S = 0.05
 
 
 @dataclass(slots=True)
 class ForceNoise:
-    """Exponentially weighted mean and variances on body x, y, z. Changed only by `learn`.
-
-    Each axis has two variances. One is about the mean; it contains vibration that is aliased to slow waves. The other
-    is of the jitter, half the squared change from sample to sample; a force that grows steadily does not raise it.
-    """
+    """Exponentially weighted mean and variance on body x, y, z. Changed only by `learn`."""
 
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
-    last_x: float = 0.0
-    last_y: float = 0.0
-    last_z: float = 0.0
     variance_x: float = 0.0
     variance_y: float = 0.0
     variance_z: float = 0.0
-    jitter_x: float = 0.0
-    jitter_y: float = 0.0
-    jitter_z: float = 0.0
     known_s: float = 0.0
     side_m_s2: float = 0.0  # standard deviation on the noisier of x and y
     vertical_m_s2: float = 0.0  # standard deviation on z
@@ -47,30 +35,19 @@ class ForceNoise:
     def is_known(self) -> bool:
         return self.known_s >= LEARNT_S
 
-    def learn(self, f_x: float, f_y: float, f_z: float, elapsed_s: float) -> None:
-        """Take one sample, m/s^2, ``elapsed_s`` after the last; the first ones count as a plain mean."""
-        step_s = elapsed_s if elapsed_s < LONGEST_STEP_S else LONGEST_STEP_S
+    def learn(self, f_x: float, f_y: float, f_z: float, step_s: float) -> None:
+        """Take one sample, m/s^2, ``step_s`` after the last; the first ones count as a plain mean."""
         if self.known_s <= 0.0:
-            self.x, self.y, self.z = self.last_x, self.last_y, self.last_z = f_x, f_y, f_z
+            self.x, self.y, self.z = f_x, f_y, f_z
         known_s = self.known_s = min(self.known_s + step_s, SPREAD_MEMORY_S)
         mean_share = step_s / (known_s if known_s < MEAN_MEMORY_S else MEAN_MEMORY_S)
         share = step_s / known_s
-        rise = share if share > step_s / JITTER_RISE_S else step_s / JITTER_RISE_S
         x, y, z = f_x - self.x, f_y - self.y, f_z - self.z
         self.x += mean_share * x
         self.y += mean_share * y
         self.z += mean_share * z
-        variance_x = self.variance_x = self.variance_x + share * (x * x - self.variance_x)
-        variance_y = self.variance_y = self.variance_y + share * (y * y - self.variance_y)
-        variance_z = self.variance_z = self.variance_z + share * (z * z - self.variance_z)
-        x, y, z = f_x - self.last_x, f_y - self.last_y, f_z - self.last_z
-        self.last_x, self.last_y, self.last_z = f_x, f_y, f_z
-        change = 0.5 * x * x - self.jitter_x
-        jitter_x = self.jitter_x = self.jitter_x + (rise if change > 0.0 else share) * change
-        change = 0.5 * y * y - self.jitter_y
-        jitter_y = self.jitter_y = self.jitter_y + (rise if change > 0.0 else share) * change
-        change = 0.5 * z * z - self.jitter_z
-        jitter_z = self.jitter_z = self.jitter_z + (rise if change > 0.0 else share) * change
-        excess = JITTER_EXCESS * JITTER_EXCESS
-        self.side_m_s2 = math.sqrt(max(excess * variance_x, excess * variance_y, jitter_x, jitter_y))
-        self.vertical_m_s2 = math.sqrt(max(excess * variance_z, jitter_z))
+        self.variance_x += share * (x * x - self.variance_x)
+        self.variance_y += share * (y * y - self.variance_y)
+        self.variance_z += share * (z * z - self.variance_z)
+        self.side_m_s2 = EXCESS * math.sqrt(max(self.variance_x, self.variance_y))
+        self.vertical_m_s2 = EXCESS * math.sqrt(self.variance_z)

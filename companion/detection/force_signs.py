@@ -1,6 +1,6 @@
-"""Thresholds of the contact force in one accelerometer sample, horizontal and along the thrust.
+"""The force of a sample beside the thresholds of a contact, horizontal and along the thrust.
 
-They depend on this vehicle's noise in its own flight (see `fused`). The state is only read.
+They depend on this vehicle's noise in its own flight (see `force_noise`). The state is only read.
 """
 
 import math
@@ -9,9 +9,7 @@ from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.messages import Vector3
 
-# A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times.
-SHAKING = 2.0
-# On a vibrating vehicle one sample below this many thresholds may be noise (once in four public logs, with 1.2).
+# One sample below this many thresholds may be noise (once in four public logs, with 1.2).
 CLEAR = 1.3
 
 
@@ -30,9 +28,18 @@ def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
     return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
 
 
+def alone_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
+    """Horizontal force of a sample by itself, less what noise may add to one."""
+    x, y = force_frd_m_s2[0] - s.floor.x, force_frd_m_s2[1] - s.floor.y
+    return math.sqrt(x * x + y * y) / CLEAR
+
+
 def together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
     """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
-    noise of a sum grows. Vibration alternates, a contact does not."""
+    noise of a sum grows. Vibration alternates, a contact does not.
+
+    Compared with zero, too: a slow swing that the mean has not followed is none.
+    """
     (f_x, f_y, _), (g_x, g_y, _), mean = force_frd_m_s2, s.soft.last, s.floor
     x, y = f_x + g_x, f_y + g_y
     return math.sqrt(0.5 * min((x - 2.0 * mean.x) ** 2 + (y - 2.0 * mean.y) ** 2, x * x + y * y))

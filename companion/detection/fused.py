@@ -18,14 +18,8 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from companion.detection.classify import kind_of
-from companion.detection.force_noise import SETTLED_US
-from companion.detection.force_signs import (
-    CLEAR,
-    SHAKING,
-    side_threshold_m_s2,
-    together_m_s2,
-    vertical_threshold_m_s2,
-)
+from companion.detection.force_noise import LONGEST_STEP_S, SETTLED_US
+from companion.detection.force_signs import alone_m_s2, side_threshold_m_s2, together_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
@@ -38,10 +32,6 @@ from companion.motion.strapdown import LEVEL
 # scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
 WORSE = 1.5
-# For this time after a hit the velocity threshold is larger by this factor, because the estimator corrects the part it
-# missed. That holds for every hit: a slow stream samples a quarter of the time and cannot exclude a hidden part. The
-# corrections reach 0.25 m/s (random missions at 50 Hz); a second hit of 0.5 m/s makes twice that.
-SWING_US, SWINGING = 1_500_000, 3.0
 
 
 class FusedDetector:
@@ -57,18 +47,15 @@ class FusedDetector:
     def __init__(self, config: FusedConfig, averaging_interval_us: int) -> None:
         self._config = config
         self._averaging_us = averaging_interval_us
-        self._rearm_us = round(config.rearm_quiet_s * 1e6)
-        self._longest_us = round(config.longest_contact_s * 1e6)
-        self._rest_us = round(config.velocity_rest_s * 1e6)
-        self._soft_us = round(config.soft_wait_s * 1e6)
 
     def initial(self) -> FusedState:
         return FusedState(threshold_m_s2=self._config.side_threshold_m_s2, jump=VelocityJump(self._averaging_us))
 
     def step(self, state: FusedState, sample: Sample, situation: Situation) -> tuple[FusedState, Impact | None]:
         if type(sample) is ImuSample:
+            before_us = state.last_sample_boot_us
             impact = self._imu(state, sample, situation)
-            state.soft.imu(state.last_sample_boot_us, sample.specific_force_frd_m_s2)
+            state.soft.imu(before_us, sample.specific_force_frd_m_s2)
             return state, impact
         if isinstance(sample, LocalPosition | Odometry):
             return state, self._velocity(state, sample, situation)
@@ -79,99 +66,64 @@ class FusedDetector:
     # --- force ------------------------------------------------------------------------------------------------
 
     def _imu(self, s: FusedState, sample: ImuSample, situation: Situation) -> Impact | None:
-        config, now_us = self._config, sample.time_boot_us
-        f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-        before_us = s.previous_sample_boot_us = s.last_sample_boot_us
+        config, now_us, f = self._config, sample.time_boot_us, sample.specific_force_frd_m_s2
+        w, off = sample.angular_velocity_frd_rad_s, situation.why_off
+        free_until_us = before_us = s.last_sample_boot_us
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
-        f_x, f_y, f_z = f
-        off = situation.why_off
-        x, y = f_x - s.floor.x, f_y - s.floor.y
-        # Compared with zero, too: the end of a long force, which the mean has learnt, is no hit.
-        side = math.sqrt(min(x * x + y * y, f_x * f_x + f_y * f_y))
-        room = vertical_threshold_m_s2(s, config)
-        most = s.thrust.most_m_s2(now_us)
-        below, above = f_z - room, -f_z - most - room
-        if s.threshold_m_s2 > SHAKING * config.side_threshold_m_s2:
-            together, side = together_m_s2(s, f), side / CLEAR
-            if together > side:
-                side, s.previous_sample_boot_us = together, s.soft.before_us
-        is_within = side < s.threshold_m_s2 and below < 0.0 and above < 0.0
-        if is_within and off is None and s.phase is Phase.ARMED:
-            # Nearly every sample ends here.
-            s.soft.since_boot_us = None
-            self._learn(s, f, before_us)
-            return None
+        side, together = alone_m_s2(s, f), together_m_s2(s, f)
+        if together > side:
+            side, free_until_us = together, s.soft.before_us
+        beyond, room = max(f[2], -f[2] - s.thrust.most_m_s2(now_us)), vertical_threshold_m_s2(s, config)
+        threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else side_threshold_m_s2(s, config, w)
+        ratio = max(side / threshold, beyond / room)
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
+        elif s.phase is Phase.OFF:
+            s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
+        if off is not None or ratio < 1.0:
+            s.soft.since_boot_us = None
             self._learn(s, f, before_us)
+            is_quiet = s.floor.is_known and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
+            if is_quiet and s.phase is not Phase.OFF:
+                s.phase = Phase.ARMED
             return None
-        threshold = side_threshold_m_s2(s, config, w)
-        if side < threshold and below < 0.0 and above < 0.0:
-            self._quiet(s, f, before_us)
-            return None
-        force = (x, y, f_z - s.thrust.expected_m_s2(now_us, s.floor.z))
-        size = math.sqrt(x * x + y * y + force[2] * force[2])
-        ratio = max(side / threshold, 1.0 + max(below, above) / room)
-        return self._loud(s, sample, situation, force, size, ratio)
+        lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
+        if s.phase is Phase.QUIET or (s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s):
+            self._learn(s, f, before_us)  # a shaking that stays
+        force = (f[0] - s.floor.x, f[1] - s.floor.y, f[2] - s.thrust.expected_m_s2(now_us, s.floor.z))
+        return self._loud(s, f, situation, force, min(now_us - self._averaging_us, free_until_us), ratio)
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
-        now_us = s.last_sample_boot_us
-        elapsed_s = (now_us - before_us) * 1e-6
-        if not 0.0 < elapsed_s < 1.0:
-            elapsed_s = 0.001
+        elapsed_s = 1e-6 * (s.last_sample_boot_us - before_us)
+        if not 0.0 < elapsed_s < LONGEST_STEP_S:
+            elapsed_s = LONGEST_STEP_S
         s.floor.learn(f[0], f[1], f[2], elapsed_s)
-        if s.phase is Phase.ARMED:
-            s.thrust.learn(now_us, f[2], elapsed_s)
         s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
-
-    def _quiet(self, s: FusedState, f: Vector3, before_us: int) -> None:
-        now_us = s.last_sample_boot_us
-        s.soft.since_boot_us = None
-        self._learn(s, f, before_us)
-        if s.phase is Phase.OFF:
-            self._switched_on(s)
-        elif s.phase is not Phase.ARMED and now_us - s.last_loud_boot_us >= self._rearm_us:
-            s.phase = Phase.ARMED if s.floor.is_known else Phase.QUIET
-
-    def _switched_on(self, s: FusedState) -> None:
-        """Begin a quiet interval; after the ground it begins SETTLED_US later."""
-        now_us = s.contact_began_boot_us = s.last_sample_boot_us
-        s.last_loud_boot_us = now_us + SETTLED_US if s.off_reason == ON_THE_GROUND else now_us
-        s.phase, s.off_reason = Phase.QUIET, ""
+        if s.phase is Phase.ARMED:
+            s.thrust.learn(s.last_sample_boot_us, f[2], elapsed_s)
 
     def _loud(
-        self, s: FusedState, sample: ImuSample, situation: Situation, force: Vector3, size: float, ratio: float
+        self, s: FusedState, f: Vector3, situation: Situation, force: Vector3, free_until_us: int, ratio: float
     ) -> Impact | None:
-        now_us, soft = s.last_sample_boot_us, s.soft
-        f, turn = sample.specific_force_frd_m_s2, s.jump.newest_rate_step_rad_s
-        jumps = soft.turns(now_us, turn) or soft.jumps(now_us, f, s.threshold_m_s2)
-        if s.phase is Phase.CONTACT:
-            s.last_loud_boot_us = now_us
-            is_another = jumps if soft.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
-            if is_another and size > WORSE * s.peak_specific_force_m_s2:
-                return self._fire(s, now_us, situation, force, s.previous_sample_boot_us, Evidence.FORCE, 1.0)
-            s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
-            if now_us - s.contact_began_boot_us > self._longest_us:
-                self._learn(s, f, now_us - 1)
-            return None
+        now_us, soft, size = s.last_sample_boot_us, s.soft, math.hypot(*force)
+        jumps = soft.jumps(now_us, f, s.threshold_m_s2)
         if s.phase is not Phase.ARMED:
-            # Switched on during vibration: it is learnt too, or too low a threshold would never rise.
-            if s.phase is Phase.OFF:
-                self._switched_on(s)
-            waited = now_us - s.contact_began_boot_us > self._longest_us and s.floor.is_known
-            s.phase, s.last_loud_boot_us = Phase.ARMED if waited else Phase.QUIET, max(now_us, s.last_loud_boot_us)
-            self._learn(s, f, now_us - 1)
+            s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
+            if s.phase is Phase.CONTACT:
+                is_another = jumps if soft.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
+                if is_another and size > WORSE * s.peak_specific_force_m_s2:
+                    return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, 1.0)
+                s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
-        free_until_us = min(now_us - self._averaging_us, s.previous_sample_boot_us)
-        if soft.since_boot_us is not None:
-            free_until_us = soft.free_until_us
+        if soft.since_boot_us is None:
+            soft.since_boot_us, soft.free_until_us = now_us, free_until_us
         kind = None
         if size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps:
-            if soft.looked_at_us(now_us, free_until_us) < self._soft_us:
+            if now_us - soft.since_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
             kind = ImpactKind.CONTACT
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
+        return self._fire(s, now_us, situation, force, soft.free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
     def _fire(
         self,
@@ -193,9 +145,7 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.soft.fired(now_us, kind is ImpactKind.CONTACT)
-        if kind is not ImpactKind.CONTACT:
-            s.hit_boot_us = now_us
+        s.soft.fired(kind is ImpactKind.CONTACT)
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
 
     # --- velocity ---------------------------------------------------------------------------------------------
@@ -207,7 +157,7 @@ class FusedDetector:
         if inertial is None or not inertial.has_new_fix:
             return None
         step = jump.step_m_s(inertial.fixes)
-        rests = time_us - s.last_loud_boot_us < self._rest_us or not situation.estimate_valid
+        rests = time_us - s.last_loud_boot_us < 1e6 * config.velocity_rest_s or not situation.estimate_valid
         if s.phase is Phase.CONTACT or rests:
             jump.since_us = time_us
             return None
@@ -231,17 +181,9 @@ class FusedDetector:
         """Threshold of a velocity jump, m/s; larger where the estimate may jump without a hit."""
         config, jump = self._config, s.jump
         caution = 1.0 if counts_resets else 2.0
-        if s.hit_boot_us is not None and time_us - s.hit_boot_us < SWING_US:
-            caution *= SWINGING
-        turned = jump.rate_step_near(time_us) >= config.rate_step_rad_s
-        least = config.velocity_step_turned_m_s if turned else config.velocity_step_m_s
-        p, q, _ = jump.rates_frd_rad_s
-        shaking = max(0.0, s.floor.side_m_s2 - config.side_threshold_m_s2 / config.noise_factor)
-        noise_m_s, room = config.noise_factor * spread_m_s, config.velocity_per_rate_m * (abs(p) + abs(q))
-        unseen_m_s = jump.unseen_m_s(shaking, abs(s.soft.last[2] - s.floor.z))
-        if jump.no_motor_turns(time_us, config.rate_step_rad_s):
-            # Two signs confirm each other: half the noise is enough, and the thrust has turned for a moment only.
-            noise_m_s, unseen_m_s, room = 0.5 * noise_m_s, 0.5 * unseen_m_s, 0.0
-        if jump.is_slow:
-            least = config.velocity_step_slow_m_s
-        return caution * max(least, noise_m_s) + unseen_m_s + room
+        least_m_s = config.velocity_step_slow_m_s if jump.is_slow else config.velocity_step_m_s
+        shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
+        least_m_s = caution * max(least_m_s, config.noise_factor * spread_m_s)
+        least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.soft.last[2] - s.floor.z))
+        # Two signs confirm each other.
+        return 0.5 * least_m_s if jump.no_motor_turns(time_us, config.rate_step_rad_s) else least_m_s

@@ -8,6 +8,7 @@ class FusedConfig(StrictModel):
 
     retired = frozenset(
         {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
+        | {"velocity_step_turned_m_s", "velocity_per_rate_m"}
     )
 
     side_threshold_m_s2: Positive = 1.75
@@ -29,15 +30,9 @@ class FusedConfig(StrictModel):
     clipping leaves the estimate 0.16."""
     velocity_step_slow_m_s: Positive = 0.7
     """The same of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz."""
-    velocity_step_turned_m_s: Positive = 0.07
-    """The same beside a rate jump. With the rates' own step: a push at 0.15 m from the centre that turns the vehicle by
-    2 rad/s changes its velocity by 0.06 m/s. Motors at full moment need 20 ms and more for 2 rad/s."""
     rate_step_rad_s: Positive = 2.0
-    """Least rate jump that counts beside a velocity jump."""
-    velocity_per_rate_m: NotNegative = 0.01
-    """Room in a velocity jump for a vehicle that turns. Thrust that turns at 1 rad/s changes the acceleration by 0.6
-    m/s^2 in 60 ms; the estimate's 20 ms of delay make 0.012 m/s of that. Turning about the thrust itself changes
-    nothing."""
+    """Least rate jump that counts beside a velocity jump, more than motors make in the same time. A push at 0.15 m from
+    the centre that turns the vehicle by 2 rad/s changes its velocity by 0.06 m/s, half of `velocity_step_m_s`."""
     rearm_quiet_s: Positive = 0.04
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5

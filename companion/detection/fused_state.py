@@ -18,8 +18,5 @@ class FusedState(DetectorState):
     thrust: ThrustGain = field(default_factory=ThrustGain)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
     velocity_ned_m_s: Vector3 | None = None
-    previous_sample_boot_us: int = 0
     contact_began_boot_us: int = 0
-    hit_boot_us: int | None = None
-    """Of the latest impact that was no hand's."""
     soft: SoftContact = field(default_factory=SoftContact)

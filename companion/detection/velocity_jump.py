@@ -6,7 +6,7 @@ body rates jump, too. A rate jump alone is no evidence: a failed motor turns the
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -25,8 +25,6 @@ LONGEST_SLOW_STEP_US = 130_000
 # Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz. So many steps
 # make one good to an eighth, as each has three axes: before that it is not used.
 MEMORY, RISE = 100, 10
-# Weight of each sample in the share of unsampled time: ten samples are half a second at the slowest useful rate.
-UNSEEN_SHARE = 0.1
 # Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
 # samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
 # deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
@@ -47,7 +45,6 @@ class VelocityJump:
 
     averaging_us: int
     rates_frd_rad_s: Vector3 = ZERO
-    newest_rate_step_rad_s: float = 0.0
     rate_step_frd_rad_s: Vector3 = ZERO
     rate_step_from_us: int = 0
     rate_step_until_us: int = 0
@@ -61,18 +58,16 @@ class VelocityJump:
     variance_m2_s2: float = 0.0
     known: int = 0
     unseen_share: float = 0.0
-    """Share of the time that no sample's averaging window covers."""
+    """Share of the newest interval between samples that no averaging window covers."""
     newest: tuple[Vector3, Vector3] = (ZERO, ZERO)
     """The newest step without correction for the delay, and the change of the acceleration."""
-    unlearnt: tuple[Vector3, Vector3, Vector3] | None = None
 
     def imu(self, before_us: int, time_us: int, rates_frd_rad_s: Vector3) -> None:
         """Take one sample; the one before it was at `before_us`."""
-        elapsed_us, self.newest_rate_step_rad_s = time_us - before_us, 0.0
+        elapsed_us = time_us - before_us
         if 0 < elapsed_us < LONGEST_GAP_US:
-            unseen = max(0.0, 1.0 - self.averaging_us / elapsed_us)
-            self.unseen_share += UNSEEN_SHARE * (unseen - self.unseen_share)
-            step = self.newest_rate_step_rad_s = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
+            self.unseen_share = max(0.0, 1.0 - self.averaging_us / elapsed_us)
+            step = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
             if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
                 self.rate_step_frd_rad_s = _less(rates_frd_rad_s, self.rates_frd_rad_s)
                 self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
@@ -92,29 +87,22 @@ class VelocityJump:
         if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_SLOW_STEP_US:
             return None
         self.is_slow = max(apart_us) > LONGEST_STEP_US
-        *before, residual = (less_sum(fix) for fix in recent[1:])
+        step = _newest_less_mean(less_sum(fix) for fix in recent[1:])
         # Mean accelerations between velocities, without vibration.
-        *led, acceleration = (
-            _over(_less(b.sum_ned_m_s, a.sum_ned_m_s), 1e-6 * us)
-            for (a, b), us in zip(pairwise(recent), apart_us, strict=True)
-        )
-        step, change = _less(residual, _mean(before)), _less(acceleration, _mean(led))
+        pairs = zip(pairwise(recent), apart_us, strict=True)
+        change = _newest_less_mean(_less(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)
         self.newest = (step, change)
         late_s = self.delay.delay_s(self.variance_m2_s2)
         return (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
 
     def learn(self, step: Vector3) -> None:
-        """Learn delay and standard deviation from the step before this one; the newest is learnt with the next.
+        """Learn delay and standard deviation from the newest step.
 
         Hits are learnt, too: an estimate that jumps repeatedly gets a larger standard deviation. It rises fast and
         falls slowly (see `force_noise`).
         """
-        unlearnt, self.unlearnt = self.unlearnt, (step, *self.newest)
-        if unlearnt is None:
-            return
-        learnt, late, change_m_s2 = unlearnt
-        self.delay.learn(late, change_m_s2)
-        square = (learnt[0] * learnt[0] + learnt[1] * learnt[1] + learnt[2] * learnt[2]) / 3.0
+        self.delay.learn(*self.newest)
+        square = (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / 3.0
         self.known = min(self.known + 1, MEMORY)
         change = square - self.variance_m2_s2
         self.variance_m2_s2 += change / (min(self.known, RISE) if change > 0.0 else self.known)
@@ -152,14 +140,11 @@ class VelocityJump:
         return self.before_us - LONGEST_DELAY_US
 
 
-def _less(a: Vector3, b: Vector3) -> Vector3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+def _less(a: Vector3, b: Vector3, seconds: float = 1.0) -> Vector3:
+    return ((a[0] - b[0]) / seconds, (a[1] - b[1]) / seconds, (a[2] - b[2]) / seconds)
 
 
-def _over(a: Vector3, seconds: float) -> Vector3:
-    return (a[0] / seconds, a[1] / seconds, a[2] / seconds)
-
-
-def _mean(vectors: Sequence[Vector3]) -> Vector3:
-    (a, b, c), (d, e, f), (x, y, z) = vectors
-    return ((a + d + x) / COMPARED, (b + e + y) / COMPARED, (c + f + z) / COMPARED)
+def _newest_less_mean(vectors: Iterable[Vector3]) -> Vector3:
+    """The last vector less the mean of those before it."""
+    x, y, z = (newest - sum(before) / COMPARED for *before, newest in zip(*vectors, strict=True))
+    return (x, y, z)

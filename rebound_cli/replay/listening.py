@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.force_signs import side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import alone_m_s2, side_threshold_m_s2, together_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
@@ -109,12 +109,12 @@ def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float
     if not isinstance(state, FusedState):
         threshold_m_s2 = state.threshold_m_s2
         return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
-    f_x, f_y, f_z = sample.specific_force_frd_m_s2
+    force = sample.specific_force_frd_m_s2
     return (
         now_us,
         phase,
-        math.hypot(f_x - state.floor.x, f_y - state.floor.y),
+        max(alone_m_s2(state, force), together_m_s2(state, force)),
         side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s),
-        max(f_z, -f_z - state.thrust.most_m_s2(now_us)),
+        max(force[2], -force[2] - state.thrust.most_m_s2(now_us)),
         vertical_threshold_m_s2(state, config),
     )
