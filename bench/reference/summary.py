@@ -42,8 +42,8 @@ COLLISION = {
     "recovery_setpoint_ned_m": "Where the recovery was to end.",
     "settled_after_s": "From the detection to the start of the time at rest; null if the vehicle did not settle.",
     "overshoot_m": "Furthest past the setpoint, away from the obstacle, by telemetry.",
-    "rebound_speed_m_s": "Speed back along the approach when the contact ended, by telemetry; null where the velocity "
-    "was not valid.",
+    "rebound_speed_m_s": "Largest speed along the normal in the 0.1 s after the contact, by telemetry; null where the "
+    "velocity was not valid.",
     "stopped_off_m": "From the place of the hit to the recovery setpoint, along `normal_ned`.",
     "truth": "What the simulator knows of it; null on a real vehicle and for a false detection.",
 }

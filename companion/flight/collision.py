@@ -13,7 +13,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix
 from companion.motion.strapdown import Strapdown
-from companion.reflex.halfspace import away_from
+from companion.reflex.halfspace import away_from, split
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.report import CollisionReport
@@ -23,15 +23,8 @@ from companion.report import CollisionReport
 REBOUND_WINDOW_US = 100_000
 # No contact that ends in a rebound lasts longer.
 REBOUND_KEPT_US = 1_000_000
-# A smaller velocity, or distance, has no reliable direction.
-LEAST_SPEED_M_S = 0.05
+# A smaller distance has no reliable direction.
 LEAST_WAY_M = 0.01
-
-
-def horizontal_unit(vector: Vector3) -> Vector3:
-    """Direction in the horizontal plane; zero when there is none."""
-    length = math.hypot(vector[0], vector[1])
-    return (vector[0] / length, vector[1] / length, 0.0) if length > 0.0 else (0.0, 0.0, 0.0)
 
 
 def level(normal: Normal) -> Normal:
@@ -60,7 +53,7 @@ class CollisionRecord:
     overshoot_m: float = 0.0
     estimated_down_m_s: float = 0.0  # the vehicle's own estimate now, right or wrong
     level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # of a vehicle that is level by its own attitude, NED
-    _speeds_away: list[tuple[int, float]] = field(default_factory=list)
+    _velocities: list[tuple[int, Vector3]] = field(default_factory=list)
 
     @property
     def normal(self) -> Normal:
@@ -121,9 +114,7 @@ class CollisionRecord:
         past_m = sum(a * (p - s) for a, p, s in zip(away, sample.position_ned_m, self.setpoint_ned_m, strict=True))
         self.overshoot_m = max(self.overshoot_m, past_m)
         if sample.time_boot_us <= self.sample_time_boot_us + REBOUND_KEPT_US:
-            back = self._direction_back()
-            speed_m_s = sum(b * v for b, v in zip(back, sample.velocity_ned_m_s, strict=True))
-            self._speeds_away.append((sample.time_boot_us, speed_m_s))
+            self._velocities.append((sample.time_boot_us, sample.velocity_ned_m_s))
 
     def _direction_away(self) -> Vector3:
         """From the contact towards the setpoint; along the normal when the two coincide."""
@@ -133,20 +124,11 @@ class CollisionRecord:
             return self.normal.direction_ned
         return ((s[0] - x[0]) / length_m, (s[1] - x[1]) / length_m, (s[2] - x[2]) / length_m)
 
-    def _direction_back(self) -> Vector3:
-        """Against the approach; along the normal for a vehicle hit while it hovered."""
-        v = self.contact.velocity_ned_m_s
-        return (
-            horizontal_unit((-v[0], -v[1], 0.0))
-            if math.hypot(v[0], v[1]) >= LEAST_SPEED_M_S
-            else self.normal.direction_ned
-        )
-
     def rebound_speed_m_s(self) -> float | None:
-        """Largest speed back, m/s, within REBOUND_WINDOW_US after the contact; None without a valid velocity."""
-        start, end = self.contact_ended_boot_us, self.contact_ended_boot_us + REBOUND_WINDOW_US
-        speeds = [speed for time_us, speed in self._speeds_away if start < time_us <= end]
-        return max(0.0, *speeds) if speeds else None
+        """Largest speed along the normal, m/s, within REBOUND_WINDOW_US after the contact; None without a valid one."""
+        start, normal = self.contact_ended_boot_us, self.normal.direction_ned
+        recent = [v for time_us, v in self._velocities if start < time_us <= start + REBOUND_WINDOW_US]
+        return max((max(0.0, split(v, normal)[0]) for v in recent), default=None)
 
     def settled_after_s(self) -> float | None:
         if self.settled_at_boot_us is None:
