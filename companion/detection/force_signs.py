@@ -7,6 +7,7 @@ import math
 
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
+from companion.detection.interface import Phase
 from companion.messages import Vector3
 
 # One sample below this many thresholds may be noise (once in four public logs, with 1.2).
@@ -29,9 +30,9 @@ def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
 
 
 def alone_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
-    """Horizontal force of a sample by itself, less what noise may add to one."""
+    """Horizontal force of a sample by itself; of one that may begin a contact, less what noise may add to it."""
     x, y = force_frd_m_s2[0] - s.floor.x, force_frd_m_s2[1] - s.floor.y
-    return math.sqrt(x * x + y * y) / CLEAR
+    return math.sqrt(x * x + y * y) / (CLEAR if s.phase is Phase.ARMED else 1.0)
 
 
 def together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:

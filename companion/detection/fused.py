@@ -72,7 +72,8 @@ class FusedDetector:
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
         side, together = alone_m_s2(s, f), together_m_s2(s, f)
-        if together > side:
+        # Within a contact each sample speaks for itself: the one after a forged sample does not confirm it.
+        if together > side and s.phase is Phase.ARMED:
             side, free_until_us = together, s.soft.before_us
         beyond, room = max(f[2], -f[2] - s.thrust.most_m_s2(now_us)), vertical_threshold_m_s2(s, config)
         threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else side_threshold_m_s2(s, config, w)

@@ -24,6 +24,7 @@ from companion.reflex.planner import (
     MotionState,
     Plan,
     height_feedback,
+    holds,
     kept_off,
     safe_to_hold,
     shortest,
@@ -184,13 +185,22 @@ class Recover:
         return MotionState(place, velocity, limited(acceleration, self._config.acceleration_m_s2))
 
     def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """Update the goal and the plan from what is known of the contact by now."""
+        """Update goal and plan from what is known by now; the plan alone where the vehicle is off it."""
         self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
-        if known == self._planned_for:
+        state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
+        is_on = holds(self._plan.at(elapsed_s), state)
+        if known != self._planned_for or not (self._is_known or is_on):
+            self._planned_for = known
+            self._aim(flight, state, now_us)
+        elif is_on or not self._law.plans:
             return
-        record, state, self._planned_for = self._record, self._state(), known
-        before, self._surfaces = record.setpoint_ned_m, _surfaces(flight, self._contact, flight.collisions)
+        self._plan, self._plan_began_us = self._plan_from(state), now_us
+
+    def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
+        """Set the recovery setpoint again, from the present contact and motion."""
+        record, before = self._record, self._record.setpoint_ned_m
+        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, self._surfaces)
         self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
         if math.dist(place, before) > flight.mission.companion.settled.distance_m:
@@ -198,7 +208,6 @@ class Recover:
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
-        self._plan, self._plan_began_us = self._plan_from(state), now_us
 
     def _plan_from(self, state: MotionState) -> Plan:
         goal = self._record.setpoint_ned_m
