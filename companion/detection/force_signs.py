@@ -29,10 +29,15 @@ def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
     return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
 
 
+def clear(s: FusedState) -> float:
+    """How many thresholds one sample must reach: more where it may begin a contact."""
+    return CLEAR if s.phase is Phase.ARMED else 1.0
+
+
 def alone_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
-    """Horizontal force of a sample by itself; of one that may begin a contact, less what noise may add to it."""
+    """Horizontal force of a sample by itself, as one that is compared with the threshold."""
     x, y = force_frd_m_s2[0] - s.floor.x, force_frd_m_s2[1] - s.floor.y
-    return math.sqrt(x * x + y * y) / (CLEAR if s.phase is Phase.ARMED else 1.0)
+    return math.sqrt(x * x + y * y) / clear(s)
 
 
 def together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:

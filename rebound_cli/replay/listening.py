@@ -12,7 +12,13 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.force_signs import alone_m_s2, side_threshold_m_s2, together_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import (
+    alone_m_s2,
+    clear,
+    side_threshold_m_s2,
+    together_m_s2,
+    vertical_threshold_m_s2,
+)
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
@@ -110,11 +116,14 @@ def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float
         threshold_m_s2 = state.threshold_m_s2
         return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
     force = sample.specific_force_frd_m_s2
+    threshold_m_s2 = side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s)
+    alone, together = alone_m_s2(state, force), together_m_s2(state, force)
+    # Of the two what is nearer to a hit, each as it was measured.
+    side = (together, threshold_m_s2) if together > alone else (clear(state) * alone, clear(state) * threshold_m_s2)
     return (
         now_us,
         phase,
-        max(alone_m_s2(state, force), together_m_s2(state, force)),
-        side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s),
+        *side,
         max(force[2], -force[2] - state.thrust.most_m_s2(now_us)),
         vertical_threshold_m_s2(state, config),
     )
