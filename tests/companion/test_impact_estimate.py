@@ -18,6 +18,7 @@ from companion.reflex.monitor import advance, start_monitor
 CONFIG = EstimateConfig()
 CONTACT_US = 10_000_000
 LEVEL = (1.0, 0.0, 0.0, 0.0)
+STILL = (0.0, 0.0, 0.0)
 
 
 def fixes(seed, seconds=1.0, acceleration=2.0, delay_s=0.02, bias=0.05, noise=0.032, every_us=32_000):
@@ -52,6 +53,24 @@ def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
     wrong = [VelocityFix(f.time_boot_us, f.velocity_ned_m_s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) for f in fixes(1)]
     assert velocity_at(wrong) is None
     assert velocity_at([]) is None
+
+
+@pytest.mark.parametrize(("off_m_s", "is_taken"), [(0.06, True), (0.10, False)])
+def test_velocities_that_the_accelerometer_denies_by_more_than_their_noise_contradict_it(off_m_s, is_taken):
+    # Given velocities with a noise of 0.04 m/s, that are off by so much to either side of the integral
+    times_us = range(CONTACT_US - 1_000_000, CONTACT_US - 5_000, 20_000)
+    signs = [off_m_s if number % 2 else -off_m_s for number in range(len(times_us))]
+    heard = [VelocityFix(t, (2.0 + off, off, off), STILL, STILL) for t, off in zip(times_us, signs, strict=True)]
+    assert (velocity_at(heard) is not None) == is_taken
+
+
+def test_a_drift_counts_as_far_as_an_accelerometers_bias_may_explain_it():
+    # Given velocities that leave the integral by 0.1 m/s in the last second
+    times_us = range(CONTACT_US - 1_000_000, CONTACT_US - 5_000, 20_000)
+    heard = [VelocityFix(t, (2.0 + 1e-7 * (t - CONTACT_US), 0.0, 0.0), STILL, STILL) for t in times_us]
+    # Then a third of that is taken for a bias, and the rest for noise
+    velocity, _ = velocity_at(heard)
+    assert velocity[0] == pytest.approx(1.967, abs=0.003)
 
 
 @pytest.mark.parametrize("late_us", [0, 100_000, 290_000])
