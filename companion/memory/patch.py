@@ -122,17 +122,15 @@ def touch_of(
     normal: Normal,
     reach_m: float,
     found_at_us: int,
-    is_behind: bool = False,
 ) -> Patch | None:
     """The patch of one hit, from the vehicle's centre and velocity; None where the direction is not known.
 
     ``normal`` is horizontal, steep or zero (see halfspace.away_from). ``reach_m``: centre to the guards' rim.
-    ``is_behind``: what was hit is known to have come after the vehicle.
     """
     n, e, d = velocity_ned_m_s
     is_fast = math.sqrt(n * n + e * e + d * d) >= LEAST_SPEED_M_S
     against = away_from((-n, -e, -d)) if is_fast else ZERO
-    is_behind = is_behind or _agreement(normal.direction_ned, against) < FROM_BEHIND
+    is_behind = _agreement(normal.direction_ned, against) < FROM_BEHIND
     if normal.direction_ned == ZERO:
         return None
     n, e, d = (c - reach_m * x for c, x in zip(centre_ned_m, normal.direction_ned, strict=True))

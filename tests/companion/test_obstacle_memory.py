@@ -53,13 +53,6 @@ def test_what_pushes_a_vehicle_on_came_after_it_and_is_no_wall():
     assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
 
 
-def test_what_is_known_to_have_come_after_the_vehicle_keeps_its_side():
-    """Pushed off to the north by a cart the vehicle drifts east, fast: the cart is south of it all the same."""
-    touch = touch_of((3.0, 1.0, -1.5), (0.2, 1.0, 0.0), Normal(NORTH, ERROR_RAD), 0.2, 0, is_behind=True)
-    assert touch.normal_ned == NORTH and touch.reaches_m == 0.0
-    assert touch.centre_ned_m == pytest.approx((2.8, 1.0, -1.5))
-
-
 def test_what_came_to_a_hovering_vehicle_is_not_believed_to_be_a_wall():
     touch = touch_of((0, 0, -1.5), (0.5 * LEAST_SPEED_M_S, 0.0, 0.0), Normal(SOUTH, ERROR_RAD), 0.2, 0)
     assert touch.reaches_m == 0.0
