@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from companion.messages import Vector3
 from companion.motion.strapdown import ZERO
 
-# Standard deviations of the directions from the normal, rad, RMS of drawn vehicles on walls, slanted and leaning walls
-# and poles (bench/notes/detection.md): friction turns a force by 17 degrees; walls are met at up to 60 degrees.
+# Standard deviations of the directions from the normal, rad, on drawn walls, slanted and leaning walls and poles
+# (bench/notes/ablation.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
+# less often head-on than a quarter, as in the draws.
 IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
 # Standard deviation of a change of velocity, m/s: that of both velocities, and what a controller adds in 0.1 s.
 CHANGE_M_S = 0.3
@@ -21,21 +22,23 @@ APPROACH_M_S = 0.5
 # Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
 # behind, and the direction of flight says nothing of it.
 FROM_BEHIND = -0.5
+# Nothing is known of a direction, rad: a recovery's clearance then counts all of the motion along the surface.
+UNKNOWN_RAD = 0.5 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Unit vector out of the obstacle, NED, and its standard deviation in rad; zero and infinite where unknown."""
+    """Unit vector out of the obstacle, NED, and its standard deviation, rad; zero and `UNKNOWN_RAD` if unknown."""
 
     direction_ned: Vector3 = ZERO
-    error_rad: float = math.inf
+    error_rad: float = UNKNOWN_RAD
 
     def with_direction(self, vector_ned: Vector3, error_rad: float) -> "Normal":
         """The normal after another vector of that direction; a zero vector changes nothing."""
         other = unit(vector_ned)
         if other == ZERO:
             return self
-        was, more = self.error_rad**-2, error_rad**-2
+        was, more = 0.0 if self.direction_ned == ZERO else self.error_rad**-2, error_rad**-2
         n, e, d = (was * a + more * b for a, b in zip(self.direction_ned, other, strict=True))
         return Normal(unit((n, e, d)), (was + more) ** -0.5)
 

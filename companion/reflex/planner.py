@@ -75,7 +75,7 @@ def shortest(state: MotionState, goal_ned_m: Callable[[float], Vector3], most_m_
     duration_s = reflex.SHORTEST_S
     while True:
         found = Plan(state, goal_ned_m(duration_s), duration_s)
-        if found.most_m_s2() <= most_m_s2:
+        if not found.most_m_s2() > most_m_s2:  # nor one that is no number, which no duration mends
             return found
         duration_s *= reflex.DURATION_STEP
 

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from companion.detection.force_signs import (
+    CLEAR,
     alone_m_s2,
-    clear,
+    shakes,
     side_threshold_m_s2,
     together_m_s2,
     vertical_threshold_m_s2,
@@ -117,9 +118,11 @@ def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float
         return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
     force = sample.specific_force_frd_m_s2
     threshold_m_s2 = side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s)
-    alone, together = alone_m_s2(state, force), together_m_s2(state, force)
-    # Of the two what is nearer to a hit, each as it was measured.
-    side = (together, threshold_m_s2) if together > alone else (clear(state) * alone, clear(state) * threshold_m_s2)
+    side = (alone_m_s2(state, force), threshold_m_s2)
+    if shakes(state, config):
+        together = together_m_s2(state, force)
+        # Of the two what is nearer to a hit, each as it was measured.
+        side = (together, threshold_m_s2) if CLEAR * together > side[0] else (side[0], CLEAR * threshold_m_s2)
     return (
         now_us,
         phase,

@@ -279,8 +279,9 @@ def test_what_lags_behind_a_manoeuvre_is_no_hit_once_the_vehicle_has_manoeuvred(
         {"lift": lambda t: GRAVITY * (1.0 + 0.4 * math.sin(t * 20e-6))},  # climbs and dives
         {"push": lambda t: (1.1 * min(1.0, max(0.0, (t - HIT_US) / 3e5)), 0.0, 0.0)},  # a gust of 5 m/s in 0.3 s
         {"noise": 2.5},
+        {"push": lambda t: (1.5 * (t > HIT_US), 0.0, 0.0)},  # an accelerometer whose zero moves at once
     ],
-    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking"],
+    ids=["free fall", "motor failure", "payload drop", "climbs", "gust", "shaking", "zero moves"],
 )
 def test_what_a_flight_does_to_itself_is_no_hit(scene, imu_every_us):
     until_us = 3_150_000 if "rates" in scene else 6_000_000

@@ -8,6 +8,7 @@ import pytest
 from companion.estimate.normal import (
     APPROACH_RAD,
     IMPULSE_RAD,
+    UNKNOWN_RAD,
     Normal,
     normal_of,
     with_change,
@@ -54,7 +55,7 @@ def test_what_pushes_along_the_flight_came_from_behind(pushed_deg, normal_deg):
 
 def test_of_nothing_nothing_is_known():
     assert normal_of((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) == Normal()
-    assert Normal().direction_ned == (0.0, 0.0, 0.0) and Normal().error_rad == math.inf
+    assert Normal().direction_ned == (0.0, 0.0, 0.0) and Normal().error_rad == UNKNOWN_RAD
 
 
 @pytest.mark.parametrize(

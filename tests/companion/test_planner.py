@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pytest
 
+from companion.estimate.normal import Normal
 from companion.fence import Fence
-from companion.reflex.config import HARD_BRAKING, LEAD_S, RecoveryConfig
+from companion.reflex.config import HARD_BRAKING, LEAD_S, SHORTEST_S, RecoveryConfig
 from companion.reflex.halfspace import FenceBounds, Surface, away_from, clear_goal, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact
 from companion.reflex.planner import REST, MotionState, Plan, height_feedback, kept_off, shortest
@@ -95,6 +96,15 @@ def test_adaptive_never_plans_towards_the_obstacle_nor_past_its_goal(speed, slan
         assert split(motion.velocity_ned_m_s, touched.normal_ned)[0] > -1e-9
         assert -1e-9 <= off_m(touched, motion.position_ned_m) <= off_m(touched, goal) + 1e-9
         assert math.hypot(*motion.acceleration_ned_m_s2) <= 3.0 * 1.02
+
+
+def test_of_a_motion_that_is_no_number_a_plan_is_tried_once():
+    assert plan(MotionState(AT, (math.nan, 0.0, 0.0)), AT).duration_s == SHORTEST_S
+
+
+def test_where_no_normal_is_known_adaptive_asks_for_a_finite_place():
+    touched = replace(hit(2.0), normal_ned=Normal().direction_ned, normal_error_rad=Normal().error_rad)
+    assert all(map(math.isfinite, goal_of("adaptive", touched)))
 
 
 def test_a_plan_made_anew_from_any_motion_on_it_is_the_same_plan():

@@ -108,7 +108,7 @@ def test_a_hit_has_its_place_its_normal_with_its_error_and_its_reasons(wall_fold
     # The simulator's first touch, before the sample that shows it
     assert moment["touched_ms"] == pytest.approx(-hit["truth"]["detection_latency_ms"], abs=0.001)
     why = "\n".join(moment["reasons"])
-    assert re.search(r"Push sideways: 33\.\d m/s², a hit from 2\.\d on \(\d+\.\d times\): speaks for a contact\.", why)
+    assert re.search(r"Push sideways: 33\.\d m/s², a hit from 1\.\d on \(\d+\.\d times\): speaks for a contact\.", why)
     assert "A landing: no" in why and "A person's hand: no" in why and "Verdict: wall, a collision" in why
 
 
