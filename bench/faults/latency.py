@@ -1,7 +1,7 @@
 """From a hit to the recovery setpoint on the wire, under load: the real loop, a real socket and the real clock.
 
-A flight is flown in virtual time to just before its hit. From there on a forked process of its own goes on with it in
-real time, as often as wanted: what the vehicle says until the hit no longer depends on the companion.
+A flight is recorded in virtual time. As often as wanted a process of its own flies it to just before the hit, and from there
+on in real time: what the vehicle says until the hit no longer depends on the companion.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ from sim_vehicle.vehicle import SimulatedVehicle
 
 FLIGHTS = 10
 BUSY_LOOPS = 2
-# A forked process first has to make its memory its own; by the hit it runs as any other.
+# Intervals in real time before the hit.
 LEAD = 30
 # Intervals after the hit in which a setpoint is waited for: half of PX4's COM_OF_LOSS_T.
 AFTER = 125
@@ -104,11 +104,6 @@ def _now_us(interval: int) -> int:
 
 def timed(flight: Recorded, times: int) -> Iterator[float | None]:
     """Seconds from the hit's datagram to the recovery setpoint; None where there was none in time."""
-    companion = Companion(mission_of(flight.number))
-    companion.confirm_plan()
-    start = flight.hit - LEAD
-    for interval in range(start):
-        companion.step(flight.said[interval], _now_us(interval))
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ours:
         ours.bind(("127.0.0.1", 0))
         for trial in range(times):
@@ -116,18 +111,22 @@ def timed(flight: Recorded, times: int) -> Iterator[float | None]:
             child = os.fork()
             if child == 0:
                 with contextlib.suppress(BaseException):
-                    _fly_on(companion, _now_us(start), ours.getsockname()[1], place)
+                    _fly_on(flight, ours.getsockname()[1], place)
                 os._exit(0)
-            yield exchanged(flight, start, ours, _address_of_child(ours))
+            yield exchanged(flight, flight.hit - LEAD, ours, _address_of_child(ours))
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
 
 
-def _fly_on(companion: Companion, now_us: int, port: int, folder: Path) -> None:
-    """The child: the loop of real flights, log and all."""
+def _fly_on(flight: Recorded, port: int, folder: Path) -> None:
+    """The child: the loop of real flights, log and all. It flies to there itself, in memory that is its own."""
+    companion, start = Companion(mission_of(flight.number)), flight.hit - LEAD
+    companion.confirm_plan()
+    for interval in range(start):
+        companion.step(flight.said[interval], _now_us(interval))
     connection = udp_out("127.0.0.1", port)
     recorder = FlightRecorder(folder, Background("log"))
-    clock = Going(now_us)
+    clock = Going(_now_us(start))
     loop = Loop(companion, connection, clock, recorder, Console(io.StringIO(), Background("console")), Interrupts())
     with undisturbed():
         connection.send(b"\0")
