@@ -210,7 +210,7 @@ class FakeVehicle:
         steps = 40 if self.wall_north_m is not None and self.position[0] > self.wall_north_m - 0.1 else 1
         force, h = 0.0, dt / steps
         # It is always level: of what its motors do to it the accelerometer shows no more than looks like no contact.
-        driven = max(-1.0, min(1.0, 6.0 * (command[0] - self.velocity[0])))
+        driven = max(-0.8, min(0.8, 6.0 * (command[0] - self.velocity[0])))
         for _ in range(steps):
             for i in range(3):
                 self.velocity[i] += max(-8.0, min(8.0, 6.0 * (command[i] - self.velocity[i]))) * h
