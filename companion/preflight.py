@@ -455,8 +455,8 @@ def _vibration(survey: Survey) -> Iterator[PreflightItem]:
         remedy = "fasten the flight controller; check the accelerometer"
         yield _judged("clipping", f"{clipped} clipped samples while {doing}", (clipped != 0, BAD, remedy))
     forces = [sample.specific_force_frd_m_s2 for sample in survey.imu]
-    threshold_m_s2 = survey.config.least_threshold_m_s2
-    if forces and survey.flies and threshold_m_s2 is not None:
+    threshold_m_s2 = survey.config.fused.side_threshold_m_s2
+    if forces and survey.flies:
         most_m_s2 = max(math.hypot(x, y) for x, y, _ in forces)
         remedy = "balance or replace propellers, tighten motors, soften the mount; then `rebound tune` on this flight"
         found = (
@@ -496,7 +496,7 @@ def _sight(survey: Survey) -> Iterator[PreflightItem]:
     if not rate_hz:
         return
     integ_hz = float(survey.parameters.get("IMU_INTEG_RATE", 1.0 / survey.config.estimate.imu_averaging_interval_s))
-    threshold_m_s2 = survey.config.least_threshold_m_s2 or 0.0
+    threshold_m_s2 = survey.config.fused.side_threshold_m_s2
     seen = min(1.0, rate_hz * (1.0 / integ_hz + STIFF_CONTACT_S))
     folding = f"arms that fold: from {threshold_m_s2 / FOLDING_DAMPING_PER_S:.2f} m/s on"
     stiff = f"stiff frames: {100 * seen:.0f} % of 1 ms contacts fall into a sample"

@@ -47,17 +47,6 @@ def load_mission_document(
     return document
 
 
-def load_flown(file: Path) -> Document:
-    """What a run's folder says was flown; older ones have settings of detectors, too, that no drone has any more."""
-    from companion.detection.registry import BASELINES
-
-    document = load_document(file)
-    companion = document.data.get("companion")
-    if isinstance(companion, dict):
-        document.data["companion"] = {key: value for key, value in companion.items() if key not in BASELINES}
-    return document
-
-
 def companion_settings(path: Path | None, sets: Sequence[str], detector: str | None) -> "CompanionConfig":
     """The companion's for a replay: defaults, a file's, and what the command line changes. Raises DocumentError.
 
@@ -65,10 +54,7 @@ def companion_settings(path: Path | None, sets: Sequence[str], detector: str | N
     """
     from companion.mission.config import CompanionConfig
 
-    if path is None:
-        document = Document("no mission file")
-    else:
-        document = load_flown(path) if path.name in (run_folder.GUARD_NAME, RESOLVED_NAME) else load_document(path)
+    document = load_document(path) if path is not None else Document("no mission file")
     documents.apply_overrides(document, sets)
     if detector is not None:
         document.put_option("--detector", ("companion", "detector"), detector)
@@ -178,7 +164,7 @@ class ResumeError(ConfigurationError):
 
 def resume_of(run: Path, mission: "Mission") -> dict[str, Any]:
     """The mission's `resume:` part, of a flight that ended early or whose process was killed. Raises ResumeError."""
-    flown = mission_from(load_flown(run / RESOLVED_NAME))
+    flown = mission_from(load_document(run / RESOLVED_NAME))
     if flown.items != mission.items:
         raise ResumeError(f"{run} is not a flight of this mission: its items are others.")
     events = list(read_records(run / run_folder.EVENTS_NAME, whole_lines(read_text(run / run_folder.EVENTS_NAME))))

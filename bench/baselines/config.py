@@ -1,7 +1,7 @@
 """A companion's settings, and a mission, in which a baseline can be chosen as the drone's own detector is."""
 
-from collections.abc import Mapping
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 from bench.baselines.fuzzy import FuzzyConfig, FuzzyDetector
 from bench.baselines.hybrid import HybridConfig, HybridDetector
@@ -9,7 +9,7 @@ from bench.baselines.lateral import LateralConfig, LateralDetector
 from bench.baselines.momentum import MomentumConfig, MomentumDetector
 from bench.baselines.threshold import ThresholdConfig, ThresholdDetector
 from bench.baselines.tracking import TrackingConfig, TrackingDetector
-from companion.detection.registry import DETECTORS, MakeDetector
+from companion.detection.interface import Detector
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 
@@ -17,8 +17,10 @@ from companion.mission.model import Mission
 class BaselineConfig(CompanionConfig):
     """All settings of the companion, and those of each baseline under its name."""
 
-    detectors: ClassVar[Mapping[str, MakeDetector]] = {
-        **DETECTORS,
+    retired = frozenset[str]()
+
+    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector[Any]]]] = {
+        **CompanionConfig.detectors,
         FuzzyDetector.name: FuzzyDetector,
         HybridDetector.name: HybridDetector,
         LateralDetector.name: LateralDetector,

@@ -8,7 +8,8 @@ from typing import Any
 
 from bench.detectors.scoring import angle_deg
 from companion.estimate.impact import ImpactEstimate
-from rebound_cli.inputs import load_flown, mission_from
+from rebound_cli.documents import load_document
+from rebound_cli.inputs import mission_from
 from rebound_cli.logs.reader import read_log
 from rebound_cli.replay.watching import Findings, watch_log
 from rebound_cli.results.run_folder import RESOLVED_NAME, TLOG_NAME, TRUTH_NAME
@@ -30,7 +31,7 @@ class CorpusCase:
 def work_out(case: CorpusCase) -> dict[str, Any]:
     """By rate: each true hit with what was told of it, and collisions told that were none."""
     folder = Path(case.folder)
-    log, settings = read_log(folder / TLOG_NAME), mission_from(load_flown(folder / RESOLVED_NAME)).companion
+    log, settings = read_log(folder / TLOG_NAME), mission_from(load_document(folder / RESOLVED_NAME)).companion
     hits, _, _ = load_truth(folder / TRUTH_NAME)
     rates = {rate: verdict(watch_log(log, settings, hz), hits) for rate, hz in ASKED_HZ.items()}
     return {"seconds": log.duration_s, "rates": rates}

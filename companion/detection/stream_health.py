@@ -1,23 +1,16 @@
 """Stream health: whether the detector has data. A fault of the streams is reported, never silent."""
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections import deque
+from dataclasses import dataclass, field
 
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.history import STAMP_RESOLUTION_US
 from companion.motion.strapdown import MOTORS_RAD_S2
 from companion.strict_model import Positive, StrictModel
 
-# The received rate is measured over this time: 20 samples at the least rate, and no longer than a link's brief gap.
+# The received rate is the number of samples in this time: 20 at the least rate, and no longer than a link's brief gap.
 RATE_WINDOW_US = 1_000_000
-# A stream that was too slow, or silent, has proven its rate by as many samples over as long a time: five intervals,
-# because two that happen to be short would pass a slower stream, and at 50 Hz they take 0.1 s.
-PROOF_SAMPLES = 5
-PROOF_US = 100_000
-
-# Above this threshold vibration hides hits, and the stream counts as faulty.
-MOST_THRESHOLD_M_S2 = 30.0
 
 
 class StreamHealthConfig(StrictModel):
@@ -29,19 +22,39 @@ class StreamHealthConfig(StrictModel):
     min_rate_hz: Positive = 20.0
     """Least rate of HIGHRES_IMU. 20 Hz is one sample in 50 ms: the longest contacts, about 100 ms, would show in two,
     most in none."""
-    max_threshold_m_s2: Positive = MOST_THRESHOLD_M_S2
+    max_threshold_m_s2: Positive = 30.0
     """Largest threshold: vibration above it hides hits. By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a
     vehicle that shakes so much that less cannot be told from its shaking does not see the slower half of its hits."""
 
 
-class StreamHealth(NamedTuple):
-    """Time and rate of the received IMU samples. A tuple, because one is made in every step."""
+@dataclass(slots=True)
+class StreamHealth:
+    """Time and rate of the received IMU samples, on the companion's clock. Changed only by `imu`."""
 
+    started_us: int
     last_heard_us: int
-    window_started_us: int
-    heard_in_window: int = 0
-    rate_hz: float | None = None
-    no_data_reason: str | None = None
+    arrivals_us: deque[int] = field(default_factory=deque)
+    """Of the samples in the last second, since the latest silence."""
+
+    def imu(self, samples: int, config: StreamHealthConfig, now_us: int) -> None:
+        """Take the number of samples that arrived by ``now_us``; after a silence, in which a link held them, as one."""
+        if samples and now_us - self.last_heard_us > config.silence_s * 1e6:
+            self.arrivals_us.clear()
+            samples = 1
+        if samples:
+            self.last_heard_us = now_us
+            self.arrivals_us.extend([now_us] * samples)
+        while self.arrivals_us and now_us - self.arrivals_us[0] >= RATE_WINDOW_US:
+            self.arrivals_us.popleft()
+
+    def fault(self, config: StreamHealthConfig, now_us: int) -> str | None:
+        """What is wrong with the stream in one phrase, or None."""
+        if now_us - self.last_heard_us > config.silence_s * 1e6:
+            return f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
+        rate_hz = len(self.arrivals_us) * 1e6 / RATE_WINDOW_US
+        if rate_hz < config.min_rate_hz and now_us - self.started_us >= RATE_WINDOW_US:
+            return f"HIGHRES_IMU at {rate_hz:.0f} Hz, below {config.min_rate_hz:g}"
+        return None
 
 
 @dataclass(slots=True)
@@ -104,35 +117,3 @@ class AttitudeGate:
         (a, b, c, d), (w, x, y, z) = before.attitude_wxyz, sample.attitude_wxyz
         turned_rad = 2.0 * math.acos(min(1.0, abs(a * w + b * x + c * y + d * z)))
         return turned_rad <= (self.most_rad_s + MOTORS_RAD_S2 * over_s) * over_s
-
-
-def with_samples(health: StreamHealth, imu_samples: int, config: StreamHealthConfig, now_us: int) -> StreamHealth:
-    """The stream health with the number of IMU samples that arrived by ``now_us`` (companion's clock)."""
-    last_us, started_us, count, rate_hz, reason = health
-    is_slow = rate_hz is not None and rate_hz < config.min_rate_hz
-    if imu_samples:
-        silent_us = now_us - last_us
-        if silent_us > config.silence_s * 1e6:
-            # A stream proves its rate again after a silence; until then the silence's own rate stands.
-            return StreamHealth(now_us, now_us, 0, 1e6 / silent_us, reason)
-        if is_slow and started_us > last_us:
-            return StreamHealth(now_us, now_us, 0, rate_hz, reason)
-        last_us, count = now_us, count + imu_samples
-    elapsed_us = now_us - started_us
-    is_proof = is_slow and imu_samples > 0 and count >= PROOF_SAMPLES and elapsed_us >= PROOF_US
-    if is_proof or elapsed_us >= RATE_WINDOW_US:
-        rate_hz, count, started_us = count * 1e6 / elapsed_us, 0, now_us
-    return StreamHealth(last_us, started_us, count, rate_hz, reason)
-
-
-def stream_fault(
-    health: StreamHealth, threshold_m_s2: float, config: StreamHealthConfig, now_us: int, imu_fault: str | None = None
-) -> str | None:
-    """The fault in one phrase, or None. `imu_fault`: what was wrong with the newest IMU message."""
-    if now_us - health.last_heard_us > config.silence_s * 1e6:
-        return imu_fault or f"no HIGHRES_IMU for {round(config.silence_s * 1e3)} ms"
-    if health.rate_hz is not None and health.rate_hz < config.min_rate_hz:
-        return f"HIGHRES_IMU at {health.rate_hz:.0f} Hz, below {config.min_rate_hz:g}"
-    if threshold_m_s2 > config.max_threshold_m_s2:
-        return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2"
-    return None

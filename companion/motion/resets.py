@@ -20,15 +20,14 @@ from companion.messages import (
     Vector3,
 )
 from companion.motion.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US
-
-STILL: Vector3 = (0.0, 0.0, 0.0)
+from companion.motion.strapdown import ZERO
 
 
 @dataclass(slots=True)
 class Resets:
     """A reset counts from its second message on, so that one forged or broken message shifts nothing."""
 
-    shift_ned_m: Vector3 = STILL
+    shift_ned_m: Vector3 = ZERO
     """Offset from this frame to the vehicle's, m."""
     _shifts: dict[int, Vector3] = field(default_factory=dict)
     """Offsets by reset counter: a counter that comes back restores its offset."""
@@ -50,7 +49,7 @@ class Resets:
                 return Refused("LOCAL_POSITION_NED", "the place jumps, and no reset is counted")
             self._place = sample
         n, e, d = self.shift_ned_m
-        if self.shift_ned_m == STILL:
+        if self.shift_ned_m == ZERO:
             return sample
         if isinstance(sample, LocalPosition | Odometry):
             x, y, z = sample.position_ned_m
@@ -94,7 +93,7 @@ class Resets:
 
     def sent(self, setpoint: PositionSetpoint) -> PositionSetpoint:
         """A setpoint moved from the companion's local NED, without resets, into the vehicle's."""
-        if self.shift_ned_m == STILL:
+        if self.shift_ned_m == ZERO:
             return setpoint
         x, y, z = (p + s for p, s in zip(setpoint.position_ned_m, self.shift_ned_m, strict=True))
         return replace(setpoint, position_ned_m=(x, y, z))

@@ -4,23 +4,16 @@ It is pure, and the same in flight, replay and bench. A `CollisionMonitor` is ch
 samples at the same times give the same impacts and notices.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
+from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
-from companion.detection.registry import BASELINES, DETECTORS, MakeDetector, check_known_detector
-from companion.detection.stream_health import (
-    AttitudeGate,
-    StreamHealth,
-    StreamHealthConfig,
-    StuckImuMonitor,
-    stream_fault,
-    with_samples,
-)
+from companion.detection.stream_health import AttitudeGate, StreamHealth, StreamHealthConfig, StuckImuMonitor
 from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
@@ -39,8 +32,11 @@ OPTIONAL_STREAMS_WAIT_US = 3_000_000
 class CollisionMonitorConfig(StrictModel):
     """Settings of the collision monitor."""
 
-    detectors: ClassVar[Mapping[str, MakeDetector]] = DETECTORS
-    """The names allowed in `detector`. A subclass adds others, with a key for the settings of each."""
+    retired = frozenset({"fuzzy", "hybrid", "lateral", "momentum", "threshold", "tracking"})
+
+    detectors: ClassVar[Mapping[str, Callable[[Any, int], Detector[Any]]]] = {FusedDetector.name: FusedDetector}
+    """By the names allowed in `detector`, from their settings and the IMU's averaging interval in microseconds. A
+    subclass adds others, with a key for the settings of each."""
 
     detector: str = "fused"
     """Its own settings are those under its name."""
@@ -48,25 +44,12 @@ class CollisionMonitorConfig(StrictModel):
     sight: StreamHealthConfig = StreamHealthConfig()
     estimate: EstimateConfig = EstimateConfig()
 
-    @property
-    def least_threshold_m_s2(self) -> float | None:
-        """The detector's horizontal threshold without vibration, m/s^2; None for one without a force threshold."""
-        settings = getattr(self, self.detector)
-        names = ("side_threshold_m_s2", "threshold_m_s2")
-        return next((float(getattr(settings, name)) for name in names if hasattr(settings, name)), None)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _no_settings_of_baselines(cls, data: object) -> object:
-        """Refuse settings of baseline detectors, with the reason that no drone has them."""
-        for key in sorted(BASELINES.intersection(data) if isinstance(data, dict) else ()):
-            check_known_detector(key, cls.detectors)
-        return data
-
     @field_validator("detector")
     @classmethod
     def _known_detector(cls, name: str) -> str:
-        check_known_detector(name, cls.detectors)
+        if name not in cls.detectors:
+            choices = " or ".join(f"'{detector}'" for detector in sorted(cls.detectors))
+            raise ValueError(f"there is no detector '{name}': a drone flies with {choices}")
         return name
 
 
@@ -88,7 +71,8 @@ class CollisionMonitor:
     state: DetectorState
     estimator: ImpactEstimator
     stream_health: StreamHealth
-    started_us: int
+    no_data_reason: str | None = None
+    """Why an armed detector could miss a hit; None while the streams are healthy."""
     stuck_imu: StuckImuMonitor = field(default_factory=StuckImuMonitor)
     attitude_gate: AttitudeGate = field(default_factory=AttitudeGate)
     last_imu_boot_us: int = 0
@@ -97,11 +81,6 @@ class CollisionMonitor:
     losses_reported: bool = False
     invalidity_reported: bool = False
     heard: set[MessageId] = field(default_factory=set)
-
-    @property
-    def no_data_reason(self) -> str | None:
-        """Why an armed detector could miss a hit; None while the streams are healthy."""
-        return self.stream_health.no_data_reason
 
     @property
     def is_attitude_old(self) -> bool:
@@ -144,7 +123,7 @@ def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonit
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
     detector = config.detectors[config.detector](getattr(config, config.detector), averaging_us)
     return CollisionMonitor(
-        config, detector, detector.initial(), ImpactEstimator(config.estimate), StreamHealth(now_us, now_us), now_us
+        config, detector, detector.initial(), ImpactEstimator(config.estimate), StreamHealth(now_us, now_us)
     )
 
 
@@ -195,30 +174,36 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     return MonitorResult(impacts, finished, notices)
 
 
+def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
+    """Why an armed detector could miss a hit, in one phrase, or None."""
+    config, threshold_m_s2 = monitor.config.sight, monitor.state.threshold_m_s2
+    fault = monitor.stream_health.fault(config, now_us)
+    if fault is not None:
+        return monitor.imu_fault or fault
+    if threshold_m_s2 > config.max_threshold_m_s2:
+        return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2"
+    return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
+
+
 def _update_stream_health(
     monitor: CollisionMonitor, imu_samples: int, situation: Situation, now_us: int
 ) -> list[Notice]:
     """Notices about stream health when it changes while the detector is on; once, about threshold and losses."""
     notices: list[Notice] = []
-    health = with_samples(monitor.stream_health, imu_samples, monitor.config.sight, now_us)
-    on = situation.off_reason is None
-    threshold_m_s2 = monitor.state.threshold_m_s2
-    reason = stream_fault(health, threshold_m_s2, monitor.config.sight, now_us, monitor.imu_fault) if on else None
-    if on and reason is None and monitor.is_attitude_old:
-        reason = f"no ATTITUDE_QUATERNION for {round(monitor.config.sight.silence_s * 1e3)} ms"
-    if (reason is None) != (health.no_data_reason is None) and on:
+    monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
+    is_on, was = situation.off_reason is None, monitor.no_data_reason
+    reason = monitor.no_data_reason = _stream_fault(monitor, now_us) if is_on else None
+    if (reason is None) != (was is None) and is_on:
         text = "the detector sees again" if reason is None else f"detector blind: {reason}"
         notices.append(Notice("link", text, {}))
-    monitor.stream_health = health if reason == health.no_data_reason else health._replace(no_data_reason=reason)
-    if not monitor.threshold_reported and monitor.state.phase is Phase.ARMED:
+    if monitor.state.phase is not Phase.ARMED:
+        return notices
+    if not monitor.threshold_reported:
         monitor.threshold_reported = True
+        threshold_m_s2 = monitor.state.threshold_m_s2
         text = f"detector '{monitor.detector.name}' armed: a hit is {threshold_m_s2:.1f} m/s^2 or more"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
-    if (
-        not monitor.losses_reported
-        and monitor.state.phase is Phase.ARMED
-        and now_us - monitor.started_us >= OPTIONAL_STREAMS_WAIT_US
-    ):
+    if not monitor.losses_reported and now_us - monitor.stream_health.started_us >= OPTIONAL_STREAMS_WAIT_US:
         monitor.losses_reported = True
         for message, loss in monitor.detector.losses.items():
             if message not in monitor.heard:

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import ModelSchema
 
-from companion.detection.registry import DETECTORS
+from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
 from companion.reflex.laws import RECOVERY_LAWS
 from sim_vehicle.scene import Scene
@@ -62,7 +62,7 @@ def mission_schema() -> dict[str, Any]:
     schema["properties"]["sim"] = {"anyOf": [{"$ref": "#/$defs/Scene"}, {"type": "null"}], "default": None}
     schema["properties"]["items"]["prefixItems"] = [{"$ref": "#/$defs/MissionItem", "required": ["takeoff"]}]
     definitions["RecoveryConfig"]["properties"]["law"]["enum"] = sorted(RECOVERY_LAWS)
-    definitions["CompanionConfig"]["properties"]["detector"]["enum"] = sorted(DETECTORS)
+    definitions["CompanionConfig"]["properties"]["detector"]["enum"] = sorted(CompanionConfig.detectors)
     for part in (schema, *definitions.values()):
         for written in part.get("properties", {}).values():
             _describe_by_part(written, part, definitions)

@@ -245,11 +245,9 @@ class _Picture:
         _finish(axis, title, _START, "specific force [m/s²]")
 
     def _draw_threshold(self, axis: Any) -> None:
-        """Nothing for a detector that does not look at forces."""
-        threshold_m_s2 = self._mission.companion.least_threshold_m_s2
-        if threshold_m_s2 is not None:
-            label = f"least threshold, {threshold_m_s2:g} m/s²"
-            axis.axhline(threshold_m_s2, color=DETECTED, linewidth=1.0, linestyle=":", label=label)
+        threshold_m_s2 = self._mission.companion.fused.side_threshold_m_s2
+        label = f"least threshold, {threshold_m_s2:g} m/s²"
+        axis.axhline(threshold_m_s2, color=DETECTED, linewidth=1.0, linestyle=":", label=label)
 
     def _mark_faults(self, axes: Sequence[Any]) -> None:
         """Shade the times at which a simulated fault acted."""

@@ -22,8 +22,8 @@ from companion.messages import ComputerStatus
 from companion.mission.model import Mission
 from companion.reflex.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
-from rebound_cli.documents import validated
-from rebound_cli.inputs import load_flown, mission_from
+from rebound_cli.documents import load_document, validated
+from rebound_cli.inputs import mission_from
 from rebound_cli.logs.log import LogError
 from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.watching import Findings
@@ -99,7 +99,7 @@ def read_recording(folder: Path) -> Recording:
 def read_settings(folder: Path) -> Mission | GuardConfig:
     """Raises DocumentError."""
     file = settings_file(folder)
-    document, is_guard = load_flown(file), file.name == run_folder.GUARD_NAME
+    document, is_guard = load_document(file), file.name == run_folder.GUARD_NAME
     return validated(GuardConfig, document, document.data) if is_guard else mission_from(document)
 
 

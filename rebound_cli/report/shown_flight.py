@@ -14,8 +14,7 @@ from companion.memory.patch import Patch
 from companion.memory.stored import KnownPatch
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from rebound_cli.documents import validated
-from rebound_cli.inputs import load_flown
+from rebound_cli.documents import load_document, validated
 from rebound_cli.replay.listening import Listener
 from rebound_cli.replay.recording import (
     Followed,
@@ -171,7 +170,7 @@ def _scene(folder: Path) -> Scene | None:
     file = settings_file(folder)
     if not (folder / run_folder.AIRFRAME_NAME).exists():
         return None
-    document = load_flown(file)
+    document = load_document(file)
     return validated(Scene, document, document.data.get("sim") or {}, ("sim",))
 
 

@@ -7,8 +7,8 @@ import pytest
 from bench.baselines.config import BaselineConfig
 from bench.baselines.fuzzy import flip_deg, inclination_deg, intensity
 from companion.detection.interface import Situation
-from companion.detection.registry import BASELINES, DETECTORS
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
+from companion.mission.config import CompanionConfig
 from companion.reflex.halfspace import plus
 from companion.reflex.monitor import advance, start_monitor
 
@@ -142,4 +142,4 @@ def test_the_fuzzy_inputs_are_signed_towards_the_wall():
 
 
 def test_the_companion_knows_each_baseline_by_name():
-    assert set(BaselineConfig.detectors) - set(DETECTORS) == BASELINES
+    assert set(BaselineConfig.detectors) - set(CompanionConfig.detectors) == CompanionConfig.retired

@@ -107,8 +107,8 @@ def imu_every(monitor, every_us, start_us, until_us):
     return changes
 
 
-@pytest.mark.parametrize(("every_us", "seeing_us"), [(4_000, 100_000), (20_000, 100_000), (40_000, 200_000)])
-def test_after_a_silence_five_intervals_and_a_tenth_of_a_second_prove_the_rate(every_us, seeing_us):
+@pytest.mark.parametrize(("every_us", "seeing_us"), [(4_000, 76_000), (20_000, 380_000), (40_000, 760_000)])
+def test_after_a_silence_the_samples_of_a_second_at_the_least_rate_prove_the_rate(every_us, seeing_us):
     monitor = start_monitor(lateral(), 0)
     fly(monitor, 1_000_000)
     advance(monitor, [], WANTED, 1_500_000)
@@ -117,13 +117,13 @@ def test_after_a_silence_five_intervals_and_a_tenth_of_a_second_prove_the_rate(e
     assert imu_every(monitor, every_us, 3_000_000, 6_000_000) == [seeing_us]
 
 
-def test_a_slow_stream_stays_blind_and_is_seen_again_a_tenth_of_a_second_after_it_is_fast():
+def test_a_slow_stream_stays_blind_and_is_seen_again_a_quarter_of_a_second_after_it_is_fast():
     monitor = start_monitor(lateral(), 0)
     fly(monitor, 1_000_000)
     (blind_us,) = imu_every(monitor, 100_000, 1_000_000, 5_000_000)
     assert blind_us <= 2_000_000
     (seeing_us,) = imu_every(monitor, 20_000, 5_000_000, 8_000_000)
-    assert seeing_us <= 220_000
+    assert seeing_us <= 250_000
 
 
 def test_samples_that_a_link_held_back_and_delivers_at_once_prove_no_rate():

@@ -152,7 +152,6 @@ def test_set_changes_any_value_and_makes_missing_parts():
         ("items.1.go_to.speed_m_s", "give PATH=VALUE"),
         ("companion.detectr=fused", "did you mean 'detector'?"),
         ("companion.detector=psychic", "there is no detector 'psychic'"),
-        ("companion.detector=lateral", "a baseline of `python -m bench detectors`"),
         ("items.1.go_to.speed_m_s=fast", "must be a valid number, not 'fast'"),
     ],
 )

@@ -133,8 +133,6 @@ def test_arguments_that_make_no_sense_are_refused(flown, tmp_path, capsys):
         ((tmp_path / "none.ulg",), "No such file"),
         ((flown, "--detector", "magic"), "there is no detector 'magic'"),
         ((flown, "--set", "companion.fused.side_treshold_m_s2=1"), "did you mean 'side_threshold_m_s2'?"),
-        ((flown, "--detector", "lateral"), "a baseline of `python -m bench detectors`"),
-        ((flown, "--set", "companion.lateral.threshold_m_s2=1"), "a baseline of `python -m bench detectors`"),
     ):
         code, _, error = replay(capsys, *arguments)
         assert code == 1 and words in error, error
