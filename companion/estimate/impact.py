@@ -91,8 +91,7 @@ class ImpactEstimator:
             if isinstance(sample, LocalPosition):
                 self.history.add(sample)
             self.inertial.velocity(sample)
-            if self.inertial.has_new_fix:
-                self.validity.update(self.inertial.fixes, self.inertial.strapdown.level_acceleration_m_s2)
+            self.validity.update(sample.time_boot_us)
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):

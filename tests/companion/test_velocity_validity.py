@@ -5,10 +5,8 @@ import math
 import pytest
 
 from companion.detection.interface import Situation
-from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
-from companion.motion.inertial import VelocityFix
 from companion.reflex.monitor import advance, start_monitor
 
 STILL = (0.0, 0.0, 0.0)
@@ -73,19 +71,19 @@ def swing(since_s):
 
 
 def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit():
-    impacts, told, trusted = after_a_hit(4.0, 120.0, 3, swing)
+    impacts, told, trusted = after_a_hit(7.0, 120.0, 3, swing)
     assert len(impacts) == 1
     assert [text for _, text in told] == [
         "velocity not valid: part of the hit was not measured",
         "velocity valid again",
     ]
-    assert 2_600_000 < told[1][0] < 3_550_000
+    assert told[1][0] == pytest.approx(6_500_000, abs=50_000)
     assert trusted[-1]
 
 
 def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all_the_same():
     """Given springs that push for six samples, when the seventh clips, then what follows is no second hit."""
-    impacts, told, trusted = after_a_hit(4.0, 30.0, 7, swing, stop_m_s2=90.0)
+    impacts, told, trusted = after_a_hit(7.0, 30.0, 7, swing, stop_m_s2=90.0)
     assert len(impacts) == 1
     assert told[0][1] == "velocity not valid: part of the hit was not measured"
     assert trusted[-1]
@@ -93,7 +91,7 @@ def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all
 
 def test_a_stiff_hit_whose_means_stay_far_below_the_range_is_no_second_hit():
     """Given a hit of a millisecond that shows as 26 m/s^2 and rings, when the velocity swings back, nothing is told."""
-    impacts, told, trusted = after_a_hit(4.0, 3.0, 4, swing, first_m_s2=23.0)
+    impacts, told, trusted = after_a_hit(7.0, 3.0, 4, swing, first_m_s2=23.0)
     assert len(impacts) == 1
     assert told[0][1] == "velocity not valid: part of the hit was not measured"
     assert trusted[-1]
@@ -101,7 +99,7 @@ def test_a_stiff_hit_whose_means_stay_far_below_the_range_is_no_second_hit():
 
 def test_a_whole_touch_does_not_clear_the_velocity_of_the_hit_before_it():
     """Given a clipped hit, when something pushes it within the range, its velocity is still not believed."""
-    impacts, _, trusted = after_a_hit(4.0, 120.0, 3, swing, again_m_s2=12.0)
+    impacts, _, trusted = after_a_hit(7.0, 120.0, 3, swing, again_m_s2=12.0)
     assert len(impacts) == 2
     assert not any(trusted[round(2.2 / 0.004) : round(2.6 / 0.004)])
     assert trusted[-1]
@@ -109,7 +107,7 @@ def test_a_whole_touch_does_not_clear_the_velocity_of_the_hit_before_it():
 
 def test_what_clips_after_the_push_has_paused_leaves_the_velocity_in_doubt():
     """Given a push measured whole, when the other guard swings in 30 ms later and clips, then it is not believed."""
-    impacts, told, _ = after_a_hit(4.0, 20.0, 4, swing, other_guard_m_s2=90.0)
+    impacts, told, _ = after_a_hit(7.0, 20.0, 4, swing, other_guard_m_s2=90.0)
     assert len(impacts) == 1
     assert told[0][1] == "velocity not valid: part of the hit was not measured"
 
@@ -144,18 +142,3 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
     assert monitor.estimator.inertial.strapdown.level_acceleration_m_s2 == pytest.approx(
         (leans_m_s2, 0.0, 0.0), abs=0.02
     )
-
-
-@pytest.mark.parametrize(("leans_m_s2", "believed_s"), [(0.1, 0.7), (0.4, 4.6)])
-def test_a_tilt_that_the_gyroscopes_deny_keeps_the_doubt(leans_m_s2, believed_s):
-    # Given a hit that may have been more, and velocities that agree with the accelerometer turned by the gyroscopes
-    validity = VelocityValidity()
-    validity.invalidate(0)
-    fixes, believed_us = [], None
-    for time_us in range(20_000, 6_000_000, 20_000):
-        fixes.append(VelocityFix(time_us, (0.5, 0.0, 0.0), STILL, STILL))
-        validity.update(fixes, (leans_m_s2, 0.0, 0.0))
-        if validity.is_valid and believed_us is None:
-            believed_us = time_us
-    # Then the vehicle is believed once its attitude agrees, too, or after so long in any case
-    assert believed_us == pytest.approx(1e6 * believed_s, abs=100_000)
