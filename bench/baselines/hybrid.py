@@ -89,7 +89,7 @@ class HybridDetector:
     def _force(self, s: HybridState, sample: ImuSample, dt_s: float) -> Vector3:
         """The observer's step; the force beyond wind, m/s^2."""
         f_x, f_y, f_z = sample.specific_force_frd_m_s2
-        s.thrust.learn(sample.time_boot_us, f_z, dt_s)
+        s.thrust.learn(sample.time_boot_us, -f_z, dt_s)
         # Without a thrust to go by the observer sees none of the axis that it acts on.
         external = (f_x, f_y, f_z - s.thrust.expected_m_s2(sample.time_boot_us, f_z))
         s.force_m_s2 = force = _followed(s.force_m_s2, external, self._config.force_gain_per_s * dt_s)

@@ -85,7 +85,7 @@ class MomentumDetector:
             case ImuSample():
                 elapsed_s = min(max(sample.time_boot_us - state.last_sample_boot_us, 0), 50_000) * 1e-6
                 state.last_sample_boot_us = sample.time_boot_us
-                state.thrust.learn(sample.time_boot_us, sample.specific_force_frd_m_s2[2], elapsed_s)
+                state.thrust.learn(sample.time_boot_us, -sample.specific_force_frd_m_s2[2], elapsed_s)
             case Attitude():
                 state.attitude_wxyz = sample.attitude_wxyz
             case AttitudeTarget():

@@ -13,8 +13,6 @@ LEARNT_S = 1.0
 SETTLED_US = 300_000
 # The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt.
 EXCESS = 1.5
-# A sample after a gap or a reboot has the weight of an interval of this length.
-LONGEST_STEP_S = 0.05
 
 
 @dataclass(slots=True)

@@ -9,8 +9,7 @@ contact, each compared with this vehicle's own flight:
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`). The threshold is lower beside a rate
   jump.
 
-`classify` names the kind. A weak force on a hovering vehicle is observed for a moment before it counts as a hit or a
-hand (see `soft_contact`).
+`classify` names the kind. A weak force on a hovering vehicle may be a hand's (see `soft_contact`).
 """
 
 import math
@@ -18,7 +17,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from companion.detection.classify import kind_of
-from companion.detection.force_noise import LONGEST_STEP_S, SETTLED_US
+from companion.detection.force_noise import SETTLED_US
 from companion.detection.force_signs import (
     CLEAR,
     alone_m_s2,
@@ -33,7 +32,7 @@ from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, Impac
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import LEVEL
+from companion.motion.strapdown import LEVEL, LONGEST_DELAY_US, LONGEST_GAP_US
 
 # A contact longer than springs take to bottom out, whose force then exceeds its peak by half, is another hit: a vehicle
 # scrapes along the ground and then strikes it.
@@ -83,15 +82,14 @@ class FusedDetector:
             side, together = side / CLEAR, together_m_s2(s, f)
             if together > side:
                 side, free_until_us = together, s.soft.before_us
-        beyond, room = max(f[2], -f[2] - s.thrust.most_m_s2(now_us)), vertical_threshold_m_s2(s, config)
+        beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
         threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else side_threshold_m_s2(s, config, w)
-        ratio = max(side / threshold, beyond / room)
+        ratio = max(side / threshold, beyond / vertical_threshold_m_s2(s, config))
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
             s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
         if off is not None or ratio < 1.0:
-            s.soft.since_boot_us = None
             self._learn(s, f, before_us)
             is_quiet = s.floor.is_known and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
@@ -104,19 +102,19 @@ class FusedDetector:
         return self._loud(s, f, situation, force, min(now_us - self._averaging_us, free_until_us), ratio)
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
-        elapsed_s = 1e-6 * (s.last_sample_boot_us - before_us)
-        if not 0.0 < elapsed_s < LONGEST_STEP_S:
-            elapsed_s = LONGEST_STEP_S
+        elapsed_us = s.last_sample_boot_us - before_us
+        # A sample after a gap or a reboot has the weight of the longest interval.
+        elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
         s.floor.learn(f[0], f[1], f[2], elapsed_s)
         s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
         if s.phase is Phase.ARMED:
-            s.thrust.learn(s.last_sample_boot_us, f[2], elapsed_s)
+            s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
     def _loud(
         self, s: FusedState, f: Vector3, situation: Situation, force: Vector3, free_until_us: int, ratio: float
     ) -> Impact | None:
         now_us, soft, size = s.last_sample_boot_us, s.soft, math.hypot(*force)
-        jumps = soft.jumps(now_us, f, s.threshold_m_s2)
+        jumps = soft.jumps(f, s.threshold_m_s2)
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
@@ -125,14 +123,9 @@ class FusedDetector:
                     return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, 1.0)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
-        if soft.since_boot_us is None:
-            soft.since_boot_us, soft.free_until_us = now_us, free_until_us
-        kind = None
-        if size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps:
-            if now_us - soft.since_boot_us < 1e6 * self._config.soft_wait_s:
-                return None
-            kind = ImpactKind.CONTACT
-        return self._fire(s, now_us, situation, force, soft.free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
+        is_hand = size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps
+        kind = ImpactKind.CONTACT if is_hand else None
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
     def _fire(
         self,
@@ -154,7 +147,7 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.soft.fired(kind is ImpactKind.CONTACT)
+        s.soft.is_hand = kind is ImpactKind.CONTACT
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
 
     # --- velocity ---------------------------------------------------------------------------------------------
@@ -178,7 +171,7 @@ class FusedDetector:
         if s.phase is not Phase.ARMED or size < least:
             return None
         jump.since_us = time_us
-        now_us, free_until_us = max(time_us, s.last_sample_boot_us), jump.free_until_us(time_us, config.rate_step_rad_s)
+        now_us, free_until_us = max(time_us, s.last_sample_boot_us), jump.before_us - LONGEST_DELAY_US
         over_s = max(now_us - free_until_us, 1) * 1e-6
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(inertial.strapdown.attitude_wxyz, push)

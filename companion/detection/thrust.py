@@ -5,16 +5,13 @@ from dataclasses import dataclass
 # A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
 # the maximum of the strongest vehicle.
 STRONGEST_M_S2 = 5.0 * 9.81
-# Memory of the gain: it follows a sagging battery (minutes) and not a climb (its thrust is in the message).
+# Memory of the gain, which is known when it is full: it follows a sagging battery (minutes) and not a climb (its thrust
+# is in the message).
 GAIN_MEMORY_S = 2.0
 # Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
 LEAST_FRACTION = 0.1
 # A commanded thrust is valid for this time. Motors follow it with a lag of 20 ms.
 KEPT_US = 300_000
-# A gain is valid when it was learnt over this time in the air.
-LEAST_LEARNT_S = 0.5
-# Between two messages 20 to 50 ms apart the commanded thrust changes by no more than this share of the maximum.
-CHANGE = 0.3
 # Error of the gain from the battery, ground effect and a mean that has not converged.
 MARGIN = 1.15
 
@@ -31,22 +28,25 @@ class ThrustGain:
     def set_fraction(self, time_us: int, fraction: float) -> None:
         self.fraction, self.fraction_boot_us = fraction, time_us
 
-    def learn(self, time_us: int, f_z: float, elapsed_s: float) -> None:
-        """Take f_z of one sample of a vehicle in free air."""
-        if self.fraction < LEAST_FRACTION or time_us - self.fraction_boot_us > KEPT_US:
-            return
-        known_s = self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
-        if known_s > 0.0:
-            self.full_m_s2 += (-f_z / self.fraction - self.full_m_s2) * elapsed_s / known_s
+    def is_commanded(self, time_us: int) -> bool:
+        """Whether the commanded thrust is valid, and large enough for a quotient."""
+        return self.fraction >= LEAST_FRACTION and time_us - self.fraction_boot_us <= KEPT_US
 
-    def most_m_s2(self, time_us: int) -> float:
-        """Largest upward specific force that thrust can explain now, m/s^2."""
-        if self.known_s < LEAST_LEARNT_S or time_us - self.fraction_boot_us > KEPT_US:
-            return STRONGEST_M_S2
-        return MARGIN * self.full_m_s2 * min(1.0, self.fraction + CHANGE)
+    @property
+    def is_known(self) -> bool:
+        return self.known_s >= GAIN_MEMORY_S
+
+    def learn(self, time_us: int, thrust_m_s2: float, elapsed_s: float) -> None:
+        """Take the specific force by thrust of one sample of a vehicle in free air."""
+        if self.is_commanded(time_us) and elapsed_s > 0.0:
+            self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
+            self.full_m_s2 += (thrust_m_s2 / self.fraction - self.full_m_s2) * elapsed_s / self.known_s
+
+    @property
+    def most_m_s2(self) -> float:
+        """Largest upward specific force that thrust can explain, m/s^2."""
+        return MARGIN * self.full_m_s2 if self.is_known else STRONGEST_M_S2
 
     def expected_m_s2(self, time_us: int, mean_m_s2: float) -> float:
         """Expected f_z in free air: from the commanded thrust, else its recent mean."""
-        if self.known_s < LEAST_LEARNT_S or time_us - self.fraction_boot_us > KEPT_US:
-            return mean_m_s2
-        return -self.full_m_s2 * self.fraction
+        return -self.full_m_s2 * self.fraction if self.is_known and self.is_commanded(time_us) else mean_m_s2

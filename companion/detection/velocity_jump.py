@@ -13,14 +13,15 @@ from itertools import pairwise
 from companion.messages import Vector3
 from companion.motion.delay import Delay
 from companion.motion.inertial import VelocityFix, less_sum
-from companion.motion.strapdown import LONGEST_DELAY_US, LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO
+from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO
 
 # Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
 # Velocities further apart are slow: samples cover a quarter of the time, and the filter corrects itself in between. At
 # 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
 LONGEST_STEP_US = 75_000
-# 10 Hz with the jitter of a log. Velocities further apart are not compared.
+# 10 Hz with the jitter of a log. Velocities further apart are not compared. A rate jump belongs to a velocity jump
+# within this time, too: the velocity's interval and its delay.
 LONGEST_SLOW_STEP_US = 130_000
 # Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz. So many steps
 # make one good to an eighth, as each has three axes: before that it is not used.
@@ -35,8 +36,6 @@ LAG_S = 0.02
 # Four times what motors do, with room for a nimbler vehicle's flips. A rigid vehicle that hits an inclined wall at 2
 # m/s has a rate jump of 15 rad/s and more.
 NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
-# A rate jump belongs to a velocity jump within this time: the velocity's interval and its delay.
-RATE_STEP_KEPT_US = 120_000
 
 
 @dataclass(slots=True)
@@ -46,7 +45,7 @@ class VelocityJump:
     averaging_us: int
     rates_frd_rad_s: Vector3 = ZERO
     rate_step_frd_rad_s: Vector3 = ZERO
-    rate_step_from_us: int = 0
+    rate_step_over_us: int = 0
     rate_step_until_us: int = 0
     is_slow: bool = False
     """Whether velocities come further apart than `LONGEST_STEP_US`."""
@@ -68,9 +67,9 @@ class VelocityJump:
         if 0 < elapsed_us < LONGEST_GAP_US:
             self.unseen_share = max(0.0, 1.0 - self.averaging_us / elapsed_us)
             step = math.dist(rates_frd_rad_s, self.rates_frd_rad_s)
-            if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > RATE_STEP_KEPT_US:
+            if step > math.hypot(*self.rate_step_frd_rad_s) or time_us - self.rate_step_until_us > LONGEST_SLOW_STEP_US:
                 self.rate_step_frd_rad_s = _less(rates_frd_rad_s, self.rates_frd_rad_s)
-                self.rate_step_from_us, self.rate_step_until_us = before_us, time_us
+                self.rate_step_over_us, self.rate_step_until_us = elapsed_us, time_us
         self.rates_frd_rad_s = rates_frd_rad_s
 
     def step_m_s(self, fixes: Sequence[VelocityFix]) -> Vector3 | None:
@@ -122,22 +121,15 @@ class VelocityJump:
 
     def rate_step_near(self, velocity_us: int) -> float:
         """The largest rate jump, rad/s, that a velocity jump at ``velocity_us`` may belong to; 0 without one."""
-        is_near = velocity_us - self.rate_step_until_us < RATE_STEP_KEPT_US
+        is_near = velocity_us - self.rate_step_until_us < LONGEST_SLOW_STEP_US
         return math.hypot(*self.rate_step_frd_rad_s) if is_near else 0.0
 
     def no_motor_turns(self, velocity_us: int, least_rad_s: float) -> bool:
         """Whether that rate jump exceeds `least_rad_s` and what motors make between two samples; a third about yaw."""
         if not self.rate_step_near(velocity_us):
             return False
-        over_s = 1e-6 * (self.rate_step_until_us - self.rate_step_from_us)
         p, q, r = self.rate_step_frd_rad_s
-        return math.hypot(p, q, r / YAW_SHARE) >= least_rad_s + NO_MOTORS_RAD_S2 * over_s
-
-    def free_until_us(self, velocity_us: int, least_rad_s: float) -> int:
-        """Latest time without contact before the velocity jump at ``velocity_us``."""
-        if self.rate_step_near(velocity_us) >= least_rad_s:
-            return self.rate_step_from_us
-        return self.before_us - LONGEST_DELAY_US
+        return math.hypot(p, q, r / YAW_SHARE) >= least_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
 
 
 def _less(a: Vector3, b: Vector3, seconds: float = 1.0) -> Vector3:

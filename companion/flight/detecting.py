@@ -52,7 +52,7 @@ def _sustained_force(
         if type(sample) is ImuSample:
             horizontal.add_imu(sample.specific_force_frd_m_s2)
         elif type(sample) is AttitudeTarget:
-            vertical.add_thrust(sample.time_boot_us, sample.thrust_fraction)
+            vertical.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, LocalPosition):
             late_us = horizontal.time_us - sample.time_boot_us
             if late_us >= REBOOT_US:

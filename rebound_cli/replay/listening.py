@@ -127,6 +127,6 @@ def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float
         now_us,
         phase,
         *side,
-        max(force[2], -force[2] - state.thrust.most_m_s2(now_us)),
+        max(force[2], -force[2] - state.thrust.most_m_s2),
         vertical_threshold_m_s2(state, config),
     )

@@ -186,7 +186,7 @@ def test_beside_a_turn_that_no_motor_makes_half_of_a_step_is_enough():
     least_m_s = detector._least_jump_m_s(state, 30_000, 0.0, True)
     # When it turns about yaw as no motor turns it
     state.jump.rate_step_frd_rad_s = (0.0, 0.0, 1.9)
-    state.jump.rate_step_from_us, state.jump.rate_step_until_us = 16_000, 20_000
+    state.jump.rate_step_over_us, state.jump.rate_step_until_us = 4_000, 20_000
     turned_m_s = detector._least_jump_m_s(state, 30_000, 0.0, True)
     # Then half of what its shaking and the velocity's noise asked for is enough
     assert least_m_s == pytest.approx(config.velocity_step_m_s + 2.0 * (0.5 * 0.15 + 0.008))

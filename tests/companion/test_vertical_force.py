@@ -27,10 +27,10 @@ def watched(seconds, height_m, fraction, thrust_m_s2, asked_m=lambda t: 2.0):
         now_us = 10_000_000 + round(t * 1e6)
         if t < 0.0:
             height, thrust, asked = 1.8, FULL_M_S2 * HOVER, 1.8
-            vertical_force.add_thrust(now_us, HOVER)
+            vertical_force.gain.set_fraction(now_us, HOVER)
         else:
             height, thrust, asked = height_m(t), thrust_m_s2(t), asked_m(t)
-            vertical_force.add_thrust(now_us, fraction(t))
+            vertical_force.gain.set_fraction(now_us, fraction(t))
         held = vertical_force.step(LocalPosition(now_us, (0.0, 0.0, -height), (0.0, 0.0, 0.0)), thrust, -asked)
         if held is not None:
             return t, held
