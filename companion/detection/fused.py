@@ -139,7 +139,7 @@ class FusedDetector:
         kind: ImpactKind | None = None,
     ) -> Impact:
         if kind is None:
-            attitude = LEVEL if situation.inertial is None else situation.inertial.strapdown.attitude_wxyz
+            attitude = LEVEL if situation.inertial is None else situation.inertial.strapdown.valid_wxyz
             n, e, d = body_to_ned(attitude, force)
             over_s = max(now_us - free_until_us, 1) * 1e-6
             impulse = (n * over_s, e * over_s, d * over_s)
@@ -174,7 +174,7 @@ class FusedDetector:
         now_us, free_until_us = max(time_us, s.last_sample_boot_us), jump.before_us - LONGEST_DELAY_US
         over_s = max(now_us - free_until_us, 1) * 1e-6
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
-        force = ned_to_body(inertial.strapdown.attitude_wxyz, push)
+        force = ned_to_body(inertial.strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
         confidence = min(1.0, 0.5 * size / least)
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, confidence)

@@ -14,7 +14,7 @@ from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
 from companion.motion.inertial import Inertial
-from companion.motion.rotation import body_to_ned, turned
+from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO
 
 # In these phases a detector's state still describes the contact it fired on.
@@ -111,7 +111,7 @@ class ImpactEstimator:
         sample_us = impact.sample_time_boot_us
         free_until_us = impact.contact_free_until_boot_us
         place, velocity, error_m_s = self._motion(free_until_us)
-        force_ned = body_to_ned(self.inertial.strapdown.attitude_wxyz, impact.specific_force_frd_m_s2)
+        force_ned = body_to_ned(self.inertial.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
         self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
@@ -146,11 +146,10 @@ class ImpactEstimator:
         between_us = self.sums[-1][0] - self.sums[-2][0]
         if sample.time_boot_us - impact.contact_free_until_boot_us > LATE_SAMPLES * between_us + averaging_us:
             return None
-        f, force, w = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
-        behind_s = (sample.time_boot_us - self.inertial.strapdown.attitude_boot_us) * 1e-6
+        f, force = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
         contact = ContactForce(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
-            attitude_wxyz=turned(self.inertial.strapdown.attitude_wxyz, w, behind_s if abs(behind_s) < 0.1 else 0.0),
+            attitude_wxyz=self.inertial.strapdown.valid_wxyz,
             averaging_us=averaging_us,
             range_m_s2=self.config.accelerometer_range_m_s2,
             started_boot_us=impact.contact_free_until_boot_us,

@@ -8,9 +8,8 @@ from companion.motion.rotation import body_to_ned, ned_to_body, turned
 GRAVITY_M_S2 = 9.80665
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector3 = (0.0, 0.0, 0.0)
-# An attitude is valid for this time; a vehicle may turn at 3 rad/s.
-ATTITUDE_KEPT_S = 0.1
-# A longer gap restarts the integral: two samples of 20 Hz, the least rate of HIGHRES_IMU.
+# A longer gap restarts the integral: two samples of 20 Hz, the least rate of HIGHRES_IMU. An attitude further from a
+# sample is not carried on to it.
 LONGEST_GAP_US = 100_000
 # Largest lag of a velocity that is compared with the integral (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
@@ -26,13 +25,13 @@ class Strapdown:
     """Changed only by `attitude` and `imu`. Times: vehicle's boot clock; vectors local NED."""
 
     attitude_wxyz: Quaternion = LEVEL
-    attitude_boot_us: int = 0
+    """As last reported, valid or not."""
     time_boot_us: int = 0
     rates_frd_rad_s: Vector3 = ZERO
     acceleration_ned_m_s2: Vector3 = ZERO
     sum_ned_m_s: Vector3 = ZERO
-    by_rates_wxyz: Quaternion | None = None
-    """Attitude from the rates alone, since the last valid one; None while the reported attitude is valid.
+    valid_wxyz: Quaternion = LEVEL
+    """At the newest sample: the last valid attitude, carried on by the rates.
 
     An estimator that corrects its velocity takes part of the error for a tilt; gyroscopes do not. After 2.4 m/s were
     clipped, a real PX4's tilt was wrong by 4 degrees for more than a second (bench/notes/px4.md).
@@ -41,43 +40,25 @@ class Strapdown:
     """Horizontal acceleration, NED, of a vehicle that is level by its reported attitude; zero while that is valid."""
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_valid: bool = True) -> None:
-        behind_s = 1e-6 * (self.time_boot_us - self.attitude_boot_us)
-        if is_valid or (self.by_rates_wxyz is None and behind_s > ATTITUDE_KEPT_S):
-            # Valid, or the last valid one is too old to be carried on by the rates.
-            self.by_rates_wxyz, self.level_acceleration_m_s2 = None, ZERO
+        behind_us, self.attitude_wxyz = self.time_boot_us - time_us, attitude_wxyz
+        if abs(behind_us) < LONGEST_GAP_US:
+            attitude_wxyz = turned(attitude_wxyz, self.rates_frd_rad_s, 1e-6 * behind_us)
+        n, e, d = body_to_ned(self.valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
+        if is_valid or -d < MOST_WRONG:
+            self.valid_wxyz, self.level_acceleration_m_s2 = attitude_wxyz, ZERO
         else:
-            if self.by_rates_wxyz is None:
-                self.by_rates_wxyz = turned(self.attitude_wxyz, self.rates_frd_rad_s, behind_s)
-            valid_wxyz = turned(self.by_rates_wxyz, self.rates_frd_rad_s, 1e-6 * (time_us - self.time_boot_us))
-            n, e, d = body_to_ned(valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
-            if -d < MOST_WRONG:
-                self.by_rates_wxyz, self.level_acceleration_m_s2 = None, ZERO
-            else:
-                self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
-        self.attitude_wxyz, self.attitude_boot_us = attitude_wxyz, time_us
+            self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
 
     def imu(self, time_us: int, f: Vector3, w: Vector3) -> bool:
         """Integrate one sample (body FRD); False where a gap restarted the integral."""
         elapsed_us = time_us - self.time_boot_us
         whole, half_s = 0 < elapsed_us < LONGEST_GAP_US, 0.5e-6 * elapsed_us
-        behind_s = (time_us - self.attitude_boot_us) * 1e-6
-        attitude_wxyz = self.attitude_wxyz
-        if not whole:
-            self.by_rates_wxyz = None
-        elif self.by_rates_wxyz is not None:
-            self.by_rates_wxyz = turned(turned(self.by_rates_wxyz, self.rates_frd_rad_s, half_s), w, half_s)
-        if self.by_rates_wxyz is not None:
-            attitude_wxyz = self.by_rates_wxyz
-        elif -ATTITUDE_KEPT_S < behind_s < ATTITUDE_KEPT_S:
-            # Turned on by its own rates since the attitude was told: f + dt w x f.
-            f_x, f_y, f_z = f
-            p, q, r = w
-            f = (
-                f_x + behind_s * (q * f_z - r * f_y),
-                f_y + behind_s * (r * f_x - p * f_z),
-                f_z + behind_s * (p * f_y - q * f_x),
-            )
-        a_n, a_e, a_d = body_to_ned(attitude_wxyz, f)
+        if whole:
+            p, q, r = self.rates_frd_rad_s
+            self.valid_wxyz = turned(self.valid_wxyz, (p + w[0], q + w[1], r + w[2]), half_s)
+        else:
+            self.valid_wxyz = self.attitude_wxyz
+        a_n, a_e, a_d = body_to_ned(self.valid_wxyz, f)
         a_d += GRAVITY_M_S2
         if whole:
             b_n, b_e, b_d = self.acceleration_ned_m_s2
@@ -87,11 +68,6 @@ class Strapdown:
         self.rates_frd_rad_s = w
         self.time_boot_us = time_us
         return whole
-
-    @property
-    def valid_wxyz(self) -> Quaternion:
-        """The attitude by which the sum goes on."""
-        return self.by_rates_wxyz or self.attitude_wxyz
 
     def sum_at(self, time_us: int) -> Vector3 | None:
         """The sum at a time near the newest sample; None where it is not near."""

@@ -155,12 +155,9 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         elif not monitor.losses_reported and type(sample) in OPTIONAL_STREAMS:
             monitor.heard.add(OPTIONAL_STREAMS[type(sample)])
         monitor.estimator.update(sample)
-        is_attitude_old = monitor.is_attitude_old
-        if is_attitude_old:
+        if monitor.is_attitude_old:
             monitor.estimator.inertial.fixes.clear()
-        known = situation
-        if not monitor.estimator.validity.is_valid or is_attitude_old:
-            known = situation._replace(estimate_valid=False)
+        known = situation if monitor.estimate_valid else situation._replace(estimate_valid=False)
         monitor.state, impact = monitor.detector.step(monitor.state, sample, known)
         if impact is not None:
             impacts.append(monitor.estimator.begin(impact, situation))
