@@ -9,7 +9,8 @@ contact, each compared with this vehicle's own flight:
 * the velocity jumps and the accelerometer does not show it (see `velocity_jump`). The threshold is lower beside a rate
   jump.
 
-`classify` names the kind. A weak force on a hovering vehicle may be a hand's (see `soft_contact`).
+`classify` names the kind. A weak force on a hovering vehicle is observed for a moment before it counts as a hit or a
+hand (see `soft_contact`).
 """
 
 import math
@@ -90,6 +91,7 @@ class FusedDetector:
         elif s.phase is Phase.OFF:
             s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
         if off is not None or ratio < 1.0:
+            s.soft.since_boot_us = None
             self._learn(s, f, before_us)
             is_quiet = s.floor.is_known and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
@@ -123,9 +125,14 @@ class FusedDetector:
                     return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, 1.0)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
-        is_hand = size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps
-        kind = ImpactKind.CONTACT if is_hand else None
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
+        if soft.since_boot_us is None:
+            soft.since_boot_us, soft.free_until_us = now_us, free_until_us
+        kind = None
+        if size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps:
+            if now_us - soft.since_boot_us < 1e6 * self._config.soft_wait_s:
+                return None
+            kind = ImpactKind.CONTACT
+        return self._fire(s, now_us, situation, force, soft.free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
 
     def _fire(
         self,
@@ -147,7 +154,7 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.soft.is_hand = kind is ImpactKind.CONTACT
+        s.soft.fired(kind is ImpactKind.CONTACT)
         return Impact(now_us, free_until_us, force, kind, evidence, confidence)
 
     # --- velocity ---------------------------------------------------------------------------------------------

@@ -1,8 +1,8 @@
 """A weak force on a vehicle that hovers, or just did: a person's hand, or a soft strike.
 
 They differ in how the force begins. An arm takes 80 ms and more to push; a hand that grips stops the small speed of a
-hover. An obstacle strikes with its own speed, and its force is there from one sample to the next. So a force that does
-not jump is a hand's, and is a strike as soon as it jumps.
+hover. An obstacle strikes with its own speed, and its force is there from one sample to the next. So a force is
+observed for a moment, and is a strike as soon as it jumps.
 """
 
 import math
@@ -25,6 +25,8 @@ class SoftContact:
     hovered_boot_us: int = -HOVERED_US
     is_hand: bool = False
     """Whether the present contact, or the latest one, was taken for a hand."""
+    since_boot_us: int | None = None
+    free_until_us: int = 0
     last: Vector3 = (0.0, 0.0, 0.0)
     before_us: int = 0
     before: Vector3 = (0.0, 0.0, 0.0)
@@ -36,6 +38,10 @@ class SoftContact:
     def velocity(self, time_us: int, velocity_ned_m_s: Vector3) -> None:
         if hovers(velocity_ned_m_s):
             self.hovered_boot_us = time_us
+
+    def fired(self, is_hand: bool) -> None:
+        """Note that a contact was reported."""
+        self.since_boot_us, self.is_hand = None, is_hand
 
     def may_be_hand(self, time_us: int) -> bool:
         return time_us - self.hovered_boot_us < HOVERED_US
