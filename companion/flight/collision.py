@@ -87,7 +87,7 @@ class CollisionRecord:
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         self.contact_normal = level(estimate.normal)
-        self.estimator.note_contact(not estimate.may_be_clipped, self.contact_ended_boot_us)
+        self.estimator.note_contact(estimate.is_fully_measured, self.contact_ended_boot_us)
 
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""

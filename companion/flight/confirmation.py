@@ -45,7 +45,7 @@ class Hypothesis:
         return self._is_unmoved(fixes) or self._stays_in_place(places, position_noise_m)
 
     def _is_unmoved(self, fixes: Sequence[VelocityFix]) -> bool:
-        """The sample in question is taken out of the integral: after a true impulse the velocity is ahead of it by that.
+        """The sample in question is taken out of the integral: after a true impulse the velocity is ahead by that.
 
         Medians: one velocity may be forged, and the first ones after a hit are late.
         """

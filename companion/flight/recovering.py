@@ -277,7 +277,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, is_second),
         hypothesis=_hypothesis(flight, estimate),
     )
-    record.estimator.note_contact(estimate.is_final and not estimate.may_be_clipped, impact.sample_time_boot_us)
+    record.estimator.note_contact(estimate.is_fully_measured, impact.sample_time_boot_us)
     flight.collisions.append(record)
     report_detection(flight, record, now_us)
 
