@@ -13,18 +13,15 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix
 from companion.motion.strapdown import Strapdown
-from companion.reflex.halfspace import away_from, split
+from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
+from companion.reflex.planner import REST
 from companion.report import CollisionReport
 
 # The rebound's speed is the largest within this time after the contact. The estimate lags some tens of milliseconds;
 # later the speed is made by the vehicle's own controller.
 REBOUND_WINDOW_US = 100_000
-# No contact that ends in a rebound lasts longer.
-REBOUND_KEPT_US = 1_000_000
-# A smaller distance has no reliable direction.
-LEAST_WAY_M = 0.01
 
 
 def level(normal: Normal) -> Normal:
@@ -101,23 +98,21 @@ class CollisionRecord:
         if sample.time_boot_us <= self.sample_time_boot_us:
             return
         away = self._direction_away()
-        past_m = sum(a * (p - s) for a, p, s in zip(away, sample.position_ned_m, self.setpoint_ned_m, strict=True))
+        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), away)[0]
         self.overshoot_m = max(self.overshoot_m, past_m)
-        if sample.time_boot_us <= self.sample_time_boot_us + REBOUND_KEPT_US:
+        if sample.time_boot_us <= self.contact_ended_boot_us + REBOUND_WINDOW_US:
             self._velocities.append((sample.time_boot_us, sample.velocity_ned_m_s))
 
     def _direction_away(self) -> Vector3:
         """From the contact towards the setpoint; along the normal when the two coincide."""
         x, s = self.contact.position_ned_m, self.setpoint_ned_m
         length_m = math.dist(x, s)
-        if length_m < LEAST_WAY_M:
-            return self.normal.direction_ned
-        return ((s[0] - x[0]) / length_m, (s[1] - x[1]) / length_m, (s[2] - x[2]) / length_m)
+        return self.normal.direction_ned if length_m == 0.0 else plus(REST, 1.0 / length_m, plus(s, -1.0, x))
 
     def rebound_speed_m_s(self) -> float | None:
         """Largest speed along the normal, m/s, within REBOUND_WINDOW_US after the contact; None without a valid one."""
-        start, normal = self.contact_ended_boot_us, self.normal.direction_ned
-        recent = [v for time_us, v in self._velocities if start < time_us <= start + REBOUND_WINDOW_US]
+        ended_us, normal = self.contact_ended_boot_us, self.normal.direction_ned
+        recent = [v for time_us, v in self._velocities if time_us > ended_us]
         return max((max(0.0, split(v, normal)[0]) for v in recent), default=None)
 
     def settled_after_s(self) -> float | None:
@@ -142,7 +137,7 @@ class CollisionRecord:
             detector=self.detector,
             position_ned_m=self.contact.position_ned_m,
             impact_velocity_ned_m_s=velocity,
-            impact_speed_m_s=math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2),
+            impact_speed_m_s=math.hypot(*velocity),
             normal_ned=self.normal.direction_ned,
             peak_specific_force_m_s2=self.peak_specific_force_m_s2,
             recovery_setpoint_ned_m=self.setpoint_ned_m,
