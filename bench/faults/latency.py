@@ -1,6 +1,6 @@
 """From a hit to the recovery setpoint on the wire, under load: the real loop, a real socket and the real clock.
 
-A flight is recorded in virtual time. As often as wanted a process of its own flies it to just before the hit, and from there
+A flight is recorded in virtual time. As often as wanted a process of its own flies it to just before the hit, and goes
 on in real time: what the vehicle says until the hit no longer depends on the companion.
 """
 

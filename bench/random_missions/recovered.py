@@ -12,7 +12,6 @@ from bench.random_missions.contacts import JudgedContact, Role
 from bench.random_missions.crashes import tilts_deg
 from bench.random_missions.flight import JudgedFlight
 from bench.random_missions.phases import phases_of
-from companion.flight.collision import LEAST_WAY_M
 from companion.reflex.halfspace import away_from
 from companion.report import CollisionReport
 from rebound_cli.results.summary import LONGEST_RECOVERY_S
@@ -125,7 +124,7 @@ def _past_m(hit: Hit, collision: CollisionReport, positions_ned_m: Floats) -> fl
     if away_from(hit.normal_ned)[2] == 0.0:
         way[2] = 0.0
     length_m = float(np.linalg.norm(way))
-    direction = way / length_m if length_m > LEAST_WAY_M else normal
+    direction = way / length_m if length_m > 0.0 else normal
     return max(0.0, float(((positions_ned_m - place_ned_m) @ direction).max(initial=0.0)))
 
 

@@ -10,7 +10,7 @@ PX4's estimate is not valid. Without the accelerometer, as in the paper, u and a
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
@@ -18,8 +18,6 @@ from companion.motion.delay import DELAY_S
 from companion.motion.history import STAMP_RESOLUTION_US
 from companion.motion.inertial import VelocityFix, less_sum
 
-# Five positions at 50 Hz; at 2 m/s^2 the vehicle is 1 cm off a straight line in that time.
-POSITIONS_US = 100_000
 # Standard deviation of the drift, m/s^2: 0.05 m/s^2 of bias and 3 mrad of g on each axis, with some reserve.
 BIAS_M_S2 = 0.08
 # Without the accelerometer: the acceleration is within the limits of a vehicle, about 0.3 g, and a straight line
@@ -52,14 +50,13 @@ def velocity_alone(
     samples: Sequence[LocalPosition], contact_boot_us: int, config: EstimateConfig
 ) -> tuple[Vector3, float] | None:
     """v_c and its standard deviation without the accelerometer."""
-    start_us = contact_boot_us - ALONE_US
-    points = ((s.time_boot_us, s.velocity_ned_m_s) for s in samples if s.time_boot_us >= start_us)
+    points = [(sample.time_boot_us, sample.velocity_ned_m_s) for sample in samples]
     found = _at_contact(points, contact_boot_us, LIMITS_M_S2, config)
     return None if found is None else found[:2]
 
 
 def _at_contact(
-    points: Iterable[tuple[int, Vector3]], contact_boot_us: int, drift_m_s2: float, config: EstimateConfig
+    points: Sequence[tuple[int, Vector3]], contact_boot_us: int, drift_m_s2: float, config: EstimateConfig
 ) -> tuple[Vector3, float, float] | None:
     """The value at the contact, its standard deviation on an axis, and the RMS of what is left, m/s.
 
@@ -67,32 +64,29 @@ def _at_contact(
     them: their variance is increased by that.
     """
     end_us = contact_boot_us - STAMP_RESOLUTION_US
-    known = [(1e-6 * (time_us - contact_boot_us), value) for time_us, value in points if time_us <= end_us]
+    known = [point for point in points if point[0] <= end_us]
     if not known:
         return None
-    count, lasted_s = len(known), known[-1][0] - known[0][0]
+    times_s = [1e-6 * (time_us - contact_boot_us) for time_us, _ in known]
+    count, lasted_s = len(known), times_s[-1] - times_s[0]
     colour = max(1.0, 2.0 * config.velocity_correlation_s * (count - 1) / lasted_s) if lasted_s > 0.0 else 1.0
     weight = 1.0 / (config.velocity_noise_m_s**2 * colour)
-    first = weight * math.fsum(t for t, _ in known)
-    second = weight * math.fsum(t * t for t, _ in known) + 1.0 / drift_m_s2**2
+    first = weight * math.fsum(times_s)
+    second = weight * math.fsum([t * t for t in times_s]) + 1.0 / drift_m_s2**2
     size = weight * count * second - first * first
-    values, left2 = [], 0.0
-    for axis in range(3):
-        total = weight * math.fsum(value[axis] for _, value in known)
-        moment = weight * math.fsum(t * value[axis] for t, value in known)
+    found, left2 = [], 0.0
+    for values in zip(*[value for _, value in known], strict=True):
+        pairs = list(zip(times_s, values, strict=True))
+        total, moment = weight * math.fsum(values), weight * math.fsum([t * value for t, value in pairs])
         start, drift = (second * total - first * moment) / size, (weight * count * moment - first * total) / size
-        left2 += math.fsum((value[axis] - start - drift * t) ** 2 for t, value in known)
-        values.append(start)
-    n, e, d = values
+        left2 += math.fsum([(value - start - drift * t) ** 2 for t, value in pairs])
+        found.append(start)
+    n, e, d = found
     return (n, e, d), math.sqrt(second / size), math.sqrt(left2 / (3 * count))
 
 
-def position_at(samples: Sequence[LocalPosition], contact_boot_us: int, velocity_ned_m_s: Vector3) -> Vector3:
-    """x(t_c), local NED, m: the mean of the last positions before the contact, each carried on to it at v_c."""
-    recent = [s for s in samples if contact_boot_us - s.time_boot_us <= POSITIONS_US] or samples[-1:]
-    ahead_s = sum(contact_boot_us - s.time_boot_us for s in recent) * 1e-6 / len(recent)
-    n, e, d = (
-        sum(s.position_ned_m[axis] for s in recent) / len(recent) + ahead_s * velocity_ned_m_s[axis]
-        for axis in range(3)
-    )
-    return (n, e, d)
+def position_at(latest: LocalPosition, contact_boot_us: int, velocity_ned_m_s: Vector3) -> Vector3:
+    """x(t_c), local NED, m: the last position before the contact, carried on to it at v_c."""
+    (n, e, d), (u, v, w) = latest.position_ned_m, velocity_ned_m_s
+    ahead_s = 1e-6 * (contact_boot_us - latest.time_boot_us)
+    return (n + ahead_s * u, e + ahead_s * v, d + ahead_s * w)

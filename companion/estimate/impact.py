@@ -19,12 +19,8 @@ from companion.motion.strapdown import ZERO
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
-# After a contact PX4's velocity oscillates (delay, a filter's switching). Velocities count again after this.
-REST_US = 150_000
 # PX4 sends VIBRATION every two seconds by default.
 CLIPPING_TOLD_US = 2_100_000
-# A detection later than this many samples has no contact force: the contact's samples are gone.
-LATE_SAMPLES = 3
 # Integrals kept: the first velocity that shows a hit comes up to 0.17 s after it (see `approach`), at 400 Hz.
 SUMS_KEPT = 80
 # Kinds that are not classified again: unknown, and a soft contact.
@@ -38,9 +34,9 @@ class ImpactEstimate:
     `time_boot_us` is t_c, good to `time_error_us` either way; `velocity_ned_m_s` is v_c, the velocity just before
     it, and `velocity_error_m_s` its standard deviation on an axis. `normal` is the direction out of the
     obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
-    IMU sample. `is_lower_bound`: the sensor clipped, or part of the contact was not seen, and both may be larger.
-    `may_be_clipped`: the sensor's range may not have been enough, and then the vehicle's own estimate lacks what it did
-    not show. `is_final`: the contact is over. `earlier` is the IMU sample before the first one that shows it.
+    IMU sample. `is_fully_measured`: nothing was clipped; otherwise the vehicle's own estimate may lack a part of the
+    hit. `is_lower_bound`: it may have been clipped, or samples are missing, and both may be larger. `is_final`: the
+    contact is over. `integrated_s`: so long the accelerometer's integral counts the first sample.
     """
 
     impact: Impact
@@ -52,12 +48,12 @@ class ImpactEstimate:
     normal: Normal
     peak_specific_force_m_s2: float
     impulse_m_s: float
+    is_fully_measured: bool
     is_lower_bound: bool
-    may_be_clipped: bool
     kind: ImpactKind
     confidence: float
     is_final: bool
-    earlier: ImuSample | None = None
+    integrated_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -70,7 +66,6 @@ class ImpactEstimator:
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     validity: VelocityValidity = field(default_factory=VelocityValidity)
     imu: ImuSample | None = None
-    earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
     contact: ContactForce | None = None
     came_ned_m_s: Vector3 = ZERO
@@ -86,7 +81,7 @@ class ImpactEstimator:
             if not self.inertial.imu(sample):
                 self.sums.clear()
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
-            self.earlier_imu, self.imu = self.imu, sample
+            self.imu = sample
         elif isinstance(sample, LocalPosition | Odometry):
             if isinstance(sample, LocalPosition):
                 self.history.add(sample)
@@ -114,7 +109,8 @@ class ImpactEstimator:
         force_ned = body_to_ned(self.inertial.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
-        self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
+        by_force = impact.evidence is Evidence.FORCE
+        self.contact = self._begin_contact_force(impact) if by_force else None
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.contact_ended_boot_us = sample_us
         self.validity.invalidate(sample_us)
@@ -128,33 +124,29 @@ class ImpactEstimator:
             normal=normal_of(force_ned, self.came_ned_m_s),
             peak_specific_force_m_s2=size,
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
+            is_fully_measured=False,
             is_lower_bound=True,
-            may_be_clipped=True,
             kind=impact.kind,
             confidence=impact.confidence,
             is_final=False,
-            earlier=self.earlier_imu,
+            integrated_s=1e-6 * (self.sums[-1][0] - self.sums[-2][0]) if by_force and len(self.sums) > 1 else 0.0,
         )
         return estimate
 
     def _begin_contact_force(self, impact: Impact) -> ContactForce | None:
-        """The contact force with its first sample; None for an impact that was detected too late for it."""
+        """The contact force with its first sample; None without one."""
         sample = self.imu
-        if sample is None or len(self.sums) < 2:
-            return None
-        averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
-        between_us = self.sums[-1][0] - self.sums[-2][0]
-        if sample.time_boot_us - impact.contact_free_until_boot_us > LATE_SAMPLES * between_us + averaging_us:
+        if sample is None:
             return None
         f, force = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
         contact = ContactForce(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
-            attitude_wxyz=self.inertial.strapdown.valid_wxyz,
-            averaging_us=averaging_us,
+            first_rates_frd_rad_s=sample.angular_velocity_frd_rad_s,
+            averaging_us=round(self.config.imu_averaging_interval_s * 1e6),
             range_m_s2=self.config.accelerometer_range_m_s2,
-            started_boot_us=impact.contact_free_until_boot_us,
+            time_boot_us=impact.contact_free_until_boot_us,
         )
-        contact.add(sample, True)
+        contact.add(sample, self.inertial.strapdown.valid_wxyz, True)
         return contact
 
     def follow(self, state: DetectorState) -> ImpactEstimate | None:
@@ -169,10 +161,10 @@ class ImpactEstimator:
         is_over = state.phase is not Phase.CONTACT
         if contact is not None and sample.time_boot_us > contact.time_boot_us:
             loud = state.last_loud_boot_us == sample.time_boot_us
-            contact.add(sample, loud)
-            # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-            self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
-            if loud or is_over:
+            contact.add(sample, self.inertial.strapdown.valid_wxyz, loud)
+            if loud:
+                # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
+                self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
                 estimate = self._refined(estimate, contact)
         self.estimate = replace(estimate, is_final=is_over)
         return self.estimate if is_over else None
@@ -184,7 +176,7 @@ class ImpactEstimator:
             begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
         kind = estimate.kind
         if self.situation is not None and estimate.impact.kind not in AS_DETECTED:
-            kind = kind_of(impulse, velocity, contact.turn_rad_s(), self.situation)
+            kind = kind_of(impulse, velocity, contact.turn_rad_s, self.situation)
         return replace(
             estimate,
             time_boot_us=begun_us,
@@ -192,22 +184,21 @@ class ImpactEstimator:
             normal=normal_of(impulse, self.came_ned_m_s),
             peak_specific_force_m_s2=contact.peak_m_s2,
             impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
-            is_lower_bound=contact.is_lower_bound,
-            may_be_clipped=contact.may_be_clipped,
+            is_fully_measured=contact.is_fully_measured,
+            is_lower_bound=contact.has_gap or not contact.is_fully_measured,
             kind=kind,
         )
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
         """x(t_c), v_c, and v_c's standard deviation on an axis, from messages between the last contact and this one."""
-        start_us, config = contact_us - ALONE_US, self.config
+        start_us, config, latest = contact_us - ALONE_US, self.config, self.history.latest()
         if self.contact_ended_boot_us is not None:
             start_us = max(start_us, self.contact_ended_boot_us + STAMP_RESOLUTION_US)
         samples = self.history.between(start_us, contact_us - STAMP_RESOLUTION_US)
         found = self._velocity(contact_us) if config.inertial else None
         found = found or velocity_alone(samples, contact_us, config)
         if found is not None and samples:
-            return position_at(samples, contact_us, found[0]), *found
-        latest = self.history.latest()
+            return position_at(samples[-1], contact_us, found[0]), *found
         if latest is None:
             return ZERO, ZERO, math.inf
         return latest.position_ned_m, latest.velocity_ned_m_s, config.velocity_noise_m_s
@@ -221,5 +212,5 @@ class ImpactEstimator:
         ahead_s = (contact_us - time_us) * 1e-6
         at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
         ended_us = self.contact_ended_boot_us
-        fixes = [fix for fix in self.inertial.fixes if ended_us is None or fix.time_boot_us > ended_us + REST_US]
+        fixes = [fix for fix in self.inertial.fixes if ended_us is None or fix.time_boot_us > ended_us]
         return velocity_at(fixes, contact_us, at_contact, self.config)

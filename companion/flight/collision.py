@@ -8,23 +8,20 @@ from itertools import takewhile
 from companion.detection.interface import DetectorState
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.normal import Normal, with_change
-from companion.flight.confirmation import DECIDED_US, ForceHypothesis, VelocityJumpHypothesis
+from companion.flight.confirmation import DECIDED_US, Hypothesis
 from companion.messages import LocalPosition, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix
 from companion.motion.strapdown import Strapdown
-from companion.reflex.halfspace import away_from, split
+from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
+from companion.reflex.planner import REST
 from companion.report import CollisionReport
 
 # The rebound's speed is the largest within this time after the contact. The estimate lags some tens of milliseconds;
 # later the speed is made by the vehicle's own controller.
 REBOUND_WINDOW_US = 100_000
-# No contact that ends in a rebound lasts longer.
-REBOUND_KEPT_US = 1_000_000
-# A smaller distance has no reliable direction.
-LEAST_WAY_M = 0.01
 
 
 def level(normal: Normal) -> Normal:
@@ -47,7 +44,7 @@ class CollisionRecord:
     estimator: MotionEstimator
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     after_ned_m_s: Vector3 | None = None  # the velocity after the contact
-    hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = None  # until it is confirmed or rejected
+    hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
@@ -67,8 +64,6 @@ class CollisionRecord:
 
     def follow_motion(self, strapdown: Strapdown) -> None:
         """Take the newest accelerometer and gyroscope sample."""
-        if isinstance(self.hypothesis, ForceHypothesis):
-            self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
         if self.fixes:
             fix = self.fixes[-1]
@@ -80,54 +75,44 @@ class CollisionRecord:
     ) -> None:
         """Update the contact's largest force, its end and its normal while it lasts."""
         self.fixes = fixes
-        hypothesis = self.hypothesis
-        is_turned = isinstance(hypothesis, ForceHypothesis) and hypothesis.is_turned
-        if hypothesis is not None and (is_turned or self._is_seen_again(state, hypothesis)):
-            self.hypothesis = None
         if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
             return
+        if self.hypothesis is not None and state.last_loud_boot_us > self.hypothesis.time_boot_us:
+            self.hypothesis = None  # another sample of the contact's force has come
         if estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
             return
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         self.contact_normal = level(estimate.normal)
-        self.estimator.note_contact(not estimate.may_be_clipped, self.contact_ended_boot_us)
-
-    def _is_seen_again(self, state: DetectorState, hypothesis: ForceHypothesis | VelocityJumpHypothesis) -> bool:
-        """Whether another sample of the contact's force has come."""
-        return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > hypothesis.time_boot_us
+        self.estimator.note_contact(estimate.is_fully_measured, self.contact_ended_boot_us)
 
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
         if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
         hypothesis, self.hypothesis = self.hypothesis, None
-        if hypothesis.is_rejected(self.fixes):
-            return True
-        return isinstance(hypothesis, VelocityJumpHypothesis) and hypothesis.stays_in_place(places, position_noise_m)
+        return hypothesis.is_rejected(self.fixes, places, position_noise_m)
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """Update overshoot and rebound speed while the vehicle recovers."""
         if sample.time_boot_us <= self.sample_time_boot_us:
             return
         away = self._direction_away()
-        past_m = sum(a * (p - s) for a, p, s in zip(away, sample.position_ned_m, self.setpoint_ned_m, strict=True))
+        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), away)[0]
         self.overshoot_m = max(self.overshoot_m, past_m)
-        if sample.time_boot_us <= self.sample_time_boot_us + REBOUND_KEPT_US:
+        if sample.time_boot_us <= self.contact_ended_boot_us + REBOUND_WINDOW_US:
             self._velocities.append((sample.time_boot_us, sample.velocity_ned_m_s))
 
     def _direction_away(self) -> Vector3:
         """From the contact towards the setpoint; along the normal when the two coincide."""
         x, s = self.contact.position_ned_m, self.setpoint_ned_m
         length_m = math.dist(x, s)
-        if length_m < LEAST_WAY_M:
-            return self.normal.direction_ned
-        return ((s[0] - x[0]) / length_m, (s[1] - x[1]) / length_m, (s[2] - x[2]) / length_m)
+        return self.normal.direction_ned if length_m == 0.0 else plus(REST, 1.0 / length_m, plus(s, -1.0, x))
 
     def rebound_speed_m_s(self) -> float | None:
         """Largest speed along the normal, m/s, within REBOUND_WINDOW_US after the contact; None without a valid one."""
-        start, normal = self.contact_ended_boot_us, self.normal.direction_ned
-        recent = [v for time_us, v in self._velocities if start < time_us <= start + REBOUND_WINDOW_US]
+        ended_us, normal = self.contact_ended_boot_us, self.normal.direction_ned
+        recent = [v for time_us, v in self._velocities if time_us > ended_us]
         return max((max(0.0, split(v, normal)[0]) for v in recent), default=None)
 
     def settled_after_s(self) -> float | None:
@@ -152,7 +137,7 @@ class CollisionRecord:
             detector=self.detector,
             position_ned_m=self.contact.position_ned_m,
             impact_velocity_ned_m_s=velocity,
-            impact_speed_m_s=math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2),
+            impact_speed_m_s=math.hypot(*velocity),
             normal_ned=self.normal.direction_ned,
             peak_specific_force_m_s2=self.peak_specific_force_m_s2,
             recovery_setpoint_ned_m=self.setpoint_ned_m,

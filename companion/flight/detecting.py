@@ -42,18 +42,18 @@ def _sustained_force(
     target, attitude = flight.target, flight.vehicle.attitude
     horizontal, vertical = flight.horizontal_force, flight.vertical_force
     flown_to = situation.setpoint_position_ned_m
-    # Half a second without a position is no tilt that lasted half a second.
+    if not flight.has_position:
+        horizontal.forget()  # half a second without a position is no tilt that lasted half a second
     is_off = situation.off_reason is not None or situation.descent_commanded or not flight.has_position
-    if is_off or flown_to is None or target is None or target.acceleration_only or attitude is None:
-        horizontal.forget()
+    if is_off or target is None or target.acceleration_only:
+        flown_to = None
         vertical.forget()
-        return None
     for sample in samples:
         if type(sample) is ImuSample:
             horizontal.add_imu(sample.specific_force_frd_m_s2)
         elif type(sample) is AttitudeTarget:
             vertical.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-        elif isinstance(sample, LocalPosition):
+        elif isinstance(sample, LocalPosition) and attitude is not None:
             late_us = horizontal.time_us - sample.time_boot_us
             if late_us >= REBOOT_US:
                 horizontal.forget()
@@ -61,7 +61,8 @@ def _sustained_force(
             elif late_us >= 0:
                 continue
             held = horizontal.step(sample, attitude.attitude_wxyz, flown_to)
-            held = vertical.step(sample, horizontal.thrust_m_s2, flown_to[2]) or held
+            if flown_to is not None:
+                held = vertical.step(sample, horizontal.thrust_m_s2, flown_to[2]) or held
             if held is not None:
                 _report_sustained_force(flight, held, sample, now_us)
                 return _estimate_of(held, sample, attitude)
@@ -84,8 +85,8 @@ def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude
         normal=Normal(held.normal_ned, IMPULSE_RAD),
         peak_specific_force_m_s2=held.force_m_s2,
         impulse_m_s=0.5 * held.force_m_s2 * lasted_us * 1e-6,
+        is_fully_measured=True,
         is_lower_bound=False,
-        may_be_clipped=False,
         kind=ImpactKind.STRUCK,
         confidence=1.0,
         is_final=True,

@@ -8,7 +8,7 @@ from companion.estimate.impact import ImpactEstimate
 from companion.estimate.normal import Normal
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery, level
-from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
+from companion.flight.confirmation import Hypothesis, hypothesis_of
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.detection_event import report_detection
 from companion.flight.obstacle_map import remembered_surfaces
@@ -277,12 +277,12 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, is_second),
         hypothesis=_hypothesis(flight, estimate),
     )
-    record.estimator.note_contact(estimate.is_final and not estimate.may_be_clipped, impact.sample_time_boot_us)
+    record.estimator.note_contact(estimate.is_fully_measured, impact.sample_time_boot_us)
     flight.collisions.append(record)
     report_detection(flight, record, now_us)
 
 
-def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
+def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> Hypothesis | None:
     """The hypothesis of a first sample; None without an attitude, or while the vehicle recovers from another hit."""
     attitude = flight.vehicle.attitude
     if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):

@@ -24,7 +24,7 @@ MOST_WINDOWS = 60
 LEAST_CONFIDENCE = 0.99
 # Least relative increase that is reported. A rotor that has lost a twentieth of its blades lifts 0.95^3 of its lift
 # (lift grows with r^2 dr), and needs a command of 1.08 where lift grows with its square. Half of that increase counts.
-LEAST_HARDER = (0.95**-1.5 - 1.0) / 2.0
+LEAST_HARDER = 0.04
 # Largest difference among the other three motors, in increases of the first. A weight that shifts towards one motor
 # relieves the opposite one: the other three then differ by 0.5. For one damaged motor they do not differ. Half way.
 MOST_UNLIKE = 0.25

@@ -33,7 +33,7 @@ def test_a_clean_approach_is_extrapolated_to_the_contact(acceleration):
     samples = approach(2.0, acceleration)
     velocity, _ = velocity_alone(samples, CONTACT_US, CONFIG)
     assert velocity == pytest.approx((2.0, 0.0, 0.0), abs=0.03)
-    assert position_at(samples, CONTACT_US, velocity) == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
+    assert position_at(samples[-1], CONTACT_US, velocity) == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
 
 
 def test_samples_after_the_contact_change_nothing():

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from companion.flight.horizontal_force import HELD_M_S2, HorizontalForceMonitor, tilt_acceleration
+from companion.flight.horizontal_force import HELD_M_S2, HorizontalForceMonitor
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
@@ -35,14 +35,6 @@ def watched(seconds, north_m, speed_m_s, tilt_m_s2, goal_north_m=1.0):
         if held is not None:
             return t, held
     return None
-
-
-def test_the_lean_is_the_acceleration_that_it_gives_in_free_air():
-    assert tilt_acceleration((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0))
-    assert tilt_acceleration(leaning_north(2.0)) == pytest.approx((2.0, 0.0))
-    assert tilt_acceleration(leaning_north(2.0), math.hypot(9.80665, 2.0)) == pytest.approx((2.0, 0.0))
-    # Also where the thrust does not carry the vehicle
-    assert tilt_acceleration(leaning_north(2.0), 0.8 * math.hypot(9.80665, 2.0)) == pytest.approx((1.6, 0.0))
 
 
 def test_a_vehicle_that_stands_still_and_leans_more_and_more_is_kept_off_its_goal():
