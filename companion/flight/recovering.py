@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.normal import Normal
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery, level
 from companion.flight.confirmation import Hypothesis, hypothesis_of
@@ -24,7 +23,6 @@ from companion.reflex.planner import (
     MotionState,
     Plan,
     height_feedback,
-    holds,
     kept_off,
     safe_to_hold,
     shortest,
@@ -44,13 +42,12 @@ class Recover:
         if flight.target is not None and len(together) == 1:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
-        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
+        self._surfaces = _surfaces(flight, self._contact)
         self._is_known = not self._law.follows  # whether the motion after the hit is known
         self._has_left, self._may_fall = False, False
         self._has_hung = False  # was pressed on the obstacle, and has not left it since
-        self._agreed: Normal | None = None  # the normal from the velocities before and after
         self._planned_for: object = None  # the state of the contact that the plan was made for
-        self._plan, self._plan_began_us = self._plan_from(self._state()), now_us
+        self._plan, self._plan_began_us = _planned(flight, self._contact, self._state(), self._surfaces), now_us
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
@@ -70,22 +67,21 @@ class Recover:
         # The estimate's known errors of position, velocity and tilt are added, because PX4 controls its own estimate.
         place = plus(planned.position_ned_m, 1.0, estimator.position_error_m)
         velocity = plus(planned.velocity_ned_m_s, 1.0, estimator.velocity_error_m_s)
-        asked = (reflex.ACCELERATION_GAIN * a, reflex.ACCELERATION_GAIN * b, c)
-        return Target(place, self._yaw_rad, velocity, plus(asked, -1.0, record.level_acceleration_m_s2))
+        return Target(place, self._yaw_rad, velocity, plus((a, b, c), -1.0, record.level_acceleration_m_s2))
 
     def _by_acceleration(self, planned: MotionState) -> Target:
         """A setpoint of acceleration alone: PX4's estimate is wrong, or its loops would harm this motion."""
         goal, record, state = self._record.setpoint_ned_m, self._record, self._state()
         a, b, c = safe_to_hold(with_feedback(planned, state), self._tilted_motion.velocity_ned_m_s)
-        is_free = self._lets_go or (self._is_level and not self._is_known)
         # Where the height is free, PX4's own loop adds nothing.
-        a, b, c = self._kept_off((a, b, self._height_m_s2(2.0 if is_free else 1.0) if self._is_level else c))
+        a, b, c = self._kept_off((a, b, self._height_m_s2(2.0) if self._is_level else c))
         if self._lets_go:
             c = reflex.DESCENT_M_S2 if self._tilts_into_surface() else max(c, 0.0)
         # The velocity of the vehicle's own estimate: PX4's vertical loop then adds nothing to the acceleration.
-        velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
+        velocity = (0.0, 0.0, record.estimated_down_m_s) if self._is_level else REST
         expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
-        return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
+        told = None if self._is_known else expected
+        return Target(goal, self._yaw_rad, velocity, (a, b, c), True, self._is_level, told)
 
     @property
     def _is_level(self) -> bool:
@@ -136,9 +132,9 @@ class Recover:
                 self._follow(flight, sample, now_us)
             if not is_known:
                 continue
-            right = record.estimator.corrected(sample)
-            record.follow_recovery(right)
-            since_us = self._monitor.settled_since(right)
+            record.follow_recovery(record.estimator.corrected(sample))
+            motion = record.estimator.motion
+            since_us = self._monitor.settled_since(sample.time_boot_us, motion.position_ned_m, motion.velocity_ned_m_s)
             if since_us is not None:
                 record.settled_at_boot_us = since_us
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
@@ -165,11 +161,8 @@ class Recover:
         self._is_known = was_known or record.estimator.has_converged
         is_rebound = sample.time_boot_us <= record.contact_ended_boot_us + REBOUND_WINDOW_US
         # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        is_measured = not record.estimator.is_second
-        if self._is_known and is_measured and (is_rebound or not was_known):
-            after = record.estimator.corrected(sample).velocity_ned_m_s
-            record.after_ned_m_s = after
-            self._agreed = record.normal
+        if self._is_known and not record.estimator.is_second and (is_rebound or not was_known):
+            record.after_ned_m_s = record.estimator.corrected(sample).velocity_ned_m_s
         return self._is_known
 
     def _state(self) -> MotionState:
@@ -185,23 +178,23 @@ class Recover:
         return MotionState(place, velocity, limited(acceleration, self._config.acceleration_m_s2))
 
     def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """Update goal and plan from what is known by now; the plan alone where the vehicle is off it."""
+        """Update goal and plan from what is known by now; also where the vehicle is off its plan."""
         self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
         state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
-        is_on = holds(self._plan.at(elapsed_s), state)
-        if known != self._planned_for or not (self._is_known or is_on):
+        planned_m_s = self._plan.at(elapsed_s).velocity_ned_m_s
+        # One that follows its plan lags behind the largest acceleration by LEAD_S.
+        is_on = math.dist(planned_m_s, state.velocity_ned_m_s) <= reflex.LEAD_S * self._config.acceleration_m_s2
+        if known != self._planned_for or not is_on:
             self._planned_for = known
             self._aim(flight, state, now_us)
-        elif is_on or not self._law.plans:
-            return
-        self._plan, self._plan_began_us = self._plan_from(state), now_us
 
     def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
-        """Set the recovery setpoint again, from the present contact and motion."""
+        """Plan again from the present contact and motion, with a new recovery setpoint."""
         record, before = self._record, self._record.setpoint_ned_m
-        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
-        record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, self._surfaces)
+        self._surfaces = _surfaces(flight, self._contact)
+        self._plan, self._plan_began_us = _planned(flight, self._contact, state, self._surfaces), now_us
+        record.setpoint_ned_m = place = self._plan.goal_ned_m
         self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
         if math.dist(place, before) > flight.mission.companion.settled.distance_m:
             record.overshoot_m = 0.0  # measured past the earlier setpoint
@@ -209,18 +202,12 @@ class Recover:
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
 
-    def _plan_from(self, state: MotionState) -> Plan:
-        goal = self._record.setpoint_ned_m
-        if not self._law.plans:
-            return Plan(state, goal, 0.0)
-        return shortest(state, lambda _: goal, self._config.acceleration_m_s2)
-
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""
         is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < reflex.CONTACT_LINGERS_US
-        estimator, contact = self._record.estimator, self._contact
-        if self._agreed is not None:
-            contact = replace(contact, normal_ned=self._agreed.direction_ned, normal_error_rad=self._agreed.error_rad)
+        estimator, contact, known = self._record.estimator, self._contact, self._record.normal
+        if self._record.after_ned_m_s is not None:
+            contact = replace(contact, normal_ned=known.direction_ned, normal_error_rad=known.error_rad)
         normal = contact.normal_ned
         off_m_s = split(estimator.motion.velocity_ned_m_s, normal)[0]
         is_pushed = split(estimator.external_m_s2, normal)[0] > reflex.PRESSING_TILT_M_S2
@@ -245,21 +232,21 @@ def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | Non
 
 
 def _has_room_below(flight: FlightContext) -> bool:
-    """Whether a fall can still be stopped above the ground."""
+    """Whether a fall can still be stopped above the ground, as far off as an obstacle."""
     latest, height_m = flight.vehicle.history.latest(), flight.height_m
     if latest is None or height_m is None:
         return False
     down_m_s = max(0.0, latest.velocity_ned_m_s[2])
-    return height_m > reflex.LEFT_BELOW_M + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
+    return height_m > flight.mission.recovery.clearance_m + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """Record a new collision: the motion just before it, and the recovery setpoint from that."""
-    mission, impact, law = flight.mission, estimate.impact, _law(flight)
+    mission, impact = flight.mission, estimate.impact
     normal = level(estimate.normal)
     place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
     before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
-    is_second = law.follows and before is not None and not before.estimator.knows_motion
+    is_second = _law(flight).follows and before is not None and not before.estimator.knows_motion
     if before is not None and is_second:
         # The vehicle's estimate is still wrong from the hit before.
         place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
@@ -270,7 +257,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         sample_time_boot_us=impact.sample_time_boot_us,
         detector=mission.companion.detector,
         contact=contact,
-        setpoint_ned_m=_setpoint(flight, contact, expected, _surfaces(flight, contact, flight.collisions)),
+        setpoint_ned_m=_planned(flight, contact, expected, _surfaces(flight, contact)).goal_ned_m,
         contact_normal=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
@@ -295,20 +282,23 @@ def _law(flight: FlightContext) -> Law:
     return RECOVERY_LAWS[flight.mission.recovery.law]
 
 
-def _setpoint(flight: FlightContext, contact: Contact, motion: MotionState, surfaces: Sequence[Surface]) -> Vector3:
-    """The law's goal, moved clear of surfaces and into the fence."""
+def _planned(flight: FlightContext, contact: Contact, motion: MotionState, surfaces: Sequence[Surface]) -> Plan:
+    """The shortest plan to the law's goal, moved clear of surfaces and into the fence."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion)
-    goal = clear_goal(surfaces[1:], contact.position_ned_m, contact.normal_ned, goal)
-    return FenceBounds(flight.origin_ned_m, flight.mission.fence).clamp(contact.position_ned_m, goal)
+    bounds, config, law = FenceBounds(flight.origin_ned_m, flight.mission.fence), flight.mission.recovery, _law(flight)
+
+    def goal_ned_m(duration_s: float) -> Vector3:
+        goal = law.goal_ned_m(config, contact, motion, duration_s)
+        goal = clear_goal(surfaces[1:], contact.position_ned_m, contact.normal_ned, goal)
+        return bounds.clamp(contact.position_ned_m, goal)
+
+    return shortest(motion, goal_ned_m, config.acceleration_m_s2)
 
 
-def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[CollisionRecord]) -> list[Surface]:
+def _surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:
     """The surface just hit first, then those hit before in the same recovery, then the obstacle map's."""
     surfaces = [Surface(contact.position_ned_m, contact.normal_ned, flight.mission.recovery.clearance_m)]
-    for record in reversed(records):
-        if record.is_over:
-            break
+    for record in in_one_recovery(flight.collisions):
         if record.contact.time_boot_us < contact.time_boot_us:
             touched = Surface(record.contact.position_ned_m, record.normal.direction_ned, 0.0)
             surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))

@@ -12,12 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
+from companion.motion.strapdown import ZERO
 from companion.reflex import config as reflex
 from companion.reflex.halfspace import Surface, plus, split
 
-REST: Vector3 = (0.0, 0.0, 0.0)
-# Values of s at which a plan is checked: its first part's acceleration is largest at 1/2, the second's at 0.21, 0.79.
-_LOOKED_AT = (0.21, 0.3, 0.4, 0.5, 0.6, 0.7, 0.79)
+REST = ZERO
+# A plan is checked at multiples of 1/14: its first part accelerates most at 1/2, the second at 0.21 and 0.79.
+_LOOKS = 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,7 @@ class Plan:
 
     def most_m_s2(self) -> float:
         """The plan's largest acceleration, m/s^2."""
-        return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in _LOOKED_AT)
+        return max(math.hypot(*(a for _, _, a in self._axes(k / _LOOKS, k / _LOOKS))) for k in range(3, _LOOKS - 2))
 
 
 def _axis(
@@ -78,13 +79,6 @@ def shortest(state: MotionState, goal_ned_m: Callable[[float], Vector3], most_m_
         if not found.most_m_s2() > most_m_s2:  # nor one that is no number, which no duration mends
             return found
         duration_s *= reflex.DURATION_STEP
-
-
-def holds(planned: MotionState, motion: MotionState) -> bool:
-    """Whether the vehicle follows the plan, as closely as PX4's loops do."""
-    off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
-    off_m = math.dist(planned.position_ned_m, motion.position_ned_m)
-    return off_m_s <= reflex.OFF_PLAN_M_S and off_m <= reflex.OFF_PLAN_M
 
 
 def with_feedback(planned: MotionState, motion: MotionState) -> Vector3:
