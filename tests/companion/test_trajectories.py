@@ -138,12 +138,12 @@ def test_a_head_wind_takes_its_part_of_the_lean_for_speeding_up():
     speeds = SpeedLimits(1.0, 2.0, speeding_up_m_s2=1.0)
     north = (5.0, 0.0, 0.0)
     # Given what a hover leans by against the wind, then it is taken off along the way, and only there
-    assert speeds.against((0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(0.7)
-    assert speeds.against((-0.3, 0.2), north).speeding_up_m_s2 == pytest.approx(1.0)
-    assert speeds.against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.4)
+    assert speeds.against((0.3, 0.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.7)
+    assert speeds.against((-0.3, 0.2, 0.0), north).speeding_up_m_s2 == pytest.approx(1.0)
+    assert speeds.against((1.2, 0.0, 0.0), north).speeding_up_m_s2 == pytest.approx(0.4)
     # and a pace that is slower than that already stays what it is
-    assert SpeedLimits(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0), north).speeding_up_m_s2 == pytest.approx(0.2)
-    assert speeds.against((1.2, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)
+    assert SpeedLimits(1.0, 2.0, speeding_up_m_s2=0.2).against((1.2, 0.0, 0.0), north).speeding_up_m_s2 == pytest.approx(0.2)
+    assert speeds.against((1.2, 0.0, 0.0), (0.0, 0.0, -1.0)).speeding_up_m_s2 == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("speed_m_s", "tried_m_s"), [(2.0, 0.5), (0.8, 0.3), (0.2, 0.2)])
