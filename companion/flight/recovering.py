@@ -47,7 +47,7 @@ class Recover:
         self._has_left, self._may_fall = False, False
         self._has_hung = False  # was pressed on the obstacle, and has not left it since
         self._planned_for: object = None  # the state of the contact that the plan was made for
-        self._plan, self._plan_began_us = _planned(flight, self._contact, self._state(), self._surfaces), now_us
+        self._plan, self._plan_began_us = self._plan_from(self._state()), now_us
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
@@ -178,16 +178,17 @@ class Recover:
         return MotionState(place, velocity, limited(acceleration, self._config.acceleration_m_s2))
 
     def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
-        """Update goal and plan from what is known by now; also where the vehicle is off its plan."""
+        """Update goal and plan from what is known by now; the plan alone where the vehicle is off it."""
         self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
         state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
         planned_m_s = self._plan.at(elapsed_s).velocity_ned_m_s
-        # One that follows its plan lags behind the largest acceleration by LEAD_S.
-        is_on = math.dist(planned_m_s, state.velocity_ned_m_s) <= reflex.LEAD_S * self._config.acceleration_m_s2
-        if known != self._planned_for or not is_on:
+        is_on = math.dist(planned_m_s, state.velocity_ned_m_s) <= reflex.OFF_PLAN_M_S
+        if known != self._planned_for or not (self._is_known or is_on):
             self._planned_for = known
             self._aim(flight, state, now_us)
+        elif not is_on:
+            self._plan, self._plan_began_us = self._plan_from(state), now_us
 
     def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
         """Plan again from the present contact and motion, with a new recovery setpoint."""
@@ -201,6 +202,10 @@ class Recover:
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
             text = f"off the obstacle at {off_m_s:.2f} m/s; recovery setpoint {as_text(flight.mission_ned_m(place))}"
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
+
+    def _plan_from(self, state: MotionState) -> Plan:
+        """A plan to the present setpoint."""
+        return shortest(state, lambda _: self._record.setpoint_ned_m, self._config.acceleration_m_s2)
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""

@@ -22,6 +22,8 @@ DURATION_STEP = 1.05
 CLIMB_GAIN_PER_S = 4.0
 # PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
 HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
+# Largest error of a vehicle that follows its plan: LEAD_S behind 3 m/s^2.
+OFF_PLAN_M_S = 0.45
 # A tilt of 14 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
 PRESSING_TILT_M_S2 = 2.5
 # Half of gravity, down. The other half is thrust to steer with.
@@ -62,9 +64,9 @@ LEAST_UPRIGHT_COSINE = 0.5
 CONTACT_LINGERS_US = 50_000
 # Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
 # 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.
-CORRECTION_DELAY_S = (0.05, 0.13, 0.21)
+CORRECTION_DELAY_S = (0.04, 0.1, 0.16, 0.22)
 CORRECTION_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
-CORRECTION_DAMPING = (0.55, 0.8)
+CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 # The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
 # Error of the models on those hits, RMS over 3 s, per m/s of clipped velocity: of the position, in s. That of the
@@ -78,7 +80,7 @@ PLACE_SPREAD_M = 0.1
 CONVERGED_M_S = 0.15
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice CONVERGED_M_S is a position that jumped.
-COMPARED_S = 0.5
+COMPARED_S, MOST_VELOCITY_ERROR_M_S = 0.5, 0.3
 # Standard deviation of the velocity after a hit about the expected one: at least, and as a share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
 SPREAD, LEAST_SPREAD_M_S = 0.3, 0.1

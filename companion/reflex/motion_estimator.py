@@ -287,7 +287,7 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
     further_m = plus(led, -1.0, measured.position_ned_m)
     estimate = plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
-    return limited(estimate, 2.0 * reflex.CONVERGED_M_S)
+    return limited(estimate, reflex.MOST_VELOCITY_ERROR_M_S)
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:

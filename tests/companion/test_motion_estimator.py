@@ -16,7 +16,7 @@ from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition
 from companion.mission.model import Mission
 from companion.motion.strapdown import Strapdown
-from companion.reflex.config import CONVERGED_M_S, TILT_PER_S
+from companion.reflex.config import CONVERGED_M_S, MOST_VELOCITY_ERROR_M_S, TILT_PER_S
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator, tilt_ahead
 from companion.reflex.planner import MotionState
@@ -321,7 +321,7 @@ def test_a_place_that_jumps_makes_no_large_error_of_a_velocity():
     found.note_contact(True, HIT_US)
     for since_us in range(60_000, 400_000, 20_000):
         found.update(said(0.0, since_us, (3.0 if since_us < 200_000 else 8.0, 0.0, -2.0)))
-    assert math.hypot(*found.velocity_error_m_s) <= 2.0 * CONVERGED_M_S + 1e-9
+    assert math.hypot(*found.velocity_error_m_s) <= MOST_VELOCITY_ERROR_M_S + 1e-9
 
 
 def test_a_push_that_its_sensor_shows_one_axis_of_is_turned_back_by_the_velocity():

@@ -49,7 +49,7 @@ def taken_over(air: Air, mode: int) -> dict[str, Any]:
     ("mode", "name", "every", "also"),
     [
         (POSCTL, "POSCTL", 37, []),
-        pytest.param(AUTO_LOITER, "AUTO.LOITER", 97, [], marks=pytest.mark.slow),
+        pytest.param(AUTO_LOITER, "AUTO.LOITER", 101, [], marks=pytest.mark.slow),
         # After the recovery the mission lands, too, and may do so before a second message says what the pilot chose.
         pytest.param(AUTO_LAND, "AUTO.LAND", 101, ["landing"], marks=pytest.mark.slow),
     ],
