@@ -36,7 +36,7 @@ class ImpactEstimate:
     obstacle. `impulse_m_s` is the contact's impulse per unit mass. `peak_specific_force_m_s2` is the largest in one
     IMU sample. `is_fully_measured`: nothing was clipped; otherwise the vehicle's own estimate may lack a part of the
     hit. `is_lower_bound`: it may have been clipped, or samples are missing, and both may be larger. `is_final`: the
-    contact is over. `integrated_s`: so long the accelerometer's integral counts the first sample.
+    contact is over. `earlier` is the IMU sample before the first one that shows it.
     """
 
     impact: Impact
@@ -53,7 +53,7 @@ class ImpactEstimate:
     kind: ImpactKind
     confidence: float
     is_final: bool
-    integrated_s: float = 0.0
+    earlier: ImuSample | None = None
 
 
 @dataclass(slots=True)
@@ -66,6 +66,7 @@ class ImpactEstimator:
     sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     validity: VelocityValidity = field(default_factory=VelocityValidity)
     imu: ImuSample | None = None
+    earlier_imu: ImuSample | None = None
     estimate: ImpactEstimate | None = None
     contact: ContactForce | None = None
     came_ned_m_s: Vector3 = ZERO
@@ -81,7 +82,7 @@ class ImpactEstimator:
             if not self.inertial.imu(sample):
                 self.sums.clear()
             self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
-            self.imu = sample
+            self.earlier_imu, self.imu = self.imu, sample
         elif isinstance(sample, LocalPosition | Odometry):
             if isinstance(sample, LocalPosition):
                 self.history.add(sample)
@@ -109,8 +110,7 @@ class ImpactEstimator:
         force_ned = body_to_ned(self.inertial.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
         self.situation = situation
-        by_force = impact.evidence is Evidence.FORCE
-        self.contact = self._begin_contact_force(impact) if by_force else None
+        self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.contact_ended_boot_us = sample_us
         self.validity.invalidate(sample_us)
@@ -129,7 +129,7 @@ class ImpactEstimator:
             kind=impact.kind,
             confidence=impact.confidence,
             is_final=False,
-            integrated_s=1e-6 * (self.sums[-1][0] - self.sums[-2][0]) if by_force and len(self.sums) > 1 else 0.0,
+            earlier=self.earlier_imu,
         )
         return estimate
 

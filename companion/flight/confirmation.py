@@ -1,90 +1,134 @@
-"""Confirmation of a hit. The first message starts a recovery at once; the hit counts when other evidence confirms it.
+"""Confirmation of a hit. The first sample starts a recovery at once; the hit counts when other evidence confirms it.
 
-The first piece of evidence is one IMU sample or one velocity. The second is another sample of the contact's force, or a
-change of the vehicle's own velocity. A true impulse changes the velocity. A broken or forged packet does not.
+The first piece of evidence is one IMU sample. The second is another sample of the contact's force, or a rate jump that
+no motor makes, or a change of the vehicle's own velocity. A true impulse over that sample's averaging time must change
+the velocity. A broken or forged packet does not: the next rates and velocities reject it.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
+from statistics import fmean, median, stdev
 
 from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
-from companion.messages import LocalPosition, Vector3
+from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix, less_sum
-from companion.reflex.halfspace import plus
+from companion.motion.strapdown import MOTORS_RAD_S2
+from companion.reflex.halfspace import plus, split
 from companion.reflex.planner import REST
 
-# Time to the decision, and of the velocities before. All but the longest contacts are over by then (0.12 s at 1 m/s),
-# and the vehicle's estimate is 20 to 40 ms late. A tilt of 17 degrees for this time moves a vehicle by 3 cm.
+# A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
+STRUCK_M_S = 0.5
+# Time to the decision. All but the longest contacts are over by then (0.12 s at 1 m/s), and the vehicle's estimate is
+# 20 to 40 ms late. A tilt of 17 degrees for this time moves a vehicle by 3 cm.
 DECIDED_US = 150_000
+LATE_US = 40_000
+# Velocities before the hit are averaged over the same time; the shorter it is, the smaller are the slow errors.
+BEFORE_US = DECIDED_US
 # A hit that matters changes the velocity by more than this; noise alone reaches 0.1 m/s now and then.
 HIT_LEAVES_M_S = 0.15
-# Standard deviations of the places' noise that a rejection needs.
+# Standard deviations of the noise that a rejection needs.
 SURE = 3.0
 
 
+@dataclass(slots=True)
+class ForceHypothesis:
+    """A hit that one IMU sample shows: the contact force per mass, local NED, as a mean over a window."""
+
+    time_boot_us: int
+    earlier: ImuSample  # the sample before
+    force_ned_m_s2: Vector3
+    averaging_s: float
+    later_boot_us: int | None = None  # time of the sample after, once it has come
+    is_turned: bool = False  # whether that sample shows a rate jump that no motor makes
+
+    def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
+        """Take the newest IMU sample's time and rates (FRD). The first one after the hit may show a rate jump."""
+        if self.later_boot_us is None and time_boot_us > self.time_boot_us:
+            self.later_boot_us = time_boot_us
+            elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)
+            turned = math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s)
+            self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
+
+    def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
+        """Whether the velocities after the sample show no impulse of this size.
+
+        `fixes` have each velocity beside the accelerometer's integral (trapezoids). The sample in question is taken out
+        of the integral. After a true impulse the velocity is ahead of it by the whole impulse; otherwise both agree.
+        """
+        hit_us, later_us = self.time_boot_us, self.later_boot_us
+        was = [less_sum(fix) for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
+        came = [less_sum(fix) for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
+        size_m_s2 = math.hypot(*self.force_ned_m_s2)
+        if len(was) < 2 or len(came) < 2 or later_us is None or size_m_s2 == 0.0:
+            return False
+        away = plus(REST, 1.0 / size_m_s2, self.force_ned_m_s2)
+        in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - self.earlier.time_boot_us)
+        change = plus(plus(_mean(came), -1.0, _mean(was)), in_sum_m_s, away)
+        spread = stdev(split(each, away)[0] for each in was) * math.sqrt(1.0 / len(was) + 1.0 / len(came))
+        least_m_s = 0.5 * max(size_m_s2 * self.averaging_s, HIT_LEAVES_M_S)
+        is_unmoved = split(change, away)[0] < least_m_s and least_m_s > SURE * spread
+        # A stuck axis shows no force along itself.
+        return is_unmoved and math.hypot(*change) < STRUCK_M_S
+
+
 @dataclass(frozen=True, slots=True)
-class Hypothesis:
-    """A hit that one message shows. Boot times; impulses per mass in local NED."""
+class VelocityJumpHypothesis:
+    """A hit that one velocity shows: it has jumped."""
 
     time_boot_us: int
     free_until_boot_us: int
-    impulse_ned_m_s: Vector3
-    in_sum_ned_m_s: Vector3  # what the accelerometer's integral has of it: nothing where a velocity shows it
+    change_m_s: float
+    away: Vector3  # its direction, local NED
 
-    @property
-    def least_m_s(self) -> float:
-        """The least change of the velocity that confirms the hit."""
-        return 0.5 * max(math.hypot(*self.impulse_ned_m_s), HIT_LEAVES_M_S)
-
-    def is_rejected(self, fixes: Sequence[VelocityFix], places: MotionHistory, position_noise_m: float) -> bool:
-        """Whether no change of the velocity shows the impulse, or the places do not follow it."""
-        return self._is_unmoved(fixes) or self._stays_in_place(places, position_noise_m)
-
-    def _is_unmoved(self, fixes: Sequence[VelocityFix]) -> bool:
-        """The sample in question is taken out of the integral: after a true impulse the velocity is ahead by that.
-
-        Medians: one velocity may be forged, and the first ones after a hit are late.
-        """
+    def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
+        """Whether no velocity since shows half of the jump."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
-        was = [less_sum(fix) for fix in fixes if free_us - DECIDED_US <= fix.time_boot_us <= free_us]
-        came = [less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
-        if len(was) < 2 or len(came) < 2:
+        before = [less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
+        after = [less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
+        if len(before) < 2 or len(after) < 2:
             return False
-        change = plus(plus(_median(came), -1.0, _median(was)), 1.0, self.in_sum_ned_m_s)
-        # In any direction: a stuck axis shows no force along itself.
-        return math.hypot(*change) < self.least_m_s
+        # The median: one of them may be forged.
+        was = median(split(each, self.away)[0] for each in before)
+        return all(split(came, self.away)[0] - was < 0.5 * self.change_m_s for came in after)
 
-    def _stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
-        """Whether the places before and after a velocity that jumped show less of it, beyond their noise."""
-        free_us, hit_us, least_m_s = self.free_until_boot_us, self.time_boot_us, self.least_m_s
-        was = _velocity(history.between(free_us - DECIDED_US, free_us + 1))
-        came = _velocity(history.between(hit_us + 1, hit_us + DECIDED_US + 1))
-        is_hidden = self.in_sum_ned_m_s != REST or least_m_s * DECIDED_US * 1e-6 < SURE * position_noise_m
-        return was is not None and came is not None and not is_hidden and math.dist(came, was) < least_m_s
+    def stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
+        """Whether the positions before and after show less than half of the jump, beyond their noise."""
+        free_us, hit_us = self.free_until_boot_us, self.time_boot_us
+        was = self._came_m_s(history.between(free_us - BEFORE_US, free_us + 1))
+        came = self._came_m_s(history.between(hit_us + 1, hit_us + DECIDED_US + 1))
+        least_m_s = 0.5 * self.change_m_s
+        if was is None or came is None or least_m_s * DECIDED_US * 1e-6 < SURE * position_noise_m:
+            return False
+        return came - was < least_m_s
+
+    def _came_m_s(self, places: Sequence[LocalPosition]) -> float | None:
+        """Speed of the positions along the jump, m/s; None for too few of them."""
+        if not places or places[-1].time_boot_us - places[0].time_boot_us < 0.5 * DECIDED_US:
+            return None
+        over_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us)
+        return split(plus(places[-1].position_ned_m, -1.0, places[0].position_ned_m), self.away)[0] / over_s
 
 
-def _velocity(places: Sequence[LocalPosition]) -> Vector3 | None:
-    """Of the positions, m/s; None for too few of them."""
-    lasted_s = 1e-6 * (places[-1].time_boot_us - places[0].time_boot_us) if places else 0.0
-    if lasted_s < 0.5e-6 * DECIDED_US:
-        return None
-    return plus(REST, 1.0 / lasted_s, plus(places[-1].position_ned_m, -1.0, places[0].position_ned_m))
-
-
-def _median(vectors: Iterable[Vector3]) -> Vector3:
-    n, e, d = (median(axis) for axis in zip(*vectors, strict=True))
+def _mean(vectors: Sequence[Vector3]) -> Vector3:
+    n, e, d = (fmean(axis) for axis in zip(*vectors, strict=True))
     return (n, e, d)
 
 
-def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Hypothesis | None:
+def hypothesis_of(
+    estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float
+) -> ForceHypothesis | VelocityJumpHypothesis | None:
     """The hypothesis that remains to be confirmed; None where more than one message shows the hit already."""
-    hit_us, free_us = estimate.impact.sample_time_boot_us, estimate.impact.contact_free_until_boot_us
-    if estimate.is_final:
+    impact = estimate.impact
+    hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
+    if impact.evidence is Evidence.VELOCITY_JUMP:
+        size_m_s2 = math.hypot(*force_ned_m_s2)
+        if size_m_s2 == 0.0:
+            return None
+        away = plus(REST, 1.0 / size_m_s2, force_ned_m_s2)
+        return VelocityJumpHypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
+    if estimate.is_final or estimate.earlier is None:
         return None
-    lasted_s = averaging_s if estimate.impact.evidence is Evidence.FORCE else 1e-6 * (hit_us - free_us)
-    in_sum = plus(REST, estimate.integrated_s, force_ned_m_s2)
-    return Hypothesis(hit_us, free_us, plus(REST, lasted_s, force_ned_m_s2), in_sum)
+    return ForceHypothesis(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)

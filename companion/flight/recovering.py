@@ -7,7 +7,7 @@ from dataclasses import replace
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery, level
-from companion.flight.confirmation import Hypothesis, hypothesis_of
+from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.detection_event import report_detection
 from companion.flight.obstacle_map import remembered_surfaces
@@ -274,7 +274,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     report_detection(flight, record, now_us)
 
 
-def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> Hypothesis | None:
+def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
     """The hypothesis of a first sample; None without an attitude, or while the vehicle recovers from another hit."""
     attitude = flight.vehicle.attitude
     if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
