@@ -23,6 +23,7 @@ from companion.reflex.planner import (
     MotionState,
     Plan,
     height_feedback,
+    holds,
     kept_off,
     safe_to_hold,
     shortest,
@@ -67,21 +68,22 @@ class Recover:
         # The estimate's known errors of position, velocity and tilt are added, because PX4 controls its own estimate.
         place = plus(planned.position_ned_m, 1.0, estimator.position_error_m)
         velocity = plus(planned.velocity_ned_m_s, 1.0, estimator.velocity_error_m_s)
-        return Target(place, self._yaw_rad, velocity, plus((a, b, c), -1.0, record.level_acceleration_m_s2))
+        asked = (reflex.ACCELERATION_GAIN * a, reflex.ACCELERATION_GAIN * b, c)
+        return Target(place, self._yaw_rad, velocity, plus(asked, -1.0, record.level_acceleration_m_s2))
 
     def _by_acceleration(self, planned: MotionState) -> Target:
         """A setpoint of acceleration alone: PX4's estimate is wrong, or its loops would harm this motion."""
         goal, record, state = self._record.setpoint_ned_m, self._record, self._state()
         a, b, c = safe_to_hold(with_feedback(planned, state), self._tilted_motion.velocity_ned_m_s)
+        is_free = self._lets_go or (self._is_level and not self._is_known)
         # Where the height is free, PX4's own loop adds nothing.
-        a, b, c = self._kept_off((a, b, self._height_m_s2(2.0) if self._is_level else c))
+        a, b, c = self._kept_off((a, b, self._height_m_s2(2.0 if is_free else 1.0) if self._is_level else c))
         if self._lets_go:
             c = reflex.DESCENT_M_S2 if self._tilts_into_surface() else max(c, 0.0)
         # The velocity of the vehicle's own estimate: PX4's vertical loop then adds nothing to the acceleration.
-        velocity = (0.0, 0.0, record.estimated_down_m_s) if self._is_level else REST
+        velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
         expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
-        told = None if self._is_known else expected
-        return Target(goal, self._yaw_rad, velocity, (a, b, c), True, self._is_level, told)
+        return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
 
     @property
     def _is_level(self) -> bool:
@@ -132,9 +134,9 @@ class Recover:
                 self._follow(flight, sample, now_us)
             if not is_known:
                 continue
-            record.follow_recovery(record.estimator.corrected(sample))
-            motion = record.estimator.motion
-            since_us = self._monitor.settled_since(sample.time_boot_us, motion.position_ned_m, motion.velocity_ned_m_s)
+            right = record.estimator.corrected(sample)
+            record.follow_recovery(right)
+            since_us = self._monitor.settled_since(right)
             if since_us is not None:
                 record.settled_at_boot_us = since_us
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
@@ -182,8 +184,7 @@ class Recover:
         self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
         state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
-        planned_m_s = self._plan.at(elapsed_s).velocity_ned_m_s
-        is_on = math.dist(planned_m_s, state.velocity_ned_m_s) <= reflex.OFF_PLAN_M_S
+        is_on = holds(self._plan.at(elapsed_s), state)
         if known != self._planned_for or not (self._is_known or is_on):
             self._planned_for = known
             self._aim(flight, state, now_us)
@@ -237,12 +238,12 @@ def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | Non
 
 
 def _has_room_below(flight: FlightContext) -> bool:
-    """Whether a fall can still be stopped above the ground, as far off as an obstacle."""
+    """Whether a fall can still be stopped above the ground."""
     latest, height_m = flight.vehicle.history.latest(), flight.height_m
     if latest is None or height_m is None:
         return False
     down_m_s = max(0.0, latest.velocity_ned_m_s[2])
-    return height_m > flight.mission.recovery.clearance_m + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
+    return height_m > reflex.LEFT_BELOW_M + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -18,18 +18,20 @@ HARD_BRAKING = 2.0
 TOUCH_TOLERANCE_M = 0.05
 # Ratio of one tried duration to the next. The lag is known less precisely than to 5 %.
 DURATION_STEP = 1.05
+# PX4's velocity loop subtracts a share of the measured acceleration: MPC_XY_VEL_D_ACC, 0.2 at most.
+ACCELERATION_GAIN = 1.1
 # PX4's MPC_Z_VEL_P_ACC, 1/s: the gain of its own loop against a climb. The companion adds the same again.
 CLIMB_GAIN_PER_S = 4.0
 # PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
 HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
-# Largest error of a vehicle that follows its plan: LEAD_S behind 3 m/s^2.
-OFF_PLAN_M_S = 0.45
+# Largest error of a vehicle that follows its plan: LEAD_S behind 3 m/s^2, and the integral of that.
+OFF_PLAN_M_S, OFF_PLAN_M = 0.45, 0.3
 # A tilt of 14 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
 PRESSING_TILT_M_S2 = 2.5
 # Half of gravity, down. The other half is thrust to steer with.
 DESCENT_M_S2 = 4.9
-# Acceleration that stops a descent (hover at 78 % of the thrust, not yet level).
-STOPPING_M_S2 = 2.0
+# Acceleration that stops a descent (hover at 78 % of the thrust, not yet level), and the least height after it.
+STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
 # A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
 YAW_LEAD_RAD = 0.28
@@ -69,9 +71,8 @@ CORRECTION_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
 CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 # The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
-# Error of the models on those hits, RMS over 3 s, per m/s of clipped velocity: of the position, in s. That of the
-# velocity is 0.03.
-MODEL_ERROR = 0.02
+# Errors of this model on those hits, RMS over 3 s, per m/s of clipped velocity: of the velocity, of the position in s.
+MODEL_ERROR, MODEL_ERROR_S = 0.03, 0.02
 # Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
 # Standard deviation of the position of the hit.

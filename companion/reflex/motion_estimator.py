@@ -233,9 +233,11 @@ class MotionEstimator:
         self._at_boot_us, self._moved_m_s = at_us, summed
         g, way_s, left = error_response(since_s)
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
-        off2 = (reflex.MODEL_ERROR * math.hypot(*bank.error_m_s)) ** 2
-        bank.update(0, way_s, sample.position_ned_m, colour * (config.position_noise_m**2 + off2))
-        bank.update(1, g, sample.velocity_ned_m_s, colour * (config.velocity_noise_m_s**2 + off2))
+        hidden_m_s = math.hypot(*bank.error_m_s)
+        off_m = hidden_m_s * min(reflex.MODEL_ERROR * since_s, reflex.MODEL_ERROR_S)
+        off_m_s = hidden_m_s * reflex.MODEL_ERROR
+        bank.update(0, way_s, sample.position_ned_m, colour * (config.position_noise_m**2 + off_m**2))
+        bank.update(1, g, sample.velocity_ned_m_s, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         estimate, spread_m_s, left_m_s = bank.estimate(left)
         self.has_converged = self.has_converged or left_m_s <= reflex.CONVERGED_M_S
         if self.has_converged:

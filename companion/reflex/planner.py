@@ -81,6 +81,13 @@ def shortest(state: MotionState, goal_ned_m: Callable[[float], Vector3], most_m_
         duration_s *= reflex.DURATION_STEP
 
 
+def holds(planned: MotionState, motion: MotionState) -> bool:
+    """Whether the vehicle follows the plan, as closely as PX4's loops do."""
+    off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
+    off_m = math.dist(planned.position_ned_m, motion.position_ned_m)
+    return off_m_s <= reflex.OFF_PLAN_M_S and off_m <= reflex.OFF_PLAN_M
+
+
 def with_feedback(planned: MotionState, motion: MotionState) -> Vector3:
     """The plan's acceleration, plus the feedback of PX4's loops for a vehicle that is off the plan."""
     slower = plus(planned.velocity_ned_m_s, -1.0, motion.velocity_ned_m_s)

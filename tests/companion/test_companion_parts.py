@@ -1,6 +1,7 @@
 """The small parts of a flight: line profiles, settling, commands, authority, identity."""
 
 import math
+import random
 
 import pytest
 
@@ -57,14 +58,20 @@ def test_a_line_of_no_length_is_over_at_once():
 # --- settling
 
 
-def positions(offset_m, speed_m_s, seconds, start_us=0):
+def positions(offset_m, speed_m_s, seconds, noise_m_s=0.0, start_us=0, seed=3):
+    rng = random.Random(seed)
     for t_us in range(start_us, start_us + round(seconds * 1e6), 20_000):
-        yield LocalPosition(t_us, (offset_m, 0.0, -1.5), (speed_m_s, 0.0, 0.0))
+        velocity = (
+            speed_m_s + rng.gauss(0.0, noise_m_s),
+            rng.gauss(0.0, noise_m_s),
+            rng.gauss(0.0, noise_m_s),
+        )
+        yield LocalPosition(t_us, (offset_m, 0.0, -1.5), velocity)
 
 
-def settled(samples):
-    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig())
-    return [monitor.settled_since(each.time_boot_us, each.position_ned_m, each.velocity_ned_m_s) for each in samples]
+def settled(samples, **config):
+    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig(**config))
+    return [monitor.settled_since(sample) for sample in samples]
 
 
 def test_settled_after_half_a_second_at_rest_and_not_before():
@@ -79,15 +86,22 @@ def test_too_far_or_too_fast_is_not_settled(offset_m, speed_m_s):
 
 
 def test_a_break_starts_the_time_anew():
+    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig(smoothing_s=0.0))
     samples = [
         *positions(0.0, 0.0, 0.4),
         *positions(0.2, 0.0, 0.04, start_us=400_000),
         *positions(0.0, 0.0, 1.0, start_us=440_000),
     ]
-    results = settled(samples)
+    results = [monitor.settled_since(sample) for sample in samples]
     first = next(i for i, r in enumerate(results) if r is not None)
     assert results[first] == 440_000
     assert samples[first].time_boot_us == 940_000
+
+
+def test_the_noise_of_a_good_estimate_does_not_keep_a_vehicle_from_settling():
+    for seed in range(20):
+        since = settled(positions(0.0, 0.0, 1.0, noise_m_s=0.03, seed=seed))
+        assert since[-1] is not None
 
 
 # --- command client
