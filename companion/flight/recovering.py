@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
+from companion.estimate.normal import Normal
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery, level
 from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
@@ -43,10 +44,11 @@ class Recover:
         if flight.target is not None and len(together) == 1:
             flight.yaw_rad = flight.target.yaw_rad
         self._yaw_rad = flight.yaw_rad
-        self._surfaces = _surfaces(flight, self._contact)
+        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
         self._is_known = not self._law.follows  # whether the motion after the hit is known
         self._has_left, self._may_fall = False, False
         self._has_hung = False  # was pressed on the obstacle, and has not left it since
+        self._agreed: Normal | None = None  # the normal from the velocities before and after
         self._planned_for: object = None  # the state of the contact that the plan was made for
         self._plan, self._plan_began_us = self._plan_from(self._state()), now_us
         self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
@@ -163,8 +165,11 @@ class Recover:
         self._is_known = was_known or record.estimator.has_converged
         is_rebound = sample.time_boot_us <= record.contact_ended_boot_us + REBOUND_WINDOW_US
         # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        if self._is_known and not record.estimator.is_second and (is_rebound or not was_known):
-            record.after_ned_m_s = record.estimator.corrected(sample).velocity_ned_m_s
+        is_measured = not record.estimator.is_second
+        if self._is_known and is_measured and (is_rebound or not was_known):
+            after = record.estimator.corrected(sample).velocity_ned_m_s
+            record.after_ned_m_s = after
+            self._agreed = record.normal
         return self._is_known
 
     def _state(self) -> MotionState:
@@ -188,15 +193,15 @@ class Recover:
         if known != self._planned_for or not (self._is_known or is_on):
             self._planned_for = known
             self._aim(flight, state, now_us)
-        elif not is_on:
-            self._plan, self._plan_began_us = self._plan_from(state), now_us
+        elif is_on or not self._law.plans:
+            return
+        self._plan, self._plan_began_us = self._plan_from(state), now_us
 
     def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
-        """Plan again from the present contact and motion, with a new recovery setpoint."""
+        """Set the recovery setpoint again, from the present contact and motion."""
         record, before = self._record, self._record.setpoint_ned_m
-        self._surfaces = _surfaces(flight, self._contact)
-        self._plan, self._plan_began_us = _planned(flight, self._contact, state, self._surfaces), now_us
-        record.setpoint_ned_m = place = self._plan.goal_ned_m
+        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
+        record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, self._surfaces)
         self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
         if math.dist(place, before) > flight.mission.companion.settled.distance_m:
             record.overshoot_m = 0.0  # measured past the earlier setpoint
@@ -205,15 +210,17 @@ class Recover:
             flight.report(now_us, "rebound", text, speed_m_s=off_m_s, recovery_setpoint_ned_m=place)
 
     def _plan_from(self, state: MotionState) -> Plan:
-        """A plan to the present setpoint."""
-        return shortest(state, lambda _: self._record.setpoint_ned_m, self._config.acceleration_m_s2)
+        goal = self._record.setpoint_ned_m
+        if not self._law.plans:
+            return Plan(state, goal, 0.0)
+        return shortest(state, lambda _: goal, self._config.acceleration_m_s2)
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""
         is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < reflex.CONTACT_LINGERS_US
-        estimator, contact, known = self._record.estimator, self._contact, self._record.normal
-        if self._record.after_ned_m_s is not None:
-            contact = replace(contact, normal_ned=known.direction_ned, normal_error_rad=known.error_rad)
+        estimator, contact = self._record.estimator, self._contact
+        if self._agreed is not None:
+            contact = replace(contact, normal_ned=self._agreed.direction_ned, normal_error_rad=self._agreed.error_rad)
         normal = contact.normal_ned
         off_m_s = split(estimator.motion.velocity_ned_m_s, normal)[0]
         is_pushed = split(estimator.external_m_s2, normal)[0] > reflex.PRESSING_TILT_M_S2
@@ -248,11 +255,11 @@ def _has_room_below(flight: FlightContext) -> bool:
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """Record a new collision: the motion just before it, and the recovery setpoint from that."""
-    mission, impact = flight.mission, estimate.impact
+    mission, impact, law = flight.mission, estimate.impact, _law(flight)
     normal = level(estimate.normal)
     place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
     before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
-    is_second = _law(flight).follows and before is not None and not before.estimator.knows_motion
+    is_second = law.follows and before is not None and not before.estimator.knows_motion
     if before is not None and is_second:
         # The vehicle's estimate is still wrong from the hit before.
         place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
@@ -263,7 +270,7 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         sample_time_boot_us=impact.sample_time_boot_us,
         detector=mission.companion.detector,
         contact=contact,
-        setpoint_ned_m=_planned(flight, contact, expected, _surfaces(flight, contact)).goal_ned_m,
+        setpoint_ned_m=_setpoint(flight, contact, expected, _surfaces(flight, contact, flight.collisions)),
         contact_normal=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
         contact_ended_boot_us=impact.sample_time_boot_us,
@@ -288,23 +295,20 @@ def _law(flight: FlightContext) -> Law:
     return RECOVERY_LAWS[flight.mission.recovery.law]
 
 
-def _planned(flight: FlightContext, contact: Contact, motion: MotionState, surfaces: Sequence[Surface]) -> Plan:
-    """The shortest plan to the law's goal, moved clear of surfaces and into the fence."""
+def _setpoint(flight: FlightContext, contact: Contact, motion: MotionState, surfaces: Sequence[Surface]) -> Vector3:
+    """The law's goal, moved clear of surfaces and into the fence."""
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
-    bounds, config, law = FenceBounds(flight.origin_ned_m, flight.mission.fence), flight.mission.recovery, _law(flight)
-
-    def goal_ned_m(duration_s: float) -> Vector3:
-        goal = law.goal_ned_m(config, contact, motion, duration_s)
-        goal = clear_goal(surfaces[1:], contact.position_ned_m, contact.normal_ned, goal)
-        return bounds.clamp(contact.position_ned_m, goal)
-
-    return shortest(motion, goal_ned_m, config.acceleration_m_s2)
+    goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion)
+    goal = clear_goal(surfaces[1:], contact.position_ned_m, contact.normal_ned, goal)
+    return FenceBounds(flight.origin_ned_m, flight.mission.fence).clamp(contact.position_ned_m, goal)
 
 
-def _surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:
+def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[CollisionRecord]) -> list[Surface]:
     """The surface just hit first, then those hit before in the same recovery, then the obstacle map's."""
     surfaces = [Surface(contact.position_ned_m, contact.normal_ned, flight.mission.recovery.clearance_m)]
-    for record in in_one_recovery(flight.collisions):
+    for record in reversed(records):
+        if record.is_over:
+            break
         if record.contact.time_boot_us < contact.time_boot_us:
             touched = Surface(record.contact.position_ned_m, record.normal.direction_ned, 0.0)
             surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))

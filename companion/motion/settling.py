@@ -1,7 +1,5 @@
 """Has the vehicle come to rest at a place?"""
 
-import math
-
 from companion.messages import LocalPosition, Vector3
 from companion.strict_model import NotNegative, Positive, StrictModel
 
@@ -62,10 +60,15 @@ class SettlingMonitor:
 
     def _is_at_rest(self) -> bool:
         assert self._position is not None
-        is_there = math.dist(self._position, self._place) <= self._config.distance_m
-        return is_there and math.hypot(*self._velocity) < self._config.speed_m_s
+        p, q, v = self._position, self._place, self._velocity
+        distance2 = (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
+        speed2 = v[0] ** 2 + v[1] ** 2 + v[2] ** 2
+        return distance2 <= self._config.distance_m**2 and speed2 < self._config.speed_m_s**2
 
 
 def _blend(old: Vector3, new: Vector3, weight: float) -> Vector3:
-    (a, b, c), (x, y, z) = old, new
-    return (a + weight * (x - a), b + weight * (y - b), c + weight * (z - c))
+    return (
+        old[0] + weight * (new[0] - old[0]),
+        old[1] + weight * (new[1] - old[1]),
+        old[2] + weight * (new[2] - old[2]),
+    )

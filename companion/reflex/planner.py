@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-from companion.motion.strapdown import ZERO
 from companion.reflex import config as reflex
 from companion.reflex.halfspace import Surface, plus, split
 
-REST = ZERO
-# A plan is checked at multiples of 1/14: its first part accelerates most at 1/2, the second at 0.21 and 0.79.
-_LOOKS = 14
+REST: Vector3 = (0.0, 0.0, 0.0)
+# Values of s at which a plan is checked: its first part's acceleration is largest at 1/2, the second's at 0.21, 0.79.
+_LOOKED_AT = (0.21, 0.3, 0.4, 0.5, 0.6, 0.7, 0.79)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class Plan:
 
     def most_m_s2(self) -> float:
         """The plan's largest acceleration, m/s^2."""
-        return max(math.hypot(*(a for _, _, a in self._axes(k / _LOOKS, k / _LOOKS))) for k in range(3, _LOOKS - 2))
+        return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in _LOOKED_AT)
 
 
 def _axis(
