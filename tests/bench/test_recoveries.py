@@ -26,7 +26,7 @@ def test_a_vehicle_that_the_hit_spins_comes_to_rest_though_lower_and_further_on(
     flight = work_out(RecoveryCase("adaptive", "rigid", 30, 5.0, 1))
     assert flight["outcome"] == "completed"
     assert flight["lost_m"] < 0.2
-    assert flight["past_m"] < 0.7
+    assert flight["past_m"] < 0.8
 
 
 @pytest.mark.parametrize(("airframe", "speed_m_s"), [("rigid", 2.0), ("foldable", 4.0)])
