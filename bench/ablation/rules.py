@@ -60,7 +60,7 @@ RULES = (
     Rule(
         "second sample",
         "a weak force shows in two samples together",
-        _DETECTION + "force_signs:together_m_s2",
+        _DETECTION + "force_signs:_together_m_s2",
         _says(0.0),
     ),
     Rule("leaning", "a lean that moves nothing is a hit", _HORIZONTAL + "step", _says(None)),

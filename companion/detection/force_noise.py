@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 # Memory of the mean. It follows drag as the speed changes, and a gust that builds up in a few tenths of a second.
 MEAN_MEMORY_S = 0.25
-# Memory of the standard deviation and of the thrust's gain: good to 5 % with 200 samples, to 12 % at the slowest rates.
+# Memory of the standard deviation: good to 5 % with 200 samples, to 12 % at the slowest useful rates.
 SPREAD_MEMORY_S = 2.0
 # The noise is known after this time: 50 samples at 50 Hz make a standard deviation good to a tenth.
 LEARNT_S = 1.0

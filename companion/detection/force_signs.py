@@ -40,13 +40,20 @@ def shakes(s: FusedState, config: FusedConfig) -> bool:
     return s.phase is Phase.ARMED and s.threshold_m_s2 > SHAKING * config.side_threshold_m_s2
 
 
-def alone_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
-    """Horizontal force of a sample by itself."""
+def side_force(s: FusedState, config: FusedConfig, force_frd_m_s2: Vector3) -> tuple[float, float, bool]:
+    """Horizontal force, m/s^2; how many thresholds are a hit; whether it is that of two samples together.
+
+    Of one sample or two on a vehicle that vibrates: what is nearer to a hit.
+    """
     x, y = force_frd_m_s2[0] - s.floor.x, force_frd_m_s2[1] - s.floor.y
-    return math.sqrt(x * x + y * y)
+    alone = math.sqrt(x * x + y * y)
+    if not shakes(s, config):
+        return alone, 1.0, False
+    together = _together_m_s2(s, force_frd_m_s2)
+    return (together, 1.0, True) if together > alone / CLEAR else (alone, CLEAR, False)
 
 
-def together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
+def _together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
     """Horizontal force of a sample and the one before it, as of one: their sum over the root of two, by which the
     noise of a sum grows. Vibration alternates, a contact does not.
 

@@ -19,14 +19,7 @@ from typing import ClassVar
 
 from companion.detection.classify import kind_of
 from companion.detection.force_noise import SETTLED_US
-from companion.detection.force_signs import (
-    CLEAR,
-    alone_m_s2,
-    shakes,
-    side_threshold_m_s2,
-    together_m_s2,
-    vertical_threshold_m_s2,
-)
+from companion.detection.force_signs import side_force, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
@@ -78,11 +71,10 @@ class FusedDetector:
         free_until_us = before_us = s.last_sample_boot_us
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
-        side = alone_m_s2(s, f)
-        if shakes(s, config):
-            side, together = side / CLEAR, together_m_s2(s, f)
-            if together > side:
-                side, free_until_us = together, s.soft.before_us
+        side, thresholds, is_of_two = side_force(s, config, f)
+        side /= thresholds
+        if is_of_two:
+            free_until_us = s.soft.before_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
         threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else side_threshold_m_s2(s, config, w)
         ratio = max(side / threshold, beyond / vertical_threshold_m_s2(s, config))

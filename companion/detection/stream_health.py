@@ -34,17 +34,18 @@ class StreamHealth:
     started_us: int
     last_heard_us: int
     arrivals_us: deque[int] = field(default_factory=deque)
-    """Of the samples in the last second, since the latest silence."""
+    """Of the samples in the second up to the newest, since the latest silence."""
 
     def imu(self, samples: int, config: StreamHealthConfig, now_us: int) -> None:
         """Take the number of samples that arrived by ``now_us``; after a silence, in which a link held them, as one."""
         if samples and now_us - self.last_heard_us > config.silence_s * 1e6:
             self.arrivals_us.clear()
             samples = 1
-        if samples:
-            self.last_heard_us = now_us
-            self.arrivals_us.extend([now_us] * samples)
-        while self.arrivals_us and now_us - self.arrivals_us[0] >= RATE_WINDOW_US:
+        if not samples:
+            return
+        self.last_heard_us = now_us
+        self.arrivals_us.extend([now_us] * samples)
+        while now_us - self.arrivals_us[0] >= RATE_WINDOW_US:
             self.arrivals_us.popleft()
 
     def fault(self, config: StreamHealthConfig, now_us: int) -> str | None:

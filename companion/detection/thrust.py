@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
-from companion.detection.force_noise import SPREAD_MEMORY_S
-
 # A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
 # the maximum of the strongest vehicle.
 STRONGEST_M_S2 = 5.0 * 9.81
+# Memory of the gain, which is known when it is full: it follows a sagging battery (minutes) and not a climb (its thrust
+# is in the message).
+GAIN_MEMORY_S = 2.0
 # Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
 LEAST_FRACTION = 0.1
 # A commanded thrust is valid for this time. Motors follow it with a lag of 20 ms.
@@ -23,7 +24,6 @@ class ThrustGain:
     fraction_boot_us: int = -KEPT_US
     full_m_s2: float = 0.0
     known_s: float = 0.0
-    """Known when it is SPREAD_MEMORY_S: a gain follows a sagging battery, and not a climb."""
 
     def set_fraction(self, time_us: int, fraction: float) -> None:
         self.fraction, self.fraction_boot_us = fraction, time_us
@@ -34,12 +34,12 @@ class ThrustGain:
 
     @property
     def is_known(self) -> bool:
-        return self.known_s >= SPREAD_MEMORY_S
+        return self.known_s >= GAIN_MEMORY_S
 
     def learn(self, time_us: int, thrust_m_s2: float, elapsed_s: float) -> None:
         """Take the specific force by thrust of one sample of a vehicle in free air."""
         if self.is_commanded(time_us) and elapsed_s > 0.0:
-            self.known_s = min(self.known_s + elapsed_s, SPREAD_MEMORY_S)
+            self.known_s = min(self.known_s + elapsed_s, GAIN_MEMORY_S)
             self.full_m_s2 += (thrust_m_s2 / self.fraction - self.full_m_s2) * elapsed_s / self.known_s
 
     @property

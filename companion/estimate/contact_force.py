@@ -10,10 +10,12 @@ from companion.motion.strapdown import ZERO
 # Samples at most 1.5 averaging windows apart are contiguous: that is nearer to one window than to two.
 CONTIGUOUS = 1.5
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
-# is a third of the range in the mean. Ringing below a third of the peak does not make a contact last.
-LEAST_SHARE = 1.0 / 3.0
-# A contact of no more samples than this is too short to exclude clipping of its raw peak.
+# is a third of the range in the mean.
+CLIPPED_SHARE = 1.0 / 3.0
+# A contact of no more samples than this is too short to exclude clipping of its raw peak. Ringing below a third of the
+# peak, or in another direction, does not count.
 SHORT = 2
+LASTING_SHARE = 1.0 / 3.0
 
 
 @dataclass(slots=True)
@@ -44,9 +46,11 @@ class ContactForce:
             return
         f, free, (n, e, d) = sample.specific_force_frd_m_s2, self.free_frd_m_s2, self.impulse_ned_m_s
         force = x, y, z = body_to_ned(attitude_wxyz, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
-        elapsed_s, is_contiguous = 1e-6 * elapsed_us, elapsed_us <= CONTIGUOUS * self.averaging_us
+        # Of the time before the first sample only its own window is known.
+        elapsed_s = 1e-6 * (elapsed_us if self.forces_ned_m_s2 else min(elapsed_us, self.averaging_us))
+        is_contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
         self.has_gap |= not is_contiguous
-        self.is_clipped |= max(map(abs, f)) >= LEAST_SHARE * self.range_m_s2
+        self.is_clipped |= max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
         self.impulse_ned_m_s = (n + elapsed_s * x, e + elapsed_s * y, d + elapsed_s * z)
         self.turn_rad_s = math.dist(sample.angular_velocity_frd_rad_s, self.first_rates_frd_rad_s)
         self.forces_ned_m_s2.append(force)
@@ -64,6 +68,6 @@ class ContactForce:
     def is_fully_measured(self) -> bool:
         """Whether the force so far was measured without clipping, as far as the samples show."""
         x, y, z = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
-        least = LEAST_SHARE * (x * x + y * y + z * z)
+        least = LASTING_SHARE * (x * x + y * y + z * z)
         lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.forces_ned_m_s2)
         return not self.is_clipped and lasting > SHORT

@@ -12,14 +12,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.force_signs import (
-    CLEAR,
-    alone_m_s2,
-    shakes,
-    side_threshold_m_s2,
-    together_m_s2,
-    vertical_threshold_m_s2,
-)
+from companion.detection.force_signs import side_force, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
@@ -118,15 +111,12 @@ def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float
         return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
     force = sample.specific_force_frd_m_s2
     threshold_m_s2 = side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s)
-    side = (alone_m_s2(state, force), threshold_m_s2)
-    if shakes(state, config):
-        together = together_m_s2(state, force)
-        # Of the two what is nearer to a hit, each as it was measured.
-        side = (together, threshold_m_s2) if CLEAR * together > side[0] else (side[0], CLEAR * threshold_m_s2)
+    side_m_s2, thresholds, _ = side_force(state, config, force)
     return (
         now_us,
         phase,
-        *side,
+        side_m_s2,
+        thresholds * threshold_m_s2,
         max(force[2], -force[2] - state.thrust.most_m_s2),
         vertical_threshold_m_s2(state, config),
     )

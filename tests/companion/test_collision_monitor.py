@@ -7,6 +7,7 @@ import pytest
 
 from bench.baselines.config import BaselineConfig
 from companion.detection.interface import Phase, Situation
+from companion.detection.stream_health import StreamHealth, StreamHealthConfig
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.monitor import advance, start_monitor
@@ -124,6 +125,19 @@ def test_a_slow_stream_stays_blind_and_is_seen_again_a_quarter_of_a_second_after
     assert blind_us <= 2_000_000
     (seeing_us,) = imu_every(monitor, 20_000, 5_000_000, 8_000_000)
     assert seeing_us <= 250_000
+
+
+def test_a_stream_at_the_least_rate_is_not_told_blind_between_its_samples():
+    # Given samples every 50 ms, each up to 8 ms late
+    arrivals = {50_000 * number + (0, 8_000, 4_000)[number % 3] for number in range(1, 180)}
+    health, config, was = StreamHealth(0, 0), StreamHealthConfig(), None
+    # When it is looked at every 2 ms, after the first second
+    for now_us in range(2_000, 9_000_000, 2_000):
+        health.imu(int(now_us in arrivals), config, now_us)
+        fault = health.fault(config, now_us)
+        # Then what is told of it changes with a sample, and not between two
+        assert now_us <= 1_000_000 or now_us in arrivals or fault == was
+        was = fault
 
 
 def test_samples_that_a_link_held_back_and_delivers_at_once_prove_no_rate():

@@ -148,6 +148,13 @@ def test_the_impulse_is_the_sum_of_the_loud_samples():
     assert contact.peak_m_s2 == pytest.approx(40.0)
 
 
+def test_of_the_time_before_the_first_sample_its_own_window_counts():
+    # Given a stream of 50 Hz whose windows are 5 ms, and a contact that one of them shows
+    contact = pushed([(-20.0, True), (0.0, False)], every_us=20_000)
+    # Then the impulse is what was seen, and no more than a lower bound
+    assert contact.impulse_ned_m_s == pytest.approx((-0.1, 0.0, 0.0)) and contact.has_gap
+
+
 def test_a_push_that_rises_and_falls_within_the_range_was_measured_whole():
     assert pushed([(-10.0, True), (-25.0, True), (-30.0, True), (-22.0, True), (-8.0, True)]).is_fully_measured
 
