@@ -7,7 +7,7 @@ ends, by PX4's velocity loop, at v + a / MPC_Z_VEL_P_ACC. That velocity beside a
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -119,16 +119,16 @@ def _asked(target: Target, motion: MotionState, axis: int) -> tuple[float | None
     return None if target.is_height_free else target.position_ned_m[2], v_s, a_s
 
 
-def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_s: float) -> Iterator[float]:
+def _led(axis: int, x: float, v: float, x_s: float | None, v_s: float | None, a_s: float) -> list[float]:
     """Of one axis: at each time, and stopped."""
     k_x, off_m = (0.0, 0.0) if x_s is None else (PLACE_GAINS_PER_S[axis], x_s - x)
     leans = x_s is None and v_s is None
     k_v = 0.0 if leans else VELOCITY_GAINS_PER_S[axis]
-    asked_m_s2, path, after_m_s = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, x, v
-    for by_asked, by_speed, left in _answers(k_x, k_v):
-        path, after_m_s = x + by_asked * asked_m_s2 + by_speed * v, by_speed * asked_m_s2 + left * v
-        yield path
-    yield path + after_m_s * (REPAIRED_S if leans else 0.5 * abs(after_m_s) / BRAKES_M_S2)
+    asked_m_s2, answers = k_v * ((v_s or 0.0) + k_x * off_m) + a_s, _answers(k_x, k_v)
+    path = [x + by_asked * asked_m_s2 + by_speed * v for by_asked, by_speed, _ in answers]
+    _, by_speed, left = answers[-1]
+    after_m_s = by_speed * asked_m_s2 + left * v
+    return [*path, path[-1] + after_m_s * (REPAIRED_S if leans else 0.5 * abs(after_m_s) / BRAKES_M_S2)]
 
 
 @cache

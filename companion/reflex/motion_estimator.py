@@ -138,7 +138,7 @@ class MotionEstimator:
     external_m_s2: Vector3 = REST  # external force per mass across the thrust, horizontal: wind, a gust or a contact
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = REST  # remaining error of the reported position, once it has converged
-    _bank: FilterBank = field(init=False)
+    _bank: FilterBank | None = None  # from the first report on
     _summed_m_s: Vector3 = REST
     _acceleration: Vector3 = REST
     _at_boot_us: int = 0  # the bank's time
@@ -155,15 +155,19 @@ class MotionEstimator:
         self._begin()
 
     def _begin(self) -> None:
-        before, after = self.contact.velocity_ned_m_s, self.start.velocity_ned_m_s
-        spread_m_s = reflex.LEAST_SPREAD_M_S + reflex.SPREAD * math.hypot(*before)
-        # Clipping hides between none and all of the change of velocity.
-        half = plus(REST, 0.5, plus(before, -1.0, after))
-        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*half) + spread_m_s)
-        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, REST, FilterBank(self.start, half, spreads)
+        self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, REST, None
         self._newest, self.has_converged = None, False
-        self.spread_m_s = 0.0 if self.is_fully_measured else spread_m_s
+        self.spread_m_s = 0.0 if self.is_fully_measured else self._expected_spread_m_s()
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
+
+    def _expected_spread_m_s(self) -> float:
+        return reflex.LEAST_SPREAD_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
+
+    def _expected(self) -> FilterBank:
+        # Clipping hides between none and all of the change of velocity.
+        half = plus(REST, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
+        spread_m_s = self._expected_spread_m_s()
+        return FilterBank(self.start, half, (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*half) + spread_m_s))
 
     @property
     def knows_motion(self) -> bool:
@@ -223,7 +227,8 @@ class MotionEstimator:
         if is_ahead or at_us <= self._at_boot_us:
             # The report's time is outside the integrated interval.
             return
-        config, bank, elapsed_s = self.config, self._bank, 1e-6 * (at_us - self._at_boot_us)
+        config, elapsed_s = self.config, 1e-6 * (at_us - self._at_boot_us)
+        bank = self._bank = self._bank or self._expected()
         since_s = 1e-6 * (at_us - self.hit_boot_us)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-3))
