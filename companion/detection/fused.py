@@ -164,9 +164,9 @@ class FusedDetector:
             return None
         if step is None:
             return None
-        spread_m_s = jump.spread_m_s
+        noise_m_s = jump.most_m_s(config.noise_factor)
         jump.learn(step)
-        size, least = math.hypot(*step), self._least_jump_m_s(s, time_us, spread_m_s, type(sample) is Odometry)
+        size, least = math.hypot(*step), self._least_jump_m_s(s, time_us, noise_m_s, type(sample) is Odometry)
         if s.phase is not Phase.ARMED or size < least:
             return None
         jump.since_us = time_us
@@ -178,13 +178,13 @@ class FusedDetector:
         confidence = min(1.0, 0.5 * size / least)
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, confidence)
 
-    def _least_jump_m_s(self, s: FusedState, time_us: int, spread_m_s: float, counts_resets: bool) -> float:
+    def _least_jump_m_s(self, s: FusedState, time_us: int, noise_m_s: float, counts_resets: bool) -> float:
         """Threshold of a velocity jump, m/s; larger where the estimate may jump without a hit."""
         config, jump = self._config, s.jump
         caution = 1.0 if counts_resets else 2.0
         least_m_s = config.velocity_step_slow_m_s if jump.is_slow else config.velocity_step_m_s
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
-        least_m_s = caution * max(least_m_s, config.noise_factor * spread_m_s)
+        least_m_s = caution * max(least_m_s, noise_m_s)
         least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.soft.last[2] - s.floor.z))
         # Two signs confirm each other.
         return 0.5 * least_m_s if jump.no_motor_turns(time_us, config.rate_step_rad_s) else least_m_s

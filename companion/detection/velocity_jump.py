@@ -23,8 +23,7 @@ LONGEST_STEP_US = 75_000
 # 10 Hz with the jitter of a log. Velocities further apart are not compared. A rate jump belongs to a velocity jump
 # within this time, too: the velocity's interval and its delay.
 LONGEST_SLOW_STEP_US = 130_000
-# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz. So many steps
-# make one good to an eighth, as each has three axes: before that it is not used.
+# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz.
 MEMORY, RISE = 100, 10
 # Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
 # samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
@@ -106,10 +105,15 @@ class VelocityJump:
         change = square - self.variance_m2_s2
         self.variance_m2_s2 += change / (min(self.known, RISE) if change > 0.0 else self.known)
 
-    @property
-    def spread_m_s(self) -> float:
-        """Standard deviation of the steps on an axis, m/s; infinite before RISE steps."""
-        return math.sqrt(self.variance_m2_s2) if self.known >= RISE else math.inf
+    def most_m_s(self, spreads: float) -> float:
+        """The step, m/s, that noise exceeds as rarely as `spreads` standard deviations; infinite before the first step.
+
+        By Student's t (its quantile, expanded in 1 / degrees of freedom): a standard deviation from few steps is
+        uncertain. Each has three axes, and shares velocities with those around it: four are worth as much as one.
+        """
+        if not self.known:
+            return math.inf
+        return spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
 
     def unseen_m_s(self, shaking_m_s2: float, thrust_change_m_s2: float) -> float:
         """Largest velocity step, m/s, from vibration between the samples and from the velocity's lag.

@@ -169,12 +169,14 @@ def test_motors_turn_a_vehicle_a_third_as_fast_about_yaw(turn_frd_rad_s, is_hit)
     assert jump.no_motor_turns(30_000, 2.0) is is_hit
 
 
-def test_a_spread_counts_when_it_is_good_to_an_eighth():
-    # Given ten steps on three axes: 1 / sqrt(2 * 3 * 10) is 0.13 of a standard deviation
-    jump = VelocityJump(averaging_us=1_000, variance_m2_s2=0.04)
-    for known, spread_m_s in ((9, math.inf), (10, 0.2)):
-        jump.known = known
-        assert jump.spread_m_s == spread_m_s
+@pytest.mark.parametrize(("degrees_of_freedom", "quantile"), [(30, 4.95), (75, 4.48)])
+def test_what_few_steps_say_of_the_noise_counts_as_student_says(degrees_of_freedom, quantile):
+    """4.2 normal standard deviations are exceeded once in 75 000 times; the quantiles are those of t."""
+    # Given a noise of 0.2 m/s, known from steps of which four are worth as much as one of their three axes
+    jump = VelocityJump(averaging_us=1_000, variance_m2_s2=0.04, known=degrees_of_freedom * 4 // 3)
+    # Then a larger step is as rare as Student's t says
+    assert jump.most_m_s(4.2) == pytest.approx(0.2 * quantile, rel=0.03)
+    assert VelocityJump(averaging_us=1_000).most_m_s(4.2) == math.inf
 
 
 def test_beside_a_turn_that_no_motor_makes_half_of_a_step_is_enough():
