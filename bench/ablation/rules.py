@@ -35,8 +35,6 @@ def _argument(number: int) -> Callable[[Arguments, Any], Any]:
 _DETECTION, _ESTIMATE, _REFLEX, _FLIGHT = (
     f"companion.{room}." for room in ("detection", "estimate", "reflex", "flight")
 )
-_HORIZONTAL = _FLIGHT + "horizontal_force:HorizontalForceMonitor."
-_VERTICAL = _FLIGHT + "vertical_force:VerticalForceMonitor."
 
 RULES = (
     Rule(
@@ -63,8 +61,12 @@ RULES = (
         _DETECTION + "force_signs:_together_m_s2",
         _says(0.0),
     ),
-    Rule("leaning", "a lean that moves nothing is a hit", _HORIZONTAL + "step", _says(None)),
-    Rule("pressing", "thrust that lifts nothing is a hit", _VERTICAL + "step", _says(None)),
+    Rule(
+        "leaning",
+        "thrust that moves nothing is a hit",
+        _FLIGHT + "sustained_force:SustainedForceMonitor.step",
+        _says(None),
+    ),
     Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule(
         "attitude by rates",

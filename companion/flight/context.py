@@ -6,9 +6,8 @@ from typing import NamedTuple, Protocol
 
 from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
-from companion.flight.horizontal_force import HorizontalForceMonitor
 from companion.flight.states import State, Trigger
-from companion.flight.vertical_force import VerticalForceMonitor
+from companion.flight.sustained_force import SustainedForceMonitor
 from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
@@ -168,9 +167,8 @@ class FlightContext:
     hits_remembered: int = 0  # so many of the collisions are in it
     unreachable: list[str] = field(default_factory=list)
     motors: MotorWatch = field(default_factory=MotorWatch)
-    horizontal_force: HorizontalForceMonitor = field(default_factory=HorizontalForceMonitor)
+    sustained_force: SustainedForceMonitor = field(default_factory=SustainedForceMonitor)
     has_climbed: bool = False  # has been higher than `min_detection_height_m` since it stood on the ground
-    vertical_force: VerticalForceMonitor = field(default_factory=VerticalForceMonitor)
     no_data_since_us: int | None = None  # the detector, while it is on
     plan_confirmed: bool = False
     outcome: Outcome | None = None

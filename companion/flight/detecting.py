@@ -6,7 +6,7 @@ from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.estimate.impact import ImpactEstimate
 from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.flight.context import FlightContext
-from companion.flight.horizontal_force import SustainedForce
+from companion.flight.sustained_force import SustainedForce
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
 from companion.motion.history import REBOOT_US
 from companion.motion.rotation import ned_to_body
@@ -39,30 +39,25 @@ def _sustained_force(
     flight: FlightContext, samples: Sequence[Sample], situation: Situation, now_us: int
 ) -> ImpactEstimate | None:
     """A sustained external force that no detector shows: only while the vehicle flies to a position."""
-    target, attitude = flight.target, flight.vehicle.attitude
-    horizontal, vertical = flight.horizontal_force, flight.vertical_force
+    target, attitude, force = flight.target, flight.vehicle.attitude, flight.sustained_force
     flown_to = situation.setpoint_position_ned_m
     if not flight.has_position:
-        horizontal.forget()  # half a second without a position is no tilt that lasted half a second
+        force.forget()  # half a second without a position is no tilt that lasted half a second
     is_off = situation.off_reason is not None or situation.descent_commanded or not flight.has_position
     if is_off or target is None or target.acceleration_only:
         flown_to = None
-        vertical.forget()
     for sample in samples:
         if type(sample) is ImuSample:
-            horizontal.add_imu(sample.specific_force_frd_m_s2)
+            force.add_imu(sample.specific_force_frd_m_s2)
         elif type(sample) is AttitudeTarget:
-            vertical.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
+            force.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, LocalPosition) and attitude is not None:
-            late_us = horizontal.time_us - sample.time_boot_us
+            late_us = force.time_us - sample.time_boot_us
             if late_us >= REBOOT_US:
-                horizontal.forget()
-                vertical.forget()
+                force.forget()
             elif late_us >= 0:
                 continue
-            held = horizontal.step(sample, attitude.attitude_wxyz, flown_to)
-            if flown_to is not None:
-                held = vertical.step(sample, horizontal.thrust_m_s2, flown_to[2]) or held
+            held = force.step(sample, attitude.attitude_wxyz, flown_to)
             if held is not None:
                 _report_sustained_force(flight, held, sample, now_us)
                 return _estimate_of(held, sample, attitude)
@@ -95,7 +90,8 @@ def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude
 
 def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample: LocalPosition, now_us: int) -> None:
     lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
-    side = "horizontal" if held.normal_ned[2] == 0.0 else "downward"
+    down = held.normal_ned[2]
+    side = "horizontal" if down == 0.0 else "downward" if down > 0.0 else "upward"
     text = f"something is in the way: {side} external force of {held.force_m_s2:.1f} m/s^2 for {lasted_s:.1f} s"
     flight.report(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
 

@@ -1,11 +1,14 @@
-"""Being pushed for long: a vehicle that leans on something is told from one that leans on the wind."""
+"""Being pushed for long: a vehicle that leans on something is told from one that leans on the wind.
+
+So is one that presses on a ceiling, met too slowly for any sample to show it.
+"""
 
 import json
 import math
 
 import pytest
 
-from companion.flight.horizontal_force import HELD_M_S2, HorizontalForceMonitor
+from companion.flight.sustained_force import HELD_M_S2, SMOOTHING_S, SustainedForceMonitor
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
 from rebound_cli.inputs import SimulatedWorld, with_guards
@@ -26,12 +29,12 @@ def leaning_north(acceleration_m_s2):
 
 def watched(seconds, north_m, speed_m_s, tilt_m_s2, goal_north_m=1.0):
     """The first time at which something is found in the way, and what; functions of the time."""
-    horizontal_force = HorizontalForceMonitor()
+    monitor = SustainedForceMonitor()
     for step in range(round(seconds / EVERY_S)):
         t = step * EVERY_S
         sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m(t), 0.0, -1.5), (speed_m_s(t), 0.0, 0.0))
-        horizontal_force.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
-        held = horizontal_force.step(sample, leaning_north(tilt_m_s2(t)), (goal_north_m, 0.0, -1.5))
+        monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
+        held = monitor.step(sample, leaning_north(tilt_m_s2(t)), (goal_north_m, 0.0, -1.5))
         if held is not None:
             return t, held
     return None
@@ -85,25 +88,26 @@ def test_a_vehicle_that_comes_nearer_is_not_kept_off():
 
 def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new():
     """Given a vehicle found pressing north, when it is sent back south and its lean returns to level."""
-    horizontal_force, found = HorizontalForceMonitor(), []
+    monitor, found = SustainedForceMonitor(), []
     for step in range(200):
         t = step * EVERY_S
         lean = min(0.8 * max(0.0, t - 0.6), 1.8) if not found else max(0.0, 1.8 - 2.0 * (t - found[0]))
         sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, 0.0, -1.5), (0.0, 0.0, 0.0))
-        horizontal_force.add_imu((0.0, 0.0, -math.hypot(9.80665, lean)))
+        monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, lean)))
         goal = (-0.35 if found else 1.0, 0.0, -1.5)
-        if horizontal_force.step(sample, leaning_north(lean), goal) is not None:
+        if monitor.step(sample, leaning_north(lean), goal) is not None:
             found.append(t)
     assert len(found) == 1
 
 
-def flown(folder, items, **sim):
+def flown(folder, items, height_m=1.5, hz=200, **sim):
     """In lockstep: the flight, and what its timeline says of things in the way."""
     data = {
         "name": "slow",
-        "items": [{"takeoff": {"height_m": 1.5}}, *items, {"land": {}}],
+        "companion": {"streams": {"highres_imu_hz": hz}},
+        "items": [{"takeoff": {"height_m": height_m}}, *items, {"land": {}}],
         "on_collision": {"then": "hold", "hold_s": 1},
-        "fence": {"radius_m": 10, "max_height_m": 5},
+        "fence": {"radius_m": 10, "max_height_m": 6},
         "sim": sim,
     }
     recorder = FlightRecorder(folder)
@@ -192,3 +196,91 @@ def test_a_cart_that_comes_after_the_vehicle_it_struck_is_moved_away_from_again(
     assert most_tilt_deg(flight) < 35.0
     assert all(collision.normal_ned[0] < -0.5 for collision in flight.report.collisions)
     assert all(collision.settled_after_s is not None for collision in flight.report.collisions[-1:])
+
+
+HOVER, FULL_M_S2 = 0.5, 19.6133
+
+
+def watched_below(seconds, fraction, climbed_m=lambda t: 0.0, asked_m=0.2, is_told=True):
+    """The first time at which something is found above, and what; functions of the time, 3 s of hovering before it."""
+    monitor = SustainedForceMonitor()
+    for step in range(-150, round(seconds / EVERY_S)):
+        t = step * EVERY_S
+        now_us = 10_000_000 + round(t * 1e6)
+        climbed, before = (climbed_m(max(each, 0.0)) for each in (t, t - EVERY_S))
+        sample = LocalPosition(now_us, (0.0, 0.0, -climbed), (0.0, 0.0, (before - climbed) / EVERY_S))
+        if is_told:
+            monitor.gain.set_fraction(now_us, fraction(t) if t > 0.0 else HOVER)
+        monitor.add_imu((0.0, 0.0, -FULL_M_S2 * HOVER))
+        held = monitor.step(sample, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, -asked_m if t > 0.0 else 0.0))
+        if held is not None:
+            return t, held
+    return None
+
+
+def pressing(t):
+    """The loops command 1 m/s^2 more each second. The accelerometer goes on showing a hover's."""
+    return HOVER + t / FULL_M_S2
+
+
+def test_more_and_more_thrust_that_nothing_shows_of_presses_on_what_is_above():
+    at_s, held = watched_below(5.0, pressing)
+    # Then it is told with the low-pass filter's delay
+    assert at_s == pytest.approx(HELD_M_S2 + SMOOTHING_S, abs=0.1)
+    assert held.normal_ned == (0.0, 0.0, 1.0) and held.force_m_s2 == pytest.approx(HELD_M_S2, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("fraction", "climbed_m", "asked_m"),
+    [
+        (lambda t: HOVER + 0.1, lambda t: 0.05 * FULL_M_S2 * t * t, 20.0),
+        (pressing, lambda t: 0.15 * t, 2.0),
+        (lambda t: HOVER + 0.2, lambda t: -0.1 * math.sin(math.pi * min(t, 1.0)), 0.2),
+        (pressing, lambda t: 0.15, 0.2),
+    ],
+    ids=["thrust that is there", "rises, if weakly", "let down by a motor, and back", "is where it is to be"],
+)
+def test_nothing_is_above_a_vehicle(fraction, climbed_m, asked_m):
+    assert watched_below(3.0, fraction, climbed_m, asked_m) is None
+
+
+def test_without_the_thrust_asked_for_nothing_is_said():
+    assert watched_below(5.0, pressing, is_told=False) is None
+
+
+def test_a_beam_met_at_a_crawl_is_moved_away_from(tmp_path):
+    up = {"go_to": {"position_ned_m": [0, 0, -3], "speed_m_s": 0.1}}
+    # Given a goal a metre above a beam, when the vehicle comes with 0.1 m/s
+    beam = {"name": "beam", "point_ned_m": [0.15, 0, -2], "normal_ned": [0, 0, 1], "width_m": 0.2, "height_m": 6}
+    flight, told = flown(tmp_path, [up], height_m=1.3, hz=50, walls=[beam])
+    # Then it presses for two seconds and not until the item's time is over, and comes down again
+    assert len(told) == 1
+    hit = flight.report.collisions[-1]
+    assert hit.normal_ned == pytest.approx((0.0, 0.0, 1.0), abs=0.1)
+    assert hit.recovery_setpoint_ned_m[2] > hit.position_ned_m[2] + 0.25
+    assert hit.settled_after_s is not None
+    assert flight.report.outcome == "completed"
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(
+            {"kind": "gust", "between_s": [10, 20], "velocity_ned_m_s": [0, 0, 5]},
+            marks=pytest.mark.slow,
+            id="wind from above",
+        ),
+        pytest.param(
+            {"kind": "battery_sag", "between_s": [10, 12], "voltage_share": 0.95},
+            marks=pytest.mark.slow,
+            id="weak battery",
+        ),
+        pytest.param({"kind": "motor_failure", "at_s": 10, "motor": 1, "thrust_share": 0.85}, id="weak motor"),
+    ],
+)
+def test_what_keeps_a_vehicle_down_is_not_always_above_it(tmp_path, fault):
+    slow = {"go_to": {"position_ned_m": [0, 0, -2], "speed_m_s": 0.2}}
+    fast = {"go_to": {"position_ned_m": [0, 0, -4], "speed_m_s": 1.0}}
+    flight, told = flown(tmp_path, [slow, fast], height_m=1.3, hz=50, faults=[fault])
+    assert flight.report.outcome == "completed"
+    assert told == [] and flight.report.collisions == ()
