@@ -67,7 +67,6 @@ RULES = (
         _FLIGHT + "sustained_force:SustainedForceMonitor.step",
         _says(None),
     ),
-    Rule("inertial v_c", "v_c with the accelerometer", _ESTIMATE + "impact:ImpactEstimator._velocity", _says(None)),
     Rule(
         "attitude by rates",
         "no clipped attitude",

@@ -20,15 +20,10 @@ FENCE_MARGIN_M = 10.0
 
 
 def pinned(mission: Mapping[str, Any]) -> dict[str, Any]:
-    """The mission with the paper's detector, law and gain stated, so that no default can change them.
-
-    v_c is that of velocities alone, as the paper has it.
-    """
-    companion = mission.get("companion", {})
-    estimate = {**companion.get("estimate", {}), "inertial": False}
+    """The mission with the paper's detector, law and gain stated, so that no default can change them."""
     return {
         **mission,
-        "companion": {**companion, "detector": DETECTOR, "estimate": estimate},
+        "companion": {**mission.get("companion", {}), "detector": DETECTOR},
         "recovery": {"law": LAW, "gamma": GAMMA_S},
     }
 

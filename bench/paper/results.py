@@ -29,7 +29,6 @@ SPEED_PATH = "items.1.go_to.speed_m_s"
 # The paper's, whatever the defaults become.
 PINNED = (
     f"companion.detector={DETECTOR}",
-    "companion.estimate.inertial=false",
     f"recovery.law={LAW}",
     f"recovery.gamma={GAMMA_S}",
 )

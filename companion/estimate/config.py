@@ -23,10 +23,7 @@ class GuardsConfig(StrictModel):
 class EstimateConfig(StrictModel):
     """Numbers of the estimate of a collision."""
 
-    retired = frozenset({"fits_normal", "jerk_density_m2_s5"})
-
-    inertial: bool = True
-    """v_c with the accelerometer's help (see estimate.approach); off: from velocities alone."""
+    retired = frozenset({"fits_normal", "inertial", "jerk_density_m2_s5"})
 
     imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
     """IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this."""
@@ -38,7 +35,7 @@ class EstimateConfig(StrictModel):
     accelerometer_range_m_s2: Positive = 156.9
     """+-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g."""
     position_noise_m: Positive = 0.03
-    """Of a good flow or motion-capture estimate, within the second that v_c is found from."""
+    """Of a good flow or motion-capture estimate, over a second."""
 
     @property
     def reach_m(self) -> float:

@@ -1,12 +1,10 @@
 """The estimate of an impact: a first one at detection, refined during the contact, final when the contact is over."""
 
 import math
-from collections import deque
 from dataclasses import dataclass, field, replace
 
 from companion.detection.classify import kind_of
 from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.estimate.approach import ALONE_US, position_at, velocity_alone, velocity_at
 from companion.estimate.config import EstimateConfig
 from companion.estimate.contact_force import ContactForce
 from companion.estimate.normal import Normal, normal_of
@@ -21,8 +19,6 @@ from companion.motion.strapdown import ZERO
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
 # PX4 sends VIBRATION every two seconds by default.
 CLIPPING_TOLD_US = 2_100_000
-# Integrals kept: the first velocity that shows a hit comes up to 0.17 s after it (see `approach`), at 400 Hz.
-SUMS_KEPT = 80
 # Kinds that are not classified again: unknown, and a soft contact.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
@@ -63,7 +59,6 @@ class ImpactEstimator:
     config: EstimateConfig
     history: MotionHistory = field(default_factory=MotionHistory)
     inertial: Inertial = field(default_factory=Inertial)
-    sums: deque[tuple[int, Vector3, Vector3]] = field(default_factory=lambda: deque(maxlen=SUMS_KEPT))
     validity: VelocityValidity = field(default_factory=VelocityValidity)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
@@ -78,10 +73,7 @@ class ImpactEstimator:
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
         if isinstance(sample, ImuSample):
-            now_us, strapdown = sample.time_boot_us, self.inertial.strapdown
-            if not self.inertial.imu(sample):
-                self.sums.clear()
-            self.sums.append((now_us, strapdown.sum_ned_m_s, strapdown.acceleration_ned_m_s2))
+            self.inertial.imu(sample)
             self.earlier_imu, self.imu = self.imu, sample
         elif isinstance(sample, LocalPosition | Odometry):
             if isinstance(sample, LocalPosition):
@@ -190,27 +182,14 @@ class ImpactEstimator:
         )
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:
-        """x(t_c), v_c, and v_c's standard deviation on an axis, from messages between the last contact and this one."""
-        start_us, config, latest = contact_us - ALONE_US, self.config, self.history.latest()
-        if self.contact_ended_boot_us is not None:
-            start_us = max(start_us, self.contact_ended_boot_us + STAMP_RESOLUTION_US)
-        samples = self.history.between(start_us, contact_us - STAMP_RESOLUTION_US)
-        found = self._velocity(contact_us) if config.inertial else None
-        found = found or velocity_alone(samples, contact_us, config)
-        if found is not None and samples:
-            return position_at(samples[-1], contact_us, found[0]), *found
+        """x(t_c), v_c, and v_c's standard deviation on an axis: the last report before the contact, carried on to it.
+
+        What comes later may lack a part of the hit: after a stiff contact PX4's estimate is not valid.
+        """
+        latest = self.history.before(contact_us - STAMP_RESOLUTION_US)
         if latest is None:
             return ZERO, ZERO, math.inf
-        return latest.position_ned_m, latest.velocity_ned_m_s, config.velocity_noise_m_s
-
-    def _velocity(self, contact_us: int) -> tuple[Vector3, float] | None:
-        """v_c from velocities and accelerometer; None where too few messages have come."""
-        before = next((entry for entry in reversed(self.sums) if entry[0] <= contact_us), None)
-        if before is None:
-            return None
-        time_us, u, a = before
-        ahead_s = (contact_us - time_us) * 1e-6
-        at_contact = (u[0] + ahead_s * a[0], u[1] + ahead_s * a[1], u[2] + ahead_s * a[2])
-        ended_us = self.contact_ended_boot_us
-        fixes = [fix for fix in self.inertial.fixes if ended_us is None or fix.time_boot_us > ended_us]
-        return velocity_at(fixes, contact_us, at_contact, self.config)
+        (n, e, d), (u, v, w) = latest.position_ned_m, latest.velocity_ned_m_s
+        ahead_s = 1e-6 * (contact_us - latest.time_boot_us)
+        place = (n + ahead_s * u, e + ahead_s * v, d + ahead_s * w)
+        return place, latest.velocity_ned_m_s, self.config.velocity_noise_m_s

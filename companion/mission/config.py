@@ -18,7 +18,7 @@ class StreamsConfig(StrictModel):
     highres_imu_hz: Rate = 250.0
     """PX4 rounds the interval to whole IMU samples: 200 gives 124, 250 gives all of them (measured on SITL)."""
     local_position_hz: Rate = 50.0
-    """Twenty-five velocities in the half second before a contact are enough for v_c (see estimate.approach)."""
+    """A velocity at most 20 ms before a contact: v_c is the last one (see estimate.impact)."""
     attitude_hz: Rate = 50.0
     """Which way the thrust points, and how the vehicle turns."""
     extended_sys_state_hz: Rate = 5.0

@@ -46,6 +46,10 @@ class MotionHistory:
     def latest(self) -> LocalPosition | None:
         return self._samples[-1] if self._samples else None
 
+    def before(self, time_boot_us: int) -> LocalPosition | None:
+        """The latest one before a time."""
+        return next((sample for sample in reversed(self._samples) if sample.time_boot_us < time_boot_us), None)
+
     def between(self, start_boot_us: int, end_boot_us: int) -> list[LocalPosition]:
         """Samples with start <= time < end, oldest first."""
         return [sample for sample in self._samples if start_boot_us <= sample.time_boot_us < end_boot_us]

@@ -16,12 +16,11 @@ KEPT_US = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class VelocityFix:
-    """One velocity of the estimate, with the accelerometer's integral and mean at its time; local NED."""
+    """One velocity of the estimate, with the accelerometer's integral at its time; local NED."""
 
     time_boot_us: int
     velocity_ned_m_s: Vector3
     sum_ned_m_s: Vector3
-    acceleration_ned_m_s2: Vector3
 
 
 def less_sum(fix: VelocityFix) -> Vector3:
@@ -69,6 +68,6 @@ class Inertial:
         if u is None:
             return
         self.has_new_fix, fixes = True, self.fixes
-        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, u, self.strapdown.acceleration_ned_m_s2))
+        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, u))
         while fixes[0].time_boot_us < time_us - KEPT_US:
             fixes.popleft()

@@ -42,8 +42,8 @@ def test_the_interrupted_item_is_left_behind(then):
 
 def test_an_item_is_tried_again_slower_each_time_until_the_limit():
     on_collision = {"then": "retry", "retry_speed_factor": 0.7, "max_hits": 3, "after_max_hits": "return"}
-    # The way back to the wall is short; the accelerometer of a vehicle that stays level does not show how it speeds up.
-    flying = {"flight": {"speeding_up_m_s2": 2.0}, "estimate": {"inertial": False}}
+    # The way back to the wall is short.
+    flying = {"flight": {"speeding_up_m_s2": 2.0}}
     near = {"clearance_s": 0.27}
     f = at_wall(INTO_WALL, ASIDE, on_collision=on_collision, companion=flying, recovery=near)
     f.run_to_end(200)

@@ -6,13 +6,11 @@ import random
 import pytest
 
 from companion.detection.interface import Impact, ImpactKind, Situation
-from companion.estimate import approach
 from companion.estimate.config import EstimateConfig
 from companion.estimate.contact_force import ContactForce
 from companion.estimate.impact import ImpactEstimator
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample, Vibration
 from companion.mission.config import CompanionConfig
-from companion.motion.inertial import VelocityFix
 from companion.reflex.monitor import advance, start_monitor
 
 CONFIG = EstimateConfig()
@@ -21,93 +19,53 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 STILL = (0.0, 0.0, 0.0)
 
 
-def fixes(seed, seconds=1.0, acceleration=2.0, delay_s=0.02, bias=0.05, noise=0.032, every_us=32_000):
-    """Velocities north at constant acceleration, 2 m/s at the contact, errors as the simulated estimate has them."""
-    rng = random.Random(seed)
-    error = rng.gauss(0.0, noise)
-    keep = math.exp(-every_us * 1e-6 / 0.3)
-    for t_us in range(CONTACT_US - round(seconds * 1e6), CONTACT_US - 5_000, every_us):
+def told(estimator, t_us, velocity_ned_m_s, position_ned_m=STILL):
+    """The vehicle's reports at one time."""
+    estimator.update(Odometry(t_us, position_ned_m, velocity_ned_m_s, 0))
+    estimator.update(LocalPosition(t_us, position_ned_m, velocity_ned_m_s))
+
+
+def approaching(acceleration_m_s2=0.0, noise_m_s=0.0, seed=1, until_us=CONTACT_US):
+    """An estimator that was told of a vehicle on its way north, at x = 4 m with 2 m/s when the contact begins."""
+    rng, estimator = random.Random(seed), ImpactEstimator(CONFIG)
+    for t_us in range(CONTACT_US - 1_000_000, until_us, 20_000):
         t = (t_us - CONTACT_US) * 1e-6
-        error = keep * error + rng.gauss(0.0, noise * math.sqrt(1 - keep**2))
-        velocity = 2.0 + acceleration * (t - delay_s) + error
-        measured = acceleration + bias
-        yield VelocityFix(t_us, (velocity, 0.0, 0.0), (measured * t, 0.0, 0.0), (measured, 0.0, 0.0))
+        off = [rng.gauss(0.0, noise_m_s) for _ in range(3)]
+        speed_m_s, north_m = 2.0 + acceleration_m_s2 * t, 4.0 + 2.0 * t + 0.5 * acceleration_m_s2 * t * t
+        told(estimator, t_us, (speed_m_s + off[0], off[1], off[2]), (north_m, 1.0, -1.5))
+    return estimator
 
 
-def velocity_at(heard):
-    return approach.velocity_at(list(heard), CONTACT_US, (0.0, 0.0, 0.0), CONFIG)
+def begun(estimator, free_until_us=CONTACT_US):
+    impact = Impact(free_until_us + 4_000, free_until_us, (-20.0, 0.0, 0.0))
+    return estimator.begin(impact, Situation())
 
 
-def test_v_c_is_right_to_a_few_centimetres_whatever_the_delay_the_bias_and_the_errors_that_last():
-    errors = [velocity_at(fixes(seed, delay_s=0.02 * (seed % 2)))[0][0] - 2.0 for seed in range(60)]
-    assert math.sqrt(sum(e * e for e in errors) / len(errors)) < 0.04
+@pytest.mark.parametrize("acceleration", [0.0, 2.0, -0.52])
+def test_place_and_velocity_of_a_clean_approach_are_those_of_the_contact(acceleration):
+    estimate = begun(approaching(acceleration))
+    assert estimate.velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.05)
+    assert estimate.position_ned_m == pytest.approx((4.0, 1.0, -1.5), abs=0.005)
 
 
-def test_the_stated_error_of_v_c_is_true():
-    pairs = [velocity_at(fixes(seed)) for seed in range(60)]
-    rms = math.sqrt(sum((v[0] - 2.0) ** 2 for v, _ in pairs) / len(pairs))
-    assert 0.4 < rms / pairs[0][1] < 1.5
+def test_the_stated_error_of_v_c_is_that_of_a_good_velocity_and_five_percent_of_it_at_most():
+    found = [begun(approaching(noise_m_s=0.03, seed=seed)) for seed in range(60)]
+    rms = math.sqrt(sum((each.velocity_ned_m_s[0] - 2.0) ** 2 for each in found) / len(found))
+    assert 0.5 * found[0].velocity_error_m_s < rms < 1.5 * found[0].velocity_error_m_s < 0.05 * 2.0
 
 
-def test_an_accelerometer_that_contradicts_the_velocities_is_not_listened_to():
-    wrong = [VelocityFix(f.time_boot_us, f.velocity_ned_m_s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) for f in fixes(1)]
-    assert velocity_at(wrong) is None
-    assert velocity_at([]) is None
+@pytest.mark.parametrize("late_us", [500, 20_000, 100_000, 290_000])
+def test_what_is_told_after_the_contact_or_in_its_millisecond_changes_nothing(late_us):
+    # Given reports that go on 3 m/s off; one's stamp is cut to the millisecond before the contact
+    estimator = approaching()
+    for t_us in range(CONTACT_US - 500, CONTACT_US + late_us, 20_000):
+        told(estimator, t_us, (-1.0, 0.0, 0.0))
+    assert begun(estimator).velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize(("off_m_s", "is_taken"), [(0.06, True), (0.10, False)])
-def test_velocities_that_the_accelerometer_denies_by_more_than_their_noise_contradict_it(off_m_s, is_taken):
-    # Given velocities with a noise of 0.04 m/s, that are off by so much to either side of the integral
-    times_us = range(CONTACT_US - 1_000_000, CONTACT_US - 5_000, 20_000)
-    signs = [off_m_s if number % 2 else -off_m_s for number in range(len(times_us))]
-    heard = [VelocityFix(t, (2.0 + off, off, off), STILL, STILL) for t, off in zip(times_us, signs, strict=True)]
-    assert (velocity_at(heard) is not None) == is_taken
-
-
-def test_a_drift_counts_as_far_as_an_accelerometers_bias_may_explain_it():
-    # Given velocities that leave the integral by 0.1 m/s in the last second
-    times_us = range(CONTACT_US - 1_000_000, CONTACT_US - 5_000, 20_000)
-    heard = [VelocityFix(t, (2.0 + 1e-7 * (t - CONTACT_US), 0.0, 0.0), STILL, STILL) for t in times_us]
-    # Then a third of that is taken for a bias, and the rest for noise
-    velocity, _ = velocity_at(heard)
-    assert velocity[0] == pytest.approx(1.967, abs=0.003)
-
-
-@pytest.mark.parametrize("late_us", [0, 100_000, 290_000])
-def test_a_hit_that_is_told_late_has_the_velocity_from_before_it(late_us):
-    # Given velocities that go on after the contact, 3 m/s off
-    heard = list(fixes(2))
-    for t_us in range(CONTACT_US + 20_000, CONTACT_US + late_us, 20_000):
-        heard.append(VelocityFix(t_us, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    velocity, _ = velocity_at(heard)
-    assert velocity[0] == pytest.approx(2.0, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("jumps", "velocity_m_s"),
-    [
-        ({}, 2.0),
-        # A jump that the estimator counts itself, and a contact: what was before is no measure any more
-        ({"reset_counter": 1}, 5.0),
-        ({"touched_us": CONTACT_US - 800_000}, 5.0),
-    ],
-)
-def test_v_c_is_found_from_velocities_that_belong_together(jumps, velocity_m_s):
-    # Given a vehicle at 2 m/s that tells 5 m/s in its last 0.8 s
-    estimator = ImpactEstimator(CONFIG)
-    estimator.update(Attitude(0, LEVEL, (0.0, 0.0, 0.0)))
-    for t_us in range(CONTACT_US - 4_000_000, CONTACT_US, 4_000):
-        estimator.update(ImuSample(t_us, (0.0, 0.0, -9.80665), (0.0, 0.0, 0.0)))
-        estimator.update(Attitude(t_us, LEVEL, (0.0, 0.0, 0.0)))
-        is_last = t_us > CONTACT_US - 800_000
-        if t_us == jumps.get("touched_us"):
-            estimator.contact_ended_boot_us = t_us
-        if t_us % 20_000 == 0:
-            told, count = (5.0, jumps.get("reset_counter", 0)) if is_last and jumps else (2.0, 0)
-            estimator.update(Odometry(t_us, (0.0, 0.0, 0.0), (told, 0.0, 0.0), count))
-    found = estimator._velocity(CONTACT_US)
-    assert found is not None
-    assert found[0][0] == pytest.approx(velocity_m_s, abs=0.05)
+def test_a_vehicle_that_has_told_no_velocity_has_none():
+    estimate = begun(ImpactEstimator(CONFIG))
+    assert estimate.velocity_ned_m_s == STILL and estimate.velocity_error_m_s == math.inf
 
 
 @pytest.mark.parametrize(("is_second", "normal_deg"), [(False, 19.0), (True, 0.0)])

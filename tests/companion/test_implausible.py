@@ -130,7 +130,7 @@ def test_a_vehicle_that_is_struck_turns_as_its_rates_say():
 def fixes(changes_by_m_s):
     """Velocities of a vehicle that hovers, every 10 ms, less the accelerometer's sum, which has all of the claim's."""
     return [
-        VelocityFix(at_ms * 1000, (changes_by_m_s if at_ms > 1000 else 0.0, 0.001 * (at_ms % 3), 0.0), STILL, STILL)
+        VelocityFix(at_ms * 1000, (changes_by_m_s if at_ms > 1000 else 0.0, 0.001 * (at_ms % 3), 0.0), STILL)
         for at_ms in range(800, 1160, 10)
     ]
 
@@ -153,8 +153,8 @@ def test_a_push_along_an_axis_that_is_stuck_is_not_taken_back_for_what_the_other
 
 
 def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_a_hit():
-    true = [VelocityFix(at_ms * 1000, STILL, STILL, STILL) for at_ms in range(800, 1160, 30)]
-    forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL, STILL)
+    true = [VelocityFix(at_ms * 1000, STILL, STILL) for at_ms in range(800, 1160, 30)]
+    forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL)
     leap = VelocityJumpHypothesis(1_000_000, 930_000, 0.64, (0.0, 1.0, 0.0))
     assert leap.is_rejected(sorted([*true, forged], key=lambda fix: fix.time_boot_us))
 
