@@ -114,7 +114,7 @@ class Recover:
         """Whether the vehicle tilts into a surface that it touches: its own thrust presses it on."""
         motion = self._tilted_motion
         return any(
-            -reflex.BEHIND_M <= surface.off_m(motion.position_ned_m) < reflex.TOUCH_TOLERANCE_M
+            -reflex.BEHIND_M <= surface.off_m(motion.position_ned_m) < reflex.PLACE_SPREAD_M
             and split(motion.acceleration_ned_m_s2, surface.normal_ned)[0] < -reflex.PRESSING_TILT_M_S2
             for surface in self._surfaces
         )
@@ -189,7 +189,7 @@ class Recover:
         self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
         state, elapsed_s = self._state(), 1e-6 * (now_us - self._plan_began_us)
-        is_on = holds(self._plan.at(elapsed_s), state)
+        is_on = holds(self._plan.at(elapsed_s), state, self._config.acceleration_m_s2)
         if known != self._planned_for or not (self._is_known or is_on):
             self._planned_for = known
             self._aim(flight, state, now_us)
@@ -224,7 +224,7 @@ class Recover:
         normal = contact.normal_ned
         off_m_s = split(estimator.motion.velocity_ned_m_s, normal)[0]
         is_pushed = split(estimator.external_m_s2, normal)[0] > reflex.PRESSING_TILT_M_S2
-        is_carried = self._is_known and is_pushed and off_m_s > reflex.LEAVING_M_S
+        is_carried = self._is_known and is_pushed and off_m_s > reflex.SAME_M_S
         self._has_left = (self._has_left or off_m_s > 0.0) and not (is_touched or is_carried)
         # Before its motion is known, a touched surface is there too: frames and arms fold.
         goes_along = self._has_hung or is_carried or (is_touched and not self._is_known)

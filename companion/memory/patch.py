@@ -7,10 +7,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from companion.detection.classify import STEEP
 from companion.estimate.normal import FROM_BEHIND, Normal
 from companion.messages import Vector3
 from companion.motion.strapdown import ZERO
-from companion.reflex.config import STEEP
 from companion.reflex.halfspace import away_from
 
 # One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the

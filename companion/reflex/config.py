@@ -2,8 +2,10 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
+from companion.motion.strapdown import GRAVITY_M_S2
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 # --- the plan
@@ -14,8 +16,6 @@ LEAD_S = 0.15
 SHORTEST_S = 1.25
 # Factor on the acceleration limit in front of a surface: a tilt of 31 degrees instead of 17.
 HARD_BRAKING = 2.0
-# Arms fold by this much, and a position estimate is noisy by it.
-TOUCH_TOLERANCE_M = 0.05
 # Ratio of one tried duration to the next. The lag is known less precisely than to 5 %.
 DURATION_STEP = 1.05
 # PX4's velocity loop subtracts a share of the measured acceleration: MPC_XY_VEL_D_ACC, 0.2 at most.
@@ -24,12 +24,10 @@ ACCELERATION_GAIN = 1.1
 CLIMB_GAIN_PER_S = 4.0
 # PX4's MPC_Z_P, MPC_XY_P and MPC_XY_VEL_P_ACC, 1/s.
 HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
-# Largest error of a vehicle that follows its plan: LEAD_S behind 3 m/s^2, and the integral of that.
-OFF_PLAN_M_S, OFF_PLAN_M = 0.45, 0.3
 # A tilt of 14 degrees. Arms that press on a wall carry a vehicle tilted by 15 degrees; from 22 on it tips over.
 PRESSING_TILT_M_S2 = 2.5
 # Half of gravity, down. The other half is thrust to steer with.
-DESCENT_M_S2 = 4.9
+DESCENT_M_S2 = 0.5 * GRAVITY_M_S2
 # Acceleration that stops a descent (hover at 78 % of the thrust, not yet level), and the least height after it.
 STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
@@ -43,50 +41,44 @@ HELD_S, NOTICED_S = 1.0, 0.13
 HELD_TO_M_S = 1.0
 
 # --- half-spaces
-# Sine of the normal's angle from the horizontal. Above it the obstacle is a ceiling, a floor or a steep roof. Below it
-# the obstacle counts as upright, because the vehicle's tilt and a clipped sample tilt the normal of a wall.
-STEEP = 0.7
 # Cosine between two normals. Below it the surfaces face each other, as in a corridor: the goal is then no further from
 # one than the middle between them. Walls of a corner are at 0.
 FACING_COSINE = -0.5
-# The vehicle's own position is free. A surface that it is behind by more than the estimate's drift and a touch's depth
-# is in a wrong place, and is ignored.
-BEHIND_M = 0.2
+# Standard deviation of a surface's position and of the hit's: arms fold, and position estimates drift.
+PLACE_SPREAD_M = 0.1
+# The vehicle's own position is free. A surface that it is behind by two of them is in a wrong place, and is ignored.
+BEHIND_M = 2.0 * PLACE_SPREAD_M
 # In an acute corner the clearance from one wall leads towards the other. The goal converges in a few rounds or never.
 ROUNDS = 5
 
 # --- the present motion
-# Time constant of the acceleration's low-pass filter: a few samples of the slowest stream, against vibration.
+# Time constant of the acceleration's low-pass filter and of corrections by the vehicle's estimate: a few samples of the
+# slowest stream, against vibration; shorter than the estimate's noise lasts, longer than its delay.
 SMOOTHED_S = 0.05
-# Time constant of corrections by the vehicle's estimate: shorter than its noise lasts, longer than its delay.
-CORRECTED_S = 0.1
 # Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5
 # A contact counts for this long after its last sample: it may go on, or the estimate does not contain it yet.
 CONTACT_LINGERS_US = 50_000
 # Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
 # 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.
-CORRECTION_DELAY_S = (0.04, 0.1, 0.16, 0.22)
-CORRECTION_RAD_S = (2.4, 3.4, 4.7, 6.6, 9.2)
+CORRECTION_DELAY_S = np.linspace(0.04, 0.22, 4)
+CORRECTION_RAD_S = np.geomspace(2.4, 9.2, 5)
 CORRECTION_DAMPING = (0.5, 0.67, 0.85)
 # The estimator takes a part of the velocity error for a tilt, which decays slowly: 0.51 and 0.49 per second.
 TILT_PER_S = 0.5
-# Errors of this model on those hits, RMS over 3 s, per m/s of clipped velocity: of the velocity, of the position in s.
-MODEL_ERROR, MODEL_ERROR_S = 0.03, 0.02
+# Error of this model on those hits, RMS over 3 s, as a share of the clipped velocity.
+MODEL_ERROR = 0.03
 # Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
-# Standard deviation of the position of the hit.
-PLACE_SPREAD_M = 0.1
-# The estimate has converged when its known error stays below four times a good velocity's noise.
-CONVERGED_M_S = 0.15
+# A velocity that differs by less does not differ: four times the noise of a good estimate. The estimate has converged
+# when its known error stays below that.
+SAME_M_S = 0.15
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
-# 0.04 m/s of it. More than twice CONVERGED_M_S is a position that jumped.
-COMPARED_S, MOST_VELOCITY_ERROR_M_S = 0.5, 0.3
-# Standard deviation of the velocity after a hit about the expected one: at least, and as a share of the speed. Frames
+# 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
+COMPARED_S = 0.5
+# Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
-SPREAD, LEAST_SPREAD_M_S = 0.3, 0.1
-# Six times the noise of a good estimate.
-LEAVING_M_S = 0.2
+SPREAD = 0.3
 
 
 class RecoveryConfig(StrictModel):

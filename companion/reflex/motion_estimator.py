@@ -161,7 +161,7 @@ class MotionEstimator:
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
 
     def _expected_spread_m_s(self) -> float:
-        return reflex.LEAST_SPREAD_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
+        return reflex.SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
 
     def _expected(self) -> FilterBank:
         # Clipping hides between none and all of the change of velocity.
@@ -217,7 +217,7 @@ class MotionEstimator:
         """Whether the reports contain the hit by now. Late ones still have the velocity before it."""
         if not self.is_second and sample.time_boot_us - self.hit_boot_us < 1e6 * LATEST_S:
             changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
-            self._is_reported = self._is_reported or changed_m_s > reflex.LEAVING_M_S
+            self._is_reported = self._is_reported or changed_m_s > reflex.SAME_M_S
             return self._is_reported
         return True
 
@@ -239,12 +239,12 @@ class MotionEstimator:
         g, way_s, left = error_response(since_s)
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
         hidden_m_s = math.hypot(*bank.error_m_s)
-        off_m = hidden_m_s * min(reflex.MODEL_ERROR * since_s, reflex.MODEL_ERROR_S)
         off_m_s = hidden_m_s * reflex.MODEL_ERROR
+        off_m = off_m_s * min(since_s, 1.0)
         bank.update(0, way_s, sample.position_ned_m, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, sample.velocity_ned_m_s, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         estimate, spread_m_s, left_m_s = bank.estimate(left)
-        self.has_converged = self.has_converged or left_m_s <= reflex.CONVERGED_M_S
+        self.has_converged = self.has_converged or left_m_s <= reflex.SAME_M_S
         if self.has_converged:
             self.position_error_m, self._hidden_error_m_s = bank.mean_error(way_s), bank.mean_error(g)
             return
@@ -259,7 +259,7 @@ class MotionEstimator:
         was, share = self.motion, 1.0
         if before is not None:
             elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
-            share = elapsed_s / (reflex.CORRECTED_S + elapsed_s)
+            share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
             if 0.0 < elapsed_s < reflex.COMPARED_S:
                 self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, self._newest, elapsed_s)
         measured = self.corrected(sample)
@@ -294,7 +294,7 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
     further_m = plus(led, -1.0, measured.position_ned_m)
     estimate = plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
-    return limited(estimate, reflex.MOST_VELOCITY_ERROR_M_S)
+    return limited(estimate, 2.0 * reflex.SAME_M_S)
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:

@@ -16,8 +16,9 @@ from companion.reflex import config as reflex
 from companion.reflex.halfspace import Surface, plus, split
 
 REST: Vector3 = (0.0, 0.0, 0.0)
-# Values of s at which a plan is checked: its first part's acceleration is largest at 1/2, the second's at 0.21, 0.79.
-_LOOKED_AT = (0.21, 0.3, 0.4, 0.5, 0.6, 0.7, 0.79)
+# A plan's acceleration is looked at between so many equal parts: its first part's is largest at 1/2, the last's at 0.21
+# and 0.79.
+_PARTS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,8 @@ class Plan:
 
     def most_m_s2(self) -> float:
         """The plan's largest acceleration, m/s^2."""
-        return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in _LOOKED_AT)
+        looked_at = (part / _PARTS for part in range(1, _PARTS))
+        return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in looked_at)
 
 
 def _axis(
@@ -80,11 +82,12 @@ def shortest(state: MotionState, goal_ned_m: Callable[[float], Vector3], most_m_
         duration_s *= reflex.DURATION_STEP
 
 
-def holds(planned: MotionState, motion: MotionState) -> bool:
-    """Whether the vehicle follows the plan, as closely as PX4's loops do."""
+def holds(planned: MotionState, motion: MotionState, most_m_s2: float) -> bool:
+    """Whether the vehicle follows the plan: it lags by LEAD_S, and its place by half of that over a plan."""
+    within_m_s = reflex.LEAD_S * most_m_s2
     off_m_s = math.dist(planned.velocity_ned_m_s, motion.velocity_ned_m_s)
     off_m = math.dist(planned.position_ned_m, motion.position_ned_m)
-    return off_m_s <= reflex.OFF_PLAN_M_S and off_m <= reflex.OFF_PLAN_M
+    return off_m_s <= within_m_s and off_m <= 0.5 * within_m_s * reflex.SHORTEST_S
 
 
 def with_feedback(planned: MotionState, motion: MotionState) -> Vector3:
