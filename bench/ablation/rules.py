@@ -46,7 +46,7 @@ RULES = (
     Rule(
         "hand",
         "a soft force on a hovering vehicle waits",
-        _DETECTION + "soft_contact:SoftContact.may_be_hand",
+        _DETECTION + "force_signs:may_be_hand",
         _says(False),
     ),
     Rule(
@@ -66,12 +66,6 @@ RULES = (
         "thrust that moves nothing is a hit",
         _FLIGHT + "sustained_force:SustainedForceMonitor.step",
         _says(None),
-    ),
-    Rule(
-        "attitude by rates",
-        "no clipped attitude",
-        _ESTIMATE + "validity:VelocityValidity.is_attitude_valid",
-        _says(True),
     ),
     Rule(
         "trust",

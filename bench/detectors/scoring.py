@@ -135,7 +135,7 @@ def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> 
         "first_normal_error_deg": angle_deg(first.first.normal.direction_ned, hit.normal_ned),
         "time_error_ms": 1e-3 * (first.final.time_boot_us - touch_us),
         "kind": first.final.kind.value,
-        "confidence": first.final.confidence,
+        "confidence": first.final.impact.confidence,
         "bound": first.final.is_lower_bound,
         "impulse": _ratio(first.final, hit),
     }

@@ -1,6 +1,10 @@
-"""The force of a sample beside the thresholds of a contact, horizontal and along the thrust.
+"""The force of a sample beside the thresholds of a contact, and whether a weak one may be a hand.
 
-They depend on this vehicle's noise in its own flight (see `force_noise`). The state is only read.
+Thresholds depend on this vehicle's noise in its own flight (see `force_noise`). The state is only read.
+
+A person's hand and a soft strike on a hovering vehicle differ in how the force begins. An arm takes 80 ms and more to
+push; a hand that grips stops the small speed of a hover. An obstacle strikes with its own speed, and its force is there
+from one sample to the next. So a force is observed for a moment, and is a strike as soon as it jumps.
 """
 
 import math
@@ -15,6 +19,11 @@ from companion.messages import Vector3
 SHAKING = 2.0
 # On a vibrating vehicle one sample below this many thresholds may be noise (once in four public logs, with 1.2).
 CLEAR = 1.3
+# A vehicle counts as hovering for this time after it hovered: pushed by a hand with 2 m/s^2 it soon moves.
+HOVERED_US = 500_000
+# Least jump, in thresholds of at least 1.75 m/s^2. A grip of 30 N s/m stops a kilogram that drifts at 0.1 m/s with
+# 2.7 m/s^2, plus noise.
+JUMP = 2.4
 
 
 def side_threshold_m_s2(s: FusedState, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
@@ -32,7 +41,7 @@ def vertical_threshold_m_s2(s: FusedState, config: FusedConfig) -> float:
     return max(config.vertical_threshold_m_s2, config.noise_factor * s.floor.vertical_m_s2)
 
 
-def shakes(s: FusedState, config: FusedConfig) -> bool:
+def _shakes(s: FusedState, config: FusedConfig) -> bool:
     """Whether noise decides if a sample begins a contact: two samples together then show more than one.
 
     Within a contact each sample speaks for itself: the one after a forged sample does not confirm it.
@@ -47,7 +56,7 @@ def side_force(s: FusedState, config: FusedConfig, force_frd_m_s2: Vector3) -> t
     """
     x, y = force_frd_m_s2[0] - s.floor.x, force_frd_m_s2[1] - s.floor.y
     alone = math.sqrt(x * x + y * y)
-    if not shakes(s, config):
+    if not _shakes(s, config):
         return alone, 1.0, False
     together = _together_m_s2(s, force_frd_m_s2)
     return (together, 1.0, True) if together > alone / CLEAR else (alone, CLEAR, False)
@@ -59,6 +68,16 @@ def _together_m_s2(s: FusedState, force_frd_m_s2: Vector3) -> float:
 
     Compared with zero, too: a slow swing that the mean has not followed is none.
     """
-    (f_x, f_y, _), (g_x, g_y, _), mean = force_frd_m_s2, s.soft.last, s.floor
+    (f_x, f_y, _), (g_x, g_y, _), mean = force_frd_m_s2, s.last_frd_m_s2, s.floor
     x, y = f_x + g_x, f_y + g_y
     return math.sqrt(0.5 * min((x - 2.0 * mean.x) ** 2 + (y - 2.0 * mean.y) ** 2, x * x + y * y))
+
+
+def may_be_hand(s: FusedState, time_us: int) -> bool:
+    """Whether the vehicle hovers, or just did."""
+    return s.hovered_boot_us is not None and time_us - s.hovered_boot_us < HOVERED_US
+
+
+def jumps(s: FusedState, force_frd_m_s2: Vector3) -> bool:
+    """Whether the force changed over one sample, or over two, by more than a hand's does."""
+    return any(math.dist(force_frd_m_s2, f) >= JUMP * s.threshold_m_s2 for f in (s.last_frd_m_s2, s.before_frd_m_s2))

@@ -10,21 +10,22 @@ contact, each compared with this vehicle's own flight:
   jump.
 
 `classify` names the kind. A weak force on a hovering vehicle is observed for a moment before it counts as a hit or a
-hand (see `soft_contact`).
+hand (see `force_signs`).
 """
 
 import math
 from collections.abc import Mapping
 from typing import ClassVar
 
-from companion.detection.classify import kind_of
+from companion.detection.classify import hovers, kind_of
 from companion.detection.force_noise import SETTLED_US
-from companion.detection.force_signs import side_force, side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import jumps, may_be_hand, side_force, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
+from companion.motion.history import SHOWN_US
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import LEVEL, LONGEST_DELAY_US, LONGEST_GAP_US
 
@@ -55,7 +56,8 @@ class FusedDetector:
         if type(sample) is ImuSample:
             before_us = state.last_sample_boot_us
             impact = self._imu(state, sample, situation)
-            state.soft.imu(before_us, sample.specific_force_frd_m_s2)
+            state.before_boot_us, state.before_frd_m_s2 = before_us, state.last_frd_m_s2
+            state.last_frd_m_s2 = sample.specific_force_frd_m_s2
             return state, impact
         if isinstance(sample, LocalPosition | Odometry):
             return state, self._velocity(state, sample, situation)
@@ -74,7 +76,7 @@ class FusedDetector:
         side, thresholds, is_of_two = side_force(s, config, f)
         side /= thresholds
         if is_of_two:
-            free_until_us = s.soft.before_us
+            free_until_us = s.before_boot_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
         threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else side_threshold_m_s2(s, config, w)
         ratio = max(side / threshold, beyond / vertical_threshold_m_s2(s, config))
@@ -83,7 +85,7 @@ class FusedDetector:
         elif s.phase is Phase.OFF:
             s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
         if off is not None or ratio < 1.0:
-            s.soft.since_boot_us = None
+            s.loud_since_boot_us = None
             self._learn(s, f, before_us)
             is_quiet = s.floor.is_known and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
@@ -107,24 +109,23 @@ class FusedDetector:
     def _loud(
         self, s: FusedState, f: Vector3, situation: Situation, force: Vector3, free_until_us: int, ratio: float
     ) -> Impact | None:
-        now_us, soft, size = s.last_sample_boot_us, s.soft, math.hypot(*force)
-        jumps = soft.jumps(f, s.threshold_m_s2)
+        now_us, size, has_jumped = s.last_sample_boot_us, math.hypot(*force), jumps(s, f)
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
-                is_another = jumps if soft.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
+                is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
                 if is_another and size > WORSE * s.peak_specific_force_m_s2:
-                    return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, 1.0)
+                    return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, ratio)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
-        if soft.since_boot_us is None:
-            soft.since_boot_us, soft.free_until_us = now_us, free_until_us
+        if s.loud_since_boot_us is None:
+            s.loud_since_boot_us, s.free_until_boot_us = now_us, free_until_us
         kind = None
-        if size < self._config.soft_m_s2 and soft.may_be_hand(now_us) and not jumps:
-            if now_us - soft.since_boot_us < 1e6 * self._config.soft_wait_s:
+        if size < self._config.soft_m_s2 and may_be_hand(s, now_us) and not has_jumped:
+            if now_us - s.loud_since_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
             kind = ImpactKind.CONTACT
-        return self._fire(s, now_us, situation, force, soft.free_until_us, Evidence.FORCE, min(1.0, 0.5 * ratio), kind)
+        return self._fire(s, now_us, situation, force, s.free_until_boot_us, Evidence.FORCE, ratio, kind)
 
     def _fire(
         self,
@@ -134,7 +135,7 @@ class FusedDetector:
         force: Vector3,
         free_until_us: int,
         evidence: Evidence,
-        confidence: float,
+        ratio: float,
         kind: ImpactKind | None = None,
     ) -> Impact:
         if kind is None:
@@ -146,20 +147,20 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.soft.fired(kind is ImpactKind.CONTACT)
-        return Impact(now_us, free_until_us, force, kind, evidence, confidence)
+        s.loud_since_boot_us, s.is_hand = None, kind is ImpactKind.CONTACT
+        return Impact(now_us, free_until_us, force, kind, evidence, min(1.0, 0.5 * ratio))
 
     # --- velocity ---------------------------------------------------------------------------------------------
 
     def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
         time_us, jump, config, inertial = sample.time_boot_us, s.jump, self._config, situation.inertial
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
-        s.soft.velocity(time_us, v)
+        if hovers(v):
+            s.hovered_boot_us = time_us
         if inertial is None or not inertial.has_new_fix:
             return None
         step = jump.step_m_s(inertial.fixes)
-        rests = time_us - s.last_loud_boot_us < 1e6 * config.velocity_rest_s or not situation.estimate_valid
-        if s.phase is Phase.CONTACT or rests:
+        if time_us - s.last_loud_boot_us < SHOWN_US or not situation.estimate_valid:
             jump.since_us = time_us
             return None
         if step is None:
@@ -175,8 +176,7 @@ class FusedDetector:
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(inertial.strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
-        confidence = min(1.0, 0.5 * size / least)
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, confidence)
+        return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, size / least)
 
     def _least_jump_m_s(self, s: FusedState, time_us: int, noise_m_s: float, counts_resets: bool) -> float:
         """Threshold of a velocity jump, m/s; larger where the estimate may jump without a hit."""
@@ -185,6 +185,6 @@ class FusedDetector:
         least_m_s = config.velocity_step_slow_m_s if jump.is_slow else config.velocity_step_m_s
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         least_m_s = caution * max(least_m_s, noise_m_s)
-        least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.soft.last[2] - s.floor.z))
+        least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.last_frd_m_s2[2] - s.floor.z))
         # Two signs confirm each other.
         return 0.5 * least_m_s if jump.no_motor_turns(time_us, config.rate_step_rad_s) else least_m_s

@@ -8,7 +8,7 @@ class FusedConfig(StrictModel):
 
     retired = frozenset(
         {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
-        | {"velocity_step_turned_m_s", "velocity_per_rate_m"}
+        | {"velocity_step_turned_m_s", "velocity_per_rate_m", "velocity_rest_s"}
     )
 
     side_threshold_m_s2: Positive = 1.75
@@ -37,11 +37,9 @@ class FusedConfig(StrictModel):
     """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
     longest_contact_s: Positive = 0.5
     """Longest contact. Longer loud than this is no contact but a new way to shake, and is learnt."""
-    velocity_rest_s: Positive = 0.15
-    """After a contact velocities count again after this: its delay and a filter's switching make the estimate swing."""
     soft_m_s2: Positive = 8.0
     """Below this, on a hovering vehicle, a force may be a hand. A hand is slower than an obstacle: below `soft_m_s2` on
     a hovering vehicle wait for the force to show itself, for so long at most; a force that jumps is no hand's (see
-    `soft`)."""
+    `force_signs`)."""
     soft_wait_s: Positive = 0.02
     """How long such a force is looked at."""

@@ -2,16 +2,17 @@
 
 from dataclasses import dataclass
 
+from companion.motion.history import CURRENT_US
+from companion.motion.strapdown import GRAVITY_M_S2
+
 # A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
 # the maximum of the strongest vehicle.
-STRONGEST_M_S2 = 5.0 * 9.81
+STRONGEST_M_S2 = 5.0 * GRAVITY_M_S2
 # Memory of the gain, which is known when it is full: it follows a sagging battery (minutes) and not a climb (its thrust
 # is in the message).
 GAIN_MEMORY_S = 2.0
 # Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
 LEAST_FRACTION = 0.1
-# A commanded thrust is valid for this time. Motors follow it with a lag of 20 ms.
-KEPT_US = 300_000
 # Error of the gain from the battery, ground effect and a mean that has not converged.
 MARGIN = 1.15
 
@@ -21,7 +22,7 @@ class ThrustGain:
     """Specific force at full thrust, learnt as -f_z over the commanded thrust. Changed only by its methods."""
 
     fraction: float = 0.0
-    fraction_boot_us: int = -KEPT_US
+    fraction_boot_us: int = -CURRENT_US
     full_m_s2: float = 0.0
     known_s: float = 0.0
 
@@ -30,7 +31,7 @@ class ThrustGain:
 
     def is_commanded(self, time_us: int) -> bool:
         """Whether the commanded thrust is valid, and large enough for a quotient."""
-        return self.fraction >= LEAST_FRACTION and time_us - self.fraction_boot_us <= KEPT_US
+        return self.fraction >= LEAST_FRACTION and time_us - self.fraction_boot_us <= CURRENT_US
 
     @property
     def is_known(self) -> bool:

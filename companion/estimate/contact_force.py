@@ -7,8 +7,6 @@ from companion.messages import ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO
 
-# Samples at most 1.5 averaging windows apart are contiguous: that is nearer to one window than to two.
-CONTIGUOUS = 1.5
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
 # is a third of the range in the mean.
 CLIPPED_SHARE = 1.0 / 3.0
@@ -48,7 +46,7 @@ class ContactForce:
         force = x, y, z = body_to_ned(attitude_wxyz, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
         # Of the time before the first sample only its own window is known.
         elapsed_s = 1e-6 * (elapsed_us if self.forces_ned_m_s2 else min(elapsed_us, self.averaging_us))
-        is_contiguous = elapsed_us <= CONTIGUOUS * self.averaging_us
+        is_contiguous = elapsed_us < 2 * self.averaging_us  # less than one window is missing
         self.has_gap |= not is_contiguous
         self.is_clipped |= max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
         self.impulse_ned_m_s = (n + elapsed_s * x, e + elapsed_s * y, d + elapsed_s * z)

@@ -10,15 +10,13 @@ from companion.estimate.contact_force import ContactForce
 from companion.estimate.normal import Normal, normal_of
 from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
-from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
+from companion.motion.history import OPTIONAL_STREAMS_WAIT_US, STAMP_RESOLUTION_US, MotionHistory
 from companion.motion.inertial import Inertial
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
-# PX4 sends VIBRATION every two seconds by default.
-CLIPPING_TOLD_US = 2_100_000
 # Kinds that are not classified again: unknown, and a soft contact.
 AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
@@ -47,7 +45,6 @@ class ImpactEstimate:
     is_fully_measured: bool
     is_lower_bound: bool
     kind: ImpactKind
-    confidence: float
     is_final: bool
     earlier: ImuSample | None = None
 
@@ -66,8 +63,6 @@ class ImpactEstimator:
     contact: ContactForce | None = None
     came_ned_m_s: Vector3 = ZERO
     """v_c, where the vehicle's estimate is valid: zero in a hit that follows another that clipping hid a part of."""
-    situation: Situation | None = None
-    contact_ended_boot_us: int | None = None
     clipping_counts: tuple[int, int, int] | None = None
 
     def update(self, sample: Sample) -> None:
@@ -83,28 +78,25 @@ class ImpactEstimator:
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
-            self.inertial.attitude(sample, self.validity.is_attitude_valid(sample.time_boot_us))
+            self.inertial.attitude(sample, self.validity.is_valid)
 
     def _clipped(self, sample: Vibration) -> None:
         """Take PX4's clipping counts. One that grew since before the contact makes its size a lower bound."""
         before, self.clipping_counts = self.clipping_counts, sample.clipping_counts
-        estimate, ended_us = self.estimate, self.contact_ended_boot_us
-        if estimate is None or ended_us is None or before is None or before == sample.clipping_counts:
+        estimate = self.estimate
+        if estimate is None or before is None or before == sample.clipping_counts:
             return
-        if sample.time_boot_us - ended_us < CLIPPING_TOLD_US:
+        if sample.time_boot_us - estimate.impact.sample_time_boot_us < OPTIONAL_STREAMS_WAIT_US:
             self.estimate = replace(estimate, is_lower_bound=True)
 
-    def begin(self, impact: Impact, situation: Situation) -> ImpactEstimate:
+    def begin(self, impact: Impact) -> ImpactEstimate:
         """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
-        sample_us = impact.sample_time_boot_us
-        free_until_us = impact.contact_free_until_boot_us
+        sample_us, free_until_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
         place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.inertial.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
-        size = math.sqrt(force_ned[0] ** 2 + force_ned[1] ** 2 + force_ned[2] ** 2)
-        self.situation = situation
-        self.contact = self._begin_contact_force(impact) if impact.evidence is Evidence.FORCE else None
+        size = math.hypot(*force_ned)
+        self.contact = self._begin_contact_force(self.imu, impact) if self.imu is not None else None
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
-        self.contact_ended_boot_us = sample_us
         self.validity.invalidate(sample_us)
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
@@ -119,16 +111,14 @@ class ImpactEstimator:
             is_fully_measured=False,
             is_lower_bound=True,
             kind=impact.kind,
-            confidence=impact.confidence,
             is_final=False,
             earlier=self.earlier_imu,
         )
         return estimate
 
-    def _begin_contact_force(self, impact: Impact) -> ContactForce | None:
-        """The contact force with its first sample; None without one."""
-        sample = self.imu
-        if sample is None:
+    def _begin_contact_force(self, sample: ImuSample, impact: Impact) -> ContactForce | None:
+        """The contact force with its first sample; None where a velocity alone shows the contact."""
+        if impact.evidence is not Evidence.FORCE:
             return None
         f, force = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
         contact = ContactForce(
@@ -141,15 +131,14 @@ class ImpactEstimator:
         contact.add(sample, self.inertial.strapdown.valid_wxyz, True)
         return contact
 
-    def follow(self, state: DetectorState) -> ImpactEstimate | None:
-        """Take the detector's state after each IMU sample.
+    def follow(self, sample: ImuSample, state: DetectorState, situation: Situation) -> ImpactEstimate | None:
+        """Take each IMU sample, and the detector's state after it.
 
         Returns the final estimate, once: when the contact is over.
         """
-        estimate, contact, sample = self.estimate, self.contact, self.imu
-        if estimate is None or sample is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
+        estimate, contact = self.estimate, self.contact
+        if estimate is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
             return None
-        self.contact_ended_boot_us = state.last_loud_boot_us
         is_over = state.phase is not Phase.CONTACT
         if contact is not None and sample.time_boot_us > contact.time_boot_us:
             loud = state.last_loud_boot_us == sample.time_boot_us
@@ -157,28 +146,26 @@ class ImpactEstimator:
             if loud:
                 # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
                 self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
-                estimate = self._refined(estimate, contact)
+                estimate = self._refined(estimate, contact, situation)
         self.estimate = replace(estimate, is_final=is_over)
         return self.estimate if is_over else None
 
-    def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
+    def _refined(self, estimate: ImpactEstimate, contact: ContactForce, situation: Situation) -> ImpactEstimate:
         velocity, impulse = estimate.velocity_ned_m_s, contact.impulse_ned_m_s
         begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
         if contact.begun_boot_us is not None:
             begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
-        kind = estimate.kind
-        if self.situation is not None and estimate.impact.kind not in AS_DETECTED:
-            kind = kind_of(impulse, velocity, contact.turn_rad_s, self.situation)
+        as_detected = estimate.impact.kind in AS_DETECTED
         return replace(
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
             normal=normal_of(impulse, self.came_ned_m_s),
             peak_specific_force_m_s2=contact.peak_m_s2,
-            impulse_m_s=math.sqrt(impulse[0] ** 2 + impulse[1] ** 2 + impulse[2] ** 2),
+            impulse_m_s=math.hypot(*impulse),
             is_fully_measured=contact.is_fully_measured,
             is_lower_bound=contact.has_gap or not contact.is_fully_measured,
-            kind=kind,
+            kind=estimate.kind if as_detected else kind_of(impulse, velocity, contact.turn_rad_s, situation),
         )
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:

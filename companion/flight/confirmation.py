@@ -13,18 +13,16 @@ from statistics import fmean, median, stdev
 from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.motion.history import MotionHistory
+from companion.motion.history import SHOWN_US, MotionHistory
 from companion.motion.inertial import VelocityFix, less_sum
-from companion.motion.strapdown import MOTORS_RAD_S2
+from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2
 from companion.reflex.halfspace import plus, split
 from companion.reflex.planner import REST
 
 # A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
 STRUCK_M_S = 0.5
-# Time to the decision. All but the longest contacts are over by then (0.12 s at 1 m/s), and the vehicle's estimate is
-# 20 to 40 ms late. A tilt of 17 degrees for this time moves a vehicle by 3 cm.
-DECIDED_US = 150_000
-LATE_US = 40_000
+# Time to the decision. A tilt of 17 degrees for this time moves a vehicle by 3 cm.
+DECIDED_US = SHOWN_US
 # Velocities before the hit are averaged over the same time; the shorter it is, the smaller are the slow errors.
 BEFORE_US = DECIDED_US
 # A hit that matters changes the velocity by more than this; noise alone reaches 0.1 m/s now and then.
@@ -60,7 +58,7 @@ class ForceHypothesis:
         """
         hit_us, later_us = self.time_boot_us, self.later_boot_us
         was = [less_sum(fix) for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
-        came = [less_sum(fix) for fix in fixes if hit_us + LATE_US <= fix.time_boot_us <= hit_us + DECIDED_US]
+        came = [less_sum(fix) for fix in fixes if hit_us + LONGEST_DELAY_US <= fix.time_boot_us <= hit_us + DECIDED_US]
         size_m_s2 = math.hypot(*self.force_ned_m_s2)
         if len(was) < 2 or len(came) < 2 or later_us is None or size_m_s2 == 0.0:
             return False

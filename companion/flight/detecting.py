@@ -83,7 +83,6 @@ def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude
         is_fully_measured=True,
         is_lower_bound=False,
         kind=ImpactKind.STRUCK,
-        confidence=1.0,
         is_final=True,
     )
 

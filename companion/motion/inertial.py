@@ -7,11 +7,8 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Vector3
-from companion.motion.history import ODOMETRY_KEPT_US
+from companion.motion.history import CURRENT_US, KEPT_US
 from companion.motion.strapdown import Strapdown
-
-# Evidence for or against a hit lies within 0.3 s of it.
-KEPT_US = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +59,7 @@ class Inertial:
             if told_us is None or sample.reset_counter != self._reset_counter:
                 self.fixes.clear()
             self._odometry_boot_us, self._reset_counter = time_us, sample.reset_counter
-        elif told_us is not None and time_us - told_us <= ODOMETRY_KEPT_US:
+        elif told_us is not None and time_us - told_us <= CURRENT_US:
             return
         u = self.strapdown.sum_at(time_us)
         if u is None:

@@ -19,7 +19,7 @@ from companion.messages import (
     Sample,
     Vector3,
 )
-from companion.motion.history import ODOMETRY_KEPT_US, STAMP_RESOLUTION_US
+from companion.motion.history import CURRENT_US, STAMP_RESOLUTION_US
 from companion.motion.strapdown import ZERO
 
 
@@ -65,7 +65,7 @@ class Resets:
         if place is None or told is None:
             return False
         over_us = sample.time_boot_us - place.time_boot_us
-        if over_us < 0 or abs(sample.time_boot_us - told.time_boot_us) >= ODOMETRY_KEPT_US:
+        if over_us < 0 or abs(sample.time_boot_us - told.time_boot_us) >= CURRENT_US:
             return False
         most_m = VELOCITY_M_S * 1e-6 * (over_us + STAMP_RESOLUTION_US)
         return math.dist(sample.position_ned_m, place.position_ned_m) > most_m

@@ -17,16 +17,15 @@ from companion.detection.stream_health import AttitudeGate, StreamHealth, Stream
 from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
-from companion.motion.history import REBOOT_US
+from companion.motion.history import OPTIONAL_STREAMS_WAIT_US, REBOOT_US
 from companion.strict_model import StrictModel
 
-# Optional streams besides HIGHRES_IMU. The slowest is PX4's VIBRATION, every two seconds by default.
+# Optional streams besides HIGHRES_IMU.
 OPTIONAL_STREAMS: dict[type, MessageId] = {
     AttitudeTarget: MessageId.ATTITUDE_TARGET,
     Odometry: MessageId.ODOMETRY,
     Vibration: MessageId.VIBRATION,
 }
-OPTIONAL_STREAMS_WAIT_US = 3_000_000
 
 
 class CollisionMonitorConfig(StrictModel):
@@ -160,9 +159,9 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         known = situation if monitor.estimate_valid else situation._replace(estimate_valid=False)
         monitor.state, impact = monitor.detector.step(monitor.state, sample, known)
         if impact is not None:
-            impacts.append(monitor.estimator.begin(impact, situation))
+            impacts.append(monitor.estimator.begin(impact))
         elif type(sample) is ImuSample:
-            final = monitor.estimator.follow(monitor.state)
+            final = monitor.estimator.follow(sample, monitor.state, situation)
             if final is not None:
                 finished.append(final)
     notices = _update_stream_health(monitor, imu_samples, situation, now_us) + _report_validity(monitor)

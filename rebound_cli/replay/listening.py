@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.force_signs import side_force, side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import may_be_hand, side_force, side_threshold_m_s2, vertical_threshold_m_s2
 from companion.detection.fused_state import FusedState
 from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
@@ -91,15 +91,15 @@ class _ListenedTo:
         return state
 
     def step(self, state: DetectorState, sample: Sample, situation: Situation) -> tuple[DetectorState, Impact | None]:
-        tested, may_be_hand = None, False
+        tested, is_soft = None, False
         if isinstance(sample, ImuSample):
             tested = _tested(state, sample, self._config)
             self._listener.numbers.extend(tested)
-            may_be_hand = isinstance(state, FusedState) and state.soft.may_be_hand(sample.time_boot_us)
+            is_soft = isinstance(state, FusedState) and may_be_hand(state, sample.time_boot_us)
         state, impact = self._detector.step(state, sample, situation)
         if impact is not None:
             one = None if tested is None else Tested(*tested)
-            self._listener.shown[impact.sample_time_boot_us] = Shown(one, may_be_hand)
+            self._listener.shown[impact.sample_time_boot_us] = Shown(one, is_soft)
         return state, impact
 
 

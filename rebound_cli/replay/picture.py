@@ -56,7 +56,9 @@ def draw_impact(replay: Replay, finding: Finding, path: Path) -> None:
         axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
     what = "hit" if finding.is_collision else "contact, no collision"
     title = f"{replay.log.path.name}: {what} at {replay.log.seconds(finding.at_us):.3f} s by '{replay.detector}'"
-    figure.suptitle(f"{title}, {finding.final.kind.value}, confidence {finding.final.confidence:.2f}", fontsize=12)
+    figure.suptitle(
+        f"{title}, {finding.final.kind.value}, confidence {finding.final.impact.confidence:.2f}", fontsize=12
+    )
     figure.savefig(path, dpi=100)
 
 

@@ -120,7 +120,8 @@ def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
     first, final, situation = finding.first, finding.final, finding.situation
     kind = "" if final.kind is ImpactKind.UNKNOWN else f": {final.kind.value}"
     at_least = "at least " if final.is_lower_bound else ""
-    yield f"{'HIT' if finding.is_collision else 'contact, no collision'}{kind}, confidence {final.confidence:.2f}"
+    what = "HIT" if finding.is_collision else "contact, no collision"
+    yield f"{what}{kind}, confidence {final.impact.confidence:.2f}"
     force = math.hypot(*first.impact.specific_force_frd_m_s2)
     how = _HOW[first.impact.evidence]
     yield f"seen by {how}: {force:.1f} m/s^2, a hit from {finding.threshold_m_s2:.1f} on"
@@ -217,7 +218,7 @@ def finding_data(finding: Finding) -> dict[str, Any]:
         "is_collision": finding.is_collision,
         "kind": final.kind.value,
         "evidence": first.impact.evidence.value,
-        "confidence": round(final.confidence, 4),
+        "confidence": round(final.impact.confidence, 4),
         "specific_force_frd_m_s2": _rounded(first.impact.specific_force_frd_m_s2),
         "threshold_m_s2": round(finding.threshold_m_s2, 4),
         "impact_velocity_m_s": _rounded(first.velocity_ned_m_s),

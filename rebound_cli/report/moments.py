@@ -27,7 +27,7 @@ Floats = npt.NDArray[np.float64]
 
 # A page of more is read by nobody, and 40 of them at PX4's fastest stream are still half a megabyte.
 MOST_MOMENTS = 40
-# What a contact shakes belongs to it: an estimate swings for so long after one (`velocity_rest_s` and a recovery).
+# What a contact shakes belongs to it: an estimate swings for so long after one (`SHOWN_US` and a recovery).
 _BESIDE_US = 500_000
 
 
@@ -76,7 +76,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
         ("Largest force in a sample", f"{least}{final.peak_specific_force_m_s2:.1f} m/s²"),
         ("Impulse", f"{least}{final.impulse_m_s:.2f} m/s"),
         ("Normal", f"{_bearing(normal.direction_ned)} ± {error_deg:.0f}°"),
-        ("Taken for", f"{what}, confidence {first.confidence:.2f}"),
+        ("Taken for", f"{what}, confidence {first.impact.confidence:.2f}"),
     ]
     if touch is not None and flight.truth is not None:
         late_ms = (boot_us - touch.contact_at_boot_us) / 1e3

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.detection.force_signs import CLEAR, side_force
 from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
 from companion.detection.fused_state import FusedState
@@ -303,6 +304,16 @@ def test_a_vehicle_that_shakes_must_show_a_weak_force_twice_and_a_strong_one_onc
     assert [i.sample_time_boot_us for i in strong.fly()] == [3_004_000]
     to_and_fro = Flight(lambda t: (0.0, {750: 10.0, 751: -10.0}.get((t - 500) // 4_000, 0.0), 0.0), noise=1.5)
     assert to_and_fro.fly() == []
+
+
+def test_two_samples_on_a_vehicle_that_shakes_count_together_where_that_is_nearer_to_a_hit():
+    # Given a vehicle that shakes, and a force that was weaker in the sample before
+    state = FusedState(phase=Phase.ARMED, threshold_m_s2=8.0, last_frd_m_s2=(3.0, 0.0, 0.0))
+    # Then both together are nearer to their one threshold than the second alone to its 1.3
+    assert side_force(state, FusedConfig(), (10.0, 0.0, 0.0)) == (pytest.approx(13.0 / math.sqrt(2.0)), 1.0, True)
+    # And one of another direction does not help
+    state.last_frd_m_s2 = (-3.0, 0.0, 0.0)
+    assert side_force(state, FusedConfig(), (10.0, 0.0, 0.0)) == (10.0, CLEAR, False)
 
 
 def test_the_gyroscope_of_a_vehicle_that_shakes_makes_no_graze_of_its_shaking():

@@ -38,7 +38,7 @@ def approaching(acceleration_m_s2=0.0, noise_m_s=0.0, seed=1, until_us=CONTACT_U
 
 def begun(estimator, free_until_us=CONTACT_US):
     impact = Impact(free_until_us + 4_000, free_until_us, (-20.0, 0.0, 0.0))
-    return estimator.begin(impact, Situation())
+    return estimator.begin(impact)
 
 
 @pytest.mark.parametrize("acceleration", [0.0, 2.0, -0.52])
@@ -81,7 +81,7 @@ def test_a_vehicle_that_slides_along_a_wall_is_not_sent_along_it_by_the_second_h
     if is_second:
         estimator.validity.invalidate(CONTACT_US - 300_000)
     # When something pushes it south
-    estimate = estimator.begin(Impact(CONTACT_US, CONTACT_US - 4_000, (-20.0, 0.0, 0.0)), Situation())
+    estimate = estimator.begin(Impact(CONTACT_US, CONTACT_US - 4_000, (-20.0, 0.0, 0.0)))
     # Then the way that it came from says where off is in a first hit alone
     n, e, _ = estimate.normal.direction_ned
     assert math.degrees(math.atan2(e, -n)) == pytest.approx(normal_deg, abs=2.0)
