@@ -8,7 +8,7 @@ from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.flight.context import FlightContext
 from companion.flight.sustained_force import SustainedForce
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
-from companion.motion.history import REBOOT_US
+from companion.motion.history import KEPT_US
 from companion.motion.rotation import ned_to_body
 from companion.reflex import monitor
 from companion.reflex.monitor import CollisionMonitor
@@ -53,7 +53,7 @@ def _sustained_force(
             force.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
         elif isinstance(sample, LocalPosition) and attitude is not None:
             late_us = force.time_us - sample.time_boot_us
-            if late_us >= REBOOT_US:
+            if late_us >= KEPT_US:
                 force.forget()
             elif late_us >= 0:
                 continue

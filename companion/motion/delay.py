@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 
-# Prior: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
-DELAY_S, DELAY_SPREAD_S = 0.01, 0.01
+# Prior, and its own standard deviation: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
+DELAY_S = 0.01
 # Longest delay that is estimated: compared velocities lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY).
 LATEST_S = 0.1
 
@@ -29,7 +29,7 @@ class Delay:
 
     def delay_s(self, variance_m2_s2: float) -> float:
         """The delay; `variance_m2_s2` is the steps' variance on an axis at constant acceleration."""
-        weight = variance_m2_s2 / DELAY_SPREAD_S**2
+        weight = variance_m2_s2 / DELAY_S**2
         total = weight + self._square
         found_s = (weight * DELAY_S + self._against) / total if total > 0.0 else DELAY_S
         return min(max(found_s, 0.0), LATEST_S)

@@ -5,10 +5,9 @@ from itertools import islice
 
 from companion.messages import LocalPosition
 
-# Evidence for or against a hit lies within 0.3 s of it; the origin is the mean of a second.
+# Evidence for or against a hit lies within 0.3 s of it; the origin is the mean of a second. A time further back than
+# this is not that of a reordered packet but of a rebooted vehicle.
 KEPT_US = 2_000_000
-# A time this far back is not a reordered packet but a rebooted vehicle.
-REBOOT_US = 1_000_000
 # PX4 cuts time_boot_ms to whole milliseconds: a stamp may be this much before its sample.
 STAMP_RESOLUTION_US = 1_000
 # A message counts as current for this time: 15 of PX4's ODOMETRY at 30 Hz, whose velocities and reset counter are used
@@ -35,7 +34,7 @@ class MotionHistory:
         if samples:
             newest_us = samples[-1].time_boot_us
             if sample.time_boot_us <= newest_us:
-                if newest_us - sample.time_boot_us < REBOOT_US:
+                if newest_us - sample.time_boot_us < KEPT_US:
                     return False
                 samples.clear()
         samples.append(sample)

@@ -17,7 +17,7 @@ from companion.detection.stream_health import AttitudeGate, StreamHealth, Stream
 from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
-from companion.motion.history import OPTIONAL_STREAMS_WAIT_US, REBOOT_US
+from companion.motion.history import KEPT_US, OPTIONAL_STREAMS_WAIT_US
 from companion.strict_model import StrictModel
 
 # Optional streams besides HIGHRES_IMU.
@@ -140,7 +140,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             monitor.imu_fault = None
             monitor.attitude_gate.imu(sample)
             imu_samples += 1
-            if 0 <= monitor.last_imu_boot_us - sample.time_boot_us < REBOOT_US:
+            if 0 <= monitor.last_imu_boot_us - sample.time_boot_us < KEPT_US:
                 continue
             monitor.last_imu_boot_us = sample.time_boot_us
         elif type(sample) is Attitude:
