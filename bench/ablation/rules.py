@@ -68,6 +68,12 @@ RULES = (
         _says(None),
     ),
     Rule(
+        "attitude by rates",
+        "no clipped attitude",
+        _ESTIMATE + "validity:VelocityValidity.is_attitude_valid",
+        _says(True),
+    ),
+    Rule(
         "trust",
         "no velocity jump while an estimate swings",
         _ESTIMATE + "validity:VelocityValidity.is_valid",

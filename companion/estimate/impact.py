@@ -78,7 +78,7 @@ class ImpactEstimator:
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
-            self.inertial.attitude(sample, self.validity.is_valid)
+            self.inertial.attitude(sample, self.validity.is_attitude_valid(sample.time_boot_us))
 
     def _clipped(self, sample: Vibration) -> None:
         """Take PX4's clipping counts. One that grew since before the contact makes its size a lower bound."""

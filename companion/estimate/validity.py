@@ -10,7 +10,9 @@ knows the normal and the expected rebound: it uses `reflex.motion_estimator`.
 
 from dataclasses import dataclass
 
-# By then PX4's estimator has corrected itself, and a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5
+# PX4's estimator begins to correct itself after 0.14 s.
+UNCORRECTED_US = 140_000
+# By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5
 # per second, bench/notes/px4.md).
 CORRECTED_US = 4_500_000
 
@@ -27,6 +29,11 @@ class VelocityValidity:
     @property
     def is_valid(self) -> bool:
         return self.invalid_since_boot_us is None
+
+    def is_attitude_valid(self, time_us: int) -> bool:
+        """Whether the attitude is valid: no hit is being corrected, or the correction cannot have begun."""
+        since_us = self.invalid_since_boot_us
+        return since_us is None or (not self._is_again and time_us - since_us < UNCORRECTED_US)
 
     def invalidate(self, time_us: int) -> None:
         """A new hit: the velocity is not valid until the hit is known to be measured whole."""
