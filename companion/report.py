@@ -44,7 +44,7 @@ class CollisionReport:
     force perpendicular to thrust in one IMU sample. `settled_after_s` runs from the detection to the start of the
     interval in which the vehicle stayed settled; None when it did not settle. `overshoot_m` is the largest distance
     past the setpoint, away from the obstacle, until the recovery ended. `rebound_speed_m_s` is the largest speed along
-    the normal in the 0.1 s after the contact; 0 when it never moved back, None when the vehicle's velocity was not
+    the normal until 0.1 s after the contact; 0 when it never moved back, None when the vehicle's velocity was not
     valid then (a clipped hit).
     """
 

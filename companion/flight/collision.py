@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import takewhile
 
 from companion.detection.interface import DetectorState
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
-from companion.estimate.normal import Normal, with_change
+from companion.estimate.normal import Normal, unit, with_change
 from companion.flight.confirmation import DECIDED_US, ForceHypothesis, VelocityJumpHypothesis
 from companion.messages import LocalPosition, Vector3
+from companion.motion.delay import LATEST_S
 from companion.motion.history import MotionHistory
 from companion.motion.inertial import VelocityFix
 from companion.motion.strapdown import Strapdown
@@ -18,10 +19,6 @@ from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.planner import REST
 from companion.report import CollisionReport
-
-# The rebound's speed is the largest within this time after the contact. The estimate lags some tens of milliseconds;
-# later the speed is made by the vehicle's own controller.
-REBOUND_WINDOW_US = 100_000
 
 
 def level(normal: Normal) -> Normal:
@@ -48,9 +45,9 @@ class CollisionRecord:
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
+    rebound_speed_m_s: float | None = None  # the largest along the normal, until the rebound is over
     estimated_down_m_s: float = 0.0  # the vehicle's own estimate now, right or wrong
     level_acceleration_m_s2: Vector3 = (0.0, 0.0, 0.0)  # of a vehicle that is level by its own attitude, NED
-    _velocities: list[tuple[int, Vector3]] = field(default_factory=list)
 
     @property
     def normal(self) -> Normal:
@@ -103,27 +100,18 @@ class CollisionRecord:
             return True
         return isinstance(hypothesis, VelocityJumpHypothesis) and hypothesis.stays_in_place(places, position_noise_m)
 
+    def is_rebound(self, time_boot_us: int) -> bool:
+        """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""
+        return time_boot_us - self.contact_ended_boot_us <= LATEST_S * 1e6
+
     def follow_recovery(self, sample: LocalPosition) -> None:
         """Update overshoot and rebound speed while the vehicle recovers."""
-        if sample.time_boot_us <= self.sample_time_boot_us:
-            return
-        away = self._direction_away()
-        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), away)[0]
+        normal = self.normal.direction_ned
+        away = unit(plus(self.setpoint_ned_m, -1.0, self.contact.position_ned_m))
+        past_m = split(plus(sample.position_ned_m, -1.0, self.setpoint_ned_m), normal if away == REST else away)[0]
         self.overshoot_m = max(self.overshoot_m, past_m)
-        if sample.time_boot_us <= self.contact_ended_boot_us + REBOUND_WINDOW_US:
-            self._velocities.append((sample.time_boot_us, sample.velocity_ned_m_s))
-
-    def _direction_away(self) -> Vector3:
-        """From the contact towards the setpoint; along the normal when the two coincide."""
-        x, s = self.contact.position_ned_m, self.setpoint_ned_m
-        length_m = math.dist(x, s)
-        return self.normal.direction_ned if length_m == 0.0 else plus(REST, 1.0 / length_m, plus(s, -1.0, x))
-
-    def rebound_speed_m_s(self) -> float | None:
-        """Largest speed along the normal, m/s, within REBOUND_WINDOW_US after the contact; None without a valid one."""
-        ended_us, normal = self.contact_ended_boot_us, self.normal.direction_ned
-        recent = [v for time_us, v in self._velocities if time_us > ended_us]
-        return max((max(0.0, split(v, normal)[0]) for v in recent), default=None)
+        if self.is_rebound(sample.time_boot_us):
+            self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])
 
     def settled_after_s(self) -> float | None:
         if self.settled_at_boot_us is None:
@@ -134,7 +122,7 @@ class CollisionRecord:
         """Of one that has settled, for people."""
         settled_after_s = self.settled_after_s()
         assert settled_after_s is not None
-        speed_m_s = self.rebound_speed_m_s()
+        speed_m_s = self.rebound_speed_m_s
         rebound = "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
         past_cm = self.overshoot_m * 100
         return f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {past_cm:.1f} cm{rebound}"
@@ -153,7 +141,7 @@ class CollisionRecord:
             recovery_setpoint_ned_m=self.setpoint_ned_m,
             settled_after_s=self.settled_after_s(),
             overshoot_m=self.overshoot_m,
-            rebound_speed_m_s=self.rebound_speed_m_s(),
+            rebound_speed_m_s=self.rebound_speed_m_s,
         )
 
 

@@ -5,12 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.normal import Normal
 from companion.flight.after_hit import afterwards, take_back
-from companion.flight.collision import REBOUND_WINDOW_US, CollisionRecord, in_one_recovery, level
-from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis, hypothesis_of
+from companion.flight.collision import CollisionRecord, in_one_recovery, level
+from companion.flight.confirmation import hypothesis_of
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
-from companion.flight.detection_event import report_detection
 from companion.flight.obstacle_map import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
 from companion.motion.rotation import body_to_ned, yaw_rad
@@ -30,28 +28,27 @@ from companion.reflex.planner import (
     shortest,
     with_feedback,
 )
+from companion.report import CollisionReport
 
 
 class Recover:
     """Fly to rest at the recovery setpoint of the newest collision, and wait until the vehicle has settled."""
 
     def __init__(self, flight: FlightContext, now_us: int) -> None:
-        self._record = record = flight.collisions[-1]
+        self._flight, self._record = flight, flight.collisions[-1]
         self._law, self._config = _law(flight), flight.mission.recovery
-        self._contact = record.contact
+        self._contact = self._record.contact  # as known now, at the vehicle's place while the obstacle goes along
         together = in_one_recovery(flight.collisions)
         self._first_hit_us = together[-1].detected_at_us
         if flight.target is not None and len(together) == 1:
             flight.yaw_rad = flight.target.yaw_rad
-        self._yaw_rad = flight.yaw_rad
-        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
+        self._surfaces = _surfaces(flight, self._contact)
         self._is_known = not self._law.follows  # whether the motion after the hit is known
-        self._has_left, self._may_fall = False, False
+        self._has_left = False
         self._has_hung = False  # was pressed on the obstacle, and has not left it since
-        self._agreed: Normal | None = None  # the normal from the velocities before and after
         self._planned_for: object = None  # the state of the contact that the plan was made for
         self._plan, self._plan_began_us = self._plan_from(self._state()), now_us
-        self._monitor = SettlingMonitor(record.setpoint_ned_m, flight.mission.companion.settled)
+        self._monitor = SettlingMonitor(flight.mission.companion.settled)
 
     def target(self, now_us: int) -> Target | None:
         if not self._law.follows:
@@ -88,6 +85,11 @@ class Recover:
         return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
 
     @property
+    def _yaw_rad(self) -> float | None:
+        attitude, wanted_rad = self._flight.vehicle.attitude, self._flight.yaw_rad
+        return wanted_rad if attitude is None else heading_towards(yaw_rad(attitude.attitude_wxyz), wanted_rad)
+
+    @property
     def _is_level(self) -> bool:
         """Whether the obstacle is upright: the height is then held separately."""
         return self._contact.normal_ned[2] == 0.0
@@ -95,7 +97,7 @@ class Recover:
     @property
     def _lets_go(self) -> bool:
         """Whether it lets go of an upright obstacle that it hung on: no more thrust than in hover until it leaves."""
-        return self._is_level and self._may_fall and self._has_hung
+        return self._has_hung and self._is_level and _has_room_below(self._flight)
 
     def _height_m_s2(self, loops: float) -> float:
         record, most_m_s2 = self._record, self._config.vertical_acceleration_m_s2
@@ -120,33 +122,24 @@ class Recover:
         )
 
     def step(self, flight: FlightContext, inputs: Inputs, now_us: int) -> Transition | None:
-        record, attitude = self._record, flight.vehicle.attitude
-        if attitude is not None:
-            self._yaw_rad = heading_towards(yaw_rad(attitude.attitude_wxyz), flight.yaw_rad)
-        self._may_fall = _has_room_below(flight)
+        record, companion = self._record, flight.mission.companion
         for sample in inputs.positions:
-            noise_m = flight.mission.companion.estimate.position_noise_m
+            noise_m = companion.estimate.position_noise_m
             if record.is_rejected(sample.time_boot_us, flight.vehicle.history, noise_m):
                 transition = take_back(flight, now_us)
                 if transition is not None:
                     return transition
             record.estimator.update(sample)
-            is_known = self._knows(sample)
+            self._learn(sample)
             if self._law.follows:
-                self._follow(flight, sample, now_us)
-            if not is_known:
-                continue
-            right = record.estimator.corrected(sample)
-            record.follow_recovery(right)
-            since_us = self._monitor.settled_since(right)
-            if since_us is not None:
-                record.settled_at_boot_us = since_us
+                self._follow(sample, now_us)
+            if self._is_known and self._has_settled(sample):
                 figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
                 flight.report(now_us, "recovered", record.recovered_text(), **figures)
                 return self._leave(flight)
         off_m_s = split(record.estimator.motion.velocity_ned_m_s, self._contact.normal_ned)[0]
         self._has_hung = self._tilts_into_surface() or (self._has_hung and off_m_s < 0.0)
-        timeout_s = flight.mission.companion.settled.timeout_s
+        timeout_s = companion.settled.timeout_s
         if now_us - self._first_hit_us > timeout_s * 1e6:
             text = f"not settled within {timeout_s:g} s of the hit; the mission goes on"
             flight.report(now_us, "recovered", text, settled_after_s=None)
@@ -159,18 +152,22 @@ class Recover:
         flight.target = Target(self._record.setpoint_ned_m, flight.yaw_rad)
         return afterwards(flight)
 
-    def _knows(self, sample: LocalPosition) -> bool:
-        """Whether the vehicle's estimate shows the motion after the hit. Until then plans use the estimated motion."""
-        record, was_known = self._record, self._is_known
-        self._is_known = was_known or record.estimator.has_converged
-        is_rebound = sample.time_boot_us <= record.contact_ended_boot_us + REBOUND_WINDOW_US
+    def _has_settled(self, sample: LocalPosition) -> bool:
+        record, right = self._record, self._record.estimator.corrected(sample)
+        record.follow_recovery(right)
+        distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
+        since_us = self._monitor.settled_since(sample.time_boot_us, distance_m, right.velocity_ned_m_s)
+        record.settled_at_boot_us = since_us or record.settled_at_boot_us
+        return since_us is not None
+
+    def _learn(self, sample: LocalPosition) -> None:
+        """Take the velocity after the hit once the vehicle's estimate shows it. Until then the estimated one counts."""
+        estimator, was_known = self._record.estimator, self._is_known
+        self._is_known = was_known or estimator.has_converged
         # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        is_measured = not record.estimator.is_second
-        if self._is_known and is_measured and (is_rebound or not was_known):
-            after = record.estimator.corrected(sample).velocity_ned_m_s
-            record.after_ned_m_s = after
-            self._agreed = record.normal
-        return self._is_known
+        is_shown = not was_known or self._record.is_rebound(sample.time_boot_us)
+        if self._is_known and is_shown and not estimator.is_second:
+            self._record.after_ned_m_s = estimator.corrected(sample).velocity_ned_m_s
 
     def _state(self) -> MotionState:
         """The present motion as the start of a plan.
@@ -184,7 +181,7 @@ class Recover:
             velocity = plus(along, max(0.0, off_m_s), normal)
         return MotionState(place, velocity, limited(acceleration, self._config.acceleration_m_s2))
 
-    def _follow(self, flight: FlightContext, sample: LocalPosition, now_us: int) -> None:
+    def _follow(self, sample: LocalPosition, now_us: int) -> None:
         """Update goal and plan from what is known by now; the plan alone where the vehicle is off it."""
         self._touch(sample)
         known = (self._contact.position_ned_m, self._contact.normal_ned, self._has_left, self._is_known)
@@ -192,17 +189,16 @@ class Recover:
         is_on = holds(self._plan.at(elapsed_s), state, self._config.acceleration_m_s2)
         if known != self._planned_for or not (self._is_known or is_on):
             self._planned_for = known
-            self._aim(flight, state, now_us)
+            self._aim(state, now_us)
         elif is_on or not self._law.plans:
             return
         self._plan, self._plan_began_us = self._plan_from(state), now_us
 
-    def _aim(self, flight: FlightContext, state: MotionState, now_us: int) -> None:
+    def _aim(self, state: MotionState, now_us: int) -> None:
         """Set the recovery setpoint again, from the present contact and motion."""
-        record, before = self._record, self._record.setpoint_ned_m
-        self._surfaces = _surfaces(flight, self._contact, flight.collisions)
+        flight, record, before = self._flight, self._record, self._record.setpoint_ned_m
+        self._surfaces = _surfaces(flight, self._contact)
         record.setpoint_ned_m = place = _setpoint(flight, self._contact, state, self._surfaces)
-        self._monitor = SettlingMonitor(place, flight.mission.companion.settled)
         if math.dist(place, before) > flight.mission.companion.settled.distance_m:
             record.overshoot_m = 0.0  # measured past the earlier setpoint
             off_m_s = split(state.velocity_ned_m_s, self._contact.normal_ned)[0]
@@ -219,8 +215,9 @@ class Recover:
         """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""
         is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < reflex.CONTACT_LINGERS_US
         estimator, contact = self._record.estimator, self._contact
-        if self._agreed is not None:
-            contact = replace(contact, normal_ned=self._agreed.direction_ned, normal_error_rad=self._agreed.error_rad)
+        if self._record.after_ned_m_s is not None:
+            known = self._record.normal
+            contact = replace(contact, normal_ned=known.direction_ned, normal_error_rad=known.error_rad)
         normal = contact.normal_ned
         off_m_s = split(estimator.motion.velocity_ned_m_s, normal)[0]
         is_pushed = split(estimator.external_m_s2, normal)[0] > reflex.PRESSING_TILT_M_S2
@@ -254,41 +251,54 @@ def _has_room_below(flight: FlightContext) -> bool:
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
-    """Record a new collision: the motion just before it, and the recovery setpoint from that."""
-    mission, impact, law = flight.mission, estimate.impact, _law(flight)
-    normal = level(estimate.normal)
-    place, velocity = estimate.position_ned_m, estimate.velocity_ned_m_s
-    before = flight.collisions[-1] if flight.collisions and not flight.collisions[-1].is_over else None
-    is_second = law.follows and before is not None and not before.estimator.knows_motion
+    """Record and report a new collision: the motion just before it, and the recovery setpoint from that."""
+    mission, impact, normal = flight.mission, estimate.impact, level(estimate.normal)
+    place, velocity, attitude = estimate.position_ned_m, estimate.velocity_ned_m_s, flight.vehicle.attitude
+    before = next(iter(in_one_recovery(flight.collisions)), None)
+    is_second = _law(flight).follows and before is not None and not before.estimator.knows_motion
     if before is not None and is_second:
         # The vehicle's estimate is still wrong from the hit before.
         place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
     contact = Contact(estimate.time_boot_us, place, velocity, normal.direction_ned, normal.error_rad)
-    expected = contact.rebound(mission.recovery.restitution)
+    expected, first_us = contact.rebound(mission.recovery.restitution), impact.sample_time_boot_us
     record = CollisionRecord(
         detected_at_us=now_us,
-        sample_time_boot_us=impact.sample_time_boot_us,
+        sample_time_boot_us=first_us,
         detector=mission.companion.detector,
         contact=contact,
-        setpoint_ned_m=_setpoint(flight, contact, expected, _surfaces(flight, contact, flight.collisions)),
+        setpoint_ned_m=_setpoint(flight, contact, expected, _surfaces(flight, contact)),
         contact_normal=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
-        contact_ended_boot_us=impact.sample_time_boot_us,
-        estimator=MotionEstimator(contact, impact.sample_time_boot_us, expected, mission.companion.estimate, is_second),
-        hypothesis=_hypothesis(flight, estimate),
+        contact_ended_boot_us=first_us,
+        estimator=MotionEstimator(contact, first_us, expected, mission.companion.estimate, is_second),
     )
-    record.estimator.note_contact(estimate.is_fully_measured, impact.sample_time_boot_us)
+    if before is None and attitude is not None:
+        force_ned = body_to_ned(attitude.attitude_wxyz, impact.specific_force_frd_m_s2)
+        record.hypothesis = hypothesis_of(estimate, force_ned, mission.companion.estimate.imu_averaging_interval_s)
+    record.estimator.note_contact(estimate.is_fully_measured, first_us)
     flight.collisions.append(record)
-    report_detection(flight, record, now_us)
+    _report_detection(flight, record.report())
 
 
-def _hypothesis(flight: FlightContext, estimate: ImpactEstimate) -> ForceHypothesis | VelocityJumpHypothesis | None:
-    """The hypothesis of a first sample; None without an attitude, or while the vehicle recovers from another hit."""
-    attitude = flight.vehicle.attitude
-    if attitude is None or (flight.collisions and not flight.collisions[-1].is_over):
-        return None
-    force_ned = body_to_ned(attitude.attitude_wxyz, estimate.impact.specific_force_frd_m_s2)
-    return hypothesis_of(estimate, force_ned, flight.mission.companion.estimate.imu_averaging_interval_s)
+def _report_detection(flight: FlightContext, hit: CollisionReport) -> None:
+    force_m_s2, v_c, speed_m_s = hit.peak_specific_force_m_s2, hit.impact_velocity_ned_m_s, hit.impact_speed_m_s
+    place, setpoint = (
+        as_text(flight.mission_ned_m(each)) for each in (hit.position_ned_m, hit.recovery_setpoint_ned_m)
+    )
+    flight.report(
+        hit.detected_at_us,
+        "detection",
+        f"hit {len(flight.collisions)}: {force_m_s2:.1f} m/s^2, v_c {as_text(v_c)} ({speed_m_s:.2f} m/s) at {place}; "
+        f"recovery setpoint {setpoint}",
+        detector=hit.detector,
+        sample_time_boot_us=hit.sample_time_boot_us,
+        impact_velocity_ned_m_s=v_c,
+        impact_speed_m_s=speed_m_s,
+        normal_ned=hit.normal_ned,
+        specific_force_m_s2=force_m_s2,
+        position_ned_m=hit.position_ned_m,
+        recovery_setpoint_ned_m=hit.recovery_setpoint_ned_m,
+    )
 
 
 def _law(flight: FlightContext) -> Law:
@@ -303,12 +313,10 @@ def _setpoint(flight: FlightContext, contact: Contact, motion: MotionState, surf
     return FenceBounds(flight.origin_ned_m, flight.mission.fence).clamp(contact.position_ned_m, goal)
 
 
-def _surfaces(flight: FlightContext, contact: Contact, records: Sequence[CollisionRecord]) -> list[Surface]:
+def _surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:
     """The surface just hit first, then those hit before in the same recovery, then the obstacle map's."""
     surfaces = [Surface(contact.position_ned_m, contact.normal_ned, flight.mission.recovery.clearance_m)]
-    for record in reversed(records):
-        if record.is_over:
-            break
+    for record in in_one_recovery(flight.collisions):
         if record.contact.time_boot_us < contact.time_boot_us:
             touched = Surface(record.contact.position_ned_m, record.normal.direction_ned, 0.0)
             surfaces.append(replace(touched, distance_m=max(0.0, touched.off_m(record.setpoint_ned_m))))

@@ -1,6 +1,9 @@
 """Has the vehicle come to rest at a place?"""
 
-from companion.messages import LocalPosition, Vector3
+import math
+
+from companion.messages import Vector3
+from companion.motion.strapdown import ZERO
 from companion.strict_model import NotNegative, Positive, StrictModel
 
 
@@ -21,54 +24,24 @@ class SettledConfig(StrictModel):
 
 
 class SettlingMonitor:
-    """Within a distance of the place and below a speed, without a break, for a duration.
+    """Within a distance of the place and below a low-pass filtered speed, without a break, for a duration."""
 
-    Position and velocity are smoothed first (exponential mean), because the noise of a good velocity estimate
-    alone, 0.03 m/s on each axis, now and then makes a vehicle at rest look faster than 0.1 m/s.
-    """
+    __slots__ = ("_config", "_since_us", "_time_us", "_velocity")
 
-    __slots__ = ("_config", "_place", "_position", "_since_us", "_time_us", "_velocity")
-
-    def __init__(self, place_ned_m: Vector3, config: SettledConfig) -> None:
-        self._place = place_ned_m
+    def __init__(self, config: SettledConfig) -> None:
         self._config = config
-        self._position: Vector3 | None = None
-        self._velocity: Vector3 = (0.0, 0.0, 0.0)
-        self._time_us = 0
+        self._velocity, self._time_us = ZERO, 0
         self._since_us: int | None = None
 
-    def settled_since(self, sample: LocalPosition) -> int | None:
-        """Take one sample; the start (boot time) of an interval that is by now long enough, or None."""
-        self._smooth(sample)
-        if not self._is_at_rest():
+    def settled_since(self, time_boot_us: int, distance_m: float, velocity_m_s: Vector3) -> int | None:
+        """Take the present motion; the start (boot time) of an interval that is by now long enough, or None."""
+        config, elapsed_s = self._config, max(1e-6, 1e-6 * (time_boot_us - self._time_us))
+        (u, v, w), (n, e, d), share = self._velocity, velocity_m_s, elapsed_s / (config.smoothing_s + elapsed_s)
+        self._velocity, self._time_us = (u + share * (n - u), v + share * (e - v), w + share * (d - w)), time_boot_us
+        if distance_m > config.distance_m or math.hypot(*self._velocity) >= config.speed_m_s:
             self._since_us = None
-            return None
-        if self._since_us is None:
-            self._since_us = sample.time_boot_us
-        elapsed_us = sample.time_boot_us - self._since_us
-        return self._since_us if elapsed_us >= self._config.duration_s * 1e6 else None
-
-    def _smooth(self, sample: LocalPosition) -> None:
-        if self._position is None:
-            self._position, self._velocity = sample.position_ned_m, sample.velocity_ned_m_s
-        else:
-            dt_s = (sample.time_boot_us - self._time_us) * 1e-6
-            weight = dt_s / (self._config.smoothing_s + dt_s) if dt_s > 0.0 else 0.0
-            self._position = _blend(self._position, sample.position_ned_m, weight)
-            self._velocity = _blend(self._velocity, sample.velocity_ned_m_s, weight)
-        self._time_us = sample.time_boot_us
-
-    def _is_at_rest(self) -> bool:
-        assert self._position is not None
-        p, q, v = self._position, self._place, self._velocity
-        distance2 = (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
-        speed2 = v[0] ** 2 + v[1] ** 2 + v[2] ** 2
-        return distance2 <= self._config.distance_m**2 and speed2 < self._config.speed_m_s**2
-
-
-def _blend(old: Vector3, new: Vector3, weight: float) -> Vector3:
-    return (
-        old[0] + weight * (new[0] - old[0]),
-        old[1] + weight * (new[1] - old[1]),
-        old[2] + weight * (new[2] - old[2]),
-    )
+        elif self._since_us is None:
+            self._since_us = time_boot_us
+        elif time_boot_us - self._since_us >= config.duration_s * 1e6:
+            return self._since_us
+        return None

@@ -13,7 +13,6 @@ from companion.messages import (
     CommandResult,
     CurrentMode,
     Heartbeat,
-    LocalPosition,
     RequestMessage,
     SetArmed,
     SetMode,
@@ -58,50 +57,37 @@ def test_a_line_of_no_length_is_over_at_once():
 # --- settling
 
 
-def positions(offset_m, speed_m_s, seconds, noise_m_s=0.0, start_us=0, seed=3):
+def settled(motions, **config):
+    monitor = SettlingMonitor(SettledConfig(**config))
+    return [monitor.settled_since(20_000 * tick, *motion) for tick, motion in enumerate(motions, 1)]
+
+
+def at_rest(ticks, noise_m_s=0.0, seed=3):
     rng = random.Random(seed)
-    for t_us in range(start_us, start_us + round(seconds * 1e6), 20_000):
-        velocity = (
-            speed_m_s + rng.gauss(0.0, noise_m_s),
-            rng.gauss(0.0, noise_m_s),
-            rng.gauss(0.0, noise_m_s),
-        )
-        yield LocalPosition(t_us, (offset_m, 0.0, -1.5), velocity)
-
-
-def settled(samples, **config):
-    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig(**config))
-    return [monitor.settled_since(sample) for sample in samples]
+    return [(0.05, (rng.gauss(0.0, noise_m_s), rng.gauss(0.0, noise_m_s), 0.0)) for _ in range(ticks)]
 
 
 def test_settled_after_half_a_second_at_rest_and_not_before():
-    since = settled(positions(0.05, 0.05, 1.0))
+    since = settled(at_rest(50))
     assert since[24] is None
-    assert since[25] == 0
+    assert since[25] == 20_000
 
 
-@pytest.mark.parametrize(("offset_m", "speed_m_s"), [(0.15, 0.0), (0.0, 0.15)])
-def test_too_far_or_too_fast_is_not_settled(offset_m, speed_m_s):
-    assert set(settled(positions(offset_m, speed_m_s, 3.0))) == {None}
+@pytest.mark.parametrize("motion", [(0.15, (0.0, 0.0, 0.0)), (0.0, (0.15, 0.0, 0.0))])
+def test_too_far_or_too_fast_is_not_settled(motion):
+    assert set(settled([motion] * 150)[5:]) == {None}
 
 
 def test_a_break_starts_the_time_anew():
-    monitor = SettlingMonitor((0.0, 0.0, -1.5), SettledConfig(smoothing_s=0.0))
-    samples = [
-        *positions(0.0, 0.0, 0.4),
-        *positions(0.2, 0.0, 0.04, start_us=400_000),
-        *positions(0.0, 0.0, 1.0, start_us=440_000),
-    ]
-    results = [monitor.settled_since(sample) for sample in samples]
+    results = settled(at_rest(20) + [(0.2, (0.0, 0.0, 0.0))] * 2 + at_rest(50))
     first = next(i for i, r in enumerate(results) if r is not None)
-    assert results[first] == 440_000
-    assert samples[first].time_boot_us == 940_000
+    assert results[first] == 460_000
+    assert first == 47
 
 
 def test_the_noise_of_a_good_estimate_does_not_keep_a_vehicle_from_settling():
     for seed in range(20):
-        since = settled(positions(0.0, 0.0, 1.0, noise_m_s=0.03, seed=seed))
-        assert since[-1] is not None
+        assert settled(at_rest(50, noise_m_s=0.03, seed=seed))[-1] is not None
 
 
 # --- command client

@@ -304,6 +304,14 @@ def test_a_velocity_that_is_not_that_of_the_places_is_put_right_by_them():
     assert record.is_over and record.settled_after_s() < 3.5
 
 
+def test_a_recovery_that_is_over_or_whose_hit_is_taken_back_goes_on_until_its_state_ends():
+    flight, record, recover = recovering(velocity=ZERO)
+    record.is_over, flight.collisions = True, []
+    at_us = 11_000_000
+    assert recover.step(flight, Inputs(positions=[said(1.0, at_us, (2.0, 0.0, -2.0))]), at_us) is not None
+    assert recover.target(at_us) is not None
+
+
 def test_a_place_that_jumps_makes_no_large_error_of_a_velocity():
     found = reckoned()
     found.note_contact(True, HIT_US)
