@@ -8,7 +8,7 @@ from itertools import takewhile
 from companion.detection.interface import DetectorState
 from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
 from companion.estimate.normal import Normal, unit, with_change
-from companion.flight.confirmation import DECIDED_US, ForceHypothesis, VelocityJumpHypothesis
+from companion.flight.confirmation import DECIDED_US, Hypothesis
 from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import LATEST_S
 from companion.motion.history import MotionHistory
@@ -41,7 +41,7 @@ class CollisionRecord:
     estimator: MotionEstimator
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     after_ned_m_s: Vector3 | None = None  # the velocity after the contact
-    hypothesis: ForceHypothesis | VelocityJumpHypothesis | None = None  # until it is confirmed or rejected
+    hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
     settled_at_boot_us: int | None = None
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
@@ -61,7 +61,7 @@ class CollisionRecord:
 
     def follow_motion(self, strapdown: Strapdown) -> None:
         """Take the newest accelerometer and gyroscope sample."""
-        if isinstance(self.hypothesis, ForceHypothesis):
+        if self.hypothesis is not None:
             self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
         self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
         if self.fixes:
@@ -74,31 +74,23 @@ class CollisionRecord:
     ) -> None:
         """Update the contact's largest force, its end and its normal while it lasts."""
         self.fixes = fixes
-        hypothesis = self.hypothesis
-        is_turned = isinstance(hypothesis, ForceHypothesis) and hypothesis.is_turned
-        if hypothesis is not None and (is_turned or self._is_seen_again(state, hypothesis)):
+        hypothesis, is_in_contact = self.hypothesis, state.phase in IN_OR_AFTER_CONTACT
+        is_seen_again = is_in_contact and state.last_loud_boot_us > self.sample_time_boot_us
+        if hypothesis is not None and (hypothesis.is_turned or is_seen_again):
             self.hypothesis = None
-        if state.phase not in IN_OR_AFTER_CONTACT or estimate is None:
-            return
-        if estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
+        if not is_in_contact or estimate is None or estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
             return
         self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
         self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
         self.contact_normal = level(estimate.normal)
         self.estimator.note_contact(estimate.is_fully_measured, self.contact_ended_boot_us)
 
-    def _is_seen_again(self, state: DetectorState, hypothesis: ForceHypothesis | VelocityJumpHypothesis) -> bool:
-        """Whether another sample of the contact's force has come."""
-        return state.phase in IN_OR_AFTER_CONTACT and state.last_loud_boot_us > hypothesis.time_boot_us
-
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""
         if self.hypothesis is None or now_boot_us - self.sample_time_boot_us < DECIDED_US:
             return False
         hypothesis, self.hypothesis = self.hypothesis, None
-        if hypothesis.is_rejected(self.fixes):
-            return True
-        return isinstance(hypothesis, VelocityJumpHypothesis) and hypothesis.stays_in_place(places, position_noise_m)
+        return hypothesis.is_rejected(self.fixes, places, position_noise_m)
 
     def is_rebound(self, time_boot_us: int) -> bool:
         """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""

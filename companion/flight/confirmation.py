@@ -1,14 +1,14 @@
-"""Confirmation of a hit. The first sample starts a recovery at once; the hit counts when other evidence confirms it.
+"""Confirmation of a hit. The first message that shows it starts a recovery; it counts when other evidence confirms it.
 
-The first piece of evidence is one IMU sample. The second is another sample of the contact's force, or a rate jump that
-no motor makes, or a change of the vehicle's own velocity. A true impulse over that sample's averaging time must change
-the velocity. A broken or forged packet does not: the next rates and velocities reject it.
+The first piece of evidence is one IMU sample, or one velocity that has jumped. The second is another sample of the
+contact's force, or a rate jump that no motor makes, or the vehicle's own velocity and position. A true impulse must
+change them. A broken or forged packet does not: the next rates, velocities and positions reject it.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import fmean, median, stdev
+from statistics import median, stdev
 
 from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
@@ -21,10 +21,9 @@ from companion.reflex.planner import REST
 
 # A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
 STRUCK_M_S = 0.5
-# Time to the decision. A tilt of 17 degrees for this time moves a vehicle by 3 cm.
+# Time to the decision. A tilt of 17 degrees for this time moves a vehicle by 3 cm. Velocities before the hit are
+# averaged over the same time; the shorter it is, the smaller are the slow errors.
 DECIDED_US = SHOWN_US
-# Velocities before the hit are averaged over the same time; the shorter it is, the smaller are the slow errors.
-BEFORE_US = DECIDED_US
 # A hit that matters changes the velocity by more than this; noise alone reaches 0.1 m/s now and then.
 HIT_LEAVES_M_S = 0.15
 # Standard deviations of the noise that a rejection needs.
@@ -32,70 +31,58 @@ SURE = 3.0
 
 
 @dataclass(slots=True)
-class ForceHypothesis:
-    """A hit that one IMU sample shows: the contact force per mass, local NED, as a mean over a window."""
+class Hypothesis:
+    """A hit that one message shows: an IMU sample's force over its averaging time, or a velocity."""
 
     time_boot_us: int
-    earlier: ImuSample  # the sample before
-    force_ned_m_s2: Vector3
-    averaging_s: float
-    later_boot_us: int | None = None  # time of the sample after, once it has come
-    is_turned: bool = False  # whether that sample shows a rate jump that no motor makes
+    free_until_boot_us: int
+    change_m_s: float  # of the velocity
+    away: Vector3  # its direction, local NED
+    force_m_s2: float = 0.0  # the contact force per mass in the IMU sample
+    earlier: ImuSample | None = None  # the one before; None where a velocity shows the hit
+    later_boot_us: int | None = None  # time of the one after, once it has come
+    is_turned: bool = False  # whether that one shows a rate jump that no motor makes
 
     def follow(self, time_boot_us: int, rates_frd_rad_s: Vector3) -> None:
         """Take the newest IMU sample's time and rates (FRD). The first one after the hit may show a rate jump."""
-        if self.later_boot_us is None and time_boot_us > self.time_boot_us:
+        if self.earlier is not None and self.later_boot_us is None and time_boot_us > self.time_boot_us:
             self.later_boot_us = time_boot_us
             elapsed_s = 1e-6 * (time_boot_us - self.earlier.time_boot_us)
             turned = math.dist(rates_frd_rad_s, self.earlier.angular_velocity_frd_rad_s)
             self.is_turned = turned > MOTORS_RAD_S2 * elapsed_s
 
-    def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
-        """Whether the velocities after the sample show no impulse of this size.
+    def is_rejected(self, fixes: Sequence[VelocityFix], history: MotionHistory, position_noise_m: float) -> bool:
+        """Whether velocities show no impulse of this size, or positions no jump of the velocity."""
+        return self._is_unmoved(fixes) or (self.earlier is None and self._stays_in_place(history, position_noise_m))
+
+    def _is_unmoved(self, fixes: Sequence[VelocityFix]) -> bool:
+        """Whether the velocities before and after show less than half of the change.
 
         `fixes` have each velocity beside the accelerometer's integral (trapezoids). The sample in question is taken out
         of the integral. After a true impulse the velocity is ahead of it by the whole impulse; otherwise both agree.
         """
-        hit_us, later_us = self.time_boot_us, self.later_boot_us
-        was = [less_sum(fix) for fix in fixes if hit_us - BEFORE_US <= fix.time_boot_us < hit_us]
-        came = [less_sum(fix) for fix in fixes if hit_us + LONGEST_DELAY_US <= fix.time_boot_us <= hit_us + DECIDED_US]
-        size_m_s2 = math.hypot(*self.force_ned_m_s2)
-        if len(was) < 2 or len(came) < 2 or later_us is None or size_m_s2 == 0.0:
+        free_us, hit_us, in_sum_m_s, sure = self.free_until_boot_us, self.time_boot_us, 0.0, 0.0
+        was = [less_sum(fix) for fix in fixes if free_us - DECIDED_US <= fix.time_boot_us <= free_us]
+        came = [less_sum(fix) for fix in fixes if LONGEST_DELAY_US <= fix.time_boot_us - hit_us <= DECIDED_US]
+        if len(was) < 2 or len(came) < 2:
             return False
-        away = plus(REST, 1.0 / size_m_s2, self.force_ned_m_s2)
-        in_sum_m_s = size_m_s2 * 0.5e-6 * (later_us - self.earlier.time_boot_us)
-        change = plus(plus(_mean(came), -1.0, _mean(was)), in_sum_m_s, away)
-        spread = stdev(split(each, away)[0] for each in was) * math.sqrt(1.0 / len(was) + 1.0 / len(came))
-        least_m_s = 0.5 * max(size_m_s2 * self.averaging_s, HIT_LEAVES_M_S)
-        is_unmoved = split(change, away)[0] < least_m_s and least_m_s > SURE * spread
-        # A stuck axis shows no force along itself.
-        return is_unmoved and math.hypot(*change) < STRUCK_M_S
-
-
-@dataclass(frozen=True, slots=True)
-class VelocityJumpHypothesis:
-    """A hit that one velocity shows: it has jumped."""
-
-    time_boot_us: int
-    free_until_boot_us: int
-    change_m_s: float
-    away: Vector3  # its direction, local NED
-
-    def is_rejected(self, fixes: Sequence[VelocityFix]) -> bool:
-        """Whether no velocity since shows half of the jump."""
-        free_us, hit_us = self.free_until_boot_us, self.time_boot_us
-        before = [less_sum(fix) for fix in fixes if free_us - BEFORE_US <= fix.time_boot_us <= free_us]
-        after = [less_sum(fix) for fix in fixes if hit_us < fix.time_boot_us <= hit_us + DECIDED_US]
-        if len(before) < 2 or len(after) < 2:
-            return False
+        if self.earlier is not None:
+            if self.later_boot_us is None:
+                return False
+            in_sum_m_s = self.force_m_s2 * 0.5e-6 * (self.later_boot_us - self.earlier.time_boot_us)
+            sure = SURE * math.sqrt(1.0 / len(was) + 1.0 / len(came))
         # The median: one of them may be forged.
-        was = median(split(each, self.away)[0] for each in before)
-        return all(split(came, self.away)[0] - was < 0.5 * self.change_m_s for came in after)
+        change = plus(plus(_median(came), -1.0, _median(was)), in_sum_m_s, self.away)
+        least_m_s = 0.5 * max(self.change_m_s, HIT_LEAVES_M_S)
+        is_unmoved = split(change, self.away)[0] < least_m_s
+        is_clear = least_m_s > sure * stdev(split(each, self.away)[0] for each in was)
+        # A stuck axis shows no force along itself.
+        return is_unmoved and is_clear and math.hypot(*change) < STRUCK_M_S
 
-    def stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
+    def _stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
         """Whether the positions before and after show less than half of the jump, beyond their noise."""
         free_us, hit_us = self.free_until_boot_us, self.time_boot_us
-        was = self._came_m_s(history.between(free_us - BEFORE_US, free_us + 1))
+        was = self._came_m_s(history.between(free_us - DECIDED_US, free_us + 1))
         came = self._came_m_s(history.between(hit_us + 1, hit_us + DECIDED_US + 1))
         least_m_s = 0.5 * self.change_m_s
         if was is None or came is None or least_m_s * DECIDED_US * 1e-6 < SURE * position_noise_m:
@@ -110,23 +97,19 @@ class VelocityJumpHypothesis:
         return split(plus(places[-1].position_ned_m, -1.0, places[0].position_ned_m), self.away)[0] / over_s
 
 
-def _mean(vectors: Sequence[Vector3]) -> Vector3:
-    n, e, d = (fmean(axis) for axis in zip(*vectors, strict=True))
+def _median(vectors: Sequence[Vector3]) -> Vector3:
+    n, e, d = (median(axis) for axis in zip(*vectors, strict=True))
     return (n, e, d)
 
 
-def hypothesis_of(
-    estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float
-) -> ForceHypothesis | VelocityJumpHypothesis | None:
+def hypothesis_of(estimate: ImpactEstimate, force_ned_m_s2: Vector3, averaging_s: float) -> Hypothesis | None:
     """The hypothesis that remains to be confirmed; None where more than one message shows the hit already."""
-    impact = estimate.impact
+    impact, size_m_s2 = estimate.impact, math.hypot(*force_ned_m_s2)
     hit_us, free_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
-    if impact.evidence is Evidence.VELOCITY_JUMP:
-        size_m_s2 = math.hypot(*force_ned_m_s2)
-        if size_m_s2 == 0.0:
-            return None
-        away = plus(REST, 1.0 / size_m_s2, force_ned_m_s2)
-        return VelocityJumpHypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
-    if estimate.is_final or estimate.earlier is None:
+    is_jump, earlier = impact.evidence is Evidence.VELOCITY_JUMP, estimate.earlier
+    if size_m_s2 == 0.0 or (not is_jump and (estimate.is_final or earlier is None)):
         return None
-    return ForceHypothesis(hit_us, estimate.earlier, force_ned_m_s2, averaging_s)
+    away = plus(REST, 1.0 / size_m_s2, force_ned_m_s2)
+    if is_jump:
+        return Hypothesis(hit_us, free_us, size_m_s2 * 1e-6 * (hit_us - free_us), away)
+    return Hypothesis(hit_us, free_us, size_m_s2 * averaging_s, away, size_m_s2, earlier)

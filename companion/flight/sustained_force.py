@@ -25,7 +25,8 @@ FOLLOWED_S = 1.0
 STEADY_M_S = 0.12
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
-# An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet.
+# An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet, and a
+# motor that fails has not let the vehicle down yet.
 LEAST_US = 300_000
 # What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
 # 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15

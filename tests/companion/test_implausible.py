@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import development as mav
 
 from bench.faults.packets import made
 from companion.detection.stream_health import AttitudeGate
-from companion.flight.confirmation import ForceHypothesis, VelocityJumpHypothesis
+from companion.flight.confirmation import Hypothesis
 from companion.messages import (
     Attitude,
     ImuSample,
@@ -139,24 +139,24 @@ def fixes(changes_by_m_s):
 def test_a_weak_force_of_one_sample_is_a_hit_only_where_the_velocity_shows_what_a_hit_leaves(changed_m_s, is_none):
     # 7 m/s^2 for 5 ms are 0.035 m/s, which no velocity shows
     earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
-    hypothesis = ForceHypothesis(1_000_000, earlier, (7.0, 0.0, 0.0), 0.005, later_boot_us=1_004_000)
-    assert hypothesis.is_rejected(fixes(changed_m_s)) is is_none
+    hypothesis = Hypothesis(1_000_000, 996_000, 0.035, (1.0, 0.0, 0.0), 7.0, earlier, later_boot_us=1_004_000)
+    assert hypothesis.is_rejected(fixes(changed_m_s), MotionHistory(), 0.03) is is_none
 
 
 def test_a_push_along_an_axis_that_is_stuck_is_not_taken_back_for_what_the_others_show_of_it():
     # Given a sensor that shows the east of a push alone, which took 1.3 m/s off the way north
     earlier = ImuSample(996_000, (0.0, 0.0, -9.8), STILL)
-    hypothesis = ForceHypothesis(1_000_000, earlier, (0.0, 7.0, 0.0), 0.005, later_boot_us=1_004_000)
-    assert not hypothesis.is_rejected(fixes(-1.3))
+    hypothesis = Hypothesis(1_000_000, 996_000, 0.035, (0.0, 1.0, 0.0), 7.0, earlier, later_boot_us=1_004_000)
+    assert not hypothesis.is_rejected(fixes(-1.3), MotionHistory(), 0.03)
     # Then without it the one sample stands alone
-    assert hypothesis.is_rejected(fixes(0.0))
+    assert hypothesis.is_rejected(fixes(0.0), MotionHistory(), 0.03)
 
 
 def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_a_hit():
     true = [VelocityFix(at_ms * 1000, STILL, STILL) for at_ms in range(800, 1160, 30)]
     forged = VelocityFix(910_000, (0.0, -2.0, 0.0), STILL)
-    leap = VelocityJumpHypothesis(1_000_000, 930_000, 0.64, (0.0, 1.0, 0.0))
-    assert leap.is_rejected(sorted([*true, forged], key=lambda fix: fix.time_boot_us))
+    leap = Hypothesis(1_000_000, 930_000, 0.64, (0.0, 1.0, 0.0))
+    assert leap.is_rejected(sorted([*true, forged], key=lambda fix: fix.time_boot_us), MotionHistory(), 0.03)
 
 
 @pytest.mark.parametrize(("speed_m_s", "stays"), [(0.0, True), (3.0, False)])
@@ -164,7 +164,7 @@ def test_a_velocity_that_jumps_is_no_hit_where_the_places_do_not_follow(speed_m_
     history = MotionHistory()
     for at_ms in range(800, 1160, 20):
         history.add(LocalPosition(at_ms * 1000, (max(0.0, speed_m_s * (at_ms - 1000) * 1e-3), 0.0, 0.0), STILL))
-    assert VelocityJumpHypothesis(1_000_000, 950_000, 3.0, (1.0, 0.0, 0.0)).stays_in_place(history, 0.03) is stays
+    assert Hypothesis(1_000_000, 950_000, 3.0, (1.0, 0.0, 0.0)).is_rejected((), history, 0.03) is stays
 
 
 def test_an_accelerometer_near_zero_is_off_and_not_a_hit():
