@@ -76,8 +76,7 @@ class CollisionMonitor:
     attitude_gate: AttitudeGate = field(default_factory=AttitudeGate)
     last_imu_boot_us: int = 0
     imu_fault: str | None = None  # what was wrong with the newest IMU message
-    threshold_reported: bool = False
-    losses_reported: bool = False
+    is_introduced: bool = False  # threshold and losses have been reported
     invalidity_reported: bool = False
     heard: set[MessageId] = field(default_factory=set)
 
@@ -114,9 +113,6 @@ class MonitorResult:
     notices: Sequence[Notice]
 
 
-NO_RESULT = MonitorResult((), (), ())
-
-
 def start_monitor(config: CollisionMonitorConfig, now_us: int) -> CollisionMonitor:
     """A monitor before its first sample; ``now_us`` is on the clock of `advance`."""
     averaging_us = round(config.estimate.imu_averaging_interval_s * 1e6)
@@ -151,7 +147,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             if sample.message == MessageId.HIGHRES_IMU.name:
                 monitor.imu_fault = f"HIGHRES_IMU not accepted: {sample.reason}"
             continue
-        elif not monitor.losses_reported and type(sample) in OPTIONAL_STREAMS:
+        elif type(sample) in OPTIONAL_STREAMS:
             monitor.heard.add(OPTIONAL_STREAMS[type(sample)])
         monitor.estimator.update(sample)
         if monitor.is_attitude_old:
@@ -164,10 +160,8 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             final = monitor.estimator.follow(sample, monitor.state, situation)
             if final is not None:
                 finished.append(final)
-    notices = _update_stream_health(monitor, imu_samples, situation, now_us) + _report_validity(monitor)
-    if not impacts and not finished and not notices:
-        return NO_RESULT
-    return MonitorResult(impacts, finished, notices)
+    monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
+    return MonitorResult(impacts, finished, _notices(monitor, situation.off_reason is None, now_us))
 
 
 def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
@@ -181,37 +175,27 @@ def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
     return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
 
 
-def _update_stream_health(
-    monitor: CollisionMonitor, imu_samples: int, situation: Situation, now_us: int
-) -> list[Notice]:
-    """Notices about stream health when it changes while the detector is on; once, about threshold and losses."""
+def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice]:
+    """Whether the detector sees while it is on, and whether the velocity is valid once the contact is over.
+
+    Each when it changes; threshold and losses once.
+    """
     notices: list[Notice] = []
-    monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
-    is_on, was = situation.off_reason is None, monitor.no_data_reason
-    reason = monitor.no_data_reason = _stream_fault(monitor, now_us) if is_on else None
+    was, reason = monitor.no_data_reason, _stream_fault(monitor, now_us) if is_on else None
+    monitor.no_data_reason = reason
     if (reason is None) != (was is None) and is_on:
-        text = "the detector sees again" if reason is None else f"detector blind: {reason}"
-        notices.append(Notice("link", text, {}))
-    if monitor.state.phase is not Phase.ARMED:
-        return notices
-    if not monitor.threshold_reported:
-        monitor.threshold_reported = True
+        notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}", {}))
+    has_waited = now_us - monitor.stream_health.started_us >= OPTIONAL_STREAMS_WAIT_US
+    if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
+        monitor.is_introduced = True
         threshold_m_s2 = monitor.state.threshold_m_s2
         text = f"detector '{monitor.detector.name}' armed: a hit is {threshold_m_s2:.1f} m/s^2 or more"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
-    if not monitor.losses_reported and now_us - monitor.stream_health.started_us >= OPTIONAL_STREAMS_WAIT_US:
-        monitor.losses_reported = True
-        for message, loss in monitor.detector.losses.items():
-            if message not in monitor.heard:
-                notices.append(Notice("loss", f"no {message.name}: {loss}", {}))
-    return notices
-
-
-def _report_validity(monitor: CollisionMonitor) -> list[Notice]:
-    """Report that the velocity estimate is not valid, once the contact is over, and when it is valid again."""
+        losses = monitor.detector.losses.items()
+        notices += [Notice("loss", f"no {name.name}: {loss}", {}) for name, loss in losses if name not in monitor.heard]
     is_invalid = not monitor.estimate_valid and monitor.state.phase is not Phase.CONTACT
-    if is_invalid == monitor.invalidity_reported:
-        return []
-    monitor.invalidity_reported = is_invalid
-    text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"
-    return [Notice("estimate", text, {})]
+    if is_invalid != monitor.invalidity_reported:
+        monitor.invalidity_reported = is_invalid
+        text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"
+        notices.append(Notice("estimate", text, {}))
+    return notices

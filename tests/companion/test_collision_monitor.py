@@ -64,7 +64,7 @@ def test_late_and_doubled_samples_are_dropped_and_a_reboot_is_not():
     fly(monitor, 2_900_000)
     at = monitor.last_imu_boot_us
     late = ImuSample(at - INTERVAL_US, (-50.0, 0.0, -9.81), (0.0, 0.0, 0.0))
-    assert advance(monitor, [late], WANTED, 2_900_000).impacts == ()
+    assert advance(monitor, [late], WANTED, 2_900_000).impacts == []
     fly(monitor, 500_000)
     assert monitor.last_imu_boot_us < 500_000
 
@@ -176,7 +176,7 @@ def test_a_watch_that_is_not_wanted_is_off_not_blind():
     monitor = start_monitor(lateral(), 0)
     fly(monitor, 1_000_000, situation=Situation("landing"))
     seen = advance(monitor, [], Situation("landing"), 3_000_000)
-    assert (seen.notices, monitor.no_data_reason, monitor.describe()) == ((), None, "off (landing)")
+    assert (seen.notices, monitor.no_data_reason, monitor.describe()) == ([], None, "off (landing)")
 
 
 def test_what_is_lost_without_a_message_is_said_once():
