@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.reflex import config as reflex
-from companion.reflex.halfspace import Surface, plus, split
+from companion.reflex.halfspace import Surface, limited, plus, split
 
 REST: Vector3 = (0.0, 0.0, 0.0)
 # A plan's acceleration is looked at between so many equal parts: its first part's is largest at 1/2, the last's at 0.21
@@ -43,33 +43,29 @@ class Plan:
         if elapsed_s >= self.duration_s:
             return MotionState(self.goal_ned_m, REST)
         s = max(0.0, elapsed_s) / self.duration_s
-        (x, u, a), (y, v, b), (z, w, c) = self._axes(s, min(1.0, s + lead_s / self.duration_s))
-        return MotionState((x, y, z), (u, v, w), (a, b, c))
-
-    def _axes(self, s: float, ahead: float) -> list[tuple[float, float, float]]:
-        start, total_s = self.start, self.duration_s
-        ends = zip(
-            start.position_ned_m, start.velocity_ned_m_s, start.acceleration_ned_m_s2, self.goal_ned_m, strict=True
+        leans = 0.5 * s**2 - 2.0 / 3.0 * s**3 + 0.25 * s**4
+        moved = self._sum(s - s**3 + 0.5 * s**4, leans, 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5)
+        moves = self._sum(1.0 - 3.0 * s**2 + 2.0 * s**3, s - 2.0 * s**2 + s**3, 30.0 * (s - s**2) ** 2)
+        return MotionState(
+            plus(self.start.position_ned_m, 1.0, moved),
+            plus(REST, 1.0 / self.duration_s, moves),
+            self._acceleration(min(1.0, s + lead_s / self.duration_s)),
         )
-        return [_axis(x_0, v_0, a_0, x_1, total_s, s, ahead) for x_0, v_0, a_0, x_1 in ends]
 
     def most_m_s2(self) -> float:
         """The plan's largest acceleration, m/s^2."""
-        looked_at = (part / _PARTS for part in range(1, _PARTS))
-        return max(math.hypot(*(a for _, _, a in self._axes(s, s))) for s in looked_at)
+        return max(math.hypot(*self._acceleration(part / _PARTS)) for part in range(1, _PARTS))
 
+    def _acceleration(self, s: float) -> Vector3:
+        bends = self._sum(6.0 * (s**2 - s), 1.0 - 4.0 * s + 3.0 * s**2, 60.0 * s - 180.0 * s**2 + 120.0 * s**3)
+        return plus(REST, self.duration_s**-2, bends)
 
-def _axis(
-    x_0: float, v_0: float, a_0: float, x_1: float, total_s: float, s: float, ahead: float
-) -> tuple[float, float, float]:
-    """Position and velocity at s, acceleration ahead of it."""
-    drift, lean = v_0 * total_s, a_0 * total_s**2
-    rest = x_1 - x_0 - 0.5 * drift - lean / 12.0
-    x = x_0 + s * drift * (1.0 + s * s * (0.5 * s - 1.0)) + rest * s**3 * (10.0 + s * (6.0 * s - 15.0))
-    x += lean * s * s * (0.5 + s * (0.25 * s - 2.0 / 3.0))
-    v = drift * (1.0 + s * s * (2.0 * s - 3.0)) + (lean * s + 30.0 * rest * s * s) * (1.0 - s) ** 2
-    a = ahead * (ahead - 1.0) * (6.0 * drift + 60.0 * rest * (2.0 * ahead - 1.0))
-    return x, v / total_s, (a + lean * (1.0 - ahead) * (1.0 - 3.0 * ahead)) / total_s**2
+    def _sum(self, of_drift: float, of_lean: float, of_rest: float) -> Vector3:
+        """Multiples of v_0 T, a_0 T^2 and e."""
+        drift = plus(REST, self.duration_s, self.start.velocity_ned_m_s)
+        lean = plus(REST, self.duration_s**2, self.start.acceleration_ned_m_s2)
+        rest = plus(plus(plus(self.goal_ned_m, -1.0, self.start.position_ned_m), -0.5, drift), -1.0 / 12.0, lean)
+        return plus(plus(plus(REST, of_drift, drift), of_lean, lean), of_rest, rest)
 
 
 def shortest(state: MotionState, goal_ned_m: Callable[[float], Vector3], most_m_s2: float) -> Plan:
@@ -125,13 +121,11 @@ def safe_to_hold(acceleration_ned_m_s2: Vector3, velocity_ned_m_s: Vector3) -> V
 
     Held for HELD_S + NOTICED_S it makes no vehicle faster than it is, or than HELD_TO_M_S.
     """
-    (a, b, c), (u, v, _) = acceleration_ned_m_s2, velocity_ned_m_s
-    most_m_s, asked2 = max(math.hypot(u, v), reflex.HELD_TO_M_S), a * a + b * b
-    # |v + share a t| = most, of which the larger root.
-    along = (a * u + b * v) / max(asked2, 1e-9)
-    most_s = math.sqrt(max(0.0, along * along + (most_m_s**2 - u * u - v * v) / max(asked2, 1e-9))) - along
-    share = min(1.0, max(0.0, most_s) / (reflex.HELD_S + reflex.NOTICED_S))
-    return (share * a, share * b, c)
+    was, held_s = (velocity_ned_m_s[0], velocity_ned_m_s[1], 0.0), reflex.HELD_S + reflex.NOTICED_S
+    made = plus(was, held_s, (acceleration_ned_m_s2[0], acceleration_ned_m_s2[1], 0.0))
+    made = limited(made, max(math.hypot(*was), reflex.HELD_TO_M_S))
+    n, e, _ = plus(REST, 1.0 / held_s, plus(made, -1.0, was))
+    return (n, e, acceleration_ned_m_s2[2])
 
 
 def height_feedback(
