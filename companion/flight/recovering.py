@@ -213,7 +213,7 @@ class Recover:
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""
-        is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < reflex.CONTACT_LINGERS_US
+        is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < 1e6 * reflex.SMOOTHED_S
         estimator, contact = self._record.estimator, self._contact
         if self._record.after_ned_m_s is not None:
             known = self._record.normal

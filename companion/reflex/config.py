@@ -53,12 +53,11 @@ ROUNDS = 5
 
 # --- the present motion
 # Time constant of the acceleration's low-pass filter and of corrections by the vehicle's estimate: a few samples of the
-# slowest stream, against vibration; shorter than the estimate's noise lasts, longer than its delay.
+# slowest stream, against vibration; shorter than the estimate's noise lasts, longer than its delay. A contact counts so
+# long after its last sample: it may go on, or the filtered motion does not contain it yet.
 SMOOTHED_S = 0.05
 # Cosine of 60 degrees. Beyond this tilt no thrust carries the vehicle.
 LEAST_UPRIGHT_COSINE = 0.5
-# A contact counts for this long after its last sample: it may go on, or the estimate does not contain it yet.
-CONTACT_LINGERS_US = 50_000
 # Hypotheses of how an estimator corrects itself after a clipped hit. A real PX4 has 0.16 s, 4.7 rad/s and a damping of
 # 0.67 by motion capture, 0.13 s, 2.4 rad/s and 0.69 by GPS (bench/notes/px4.md). Others are up to twice as fast.
 CORRECTION_DELAY_S = np.linspace(0.04, 0.22, 4)

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import DELAY_S, LATEST_S
-from companion.motion.rotation import body_to_ned
+from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
 from companion.reflex import config as reflex
 from companion.reflex.halfspace import limited, plus, split
@@ -30,31 +30,49 @@ from companion.reflex.planner import REST, MotionState
 
 Floats = npt.NDArray[np.float64]
 
-# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping.
-_MODELS = np.array(list(product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)))
+# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping. The last: nothing is missing.
+_SOME = np.array([*product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)])
+_LATE_S, _RAD_S, _DAMPING = np.append(_SOME, _SOME[-1:], axis=0).T
+_SWING, _SLOW, _ONE, _ZERO = 2.0 * _DAMPING * _RAD_S, reflex.TILT_PER_S, np.ones_like(_RAD_S), np.zeros_like(_RAD_S)
+# The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
+# p = delay, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
+# s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
+_K, _H, _M = _SWING + _SLOW, _RAD_S**2 + _SWING * _SLOW, _RAD_S**2 * _SLOW
+_RATES = np.array([[-_K, _ONE, _ZERO], [-_H, _ZERO, _ONE], [-_M, _ZERO, _ZERO]])
+_POLES, _SHAPES = np.linalg.eig(np.moveaxis(_RATES, 2, 0))
+_MODES = _SHAPES * np.linalg.solve(_SHAPES, np.array([_LATE_S, _ONE, _ZERO]).T[..., None]).swapaxes(1, 2)
+
+
+def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
+    """g, G in seconds, and the swing's remaining amplitude, of each model at a time after the hit."""
+    x = np.maximum(since_s - _LATE_S, 0.0)
+    way_s, g, _ = np.einsum("wim,wm->iw", _MODES, np.exp(_POLES * x[:, None])).real
+    return g, way_s - np.maximum(_LATE_S - since_s, 0.0), np.exp(-0.5 * _SWING * x)
 
 
 @dataclass(slots=True)
 class FilterBank:
-    """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); the last has e = 0.
+    """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); in the last e = 0.
 
     Local NED, SI. Changed only by its methods.
     """
 
     start: MotionState
+    spread_m_s: float  # standard deviation of its velocity
     error_m_s: Vector3
-    spreads: tuple[float, float, float]  # standard deviations of x, v and e
     state: Floats = field(init=False)
     covariance: Floats = field(init=False)
     log_likelihoods: Floats = field(init=False)  # twice the logarithm of each model's likelihood
 
     def __post_init__(self) -> None:
-        models = len(_MODELS) + 1
+        models = len(_POLES)
         state = np.stack([self.start.position_ned_m, self.start.velocity_ned_m_s, self.error_m_s], axis=1)
         self.state = np.tile(state, (models, 1, 1))
-        self.covariance = np.tile(np.diag(np.square(self.spreads)), (models, 1, 1))
+        spreads = (reflex.PLACE_SPREAD_M, self.spread_m_s, math.hypot(*self.error_m_s) + self.spread_m_s)
+        self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
         self.log_likelihoods = np.zeros(models)
-        self.log_likelihoods[-1] = 2.0 * math.log(len(_MODELS))  # as likely as all others together
+        self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
+        self.log_likelihoods[-1] = 2.0 * math.log(models)  # as likely as all others together
 
     def predict(self, elapsed_s: float, faster_m_s: Vector3) -> None:
         """Predict over a time, with the accelerometer's integral; its attitude may be slightly wrong."""
@@ -96,32 +114,6 @@ class FilterBank:
         return share
 
 
-def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
-    """g, G in seconds, and the swing's remaining amplitude, of each model at a time after the hit.
-
-    The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
-    p = late_s, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
-    s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
-    """
-    (late_s, rad_s, damping), slow = _MODELS.T, reflex.TILT_PER_S
-    slowing, turning = damping * rad_s, rad_s * np.sqrt(1.0 - damping**2)
-    k, h = 2.0 * slowing + slow, rad_s**2 + 2.0 * slowing * slow
-    x = np.maximum(since_s - late_s, 0.0)
-    rate = 1.0 - k * late_s
-    bend = -h * late_s - k * rate
-    rest = (bend + 2.0 * slowing * rate + rad_s**2 * late_s) / (slow * slow - 2.0 * slowing * slow + rad_s**2)
-    swung = late_s - rest
-    across = (rate + slow * rest + slowing * swung) / turning
-    cos, sin, left = np.cos(turning * x), np.sin(turning * x), np.exp(-slowing * x)
-    rests = rest * np.exp(-slow * x)
-    swings = left * (swung * cos + across * sin)
-    slope = left * turning * (across * cos - swung * sin) - slowing * swings - slow * rests
-    is_late = since_s <= late_s
-    g = np.where(is_late, 1.0, slope + k * (rests + swings))
-    way_s = np.where(is_late, since_s, rests + swings)
-    return np.append(g, 0.0), np.append(way_s, 0.0), np.append(left, 0.0)
-
-
 @dataclass(slots=True)
 class MotionEstimator:
     """Local NED, SI, the vehicle's boot clock. Changed only by its methods."""
@@ -139,16 +131,14 @@ class MotionEstimator:
     spread_m_s: float = 0.0  # largest standard deviation of the motion's velocity
     position_error_m: Vector3 = REST  # remaining error of the reported position, once it has converged
     _bank: FilterBank | None = None  # from the first report on
-    _summed_m_s: Vector3 = REST
-    _acceleration: Vector3 = REST
+    _summed_m_s: Vector3 = REST  # the accelerometer's integral
     _at_boot_us: int = 0  # the bank's time
     _moved_m_s: Vector3 = REST  # the integral up to that time
-    _time_boot_us: int = 0
+    _time_boot_us: int = 0  # of the newest sample of the accelerometer
     _hidden_error_m_s: Vector3 = REST  # remaining error of the reported velocity
     _rate_error_m_s: Vector3 = REST  # its difference from the positions' rate
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
     _pushed_boot_us: int = 0
-    _is_reported: bool = False  # the reports contain the hit
 
     def __post_init__(self) -> None:
         self.motion = self.start
@@ -157,17 +147,8 @@ class MotionEstimator:
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, REST, None
         self._newest, self.has_converged = None, False
-        self.spread_m_s = 0.0 if self.is_fully_measured else self._expected_spread_m_s()
+        self.spread_m_s = reflex.SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
-
-    def _expected_spread_m_s(self) -> float:
-        return reflex.SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
-
-    def _expected(self) -> FilterBank:
-        # Clipping hides between none and all of the change of velocity.
-        half = plus(REST, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
-        spread_m_s = self._expected_spread_m_s()
-        return FilterBank(self.start, half, (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*half) + spread_m_s))
 
     @property
     def knows_motion(self) -> bool:
@@ -185,8 +166,8 @@ class MotionEstimator:
     def imu(self, strapdown: Strapdown) -> None:
         """Integrate the newest sample. More than 1 g is the contact itself, whose effect `start` already contains."""
         time_us, elapsed_s = strapdown.time_boot_us, 1e-6 * (strapdown.time_boot_us - self._time_boot_us)
-        first, self._time_boot_us = self._time_boot_us == 0, time_us
-        if first or not 0.0 < elapsed_s < 0.1:
+        self._time_boot_us = time_us
+        if not 0.0 < elapsed_s < 1e-6 * LONGEST_GAP_US:
             return
         pushed = strapdown.acceleration_ned_m_s2
         if math.hypot(*pushed) >= GRAVITY_M_S2:
@@ -195,7 +176,7 @@ class MotionEstimator:
         mean = plus(was.acceleration_ned_m_s2, weight, plus(pushed, -1.0, was.acceleration_ned_m_s2))
         place = plus(was.position_ned_m, elapsed_s, plus(was.velocity_ned_m_s, 0.5 * elapsed_s, pushed))
         self.motion = MotionState(place, plus(was.velocity_ned_m_s, elapsed_s, pushed), mean)
-        self._summed_m_s, self._acceleration = plus(self._summed_m_s, elapsed_s, pushed), pushed
+        self._summed_m_s = plus(self._summed_m_s, elapsed_s, pushed)
         self.tilt_m_s2 = tilt_ahead(strapdown, reflex.LEAD_S)
         down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
         n, e, _ = split(plus(mean, -GRAVITY_M_S2, (0.0, 0.0, 1.0)), down)[1]
@@ -203,66 +184,58 @@ class MotionEstimator:
 
     def update(self, sample: LocalPosition) -> None:
         """Take the vehicle's reported position and velocity."""
-        at_us = sample.time_boot_us - round(1e6 * DELAY_S)
-        if at_us <= self.hit_boot_us or not self._shows_hit(sample):
+        at_us, since_us = sample.time_boot_us - round(1e6 * DELAY_S), sample.time_boot_us - self.hit_boot_us
+        changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
+        is_late = since_us < 1e6 * LATEST_S and changed_m_s <= reflex.SAME_M_S and not self.is_second
+        if at_us <= self.hit_boot_us or is_late:
             return
         if self.is_fully_measured:
-            self.has_converged, self.position_error_m, self._hidden_error_m_s = True, REST, REST
+            self.has_converged = True
         elif self.has_converged or sample.time_boot_us > self._pushed_boot_us:
             self._filter(sample, at_us)
         if self.has_converged:
             self._correct(sample)
 
-    def _shows_hit(self, sample: LocalPosition) -> bool:
-        """Whether the reports contain the hit by now. Late ones still have the velocity before it."""
-        if not self.is_second and sample.time_boot_us - self.hit_boot_us < 1e6 * LATEST_S:
-            changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
-            self._is_reported = self._is_reported or changed_m_s > reflex.SAME_M_S
-            return self._is_reported
-        return True
-
     def _filter(self, sample: LocalPosition, at_us: int) -> None:
         """Update the bank. The vehicle's estimate has converged once the swing that is left is small enough."""
-        is_ahead = self._time_boot_us > 0 and at_us > self._time_boot_us + LONGEST_GAP_US
-        if is_ahead or at_us <= self._at_boot_us:
+        now_us = self._time_boot_us or at_us
+        if abs(now_us - at_us) > LONGEST_GAP_US or now_us <= self._at_boot_us:
             # The report's time is outside the integrated interval.
             return
-        config, elapsed_s = self.config, 1e-6 * (at_us - self._at_boot_us)
-        bank = self._bank = self._bank or self._expected()
-        since_s = 1e-6 * (at_us - self.hit_boot_us)
+        config, elapsed_s, behind_s = self.config, 1e-6 * (now_us - self._at_boot_us), 1e-6 * (now_us - at_us)
+        # Clipping hides between none and all of the change of velocity.
+        half = plus(REST, 0.5, plus(self.contact.velocity_ned_m_s, -1.0, self.start.velocity_ned_m_s))
+        bank = self._bank = self._bank or FilterBank(self.start, self.spread_m_s, half)
+        bank.predict(elapsed_s, plus(self._summed_m_s, -1.0, self._moved_m_s))
+        self._at_boot_us, self._moved_m_s = now_us, self._summed_m_s
+        g, way_s, left = error_response(1e-6 * (at_us - self.hit_boot_us))
+        # The report as of now.
+        place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
+        velocity = plus(sample.velocity_ned_m_s, behind_s, self.motion.acceleration_ned_m_s2)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-3))
-        behind_s = 1e-6 * (self._time_boot_us - at_us)
-        summed = plus(self._summed_m_s, -behind_s, self._acceleration)
-        bank.predict(elapsed_s, plus(summed, -1.0, self._moved_m_s))
-        self._at_boot_us, self._moved_m_s = at_us, summed
-        g, way_s, left = error_response(since_s)
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
-        hidden_m_s = math.hypot(*bank.error_m_s)
-        off_m_s = hidden_m_s * reflex.MODEL_ERROR
-        off_m = off_m_s * min(since_s, 1.0)
-        bank.update(0, way_s, sample.position_ned_m, colour * (config.position_noise_m**2 + off_m**2))
-        bank.update(1, g, sample.velocity_ned_m_s, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
+        off_m_s = math.hypot(*bank.error_m_s) * reflex.MODEL_ERROR
+        off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
+        bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
+        bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         estimate, spread_m_s, left_m_s = bank.estimate(left)
         self.has_converged = self.has_converged or left_m_s <= reflex.SAME_M_S
         if self.has_converged:
             self.position_error_m, self._hidden_error_m_s = bank.mean_error(way_s), bank.mean_error(g)
             return
-        velocity = plus(estimate.velocity_ned_m_s, behind_s, self._acceleration)
-        place = plus(estimate.position_ned_m, behind_s, velocity)
-        self.motion = MotionState(place, velocity, self.motion.acceleration_ned_m_s2)
+        self.motion = replace(estimate, acceleration_ned_m_s2=self.motion.acceleration_ned_m_s2)
         self.spread_m_s = spread_m_s
 
     def _correct(self, sample: LocalPosition) -> None:
         """Correct the motion by a converged estimate: wholly by the first report, then by a low-pass filter."""
-        before, self._newest = self._newest, _without(sample, self.position_error_m, self._hidden_error_m_s)
-        was, share = self.motion, 1.0
+        measured = self.corrected(sample)
+        was, share, before, self._newest = self.motion, 1.0, self._newest, measured
         if before is not None:
             elapsed_s = max(0.0, 1e-6 * (sample.time_boot_us - before.time_boot_us))
             share = elapsed_s / (reflex.SMOOTHED_S + elapsed_s)
             if 0.0 < elapsed_s < reflex.COMPARED_S:
-                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, self._newest, elapsed_s)
-        measured = self.corrected(sample)
+                self._rate_error_m_s = _rate_error(self._rate_error_m_s, before, measured, elapsed_s)
         place = plus(was.position_ned_m, share, plus(measured.position_ned_m, -1.0, was.position_ned_m))
         velocity = plus(was.velocity_ned_m_s, share, plus(measured.velocity_ned_m_s, -1.0, was.velocity_ned_m_s))
         self.motion = MotionState(place, velocity, was.acceleration_ned_m_s2)
@@ -275,32 +248,25 @@ class MotionEstimator:
 
     def corrected(self, sample: LocalPosition) -> LocalPosition:
         """The report without its known errors."""
-        return _without(sample, self.position_error_m, self.velocity_error_m_s)
-
-
-def _without(sample: LocalPosition, position_error_m: Vector3, velocity_error_m_s: Vector3) -> LocalPosition:
-    place = plus(sample.position_ned_m, -1.0, position_error_m)
-    return replace(
-        sample, position_ned_m=place, velocity_ned_m_s=plus(sample.velocity_ned_m_s, -1.0, velocity_error_m_s)
-    )
+        place = plus(sample.position_ned_m, -1.0, self.position_error_m)
+        velocity = plus(sample.velocity_ned_m_s, -1.0, self.velocity_error_m_s)
+        return replace(sample, position_ned_m=place, velocity_ned_m_s=velocity)
 
 
 def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition, elapsed_s: float) -> Vector3:
     """Difference between the reported velocity and the positions' rate, m/s: low-pass filtered and limited.
 
-    The errors of positions are shorter than those of velocities.
+    The errors of positions are shorter than those of velocities. The reports are without the error so far.
     """
     half_s = 0.5 * elapsed_s
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
     further_m = plus(led, -1.0, measured.position_ned_m)
-    estimate = plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), plus(further_m, -elapsed_s, was_m_s))
-    return limited(estimate, 2.0 * reflex.SAME_M_S)
+    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * reflex.SAME_M_S)
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:
     """Horizontal acceleration, NED, of a thrust that carries the vehicle, at the tilt in `lead_s`."""
-    n, e, d = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, -1.0))
-    p, q, r = body_to_ned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s)
-    n, e, d = n + lead_s * (q * d - r * e), e + lead_s * (r * n - p * d), d + lead_s * (p * e - q * n)
-    carrying_m_s2 = GRAVITY_M_S2 / max(-d, reflex.LEAST_UPRIGHT_COSINE)
-    return (carrying_m_s2 * n, carrying_m_s2 * e, 0.0)
+    ahead_wxyz = turned(strapdown.valid_wxyz, strapdown.rates_frd_rad_s, lead_s)
+    n, e, d = body_to_ned(ahead_wxyz, (0.0, 0.0, -GRAVITY_M_S2))
+    upright = max(-d / GRAVITY_M_S2, reflex.LEAST_UPRIGHT_COSINE)
+    return (n / upright, e / upright, 0.0)
