@@ -4,9 +4,8 @@ import math
 
 from companion.detection.interface import ImpactKind, Situation
 from companion.messages import Vector3
+from companion.motion.history import SAME_M_S
 
-# A vehicle slower than this did not run into anything: the obstacle came to it. Six times the noise of a good estimate.
-HOVER_M_S = 0.2
 # Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
@@ -16,8 +15,11 @@ TURN_RAD_S_PER_M_S = 10.0
 
 
 def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
-    """Whether this velocity is too small to have run into anything; False where it is unknown."""
-    return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < HOVER_M_S
+    """Whether this velocity is too small to have run into anything; False where it is unknown.
+
+    Then the obstacle came to the vehicle.
+    """
+    return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < SAME_M_S
 
 
 def kind_of(

@@ -18,6 +18,9 @@ OPTIONAL_STREAMS_WAIT_US = 3_000_000
 # The vehicle's estimate shows a hit by this time: all but the longest contacts are over (0.12 s at 1 m/s), it is 20 to
 # 40 ms late, and a filter's switching makes it swing.
 SHOWN_US = 150_000
+# A velocity that differs by less does not differ: four times the noise of a good estimate, which reaches 0.1 m/s now
+# and then. An estimate has converged when its known error stays below that.
+SAME_M_S = 0.15
 
 
 class MotionHistory:

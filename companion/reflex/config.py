@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from companion.motion.history import SAME_M_S as SAME_M_S
 from companion.motion.strapdown import GRAVITY_M_S2
 from companion.strict_model import NotNegative, Positive, StrictModel
 
@@ -69,9 +70,6 @@ TILT_PER_S = 0.5
 MODEL_ERROR = 0.03
 # Process noise of the accelerometer's integral: an attitude that is wrong by 2 degrees for 0.3 s.
 DRIFT_M2_S3 = 0.03
-# A velocity that differs by less does not differ: four times the noise of a good estimate. The estimate has converged
-# when its known error stays below that.
-SAME_M_S = 0.15
 # The reported velocity is compared with the rate of the reported positions over this time, whose noise of 0.02 m makes
 # 0.04 m/s of it. More than twice SAME_M_S is a position that jumped.
 COMPARED_S = 0.5
