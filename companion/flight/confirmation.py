@@ -13,7 +13,7 @@ from statistics import median, stdev
 from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.motion.history import SHOWN_US, MotionHistory
+from companion.motion.history import SAME_M_S, SHOWN_US, MotionHistory
 from companion.motion.inertial import VelocityFix, less_sum
 from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2
 from companion.reflex.halfspace import plus, split
@@ -24,8 +24,6 @@ STRUCK_M_S = 0.5
 # Time to the decision. A tilt of 17 degrees for this time moves a vehicle by 3 cm. Velocities before the hit are
 # averaged over the same time; the shorter it is, the smaller are the slow errors.
 DECIDED_US = SHOWN_US
-# A hit that matters changes the velocity by more than this; noise alone reaches 0.1 m/s now and then.
-HIT_LEAVES_M_S = 0.15
 # Standard deviations of the noise that a rejection needs.
 SURE = 3.0
 
@@ -73,7 +71,7 @@ class Hypothesis:
             sure = SURE * math.sqrt(1.0 / len(was) + 1.0 / len(came))
         # The median: one of them may be forged.
         change = plus(plus(_median(came), -1.0, _median(was)), in_sum_m_s, self.away)
-        least_m_s = 0.5 * max(self.change_m_s, HIT_LEAVES_M_S)
+        least_m_s = 0.5 * max(self.change_m_s, SAME_M_S)
         is_unmoved = split(change, self.away)[0] < least_m_s
         is_clear = least_m_s > sure * stdev(split(each, self.away)[0] for each in was)
         # A stuck axis shows no force along itself.
