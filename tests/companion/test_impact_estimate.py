@@ -1,4 +1,4 @@
-"""v_c with the accelerometer's help, the push's impulse, the obstacle's normal: each against motion made by hand."""
+"""v_c and x(t_c), the push's impulse, the obstacle's normal: each against motion made by hand."""
 
 import math
 import random
