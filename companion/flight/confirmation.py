@@ -69,13 +69,18 @@ class Hypothesis:
                 return False
             in_sum_m_s = self.force_m_s2 * 0.5e-6 * (self.later_boot_us - self.earlier.time_boot_us)
             sure = SURE * math.sqrt(1.0 / len(was) + 1.0 / len(came))
-        # The median: one of them may be forged.
+        # The median: one of them may be forged. A jump that no sample showed fades from the sum: one velocity shows it.
         change = plus(plus(_median(came), -1.0, _median(was)), in_sum_m_s, self.away)
+        shown = max if self.earlier is None else median
+        shown_m_s, was_m_s = shown(self._along(came)), median(self._along(was))
         least_m_s = 0.5 * max(self.change_m_s, SAME_M_S)
-        is_unmoved = split(change, self.away)[0] < least_m_s
-        is_clear = least_m_s > sure * stdev(split(each, self.away)[0] for each in was)
+        is_unmoved = shown_m_s - was_m_s + in_sum_m_s < least_m_s
+        is_clear = least_m_s > sure * stdev(self._along(was))
         # A stuck axis shows no force along itself.
         return is_unmoved and is_clear and math.hypot(*change) < STRUCK_M_S
+
+    def _along(self, vectors: Sequence[Vector3]) -> list[float]:
+        return [split(each, self.away)[0] for each in vectors]
 
     def _stays_in_place(self, history: MotionHistory, position_noise_m: float) -> bool:
         """Whether the positions before and after show less than half of the jump, beyond their noise."""

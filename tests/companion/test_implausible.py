@@ -159,6 +159,18 @@ def test_one_forged_velocity_among_those_before_does_not_make_the_next_true_one_
     assert leap.is_rejected(sorted([*true, forged], key=lambda fix: fix.time_boot_us), MotionHistory(), 0.03)
 
 
+@pytest.mark.parametrize(("shown_m_s", "is_none"), [(0.3, False), (0.2, True)])
+def test_a_jump_of_the_velocity_that_fades_is_a_hit_where_one_velocity_shows_half_of_it(shown_m_s, is_none):
+    """A ceiling met at 2 m/s between the samples at 50 Hz: the sum drifts while the vehicle turns."""
+    was = [VelocityFix(at_ms * 1000, STILL, STILL) for at_ms in range(800, 950, 30)]
+    came = [
+        VelocityFix(at_ms * 1000, (0.0, 0.0, shown_m_s - 0.0015 * (at_ms - 1040)), STILL)
+        for at_ms in range(1040, 1150, 33)
+    ]
+    hit = Hypothesis(1_000_000, 930_000, 0.51, (0.0, 0.0, 1.0))
+    assert hit.is_rejected([*was, *came], MotionHistory(), 0.03) is is_none
+
+
 @pytest.mark.parametrize(("speed_m_s", "stays"), [(0.0, True), (3.0, False)])
 def test_a_velocity_that_jumps_is_no_hit_where_the_places_do_not_follow(speed_m_s, stays):
     history = MotionHistory()
