@@ -124,7 +124,10 @@ class Core(ABC, Generic[FlightT, MachineT]):
             impacts = () if flight.fault else collisions(flight, monitor, samples, self.situation(), now_us)
             acks = [sample for sample in samples if isinstance(sample, CommandAck)]
             positions = [sample for sample in samples if isinstance(sample, LocalPosition)]
+            unconfirmed = flight.unconfirmed
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
+            if flight.unconfirmed > unconfirmed:
+                self.monitor.reject()
             follow_contact(flight, self.monitor)
             note_motors(flight, samples, now_us)
         except Exception as error:

@@ -99,6 +99,10 @@ class CollisionMonitor:
         """The present estimate of the latest impact."""
         return self.estimator.estimate
 
+    def reject(self) -> None:
+        """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
+        self.estimator.validity.assess(True, self.last_imu_boot_us)
+
     def describe(self) -> str:
         """For the live line."""
         return self.state.describe() if self.no_data_reason is None else f"blind ({self.no_data_reason})"

@@ -209,6 +209,8 @@ def test_one_forged_velocity_is_contradicted_by_the_velocities_after_it(forged, 
         air.run_until(lambda: air.state == "recovering", 0.1)
         air.run_until(lambda: air.state == "mission", 1.0)
         assert air.vehicle.time_boot_us - began_us <= 250_000
+        # What was none hides nothing of a velocity
+        air.run_until(lambda: air.events[-1].text == "velocity valid again", 0.1)
         assert_goes_on(air, unconfirmed=1)
 
     fly_on(forge, f"companion.streams.highres_imu_hz={hz}")
