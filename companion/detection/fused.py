@@ -139,7 +139,7 @@ class FusedDetector:
         kind: ImpactKind | None = None,
     ) -> Impact:
         if kind is None:
-            attitude = LEVEL if situation.inertial is None else situation.inertial.strapdown.valid_wxyz
+            attitude = LEVEL if situation.strapdown is None else situation.strapdown.valid_wxyz
             n, e, d = body_to_ned(attitude, force)
             over_s = max(now_us - free_until_us, 1) * 1e-6
             impulse = (n * over_s, e * over_s, d * over_s)
@@ -153,13 +153,13 @@ class FusedDetector:
     # --- velocity ---------------------------------------------------------------------------------------------
 
     def _velocity(self, s: FusedState, sample: LocalPosition | Odometry, situation: Situation) -> Impact | None:
-        time_us, jump, config, inertial = sample.time_boot_us, s.jump, self._config, situation.inertial
+        time_us, jump, config, strapdown = sample.time_boot_us, s.jump, self._config, situation.strapdown
         s.velocity_ned_m_s = v = sample.velocity_ned_m_s
         if hovers(v):
             s.hovered_boot_us = time_us
-        if inertial is None or not inertial.has_new_fix:
+        if strapdown is None or not strapdown.has_new_fix:
             return None
-        step = jump.step_m_s(inertial.fixes)
+        step = jump.step_m_s(strapdown.fixes)
         if time_us - s.last_loud_boot_us < SHOWN_US or not situation.estimate_valid:
             jump.since_us = time_us
             return None
@@ -174,7 +174,7 @@ class FusedDetector:
         now_us, free_until_us = max(time_us, s.last_sample_boot_us), jump.before_us - LONGEST_DELAY_US
         over_s = max(now_us - free_until_us, 1) * 1e-6
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
-        force = ned_to_body(inertial.strapdown.valid_wxyz, push)
+        force = ned_to_body(strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
         return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, size / least)
 

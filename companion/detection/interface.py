@@ -6,7 +6,7 @@ from enum import Enum
 from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from companion.messages import LandedState, MessageId, Sample, Vector3
-from companion.motion.inertial import Inertial
+from companion.motion.strapdown import Strapdown
 
 
 class Phase(Enum):
@@ -52,7 +52,7 @@ class Situation(NamedTuple):
     `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
     one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
     to, so that touching it is no surprise. The watch fills in the last two. `estimate_valid`: False while the
-    vehicle's velocity cannot be believed, because its accelerometer did not show the whole of a hit. `inertial` has
+    vehicle's velocity cannot be believed, because its accelerometer did not show the whole of a hit. `strapdown` has
     heard the sample already.
     """
 
@@ -63,7 +63,7 @@ class Situation(NamedTuple):
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
     estimate_valid: bool = True
-    inertial: Inertial | None = None
+    strapdown: Strapdown | None = None
 
     @property
     def why_off(self) -> str | None:

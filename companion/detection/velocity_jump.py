@@ -1,6 +1,6 @@
 """A velocity jump: a step in the vehicle's velocity that the accelerometer did not show.
 
-Between two velocities the vehicle's estimate changes as the integrated accelerometer does (see `motion.inertial`). A
+Between two velocities the vehicle's estimate changes as the integrated accelerometer does (see `motion.strapdown`). A
 contact between two received samples, or in a lost one, changes the estimate only. A force beside the centre makes the
 body rates jump, too. A rate jump alone is no evidence: a failed motor turns the vehicle as well.
 """
@@ -12,8 +12,7 @@ from itertools import pairwise
 
 from companion.messages import Vector3
 from companion.motion.delay import Delay
-from companion.motion.inertial import VelocityFix, less_sum
-from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO
+from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO, VelocityFix, less_sum
 
 # Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3

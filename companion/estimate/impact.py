@@ -11,9 +11,8 @@ from companion.estimate.normal import Normal, normal_of
 from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
 from companion.motion.history import OPTIONAL_STREAMS_WAIT_US, STAMP_RESOLUTION_US, MotionHistory
-from companion.motion.inertial import Inertial
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import ZERO
+from companion.motion.strapdown import ZERO, Strapdown
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
@@ -55,7 +54,7 @@ class ImpactEstimator:
 
     config: EstimateConfig
     history: MotionHistory = field(default_factory=MotionHistory)
-    inertial: Inertial = field(default_factory=Inertial)
+    strapdown: Strapdown = field(default_factory=Strapdown)
     validity: VelocityValidity = field(default_factory=VelocityValidity)
     imu: ImuSample | None = None
     earlier_imu: ImuSample | None = None
@@ -68,17 +67,19 @@ class ImpactEstimator:
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
         if isinstance(sample, ImuSample):
-            self.inertial.imu(sample)
+            f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+            self.strapdown.imu(sample.time_boot_us, f, w)
             self.earlier_imu, self.imu = self.imu, sample
         elif isinstance(sample, LocalPosition | Odometry):
             if isinstance(sample, LocalPosition):
                 self.history.add(sample)
-            self.inertial.velocity(sample)
+            self.strapdown.velocity(sample)
             self.validity.update(sample.time_boot_us)
         elif isinstance(sample, Vibration):
             self._clipped(sample)
         elif isinstance(sample, Attitude):
-            self.inertial.attitude(sample, self.validity.is_attitude_valid(sample.time_boot_us))
+            time_us = sample.time_boot_us
+            self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.is_attitude_valid(time_us))
 
     def _clipped(self, sample: Vibration) -> None:
         """Take PX4's clipping counts. One that grew since before the contact makes its size a lower bound."""
@@ -93,7 +94,7 @@ class ImpactEstimator:
         """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
         sample_us, free_until_us = impact.sample_time_boot_us, impact.contact_free_until_boot_us
         place, velocity, error_m_s = self._motion(free_until_us)
-        force_ned = body_to_ned(self.inertial.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
+        force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
         self.contact = self._begin_contact_force(self.imu, impact) if self.imu is not None else None
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
@@ -128,7 +129,7 @@ class ImpactEstimator:
             range_m_s2=self.config.accelerometer_range_m_s2,
             time_boot_us=impact.contact_free_until_boot_us,
         )
-        contact.add(sample, self.inertial.strapdown.valid_wxyz, True)
+        contact.add(sample, self.strapdown.valid_wxyz, True)
         return contact
 
     def follow(self, sample: ImuSample, state: DetectorState, situation: Situation) -> ImpactEstimate | None:
@@ -142,7 +143,7 @@ class ImpactEstimator:
         is_over = state.phase is not Phase.CONTACT
         if contact is not None and sample.time_boot_us > contact.time_boot_us:
             loud = state.last_loud_boot_us == sample.time_boot_us
-            contact.add(sample, self.inertial.strapdown.valid_wxyz, loud)
+            contact.add(sample, self.strapdown.valid_wxyz, loud)
             if loud:
                 # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
                 self.validity.assess(contact.is_fully_measured, sample.time_boot_us)

@@ -12,8 +12,7 @@ from companion.flight.confirmation import DECIDED_US, Hypothesis
 from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import LATEST_S
 from companion.motion.history import MotionHistory
-from companion.motion.inertial import VelocityFix
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import Strapdown, VelocityFix
 from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator

@@ -14,8 +14,7 @@ from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import SAME_M_S, SHOWN_US, MotionHistory
-from companion.motion.inertial import VelocityFix, less_sum
-from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2
+from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2, VelocityFix, less_sum
 from companion.reflex.halfspace import plus, split
 from companion.reflex.planner import REST
 

@@ -98,9 +98,9 @@ def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample:
 def follow_contact(flight: FlightContext, collision_monitor: CollisionMonitor) -> None:
     """Update the latest collision's record while the contact lasts."""
     if flight.collisions:
-        record, inertial = flight.collisions[-1], collision_monitor.estimator.inertial
-        record.follow_contact(collision_monitor.state, collision_monitor.estimate, inertial.fixes)
-        record.follow_motion(inertial.strapdown)
+        record, strapdown = flight.collisions[-1], collision_monitor.estimator.strapdown
+        record.follow_contact(collision_monitor.state, collision_monitor.estimate, strapdown.fixes)
+        record.follow_motion(strapdown)
 
 
 def _report_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -1,8 +1,13 @@
-"""The integrated accelerometer: v' = R f + g, with the reported attitude carried on by the body rates."""
+"""The integrated accelerometer: v' = R f + g, with the reported attitude carried on by the body rates.
 
-from dataclasses import dataclass
+The vehicle's velocities stand beside it. While the two agree, velocity minus integral is constant.
+"""
 
-from companion.messages import Quaternion, Vector3
+from collections import deque
+from dataclasses import dataclass, field
+
+from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
+from companion.motion.history import CURRENT_US, KEPT_US
 from companion.motion.rotation import body_to_ned, ned_to_body, turned
 
 GRAVITY_M_S2 = 9.80665
@@ -20,9 +25,24 @@ MOST_WRONG = 0.966
 MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
 
 
+@dataclass(frozen=True, slots=True)
+class VelocityFix:
+    """One velocity of the estimate, with the accelerometer's integral at its time; local NED."""
+
+    time_boot_us: int
+    velocity_ned_m_s: Vector3
+    sum_ned_m_s: Vector3
+
+
+def less_sum(fix: VelocityFix) -> Vector3:
+    """Velocity minus integral, m/s: constant while the two agree."""
+    v, u = fix.velocity_ned_m_s, fix.sum_ned_m_s
+    return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
+
+
 @dataclass(slots=True)
 class Strapdown:
-    """Changed only by `attitude` and `imu`. Times: vehicle's boot clock; vectors local NED."""
+    """Changed only by its methods. Times: vehicle's boot clock; vectors local NED."""
 
     attitude_wxyz: Quaternion = LEVEL
     """As last reported, valid or not."""
@@ -38,6 +58,12 @@ class Strapdown:
     """
     level_acceleration_m_s2: Vector3 = ZERO
     """Horizontal acceleration, NED, of a vehicle that is level by its reported attitude; zero while that is valid."""
+    fixes: deque[VelocityFix] = field(default_factory=deque)
+    """Velocities without a restart of the integral or a reset of the estimator between them, the newest last."""
+    has_new_fix: bool = False
+    """Whether the newest velocity is one of them; while ODOMETRY comes, only its velocities are."""
+    _odometry_boot_us: int | None = None
+    _reset_counter: int = 0
 
     def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_valid: bool = True) -> None:
         behind_us, self.attitude_wxyz = self.time_boot_us - time_us, attitude_wxyz
@@ -49,8 +75,8 @@ class Strapdown:
         else:
             self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)
 
-    def imu(self, time_us: int, f: Vector3, w: Vector3) -> bool:
-        """Integrate one sample (body FRD); False where a gap restarted the integral."""
+    def imu(self, time_us: int, f: Vector3, w: Vector3) -> None:
+        """Integrate one sample (body FRD); a gap restarts the integral."""
         elapsed_us = time_us - self.time_boot_us
         whole, half_s = 0 < elapsed_us < LONGEST_GAP_US, 0.5e-6 * elapsed_us
         if whole:
@@ -58,21 +84,30 @@ class Strapdown:
             self.valid_wxyz = turned(self.valid_wxyz, (p + w[0], q + w[1], r + w[2]), half_s)
         else:
             self.valid_wxyz = self.attitude_wxyz
+            self.fixes.clear()
         a_n, a_e, a_d = body_to_ned(self.valid_wxyz, f)
         a_d += GRAVITY_M_S2
         if whole:
             b_n, b_e, b_d = self.acceleration_ned_m_s2
             n, e, d = self.sum_ned_m_s
             self.sum_ned_m_s = (n + half_s * (a_n + b_n), e + half_s * (a_e + b_e), d + half_s * (a_d + b_d))
-        self.acceleration_ned_m_s2 = (a_n, a_e, a_d)
-        self.rates_frd_rad_s = w
-        self.time_boot_us = time_us
-        return whole
+        self.time_boot_us, self.rates_frd_rad_s, self.acceleration_ned_m_s2 = time_us, w, (a_n, a_e, a_d)
 
-    def sum_at(self, time_us: int) -> Vector3 | None:
-        """The sum at a time near the newest sample; None where it is not near."""
-        ahead_us = time_us - self.time_boot_us
+    def velocity(self, sample: LocalPosition | Odometry) -> None:
+        """Take one velocity."""
+        time_us, told_us = sample.time_boot_us, self._odometry_boot_us
+        self.has_new_fix, ahead_us = False, time_us - self.time_boot_us
+        if isinstance(sample, Odometry):
+            if told_us is None or sample.reset_counter != self._reset_counter:
+                self.fixes.clear()
+            self._odometry_boot_us, self._reset_counter = time_us, sample.reset_counter
+        elif told_us is not None and time_us - told_us <= CURRENT_US:
+            return
         if not -LONGEST_GAP_US < ahead_us < LONGEST_GAP_US:
-            return None
-        s, a, ahead_s = self.sum_ned_m_s, self.acceleration_ned_m_s2, ahead_us * 1e-6
-        return (s[0] + ahead_s * a[0], s[1] + ahead_s * a[1], s[2] + ahead_s * a[2])
+            return
+        (n, e, d), (a, b, c), ahead_s = self.sum_ned_m_s, self.acceleration_ned_m_s2, ahead_us * 1e-6
+        in_sum = (n + ahead_s * a, e + ahead_s * b, d + ahead_s * c)
+        self.has_new_fix, fixes = True, self.fixes
+        fixes.append(VelocityFix(time_us, sample.velocity_ned_m_s, in_sum))
+        while fixes[0].time_boot_us < time_us - KEPT_US:
+            fixes.popleft()

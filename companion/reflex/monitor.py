@@ -131,7 +131,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
     imu_samples = 0
-    situation = situation._replace(inertial=monitor.estimator.inertial)
+    situation = situation._replace(strapdown=monitor.estimator.strapdown)
     for sample in samples:
         if type(sample) is ImuSample:
             if monitor.stuck_imu.imu(sample):
@@ -155,7 +155,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             monitor.heard.add(OPTIONAL_STREAMS[type(sample)])
         monitor.estimator.update(sample)
         if monitor.is_attitude_old:
-            monitor.estimator.inertial.fixes.clear()
+            monitor.estimator.strapdown.fixes.clear()
         known = situation if monitor.estimate_valid else situation._replace(estimate_valid=False)
         monitor.state, impact = monitor.detector.step(monitor.state, sample, known)
         if impact is not None:

@@ -13,7 +13,7 @@ from companion.detection.fused_state import FusedState
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
-from companion.motion.inertial import Inertial
+from companion.motion.strapdown import Strapdown
 
 TICK_US = 1_000
 WINDOW_US = 4_000
@@ -77,18 +77,19 @@ class Flight:
 
     def fly(self, until_us=4_000_000, **config):
         detector = FusedDetector(FusedConfig(**config), WINDOW_US)
-        self.state, impacts, inertial = detector.initial(), [], Inertial()
+        self.state, impacts, strapdown = detector.initial(), [], Strapdown()
         for t, sample in self.samples(until_us):
             if not isinstance(sample, ImuSample) and not isinstance(sample, self.heard):
                 continue
             match sample:
                 case ImuSample():
-                    inertial.imu(sample)
+                    f, w = sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s
+                    strapdown.imu(sample.time_boot_us, f, w)
                 case Attitude():
-                    inertial.attitude(sample)
+                    strapdown.attitude(sample.time_boot_us, sample.attitude_wxyz)
                 case LocalPosition() | Odometry():
-                    inertial.velocity(sample)
-            known = self.situation(t)._replace(inertial=inertial)
+                    strapdown.velocity(sample)
+            known = self.situation(t)._replace(strapdown=strapdown)
             self.state, impact = detector.step(self.state, sample, known)
             if impact is not None:
                 impacts.append(impact)

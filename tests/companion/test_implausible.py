@@ -18,9 +18,8 @@ from companion.messages import (
     Refused,
 )
 from companion.motion.history import MotionHistory
-from companion.motion.inertial import VelocityFix
 from companion.motion.resets import Resets
-from companion.motion.strapdown import Strapdown
+from companion.motion.strapdown import Strapdown, VelocityFix
 from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import Attacker, attacked, flight_in
 

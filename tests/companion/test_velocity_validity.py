@@ -136,9 +136,9 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
             samples.append(Attitude(t_us, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), rates))
         advance(monitor, samples, situation, t_us)
         if t_us < 2_140_000:
-            assert monitor.estimator.inertial.strapdown.level_acceleration_m_s2 == STILL
+            assert monitor.estimator.strapdown.level_acceleration_m_s2 == STILL
     # Then it is the filter's in the one case and the vehicle's in the other
     assert not monitor.estimate_valid
-    assert monitor.estimator.inertial.strapdown.level_acceleration_m_s2 == pytest.approx(
+    assert monitor.estimator.strapdown.level_acceleration_m_s2 == pytest.approx(
         (leans_m_s2, 0.0, 0.0), abs=0.02
     )
