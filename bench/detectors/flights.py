@@ -75,7 +75,9 @@ def _reports(case: FlightCase, vehicle: BenchVehicle, flown: FlownHealthy, wire:
     for name in case.detectors:
         found, touches, blind = watch_all(configuration(name, vehicle.settings), arrived, situations)
         entry: dict[str, Any] = {
-            "alarms": [_told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.final.kind) for f in found],
+            "alarms": [
+                _told(f.time_boot_us, flown.phases[index_at[f.time_boot_us]], f.first.impact.kind) for f in found
+            ],
             "touches": len(touches),
             "blind": blind,
         }

@@ -56,7 +56,7 @@ def work_out_hand(case: HandCase) -> dict[str, Any]:
             found, touches, _ = watch_all(configuration(name, vehicle.settings), arrived, recording.situations)
             told_us = [t.impact.sample_time_boot_us for t in touches if t.impact.sample_time_boot_us >= began_us]
             entries[name] = {
-                "collisions": [f.final.kind.value for f in found],
+                "collisions": [f.final.impact.kind.value for f in found],
                 "told_after_ms": 1e-3 * (told_us[0] - began_us) if told_us else None,
             }
         result["rates"][str(rate)] = {"detectors": entries}

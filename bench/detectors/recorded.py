@@ -102,8 +102,8 @@ def work_out_healthy(case: HealthyCase) -> dict[str, Any]:
         for name in case.detectors:
             findings = watch_log(log, configuration(name), asked_hz)
             detectors[name] = {
-                "collisions": [[log.seconds(f.at_us), f.final.kind.value] for f in findings.collisions],
-                "touches": [[log.seconds(f.at_us), f.final.kind.value] for f in findings.contacts],
+                "collisions": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.collisions],
+                "touches": [[log.seconds(f.at_us), f.final.impact.kind.value] for f in findings.contacts],
                 "blind_s": sum(span.duration_s for span in findings.blind),
             }
         result["rates"][rate] = detectors

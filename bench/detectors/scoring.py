@@ -134,7 +134,7 @@ def _entry(found: Sequence[Found], hit: Hit, possible: Possible, blind: int) -> 
         "normal_error_deg": angle_deg(first.final.normal.direction_ned, hit.normal_ned),
         "first_normal_error_deg": angle_deg(first.first.normal.direction_ned, hit.normal_ned),
         "time_error_ms": 1e-3 * (first.final.time_boot_us - touch_us),
-        "kind": first.final.kind.value,
+        "kind": first.final.impact.kind.value,
         "confidence": first.final.impact.confidence,
         "bound": first.final.is_lower_bound,
         "impulse": _ratio(first.final, hit),

@@ -10,8 +10,6 @@ from companion.motion.history import SAME_M_S
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
-# Turn for each m/s of impulse: lever over the squared radius of gyration, 0.04 m / 0.004 m^2 for the paper's vehicle.
-TURN_RAD_S_PER_M_S = 10.0
 
 
 def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
@@ -22,17 +20,14 @@ def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
     return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < SAME_M_S
 
 
-def kind_of(
-    impulse_ned_m_s: Vector3, velocity_ned_m_s: Vector3 | None, turn_rad_s: float, situation: Situation
-) -> ImpactKind:
+def kind_of(force_ned: Vector3, velocity_ned_m_s: Vector3 | None, situation: Situation) -> ImpactKind:
     """The kind by direction and situation alone; the size of the force has no influence.
 
     Contact with the ground at the end of a commanded descent is a landing, however hard. The same force without a
-    commanded descent is a strike. `turn_rad_s` is the change of the body rates by the contact.
+    commanded descent is a strike.
     """
-    push = impulse_ned_m_s
-    size = math.sqrt(push[0] ** 2 + push[1] ** 2 + push[2] ** 2)
-    up = -push[2] / size if size > 0.0 else 0.0
+    size = math.hypot(*force_ned)
+    up = -force_ned[2] / size if size > 0.0 else 0.0
     height_m = situation.height_m
     near_ground = height_m is None or height_m < GROUND_M
     if situation.descent_commanded and (near_ground or up > STEEP):
@@ -42,6 +37,4 @@ def kind_of(
         return ImpactKind.STRUCK if is_hovering and not near_ground else ImpactKind.FLOOR
     if is_hovering:
         return ImpactKind.STRUCK
-    if up < -STEEP:
-        return ImpactKind.CEILING
-    return ImpactKind.OFF_CENTRE if turn_rad_s > TURN_RAD_S_PER_M_S * size else ImpactKind.WALL
+    return ImpactKind.CEILING if up < -STEEP else ImpactKind.WALL

@@ -140,10 +140,7 @@ class FusedDetector:
     ) -> Impact:
         if kind is None:
             attitude = LEVEL if situation.strapdown is None else situation.strapdown.valid_wxyz
-            n, e, d = body_to_ned(attitude, force)
-            over_s = max(now_us - free_until_us, 1) * 1e-6
-            impulse = (n * over_s, e * over_s, d * over_s)
-            kind = kind_of(impulse, s.velocity_ned_m_s, s.jump.rate_step_near(now_us), situation)
+            kind = kind_of(body_to_ned(attitude, force), s.velocity_ned_m_s, situation)
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = now_us
         s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])

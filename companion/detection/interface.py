@@ -25,7 +25,6 @@ class ImpactKind(Enum):
     WALL = "wall"
     CEILING = "ceiling"
     FLOOR = "floor"  # the ground, not by a landing
-    OFF_CENTRE = "pole or off-centre"  # the push passes beside the centre and turns the vehicle
     STRUCK = "struck while hovering"  # the obstacle moved, not the vehicle
     LANDING = "landing"  # touchdown
     CONTACT = "contact"  # held or pushed gently, as by a hand

@@ -122,17 +122,14 @@ class VelocityJump:
         """
         return shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S) + LAG_S * thrust_change_m_s2
 
-    def rate_step_near(self, velocity_us: int) -> float:
-        """The largest rate jump, rad/s, that a velocity jump at ``velocity_us`` may belong to; 0 without one."""
-        is_near = velocity_us - self.rate_step_until_us < LONGEST_SLOW_STEP_US
-        return math.hypot(*self.rate_step_frd_rad_s) if is_near else 0.0
-
     def no_motor_turns(self, velocity_us: int, least_rad_s: float) -> bool:
-        """Whether that rate jump exceeds `least_rad_s` and what motors make between two samples; a third about yaw."""
-        if not self.rate_step_near(velocity_us):
-            return False
-        p, q, r = self.rate_step_frd_rad_s
-        return math.hypot(p, q, r / YAW_SHARE) >= least_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
+        """Whether the largest rate jump that a velocity jump at ``velocity_us`` may belong to is no motor's.
+
+        It exceeds `least_rad_s` and what motors make between two samples; a third about yaw.
+        """
+        (p, q, r), since_us = self.rate_step_frd_rad_s, velocity_us - self.rate_step_until_us
+        most_rad_s = least_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
+        return since_us < LONGEST_SLOW_STEP_US and math.hypot(p, q, r / YAW_SHARE) >= most_rad_s
 
 
 def _less(a: Vector3, b: Vector3, seconds: float = 1.0) -> Vector3:

@@ -22,14 +22,11 @@ class ContactForce:
 
     free_frd_m_s2: Vector3
     """The accelerometer's value without the contact."""
-    first_rates_frd_rad_s: Vector3
     averaging_us: int
     range_m_s2: float
     time_boot_us: int
     """Of the newest sample; before the first, the latest time without contact."""
     impulse_ned_m_s: Vector3 = ZERO
-    turn_rad_s: float = 0.0
-    """Change of the body rates since the contact's first sample."""
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)
     """The contact force in samples above the threshold."""
     is_clipped: bool = False
@@ -50,7 +47,6 @@ class ContactForce:
         self.has_gap |= not is_contiguous
         self.is_clipped |= max(map(abs, f)) >= CLIPPED_SHARE * self.range_m_s2
         self.impulse_ned_m_s = (n + elapsed_s * x, e + elapsed_s * y, d + elapsed_s * z)
-        self.turn_rad_s = math.dist(sample.angular_velocity_frd_rad_s, self.first_rates_frd_rad_s)
         self.forces_ned_m_s2.append(force)
         if len(self.forces_ned_m_s2) == 2 and is_contiguous:
             # The contact began within the first window: its mean is that share of the second window's.

@@ -3,8 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.detection.classify import kind_of
-from companion.detection.interface import DetectorState, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.detection.interface import DetectorState, Evidence, Impact, Phase
 from companion.estimate.config import EstimateConfig
 from companion.estimate.contact_force import ContactForce
 from companion.estimate.normal import Normal, normal_of
@@ -16,8 +15,6 @@ from companion.motion.strapdown import ZERO, Strapdown
 
 # In these phases a detector's state still describes the contact it fired on.
 IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
-# Kinds that are not classified again: unknown, and a soft contact.
-AS_DETECTED = (ImpactKind.UNKNOWN, ImpactKind.CONTACT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +40,6 @@ class ImpactEstimate:
     impulse_m_s: float
     is_fully_measured: bool
     is_lower_bound: bool
-    kind: ImpactKind
     is_final: bool
     earlier: ImuSample | None = None
 
@@ -111,7 +107,6 @@ class ImpactEstimator:
             impulse_m_s=size * 1e-6 * (sample_us - free_until_us),
             is_fully_measured=False,
             is_lower_bound=True,
-            kind=impact.kind,
             is_final=False,
             earlier=self.earlier_imu,
         )
@@ -124,7 +119,6 @@ class ImpactEstimator:
         f, force = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
         contact = ContactForce(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
-            first_rates_frd_rad_s=sample.angular_velocity_frd_rad_s,
             averaging_us=round(self.config.imu_averaging_interval_s * 1e6),
             range_m_s2=self.config.accelerometer_range_m_s2,
             time_boot_us=impact.contact_free_until_boot_us,
@@ -132,7 +126,7 @@ class ImpactEstimator:
         contact.add(sample, self.strapdown.valid_wxyz, True)
         return contact
 
-    def follow(self, sample: ImuSample, state: DetectorState, situation: Situation) -> ImpactEstimate | None:
+    def follow(self, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
         """Take each IMU sample, and the detector's state after it.
 
         Returns the final estimate, once: when the contact is over.
@@ -147,26 +141,23 @@ class ImpactEstimator:
             if loud:
                 # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
                 self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
-                estimate = self._refined(estimate, contact, situation)
+                estimate = self._refined(estimate, contact)
         self.estimate = replace(estimate, is_final=is_over)
         return self.estimate if is_over else None
 
-    def _refined(self, estimate: ImpactEstimate, contact: ContactForce, situation: Situation) -> ImpactEstimate:
-        velocity, impulse = estimate.velocity_ned_m_s, contact.impulse_ned_m_s
+    def _refined(self, estimate: ImpactEstimate, contact: ContactForce) -> ImpactEstimate:
         begun_us, error_us = estimate.time_boot_us, estimate.time_error_us
         if contact.begun_boot_us is not None:
             begun_us, error_us = contact.begun_boot_us, contact.averaging_us // 4
-        as_detected = estimate.impact.kind in AS_DETECTED
         return replace(
             estimate,
             time_boot_us=begun_us,
             time_error_us=error_us,
-            normal=normal_of(impulse, self.came_ned_m_s),
+            normal=normal_of(contact.impulse_ned_m_s, self.came_ned_m_s),
             peak_specific_force_m_s2=contact.peak_m_s2,
-            impulse_m_s=math.hypot(*impulse),
+            impulse_m_s=math.hypot(*contact.impulse_ned_m_s),
             is_fully_measured=contact.is_fully_measured,
             is_lower_bound=contact.has_gap or not contact.is_fully_measured,
-            kind=estimate.kind if as_detected else kind_of(impulse, velocity, contact.turn_rad_s, situation),
         )
 
     def _motion(self, contact_us: int) -> tuple[Vector3, Vector3, float]:

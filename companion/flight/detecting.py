@@ -82,7 +82,6 @@ def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude
         impulse_m_s=0.5 * held.force_m_s2 * lasted_us * 1e-6,
         is_fully_measured=True,
         is_lower_bound=False,
-        kind=ImpactKind.STRUCK,
         is_final=True,
     )
 

@@ -161,7 +161,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         if impact is not None:
             impacts.append(monitor.estimator.begin(impact))
         elif type(sample) is ImuSample:
-            final = monitor.estimator.follow(sample, monitor.state, situation)
+            final = monitor.estimator.follow(sample, monitor.state)
             if final is not None:
                 finished.append(final)
     monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)

@@ -57,7 +57,7 @@ def draw_impact(replay: Replay, finding: Finding, path: Path) -> None:
     what = "hit" if finding.is_collision else "contact, no collision"
     title = f"{replay.log.path.name}: {what} at {replay.log.seconds(finding.at_us):.3f} s by '{replay.detector}'"
     figure.suptitle(
-        f"{title}, {finding.final.kind.value}, confidence {finding.final.impact.confidence:.2f}", fontsize=12
+        f"{title}, {finding.final.impact.kind.value}, confidence {finding.final.impact.confidence:.2f}", fontsize=12
     )
     figure.savefig(path, dpi=100)
 

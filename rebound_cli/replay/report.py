@@ -118,7 +118,7 @@ def _verdict(replay: Replay) -> str:
 
 def _finding_rows(replay: Replay, finding: Finding) -> Iterator[str]:
     first, final, situation = finding.first, finding.final, finding.situation
-    kind = "" if final.kind is ImpactKind.UNKNOWN else f": {final.kind.value}"
+    kind = "" if final.impact.kind is ImpactKind.UNKNOWN else f": {final.impact.kind.value}"
     at_least = "at least " if final.is_lower_bound else ""
     what = "HIT" if finding.is_collision else "contact, no collision"
     yield f"{what}{kind}, confidence {final.impact.confidence:.2f}"
@@ -216,7 +216,7 @@ def finding_data(finding: Finding) -> dict[str, Any]:
     return {
         "sample_time_boot_us": first.impact.sample_time_boot_us,
         "is_collision": finding.is_collision,
-        "kind": final.kind.value,
+        "kind": final.impact.kind.value,
         "evidence": first.impact.evidence.value,
         "confidence": round(final.impact.confidence, 4),
         "specific_force_frd_m_s2": _rounded(first.impact.specific_force_frd_m_s2),

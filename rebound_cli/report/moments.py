@@ -65,7 +65,7 @@ def _impact(flight: ShownFlight, finding: Finding) -> Moment:
     normal = _normal(flight, finding)
     error_deg = math.degrees(normal.error_rad)
     kind = "hit" if finding.is_collision else "contact"
-    what = final.kind.value if final.kind is not ImpactKind.UNKNOWN else "something"
+    what = final.impact.kind.value if final.impact.kind is not ImpactKind.UNKNOWN else "something"
     speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"
     contact_s = flight.seconds(finding.at_us - (boot_us - final.time_boot_us))
     least = "at least " if final.is_lower_bound else ""
@@ -127,7 +127,7 @@ def _reasons(flight: ShownFlight, finding: Finding, touch: "Hit | None") -> Iter
         yield "A landing: no, nobody had told the vehicle to go down."
     if shown is not None:
         yield _hand_text(flight, finding, shown)
-    kind = finding.final.kind
+    kind = finding.final.impact.kind
     verdict = "a collision, to be recovered from" if finding.is_collision else "nothing to recover from"
     yield f"Verdict: {kind.value}, {verdict}."
     if finding.final.is_lower_bound:

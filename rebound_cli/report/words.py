@@ -31,7 +31,7 @@ def sentence(flight: ShownFlight) -> str:
 
 
 def _hit_text(flight: ShownFlight, hit: Finding) -> str:
-    kind, first = hit.final.kind, hit.first
+    kind, first = hit.first.impact.kind, hit.first
     struck = {ImpactKind.UNKNOWN: "Hit something", ImpactKind.STRUCK: "Struck by something, itself"}
     what = struck.get(kind, f"Hit a {kind.value}")
     speed = f"{math.hypot(*first.velocity_ned_m_s):.2f} ± {first.velocity_error_m_s:.2f} m/s"

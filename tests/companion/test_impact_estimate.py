@@ -92,7 +92,7 @@ def imu(t_us, contact, yaw_rate=0.0):
 
 
 def pushed(pushes, every_us=4_000, yaw_rate=0.0):
-    contact = ContactForce((0.0, 0.0, -9.81), STILL, 5_000, 156.9, 1_000_000)
+    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9, 1_000_000)
     for number, (force, loud) in enumerate(pushes, start=1):
         turned_rad = 0.5e-6 * (number - 1) * every_us * yaw_rate
         attitude = (math.cos(turned_rad), 0.0, 0.0, math.sin(turned_rad))
@@ -162,7 +162,7 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_cou
             samples.append(Vibration(t, 0.0, 0.0, (0 if t < hit_us else 9, 0, 0)))
         finished += advance(monitor, samples, situation, t).finished
     (final,) = finished
-    assert final.kind is ImpactKind.WALL
+    assert final.impact.kind is ImpactKind.WALL
     assert abs(final.time_boot_us - hit_us) < 2_000
     assert final.velocity_ned_m_s == pytest.approx((1.5, 0.0, 0.0), abs=0.03)
     assert final.position_ned_m[0] == pytest.approx(1.5 * hit_us * 1e-6, abs=0.03)

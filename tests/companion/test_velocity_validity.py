@@ -139,6 +139,4 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
             assert monitor.estimator.strapdown.level_acceleration_m_s2 == STILL
     # Then it is the filter's in the one case and the vehicle's in the other
     assert not monitor.estimate_valid
-    assert monitor.estimator.strapdown.level_acceleration_m_s2 == pytest.approx(
-        (leans_m_s2, 0.0, 0.0), abs=0.02
-    )
+    assert monitor.estimator.strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
