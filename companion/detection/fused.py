@@ -41,7 +41,6 @@ class FusedDetector:
     name = "fused"
     losses: ClassVar[Mapping[MessageId, str]] = {
         MessageId.ATTITUDE_TARGET: "a force from below counts only beyond 5 g",
-        MessageId.VIBRATION: "a clipped peak is recognised by its size alone",
         MessageId.ODOMETRY: "resets of the estimator look like hits, so a velocity jump must be twice as large",
     }
 

@@ -8,8 +8,8 @@ from companion.estimate.config import EstimateConfig
 from companion.estimate.contact_force import ContactForce
 from companion.estimate.normal import Normal, normal_of
 from companion.estimate.validity import VelocityValidity
-from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3, Vibration
-from companion.motion.history import OPTIONAL_STREAMS_WAIT_US, STAMP_RESOLUTION_US, MotionHistory
+from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3
+from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO, Strapdown
 
@@ -58,7 +58,6 @@ class ImpactEstimator:
     contact: ContactForce | None = None
     came_ned_m_s: Vector3 = ZERO
     """v_c, where the vehicle's estimate is valid: zero in a hit that follows another that clipping hid a part of."""
-    clipping_counts: tuple[int, int, int] | None = None
 
     def update(self, sample: Sample) -> None:
         """Take one sample of any kind."""
@@ -71,20 +70,9 @@ class ImpactEstimator:
                 self.history.add(sample)
             self.strapdown.velocity(sample)
             self.validity.update(sample.time_boot_us)
-        elif isinstance(sample, Vibration):
-            self._clipped(sample)
         elif isinstance(sample, Attitude):
             time_us = sample.time_boot_us
             self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.is_attitude_valid(time_us))
-
-    def _clipped(self, sample: Vibration) -> None:
-        """Take PX4's clipping counts. One that grew since before the contact makes its size a lower bound."""
-        before, self.clipping_counts = self.clipping_counts, sample.clipping_counts
-        estimate = self.estimate
-        if estimate is None or before is None or before == sample.clipping_counts:
-            return
-        if sample.time_boot_us - estimate.impact.sample_time_boot_us < OPTIONAL_STREAMS_WAIT_US:
-            self.estimate = replace(estimate, is_lower_bound=True)
 
     def begin(self, impact: Impact) -> ImpactEstimate:
         """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""

@@ -29,7 +29,7 @@ class StreamsConfig(StrictModel):
     odometry_hz: Rate = 30.0
     """PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of."""
     vibration_hz: Rate = 1.0
-    """Cumulative counts; twice a second is PX4's own rate."""
+    """For `rebound preflight`: cumulative counts; twice a second is PX4's own rate."""
     current_mode_hz: Rate = 10.0
     """Mode changes are acted on within a tenth of a second."""
     window_s: Positive = 2.0

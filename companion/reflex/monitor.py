@@ -16,15 +16,14 @@ from companion.detection.interface import Detector, DetectorState, Phase, Situat
 from companion.detection.stream_health import AttitudeGate, StreamHealth, StreamHealthConfig, StuckImuMonitor
 from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
-from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample, Vibration
-from companion.motion.history import KEPT_US, OPTIONAL_STREAMS_WAIT_US
+from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample
+from companion.motion.history import KEPT_US
 from companion.strict_model import StrictModel
 
 # Optional streams besides HIGHRES_IMU.
 OPTIONAL_STREAMS: dict[type, MessageId] = {
     AttitudeTarget: MessageId.ATTITUDE_TARGET,
     Odometry: MessageId.ODOMETRY,
-    Vibration: MessageId.VIBRATION,
 }
 
 
@@ -189,7 +188,7 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
     monitor.no_data_reason = reason
     if (reason is None) != (was is None) and is_on:
         notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}", {}))
-    has_waited = now_us - monitor.stream_health.started_us >= OPTIONAL_STREAMS_WAIT_US
+    has_waited = now_us - monitor.stream_health.started_us >= KEPT_US
     if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
         monitor.is_introduced = True
         threshold_m_s2 = monitor.state.threshold_m_s2

@@ -9,7 +9,7 @@ from companion.detection.interface import Impact, ImpactKind, Situation
 from companion.estimate.config import EstimateConfig
 from companion.estimate.contact_force import ContactForce
 from companion.estimate.impact import ImpactEstimator
-from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample, Vibration
+from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
 from companion.reflex.monitor import advance, start_monitor
 
@@ -145,8 +145,8 @@ def test_what_may_have_been_more_is_a_lower_bound(pushes, every_us):
     assert contact.has_gap or not contact.is_fully_measured
 
 
-def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_counts_to_heart():
-    """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms; the sensor says a second later it clipped."""
+def test_the_watch_tells_t_c_v_c_normal_impulse_and_class():
+    """North at 1.5 m/s, a wall stops the vehicle with 30 m/s^2 for 50 ms."""
     monitor = start_monitor(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     finished, hit_us = [], 3_002_000
@@ -158,8 +158,6 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_cou
             samples.append(Odometry(t, (0.0, 0.0, -3.0), (speed, 0.0, 0.0), 0))
             samples.append(LocalPosition(t, (1.5 * t * 1e-6, 0.0, -3.0), (speed, 0.0, 0.0)))
             samples.append(Attitude(t, LEVEL))
-        if t % 1_000_000 == 0:
-            samples.append(Vibration(t, 0.0, 0.0, (0 if t < hit_us else 9, 0, 0)))
         finished += advance(monitor, samples, situation, t).finished
     (final,) = finished
     assert final.impact.kind is ImpactKind.WALL
@@ -168,5 +166,5 @@ def test_the_watch_tells_t_c_v_c_normal_impulse_and_class_and_takes_clipping_cou
     assert final.position_ned_m[0] == pytest.approx(1.5 * hit_us * 1e-6, abs=0.03)
     assert final.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.15)
     assert final.impulse_m_s == pytest.approx(1.5, abs=0.05)
-    assert (final.is_lower_bound, monitor.estimate.is_lower_bound) == (False, True)
+    assert not final.is_lower_bound
     assert final.is_fully_measured

@@ -130,8 +130,8 @@ def screen(north_m, **motion):
 
 
 def test_a_wall_met_at_a_crawl_is_backed_away_from(tmp_path):
-    # Given a goal 1 m behind a wall, when the vehicle comes with 0.08 m/s, which no detector takes for a hit
-    go = {"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.08}}
+    # Given a goal 1 m behind a wall, when the vehicle comes with 0.06 m/s, which no detector takes for a hit
+    go = {"go_to": {"position_ned_m": [1.5, 0, -1.5], "speed_m_s": 0.06}}
     flight, told = flown(tmp_path, [go], walls=screen(0.5))
     # Then it leans on it for no longer than it takes to be sure, backs away, and the policy follows
     assert len(told) == 1 and len(flight.report.collisions) == 1
