@@ -46,19 +46,19 @@ RULES = (
     Rule(
         "hand",
         "a soft force on a hovering vehicle waits",
-        _DETECTION + "force_signs:may_be_hand",
+        _DETECTION + "force_signs:FusedState.may_be_hand",
         _says(False),
     ),
     Rule(
         "turning drag",
         "a turning vehicle needs more force for a hit",
-        _DETECTION + "force_signs:side_threshold_m_s2",
+        _DETECTION + "force_signs:FusedState.side_threshold_m_s2",
         lambda arguments, found: arguments[0].threshold_m_s2,
     ),
     Rule(
         "second sample",
         "a weak force shows in two samples together",
-        _DETECTION + "force_signs:_together_m_s2",
+        _DETECTION + "force_signs:FusedState._together_m_s2",
         _says(0.0),
     ),
     Rule(

@@ -15,13 +15,13 @@ hand (see `force_signs`).
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 from companion.detection.classify import hovers, kind_of
 from companion.detection.force_noise import SETTLED_US
-from companion.detection.force_signs import jumps, may_be_hand, side_force, side_threshold_m_s2, vertical_threshold_m_s2
+from companion.detection.force_signs import FusedState
 from companion.detection.fused_config import FusedConfig
-from companion.detection.fused_state import FusedState
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
@@ -72,19 +72,19 @@ class FusedDetector:
         free_until_us = before_us = s.last_sample_boot_us
         s.last_sample_boot_us = now_us
         s.jump.imu(before_us, now_us, w)
-        side, thresholds, is_of_two = side_force(s, config, f)
+        side, thresholds, is_of_two = s.side_force(config, f)
         side /= thresholds
         if is_of_two:
             free_until_us = s.before_boot_us
         beyond = max(f[2], -f[2] - s.thrust.most_m_s2)
-        threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else side_threshold_m_s2(s, config, w)
-        ratio = max(side / threshold, beyond / vertical_threshold_m_s2(s, config))
+        threshold = s.threshold_m_s2 if side < s.threshold_m_s2 else s.side_threshold_m_s2(config, w)
+        ratio = max(side / threshold, beyond / s.vertical_threshold_m_s2(config))
         if off is not None:
             s.phase, s.off_reason = Phase.OFF, off
         elif s.phase is Phase.OFF:
             s.phase, s.last_loud_boot_us = Phase.QUIET, now_us + (SETTLED_US if s.off_reason == ON_THE_GROUND else 0)
         if off is not None or ratio < 1.0:
-            s.loud_since_boot_us = None
+            s.observed = None
             self._learn(s, f, before_us)
             is_quiet = s.floor.is_known and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
@@ -94,7 +94,9 @@ class FusedDetector:
         if s.phase is Phase.QUIET or (s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s):
             self._learn(s, f, before_us)  # a shaking that stays
         force = (f[0] - s.floor.x, f[1] - s.floor.y, f[2] - s.thrust.expected_m_s2(now_us, s.floor.z))
-        return self._loud(s, f, situation, force, min(now_us - self._averaging_us, free_until_us), ratio)
+        free_until_us = min(now_us - self._averaging_us, free_until_us)
+        impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
+        return self._loud(s, situation, impact, s.jumps(f))
 
     def _learn(self, s: FusedState, f: Vector3, before_us: int) -> None:
         elapsed_us = s.last_sample_boot_us - before_us
@@ -105,46 +107,35 @@ class FusedDetector:
         if s.phase is Phase.ARMED:
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
 
-    def _loud(
-        self, s: FusedState, f: Vector3, situation: Situation, force: Vector3, free_until_us: int, ratio: float
-    ) -> Impact | None:
-        now_us, size, has_jumped = s.last_sample_boot_us, math.hypot(*force), jumps(s, f)
+    def _loud(self, s: FusedState, situation: Situation, impact: Impact, has_jumped: bool) -> Impact | None:
+        now_us, size = impact.sample_time_boot_us, math.hypot(*impact.specific_force_frd_m_s2)
         if s.phase is not Phase.ARMED:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
                 is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
                 if is_another and size > WORSE * s.peak_specific_force_m_s2:
-                    return self._fire(s, now_us, situation, force, free_until_us, Evidence.FORCE, ratio)
+                    return self._fire(s, situation, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
-        if s.loud_since_boot_us is None:
-            s.loud_since_boot_us, s.free_until_boot_us = now_us, free_until_us
-        kind = None
-        if size < self._config.soft_m_s2 and may_be_hand(s, now_us) and not has_jumped:
-            if now_us - s.loud_since_boot_us < 1e6 * self._config.soft_wait_s:
+        first = s.observed = s.observed or impact
+        impact = replace(impact, contact_free_until_boot_us=first.contact_free_until_boot_us)
+        if size < self._config.soft_m_s2 and s.may_be_hand(now_us) and not has_jumped:
+            if now_us - first.sample_time_boot_us < 1e6 * self._config.soft_wait_s:
                 return None
-            kind = ImpactKind.CONTACT
-        return self._fire(s, now_us, situation, force, s.free_until_boot_us, Evidence.FORCE, ratio, kind)
+            impact = replace(impact, kind=ImpactKind.CONTACT)
+        return self._fire(s, situation, impact)
 
-    def _fire(
-        self,
-        s: FusedState,
-        now_us: int,
-        situation: Situation,
-        force: Vector3,
-        free_until_us: int,
-        evidence: Evidence,
-        ratio: float,
-        kind: ImpactKind | None = None,
-    ) -> Impact:
-        if kind is None:
+    def _fire(self, s: FusedState, situation: Situation, impact: Impact) -> Impact:
+        """Begin the contact; the impact with its kind where that is unknown."""
+        force = impact.specific_force_frd_m_s2
+        if impact.kind is ImpactKind.UNKNOWN:
             attitude = LEVEL if situation.strapdown is None else situation.strapdown.valid_wxyz
-            kind = kind_of(body_to_ned(attitude, force), s.velocity_ned_m_s, situation)
+            impact = replace(impact, kind=kind_of(body_to_ned(attitude, force), s.velocity_ned_m_s, situation))
         s.phase, s.off_reason = Phase.CONTACT, ""
-        s.last_loud_boot_us = s.contact_began_boot_us = now_us
-        s.peak_specific_force_m_s2 = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-        s.loud_since_boot_us, s.is_hand = None, kind is ImpactKind.CONTACT
-        return Impact(now_us, free_until_us, force, kind, evidence, min(1.0, 0.5 * ratio))
+        s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
+        s.peak_specific_force_m_s2 = math.hypot(*force)
+        s.observed, s.is_hand = None, impact.kind is ImpactKind.CONTACT
+        return impact
 
     # --- velocity ---------------------------------------------------------------------------------------------
 
@@ -167,12 +158,16 @@ class FusedDetector:
         if s.phase is not Phase.ARMED or size < least:
             return None
         jump.since_us = time_us
-        now_us, free_until_us = max(time_us, s.last_sample_boot_us), jump.before_us - LONGEST_DELAY_US
+        now_us = max(time_us, s.last_sample_boot_us)
+        free_until_us = strapdown.fixes[-2].time_boot_us - LONGEST_DELAY_US
         over_s = max(now_us - free_until_us, 1) * 1e-6
         push = (step[0] / over_s, step[1] / over_s, step[2] / over_s)
         force = ned_to_body(strapdown.valid_wxyz, push)
         s.velocity_ned_m_s = (v[0] - step[0], v[1] - step[1], v[2] - step[2])
-        return self._fire(s, now_us, situation, force, free_until_us, Evidence.VELOCITY_JUMP, size / least)
+        impact = Impact(
+            now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
+        )
+        return self._fire(s, situation, impact)
 
     def _least_jump_m_s(self, s: FusedState, time_us: int, noise_m_s: float, counts_resets: bool) -> float:
         """Threshold of a velocity jump, m/s; larger where the estimate may jump without a hit."""

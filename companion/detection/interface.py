@@ -30,10 +30,6 @@ class ImpactKind(Enum):
     CONTACT = "contact"  # held or pushed gently, as by a hand
 
 
-# Touching the ground at the end of a landing and being caught by hand are nothing to recover from.
-NO_COLLISION = frozenset({ImpactKind.LANDING, ImpactKind.CONTACT})
-
-
 # Why a detector is off that nobody switched off.
 ON_THE_GROUND = "on the ground"
 
@@ -92,7 +88,8 @@ class Impact:
 
     @property
     def is_collision(self) -> bool:
-        return self.kind not in NO_COLLISION
+        """Touching the ground at the end of a landing and being caught by hand are nothing to recover from."""
+        return self.kind not in (ImpactKind.LANDING, ImpactKind.CONTACT)
 
 
 @dataclass(slots=True)

@@ -49,8 +49,6 @@ class VelocityJump:
     """Whether velocities come further apart than `LONGEST_STEP_US`."""
     since_us: int = 0
     """Velocities before this time are not compared."""
-    before_us: int = 0
-    """Time of the velocity before the newest."""
     delay: Delay = field(default_factory=Delay)
     variance_m2_s2: float = 0.0
     known: int = 0
@@ -76,7 +74,6 @@ class VelocityJump:
             return None
         recent = [fixes[place] for place in range(-COMPARED - 2, 0)]
         times = [fix.time_boot_us for fix in recent]
-        self.before_us = times[-2]
         if recent[-1].velocity_ned_m_s == recent[-2].velocity_ned_m_s:
             # Equal to the last digit: the estimator is not running, and restarts after this.
             self.since_us = times[-1]

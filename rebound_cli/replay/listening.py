@@ -12,8 +12,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.force_signs import may_be_hand, side_force, side_threshold_m_s2, vertical_threshold_m_s2
-from companion.detection.fused_state import FusedState
+from companion.detection.force_signs import FusedState
 from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
 from companion.reflex.monitor import CollisionMonitor
@@ -95,7 +94,7 @@ class _ListenedTo:
         if isinstance(sample, ImuSample):
             tested = _tested(state, sample, self._config)
             self._listener.numbers.extend(tested)
-            is_soft = isinstance(state, FusedState) and may_be_hand(state, sample.time_boot_us)
+            is_soft = isinstance(state, FusedState) and state.may_be_hand(sample.time_boot_us)
         state, impact = self._detector.step(state, sample, situation)
         if impact is not None:
             one = None if tested is None else Tested(*tested)
@@ -110,13 +109,13 @@ def _tested(state: DetectorState, sample: ImuSample, config: Any) -> tuple[float
         threshold_m_s2 = state.threshold_m_s2
         return now_us, phase, math.nan, threshold_m_s2, math.nan, threshold_m_s2
     force = sample.specific_force_frd_m_s2
-    threshold_m_s2 = side_threshold_m_s2(state, config, sample.angular_velocity_frd_rad_s)
-    side_m_s2, thresholds, _ = side_force(state, config, force)
+    threshold_m_s2 = state.side_threshold_m_s2(config, sample.angular_velocity_frd_rad_s)
+    side_m_s2, thresholds, _ = state.side_force(config, force)
     return (
         now_us,
         phase,
         side_m_s2,
         thresholds * threshold_m_s2,
         max(force[2], -force[2] - state.thrust.most_m_s2),
-        vertical_threshold_m_s2(state, config),
+        state.vertical_threshold_m_s2(config),
     )

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from companion.detection.force_signs import CLEAR, side_force
+from companion.detection.force_signs import CLEAR, FusedState
 from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
-from companion.detection.fused_state import FusedState
 from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
 from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
@@ -311,10 +310,10 @@ def test_two_samples_on_a_vehicle_that_shakes_count_together_where_that_is_neare
     # Given a vehicle that shakes, and a force that was weaker in the sample before
     state = FusedState(phase=Phase.ARMED, threshold_m_s2=8.0, last_frd_m_s2=(3.0, 0.0, 0.0))
     # Then both together are nearer to their one threshold than the second alone to its 1.3
-    assert side_force(state, FusedConfig(), (10.0, 0.0, 0.0)) == (pytest.approx(13.0 / math.sqrt(2.0)), 1.0, True)
+    assert state.side_force(FusedConfig(), (10.0, 0.0, 0.0)) == (pytest.approx(13.0 / math.sqrt(2.0)), 1.0, True)
     # And one of another direction does not help
     state.last_frd_m_s2 = (-3.0, 0.0, 0.0)
-    assert side_force(state, FusedConfig(), (10.0, 0.0, 0.0)) == (10.0, CLEAR, False)
+    assert state.side_force(FusedConfig(), (10.0, 0.0, 0.0)) == (10.0, CLEAR, False)
 
 
 def test_the_gyroscope_of_a_vehicle_that_shakes_makes_no_graze_of_its_shaking():
