@@ -4,7 +4,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, field
 
-from companion.messages import Attitude, ImuSample, Quaternion, Vector3
+from companion.messages import Attitude, ImuSample, Vector3
 from companion.motion.history import STAMP_RESOLUTION_US
 from companion.motion.strapdown import MOTORS_RAD_S2
 from companion.strict_model import Positive, StrictModel
@@ -56,49 +56,37 @@ class StreamHealth:
 
 
 @dataclass(slots=True)
-class StuckImuMonitor:
-    """Detects an IMU stuck at one value: all six axes equal to the last bit while the vehicle has turned.
+class SampleGate:
+    """Rejects what the vehicle cannot have measured: an IMU stuck at one value, and an attitude out of reach.
 
-    Noise alone changes the last bits of real measurements. At rest a simulated sensor without noise may repeat itself.
-    """
+    Stuck: all six axes are equal to the last bit, and the attitude is not. Noise alone changes the last bits of real
+    measurements; at rest a simulated sensor without noise may repeat itself.
 
-    values: tuple[Vector3, Vector3] | None = None
-    attitude_wxyz: Quaternion | None = None
-    """Attitude at the first of the equal samples."""
-    has_turned: bool = False
-
-    def imu(self, sample: ImuSample) -> bool:
-        """Take one sample; whether it equals the one before although the vehicle has turned."""
-        values = (sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
-        if values == self.values:
-            return self.has_turned
-        self.values, self.attitude_wxyz, self.has_turned = values, None, False
-        return False
-
-    def attitude(self, sample: Attitude) -> None:
-        """Take one attitude; one that differs from the first shows that the vehicle has turned."""
-        if self.attitude_wxyz is None:
-            self.attitude_wxyz = sample.attitude_wxyz
-        elif sample.attitude_wxyz != self.attitude_wxyz:
-            self.has_turned = True
-
-
-@dataclass(slots=True)
-class AttitudeGate:
-    """Innovation gate on attitudes: rejects one that the vehicle cannot have turned to since the last.
-
-    A second attitude that agrees with a rejected one is accepted, as after a reset of the estimator. So one forged or
-    broken message does not disturb the integrated accelerometer.
+    An attitude is out of reach if the vehicle cannot have turned to it since the last. A second one that agrees with a
+    rejected one is accepted, as after a reset of the estimator. So one forged or broken message does not disturb the
+    integrated accelerometer.
     """
 
     latest: Attitude | None = None
     rejected: Attitude | None = None
     most_rad_s: float = 0.0
     """The largest rate since the latest attitude."""
+    values: tuple[Vector3, Vector3] | None = None
+    """Of the newest IMU sample."""
+    values_attitude: Attitude | None = None
+    """The latest at the first of the samples that are equal to it."""
+    is_stuck: bool = False
 
-    def imu(self, sample: ImuSample) -> None:
-        """Take one sample."""
+    def imu(self, sample: ImuSample) -> bool:
+        """Take one sample; whether it is accepted."""
+        values = (sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
+        first, latest = self.values_attitude, self.latest
+        if values != self.values or first is None or latest is None:
+            self.values, self.values_attitude, self.is_stuck = values, latest, False
+        elif latest.attitude_wxyz != first.attitude_wxyz:
+            self.is_stuck = True
         self.most_rad_s = max(self.most_rad_s, math.hypot(*sample.angular_velocity_frd_rad_s))
+        return not self.is_stuck
 
     def attitude(self, sample: Attitude) -> bool:
         """Take one attitude; whether it is accepted."""

@@ -13,7 +13,7 @@ from pydantic import field_validator
 from companion.detection.fused import FusedDetector
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import Detector, DetectorState, Phase, Situation
-from companion.detection.stream_health import AttitudeGate, StreamHealth, StreamHealthConfig, StuckImuMonitor
+from companion.detection.stream_health import SampleGate, StreamHealth, StreamHealthConfig
 from companion.estimate.config import EstimateConfig
 from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample
@@ -71,8 +71,7 @@ class CollisionMonitor:
     stream_health: StreamHealth
     no_data_reason: str | None = None
     """Why an armed detector could miss a hit; None while the streams are healthy."""
-    stuck_imu: StuckImuMonitor = field(default_factory=StuckImuMonitor)
-    attitude_gate: AttitudeGate = field(default_factory=AttitudeGate)
+    gate: SampleGate = field(default_factory=SampleGate)
     last_imu_boot_us: int = 0
     imu_fault: str | None = None  # what was wrong with the newest IMU message
     is_introduced: bool = False  # threshold and losses have been reported
@@ -82,7 +81,7 @@ class CollisionMonitor:
     @property
     def is_attitude_old(self) -> bool:
         """Whether the attitude is too old to integrate the accelerometer."""
-        latest = self.attitude_gate.latest
+        latest = self.gate.latest
         return latest is not None and self.last_imu_boot_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
 
     @property
@@ -133,18 +132,16 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     situation = situation._replace(strapdown=monitor.estimator.strapdown)
     for sample in samples:
         if type(sample) is ImuSample:
-            if monitor.stuck_imu.imu(sample):
+            if not monitor.gate.imu(sample):
                 monitor.imu_fault = "IMU stuck at one value"
                 continue
             monitor.imu_fault = None
-            monitor.attitude_gate.imu(sample)
             imu_samples += 1
             if 0 <= monitor.last_imu_boot_us - sample.time_boot_us < KEPT_US:
                 continue
             monitor.last_imu_boot_us = sample.time_boot_us
         elif type(sample) is Attitude:
-            monitor.stuck_imu.attitude(sample)
-            if not monitor.attitude_gate.attitude(sample):
+            if not monitor.gate.attitude(sample):
                 continue
         elif type(sample) is Refused:
             if sample.message == MessageId.HIGHRES_IMU.name:

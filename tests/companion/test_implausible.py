@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from bench.faults.packets import made
-from companion.detection.stream_health import AttitudeGate
+from companion.detection.stream_health import SampleGate
 from companion.flight.confirmation import Hypothesis
 from companion.messages import (
     Attitude,
@@ -106,7 +106,7 @@ def test_a_reset_moves_no_vehicle_and_is_told():
 
 
 def test_an_attitude_that_no_rate_leads_to_counts_from_the_second_on():
-    turning = AttitudeGate()
+    turning = SampleGate()
     level, upside_down = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)
     assert turning.attitude(Attitude(0, level))
     assert not turning.attitude(Attitude(20_000, upside_down))
@@ -116,7 +116,7 @@ def test_an_attitude_that_no_rate_leads_to_counts_from_the_second_on():
 
 
 def test_a_vehicle_that_is_struck_turns_as_its_rates_say():
-    turning = AttitudeGate()
+    turning = SampleGate()
     assert turning.attitude(Attitude(0, (1.0, 0.0, 0.0, 0.0)))
     turning.imu(ImuSample(4_000, (0.0, 0.0, -9.8), (15.0, 0.0, 0.0)))
     half_rad = 0.5 * 15.0 * 0.02
