@@ -3,6 +3,9 @@
 import math
 from dataclasses import dataclass
 
+from companion.messages import Vector3
+from companion.motion.strapdown import ZERO
+
 # Memory of the mean. It follows drag as the speed changes, and a gust that builds up in a few tenths of a second.
 MEAN_MEMORY_S = 0.25
 # Memory of the standard deviation: good to 5 % with 200 samples, to 12 % at the slowest useful rates.
@@ -19,12 +22,8 @@ EXCESS = 1.5
 class ForceNoise:
     """Exponentially weighted mean and variance on body x, y, z. Changed only by `learn`."""
 
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    variance_x: float = 0.0
-    variance_y: float = 0.0
-    variance_z: float = 0.0
+    mean_frd_m_s2: Vector3 = ZERO
+    variance_m2_s4: Vector3 = ZERO
     known_s: float = 0.0
     side_m_s2: float = 0.0  # standard deviation on the noisier of x and y
     vertical_m_s2: float = 0.0  # standard deviation on z
@@ -33,19 +32,16 @@ class ForceNoise:
     def is_known(self) -> bool:
         return self.known_s >= LEARNT_S
 
-    def learn(self, f_x: float, f_y: float, f_z: float, step_s: float) -> None:
-        """Take one sample, m/s^2, ``step_s`` after the last; the first ones count as a plain mean."""
+    def learn(self, force_frd_m_s2: Vector3, step_s: float) -> None:
+        """Take one sample, ``step_s`` after the last; the first ones count as a plain mean."""
         if self.known_s <= 0.0:
-            self.x, self.y, self.z = f_x, f_y, f_z
+            self.mean_frd_m_s2 = force_frd_m_s2
         known_s = self.known_s = min(self.known_s + step_s, SPREAD_MEMORY_S)
-        mean_share = step_s / (known_s if known_s < MEAN_MEMORY_S else MEAN_MEMORY_S)
-        share = step_s / known_s
-        x, y, z = f_x - self.x, f_y - self.y, f_z - self.z
-        self.x += mean_share * x
-        self.y += mean_share * y
-        self.z += mean_share * z
-        self.variance_x += share * (x * x - self.variance_x)
-        self.variance_y += share * (y * y - self.variance_y)
-        self.variance_z += share * (z * z - self.variance_z)
-        self.side_m_s2 = EXCESS * math.sqrt(max(self.variance_x, self.variance_y))
-        self.vertical_m_s2 = EXCESS * math.sqrt(self.variance_z)
+        mean_share, share = step_s / min(known_s, MEAN_MEMORY_S), step_s / known_s
+        (f_x, f_y, f_z), (m_x, m_y, m_z), (v_x, v_y, v_z) = force_frd_m_s2, self.mean_frd_m_s2, self.variance_m2_s4
+        x, y, z = f_x - m_x, f_y - m_y, f_z - m_z
+        v_x, v_y, v_z = v_x + share * (x * x - v_x), v_y + share * (y * y - v_y), v_z + share * (z * z - v_z)
+        self.mean_frd_m_s2 = (m_x + mean_share * x, m_y + mean_share * y, m_z + mean_share * z)
+        self.variance_m2_s4 = (v_x, v_y, v_z)
+        self.side_m_s2 = EXCESS * math.sqrt(max(v_x, v_y))
+        self.vertical_m_s2 = EXCESS * math.sqrt(v_z)

@@ -66,7 +66,7 @@ class FusedState(DetectorState):
         Of one sample, or of two on a vehicle that vibrates until a contact has begun: what is nearer to a hit. Within a
         contact each sample speaks for itself: the one after a forged sample does not confirm it.
         """
-        alone = math.hypot(force_frd_m_s2[0] - self.floor.x, force_frd_m_s2[1] - self.floor.y)
+        alone = math.dist(force_frd_m_s2[:2], self.floor.mean_frd_m_s2[:2])
         if self.phase is not Phase.ARMED or self.threshold_m_s2 <= SHAKING * config.side_threshold_m_s2:
             return alone, 1.0, False
         together = self._together_m_s2(force_frd_m_s2)
@@ -78,9 +78,9 @@ class FusedState(DetectorState):
 
         Compared with zero, too: a slow swing that the mean has not followed is none.
         """
-        (f_x, f_y, _), (g_x, g_y, _), mean = force_frd_m_s2, self.last_frd_m_s2, self.floor
+        (f_x, f_y, _), (g_x, g_y, _), (m_x, m_y, _) = force_frd_m_s2, self.last_frd_m_s2, self.floor.mean_frd_m_s2
         x, y = f_x + g_x, f_y + g_y
-        return math.sqrt(0.5 * min((x - 2.0 * mean.x) ** 2 + (y - 2.0 * mean.y) ** 2, x * x + y * y))
+        return math.sqrt(0.5) * min(math.hypot(x - 2.0 * m_x, y - 2.0 * m_y), math.hypot(x, y))
 
     def may_be_hand(self, time_us: int) -> bool:
         """Whether the vehicle hovers, or just did: pushed by a hand with 2 m/s^2 it soon moves."""

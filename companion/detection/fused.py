@@ -93,7 +93,8 @@ class FusedDetector:
         lasts_s = 1e-6 * (now_us - s.contact_began_boot_us)
         if s.phase is Phase.QUIET or (s.phase is Phase.CONTACT and lasts_s > config.longest_contact_s):
             self._learn(s, f, before_us)  # a shaking that stays
-        force = (f[0] - s.floor.x, f[1] - s.floor.y, f[2] - s.thrust.expected_m_s2(now_us, s.floor.z))
+        x, y, z = s.floor.mean_frd_m_s2
+        force = (f[0] - x, f[1] - y, f[2] - s.thrust.expected_m_s2(now_us, z))
         free_until_us = min(now_us - self._averaging_us, free_until_us)
         impact = Impact(now_us, free_until_us, force, confidence=min(1.0, 0.5 * ratio))
         return self._loud(s, situation, impact, s.jumps(f))
@@ -102,7 +103,7 @@ class FusedDetector:
         elapsed_us = s.last_sample_boot_us - before_us
         # A sample after a gap or a reboot has the weight of the longest interval.
         elapsed_s = 1e-6 * (elapsed_us if 0 < elapsed_us < LONGEST_GAP_US else LONGEST_GAP_US)
-        s.floor.learn(f[0], f[1], f[2], elapsed_s)
+        s.floor.learn(f, elapsed_s)
         s.threshold_m_s2 = max(self._config.side_threshold_m_s2, self._config.noise_factor * s.floor.side_m_s2)
         if s.phase is Phase.ARMED:
             s.thrust.learn(s.last_sample_boot_us, -f[2], elapsed_s)
@@ -176,6 +177,6 @@ class FusedDetector:
         least_m_s = config.velocity_step_slow_m_s if jump.is_slow else config.velocity_step_m_s
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         least_m_s = caution * max(least_m_s, noise_m_s)
-        least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.last_frd_m_s2[2] - s.floor.z))
+        least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2]))
         # Two signs confirm each other.
         return 0.5 * least_m_s if jump.no_motor_turns(time_us, config.rate_step_rad_s) else least_m_s
