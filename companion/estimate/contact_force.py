@@ -24,8 +24,6 @@ class ContactForce:
     """The accelerometer's value without the contact."""
     averaging_us: int
     range_m_s2: float
-    time_boot_us: int
-    """Of the newest sample; before the first, the latest time without contact."""
     impulse_ned_m_s: Vector3 = ZERO
     forces_ned_m_s2: list[Vector3] = field(default_factory=list)
     """The contact force in samples above the threshold."""
@@ -34,11 +32,11 @@ class ContactForce:
     """Whether samples are missing; PX4's own estimate does not lack them."""
     begun_boot_us: int | None = None
 
-    def add(self, sample: ImuSample, attitude_wxyz: Quaternion, loud: bool) -> None:
-        """Take one IMU sample and the attitude at its time; `loud`: it is above the threshold. Others do not count."""
-        elapsed_us, self.time_boot_us = sample.time_boot_us - self.time_boot_us, sample.time_boot_us
-        if not loud:
-            return
+    def add(self, sample: ImuSample, elapsed_us: int, attitude_wxyz: Quaternion) -> None:
+        """Take one IMU sample above the threshold, so long after the one before it, and the attitude at its time.
+
+        The first one comes so long after the latest time without contact.
+        """
         f, free, (n, e, d) = sample.specific_force_frd_m_s2, self.free_frd_m_s2, self.impulse_ned_m_s
         force = x, y, z = body_to_ned(attitude_wxyz, (f[0] - free[0], f[1] - free[1], f[2] - free[2]))
         # Of the time before the first sample only its own window is known.

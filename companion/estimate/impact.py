@@ -13,9 +13,6 @@ from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO, Strapdown
 
-# In these phases a detector's state still describes the contact it fired on.
-IN_OR_AFTER_CONTACT = (Phase.CONTACT, Phase.ARMED)
-
 
 @dataclass(frozen=True, slots=True)
 class ImpactEstimate:
@@ -109,9 +106,8 @@ class ImpactEstimator:
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
             averaging_us=round(self.config.imu_averaging_interval_s * 1e6),
             range_m_s2=self.config.accelerometer_range_m_s2,
-            time_boot_us=impact.contact_free_until_boot_us,
         )
-        contact.add(sample, self.strapdown.valid_wxyz, True)
+        contact.add(sample, sample.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
         return contact
 
     def follow(self, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
@@ -120,16 +116,14 @@ class ImpactEstimator:
         Returns the final estimate, once: when the contact is over.
         """
         estimate, contact = self.estimate, self.contact
-        if estimate is None or estimate.is_final or state.phase not in IN_OR_AFTER_CONTACT:
+        if estimate is None or estimate.is_final:
             return None
         is_over = state.phase is not Phase.CONTACT
-        if contact is not None and sample.time_boot_us > contact.time_boot_us:
-            loud = state.last_loud_boot_us == sample.time_boot_us
-            contact.add(sample, self.strapdown.valid_wxyz, loud)
-            if loud:
-                # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
-                self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
-                estimate = self._refined(estimate, contact)
+        if contact is not None and self.earlier_imu is not None and state.last_loud_boot_us == sample.time_boot_us:
+            contact.add(sample, sample.time_boot_us - self.earlier_imu.time_boot_us, self.strapdown.valid_wxyz)
+            # With each sample: arms may meet their stop, and clip the sensor, late in the contact.
+            self.validity.assess(contact.is_fully_measured, sample.time_boot_us)
+            estimate = self._refined(estimate, contact)
         self.estimate = replace(estimate, is_final=is_over)
         return self.estimate if is_over else None
 

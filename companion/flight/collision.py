@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from companion.detection.interface import DetectorState
-from companion.estimate.impact import IN_OR_AFTER_CONTACT, ImpactEstimate
+from companion.detection.interface import DetectorState, Phase
+from companion.estimate.impact import ImpactEstimate
 from companion.estimate.normal import Normal, unit, with_change
 from companion.flight.confirmation import DECIDED_US, Hypothesis
 from companion.messages import LocalPosition, Vector3
@@ -73,7 +73,8 @@ class CollisionRecord:
     ) -> None:
         """Update the contact's largest force, its end and its normal while it lasts."""
         self.fixes = fixes
-        hypothesis, is_in_contact = self.hypothesis, state.phase in IN_OR_AFTER_CONTACT
+        # In these phases the state still describes the contact.
+        hypothesis, is_in_contact = self.hypothesis, state.phase in (Phase.CONTACT, Phase.ARMED)
         is_seen_again = is_in_contact and state.last_loud_boot_us > self.sample_time_boot_us
         if hypothesis is not None and (hypothesis.is_turned or is_seen_again):
             self.hypothesis = None

@@ -92,11 +92,12 @@ def imu(t_us, contact, yaw_rate=0.0):
 
 
 def pushed(pushes, every_us=4_000, yaw_rate=0.0):
-    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9, 1_000_000)
+    contact = ContactForce((0.0, 0.0, -9.81), 5_000, 156.9)
     for number, (force, loud) in enumerate(pushes, start=1):
         turned_rad = 0.5e-6 * (number - 1) * every_us * yaw_rate
         attitude = (math.cos(turned_rad), 0.0, 0.0, math.sin(turned_rad))
-        contact.add(imu(1_000_000 + number * every_us, force, yaw_rate), attitude, loud)
+        if loud:
+            contact.add(imu(1_000_000 + number * every_us, force, yaw_rate), every_us, attitude)
     return contact
 
 
