@@ -28,10 +28,6 @@ class ForceNoise:
     side_m_s2: float = 0.0  # standard deviation on the noisier of x and y
     vertical_m_s2: float = 0.0  # standard deviation on z
 
-    @property
-    def is_known(self) -> bool:
-        return self.known_s >= LEARNT_S
-
     def learn(self, force_frd_m_s2: Vector3, step_s: float) -> None:
         """Take one sample, ``step_s`` after the last; the first ones count as a plain mean."""
         if self.known_s <= 0.0:

@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from companion.detection.classify import hovers, kind_of
-from companion.detection.force_noise import SETTLED_US
+from companion.detection.force_noise import LEARNT_S, SETTLED_US
 from companion.detection.force_signs import FusedState
 from companion.detection.fused_config import FusedConfig
 from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
@@ -86,7 +86,7 @@ class FusedDetector:
         if off is not None or ratio < 1.0:
             s.observed = None
             self._learn(s, f, before_us)
-            is_quiet = s.floor.is_known and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
+            is_quiet = s.floor.known_s >= LEARNT_S and now_us - s.last_loud_boot_us >= 1e6 * config.rearm_quiet_s
             if is_quiet and s.phase is not Phase.OFF:
                 s.phase = Phase.ARMED
             return None
@@ -153,9 +153,12 @@ class FusedDetector:
             return None
         if step is None:
             return None
-        noise_m_s = jump.most_m_s(config.noise_factor)
+        shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
+        change_m_s2 = abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2])
+        # ODOMETRY alone counts the estimator's resets.
+        caution = 1.0 if type(sample) is Odometry else 2.0
+        size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
         jump.learn(step)
-        size, least = math.hypot(*step), self._least_jump_m_s(s, time_us, noise_m_s, type(sample) is Odometry)
         if s.phase is not Phase.ARMED or size < least:
             return None
         jump.since_us = time_us
@@ -169,14 +172,3 @@ class FusedDetector:
             now_us, free_until_us, force, evidence=Evidence.VELOCITY_JUMP, confidence=min(1.0, 0.5 * size / least)
         )
         return self._fire(s, situation, impact)
-
-    def _least_jump_m_s(self, s: FusedState, time_us: int, noise_m_s: float, counts_resets: bool) -> float:
-        """Threshold of a velocity jump, m/s; larger where the estimate may jump without a hit."""
-        config, jump = self._config, s.jump
-        caution = 1.0 if counts_resets else 2.0
-        least_m_s = config.velocity_step_slow_m_s if jump.is_slow else config.velocity_step_m_s
-        shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
-        least_m_s = caution * max(least_m_s, noise_m_s)
-        least_m_s += jump.unseen_m_s(shaking_m_s2, abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2]))
-        # Two signs confirm each other.
-        return 0.5 * least_m_s if jump.no_motor_turns(time_us, config.rate_step_rad_s) else least_m_s

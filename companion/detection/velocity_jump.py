@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+from companion.detection.fused_config import FusedConfig
 from companion.messages import Vector3
 from companion.motion.delay import Delay
 from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO, VelocityFix, less_sum
@@ -101,32 +102,28 @@ class VelocityJump:
         change = square - self.variance_m2_s2
         self.variance_m2_s2 += change / (min(self.known, RISE) if change > 0.0 else self.known)
 
-    def most_m_s(self, spreads: float) -> float:
-        """The step, m/s, that noise exceeds as rarely as `spreads` standard deviations; infinite before the first step.
+    def least_m_s(
+        self, config: FusedConfig, time_us: int, caution: float, shaking_m_s2: float, thrust_change_m_s2: float
+    ) -> float:
+        """The step, m/s, that is a hit; infinite before the first step.
 
-        By Student's t (its quantile, expanded in 1 / degrees of freedom): a standard deviation from few steps is
-        uncertain. Each has three axes, and shares velocities with those around it: four are worth as much as one.
+        Noise exceeds it as rarely as `noise_factor` standard deviations, by Student's t (its quantile, expanded in
+        1 / degrees of freedom): a standard deviation from few steps is uncertain. Each has three axes, and shares
+        velocities with those around it: four are worth as much as one. It is larger by `caution` where the estimate may
+        jump without a hit, by vibration between the samples (standard deviation `shaking_m_s2`), and by the velocity's
+        lag where the thrust changes, as in free fall. A rate jump that no motor makes confirms it: half is enough.
         """
         if not self.known:
             return math.inf
-        return spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
-
-    def unseen_m_s(self, shaking_m_s2: float, thrust_change_m_s2: float) -> float:
-        """Largest velocity step, m/s, from vibration between the samples and from the velocity's lag.
-
-        `shaking_m_s2` is the vibration's standard deviation, `thrust_change_m_s2` a change of the thrust, as in free
-        fall.
-        """
-        return shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S) + LAG_S * thrust_change_m_s2
-
-    def no_motor_turns(self, velocity_us: int, least_rad_s: float) -> bool:
-        """Whether the largest rate jump that a velocity jump at ``velocity_us`` may belong to is no motor's.
-
-        It exceeds `least_rad_s` and what motors make between two samples; a third about yaw.
-        """
-        (p, q, r), since_us = self.rate_step_frd_rad_s, velocity_us - self.rate_step_until_us
-        most_rad_s = least_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
-        return since_us < LONGEST_SLOW_STEP_US and math.hypot(p, q, r / YAW_SHARE) >= most_rad_s
+        spreads = config.noise_factor
+        step_m_s = config.velocity_step_slow_m_s if self.is_slow else config.velocity_step_m_s
+        noise_m_s = spreads * math.sqrt(self.variance_m2_s2) * (1.0 + (spreads * spreads + 1.0) / (3.0 * self.known))
+        unseen_m_s = shaking_m_s2 * (SHAKEN_S * self.unseen_share + STAMP_S) + LAG_S * thrust_change_m_s2
+        least_m_s = caution * max(step_m_s, noise_m_s) + unseen_m_s
+        (p, q, r), since_us = self.rate_step_frd_rad_s, time_us - self.rate_step_until_us
+        most_rad_s = config.rate_step_rad_s + NO_MOTORS_RAD_S2 * 1e-6 * self.rate_step_over_us
+        is_turned = since_us < LONGEST_SLOW_STEP_US and math.hypot(p, q, r / YAW_SHARE) >= most_rad_s
+        return 0.5 * least_m_s if is_turned else least_m_s
 
 
 def _less(a: Vector3, b: Vector3, seconds: float = 1.0) -> Vector3:

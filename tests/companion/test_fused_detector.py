@@ -164,10 +164,11 @@ def test_velocities_ten_times_a_second_show_a_large_step_that_no_sample_showed(s
 
 @pytest.mark.parametrize(("turn_frd_rad_s", "is_hit"), [((3.4, 0.0, 0.0), False), ((0.0, 0.0, 3.4), True)])
 def test_motors_turn_a_vehicle_a_third_as_fast_about_yaw(turn_frd_rad_s, is_hit):
-    jump = VelocityJump(averaging_us=1_000)
+    config, jump = FusedConfig(), VelocityJump(averaging_us=1_000, known=100)
     for time_us, rates in ((0, (0.0, 0.0, 0.0)), (20_000, turn_frd_rad_s)):
         jump.imu(time_us - 20_000, time_us, rates)
-    assert jump.no_motor_turns(30_000, 2.0) is is_hit
+    least_m_s = jump.least_m_s(config, 30_000, 1.0, 0.0, 0.0)
+    assert least_m_s == pytest.approx((0.5 if is_hit else 1.0) * config.velocity_step_m_s)
 
 
 @pytest.mark.parametrize(("degrees_of_freedom", "quantile"), [(30, 4.95), (75, 4.48)])
@@ -176,21 +177,19 @@ def test_what_few_steps_say_of_the_noise_counts_as_student_says(degrees_of_freed
     # Given a noise of 0.2 m/s, known from steps of which four are worth as much as one of their three axes
     jump = VelocityJump(averaging_us=1_000, variance_m2_s2=0.04, known=degrees_of_freedom * 4 // 3)
     # Then a larger step is as rare as Student's t says
-    assert jump.most_m_s(4.2) == pytest.approx(0.2 * quantile, rel=0.03)
-    assert VelocityJump(averaging_us=1_000).most_m_s(4.2) == math.inf
+    asked = (FusedConfig(noise_factor=4.2), 0, 1.0, 0.0, 0.0)
+    assert jump.least_m_s(*asked) == pytest.approx(0.2 * quantile, rel=0.03)
+    assert VelocityJump(averaging_us=1_000).least_m_s(*asked) == math.inf
 
 
 def test_beside_a_turn_that_no_motor_makes_half_of_a_step_is_enough():
     # Given a vehicle that shakes by 2 m/s^2 more than a calm one, and half of whose time no sample sees
-    config, state = FusedConfig(), FusedState()
-    detector = FusedDetector(config, 1_000)
-    state.threshold_m_s2 = config.side_threshold_m_s2 + 2.0 * config.noise_factor
-    state.jump.unseen_share = 0.5
-    least_m_s = detector._least_jump_m_s(state, 30_000, 0.0, True)
+    config, jump = FusedConfig(), VelocityJump(averaging_us=1_000, known=100, unseen_share=0.5)
+    least_m_s = jump.least_m_s(config, 30_000, 1.0, 2.0, 0.0)
     # When it turns about yaw as no motor turns it
-    state.jump.rate_step_frd_rad_s = (0.0, 0.0, 1.9)
-    state.jump.rate_step_over_us, state.jump.rate_step_until_us = 4_000, 20_000
-    turned_m_s = detector._least_jump_m_s(state, 30_000, 0.0, True)
+    jump.rate_step_frd_rad_s = (0.0, 0.0, 1.9)
+    jump.rate_step_over_us, jump.rate_step_until_us = 4_000, 20_000
+    turned_m_s = jump.least_m_s(config, 30_000, 1.0, 2.0, 0.0)
     # Then half of what its shaking and the velocity's noise asked for is enough
     assert least_m_s == pytest.approx(config.velocity_step_m_s + 2.0 * (0.5 * 0.15 + 0.008))
     assert turned_m_s == pytest.approx(0.5 * least_m_s)
