@@ -11,7 +11,7 @@ chances.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import fmean, median
 from typing import TypeAlias
@@ -28,8 +28,9 @@ LEAST_HARDER = 0.04
 # Largest difference among the other three motors, in increases of the first. A weight that shifts towards one motor
 # relieves the opposite one: the other three then differ by 0.5. For one damaged motor they do not differ. Half way.
 MOST_UNLIKE = 0.25
-# The least that PX4 lets a PWM output be (PWM_MAIN_MINn). Outputs of DShot and CAN begin at zero, those of PWM at 1 ms.
-LEAST_PWM, PWM_ZERO = 800.0, 1000.0
+# Outputs of PWM begin at 1 ms, those of DShot and CAN at zero. PWM that is set to begin sooner is taken for the latter:
+# the same damage is then a smaller share.
+PWM_ZERO = 1000.0
 
 Outputs: TypeAlias = tuple[float, float, float, float]
 
@@ -55,8 +56,8 @@ class MotorWatch:
 
     earlier_hits: int = 0  # of flights before this one
     damage: Damage | None = None
-    _before: list[Outputs] = field(default_factory=list)  # a window's means
-    _after: list[Outputs] = field(default_factory=list)
+    _before: list[list[float]] = field(default_factory=list)  # of each window: see `_shares`
+    _after: list[list[float]] = field(default_factory=list)
     _samples_after: list[Outputs] = field(default_factory=list)
     _window: list[Outputs] = field(default_factory=list)
     _window_began_us: int = 0
@@ -83,7 +84,8 @@ class MotorWatch:
             self._samples_after.append(outputs)
         if now_us - self._window_began_us < WINDOW_US:
             return None
-        (self._after if was_hit else self._before).append(_over(self._window, fmean))
+        zero = PWM_ZERO if self._least >= PWM_ZERO else 0.0
+        (self._after if was_hit else self._before).append(_shares(self._window, zero))
         self._window = []
         self.damage = self._judged() if was_hit else None
         return self.damage
@@ -93,13 +95,12 @@ class MotorWatch:
         confidence = 1.0 - 4.0 / math.comb(len(self._before) + count, count)
         if confidence < LEAST_CONFIDENCE:
             return None
-        zero = PWM_ZERO if self._least >= LEAST_PWM else 0.0
-        before, after = (_shares(windows, zero) for windows in (self._before, self._after))
-        changes = [now - was for now, was in zip(_over(after, median), _over(before, median), strict=True)]
+        before, after = (list(zip(*windows, strict=True)) for windows in (self._before, self._after))
+        changes = [median(now) - median(was) for now, was in zip(after, before, strict=True)]
         motor = max(range(4), key=changes.__getitem__)
         others = [change for number, change in enumerate(changes) if number != motor]
         harder = changes[motor] - fmean(others)
-        if harder < LEAST_HARDER or min(_beside(after, motor)) <= max(_beside(before, motor)):
+        if harder < LEAST_HARDER or min(after[motor]) <= max(before[motor]):
             return None
         # One that gives all that it has says the same most of the time, and how much more is wanted is not seen.
         shown = [outputs[motor] for outputs in self._samples_after]
@@ -109,21 +110,10 @@ class MotorWatch:
         return Damage(motor + 1, harder, confidence, is_at_limit) if is_alone else None
 
 
-def _over(windows: Sequence[Outputs], of: Callable[[Sequence[float]], float]) -> Outputs:
-    """Of each motor."""
-    first, second, third, fourth = (of(column) for column in zip(*windows, strict=True))
-    return first, second, third, fourth
+def _shares(window: Sequence[Outputs], zero: float) -> list[float]:
+    """Each motor's mean output beyond `zero`, as a share of the four's mean.
 
-
-def _shares(windows: Sequence[Outputs], zero: float) -> list[Outputs]:
-    """Of the four's mean. One microsecond is what PWM can tell apart: of less nothing is a share."""
-    shares: list[Outputs] = []
-    for first, second, third, fourth in windows:
-        mean = max(fmean((first, second, third, fourth)) - zero, 1.0)
-        shares.append(((first - zero) / mean, (second - zero) / mean, (third - zero) / mean, (fourth - zero) / mean))
-    return shares
-
-
-def _beside(windows: Sequence[Outputs], motor: int) -> list[float]:
-    """By how much a motor works harder than the other three."""
-    return [(4.0 * shares[motor] - sum(shares)) / 3.0 for shares in windows]
+    One microsecond is what PWM can tell apart: of less nothing is a share.
+    """
+    means = [fmean(column) - zero for column in zip(*window, strict=True)]
+    return [each / max(fmean(means), 1.0) for each in means]
