@@ -77,7 +77,8 @@ class ImpactEstimator:
         place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
-        self.contact = self._begin_contact_force(self.imu, impact) if self.imu is not None else None
+        # A velocity that alone shows a contact has no force of its own.
+        self.contact = self._begun(impact, self.imu) if self.imu and impact.evidence is Evidence.FORCE else None
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.validity.invalidate(sample_us)
         self.estimate = estimate = ImpactEstimate(
@@ -97,10 +98,8 @@ class ImpactEstimator:
         )
         return estimate
 
-    def _begin_contact_force(self, sample: ImuSample, impact: Impact) -> ContactForce | None:
-        """The contact force with its first sample; None where a velocity alone shows the contact."""
-        if impact.evidence is not Evidence.FORCE:
-            return None
+    def _begun(self, impact: Impact, sample: ImuSample) -> ContactForce:
+        """The contact force with its first sample."""
         f, force = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
         contact = ContactForce(
             free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),

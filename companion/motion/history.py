@@ -1,6 +1,7 @@
 """The last two seconds of motion, in the vehicle's boot clock."""
 
 from collections import deque
+from dataclasses import dataclass, field
 from itertools import islice
 
 from companion.messages import LocalPosition
@@ -22,26 +23,22 @@ SHOWN_US = 150_000
 SAME_M_S = 0.15
 
 
+@dataclass(slots=True)
 class MotionHistory:
     """Positions and velocities in the order of their time stamps; late packets are dropped."""
 
-    __slots__ = ("_samples",)
-
-    def __init__(self) -> None:
-        self._samples: deque[LocalPosition] = deque()
+    _samples: deque[LocalPosition] = field(default_factory=deque)
 
     def add(self, sample: LocalPosition) -> bool:
         """Remember a sample; False when it is older than what is known and was dropped."""
-        samples = self._samples
-        if samples:
-            newest_us = samples[-1].time_boot_us
-            if sample.time_boot_us <= newest_us:
-                if newest_us - sample.time_boot_us < KEPT_US:
-                    return False
-                samples.clear()
+        samples, time_us = self._samples, sample.time_boot_us
+        late_us = samples[-1].time_boot_us - time_us if samples else -1
+        if 0 <= late_us < KEPT_US:
+            return False
+        if late_us >= KEPT_US:
+            samples.clear()
         samples.append(sample)
-        oldest_us = sample.time_boot_us - KEPT_US
-        while samples[0].time_boot_us < oldest_us:
+        while samples[0].time_boot_us < time_us - KEPT_US:
             samples.popleft()
         return True
 
