@@ -28,9 +28,8 @@ LEAST_HARDER = 0.04
 # Largest difference among the other three motors, in increases of the first. A weight that shifts towards one motor
 # relieves the opposite one: the other three then differ by 0.5. For one damaged motor they do not differ. Half way.
 MOST_UNLIKE = 0.25
-# Outputs of PWM begin at 1 ms, those of DShot and CAN at zero. PWM that is set to begin sooner is taken for the latter:
-# the same damage is then a smaller share.
-PWM_ZERO = 1000.0
+# The least that PX4 lets a PWM output be (PWM_MAIN_MINn). Outputs of DShot and CAN begin at zero, those of PWM at 1 ms.
+LEAST_PWM, PWM_ZERO = 800.0, 1000.0
 
 Outputs: TypeAlias = tuple[float, float, float, float]
 
@@ -84,7 +83,7 @@ class MotorWatch:
             self._samples_after.append(outputs)
         if now_us - self._window_began_us < WINDOW_US:
             return None
-        zero = PWM_ZERO if self._least >= PWM_ZERO else 0.0
+        zero = PWM_ZERO if self._least >= LEAST_PWM else 0.0
         (self._after if was_hit else self._before).append(_shares(self._window, zero))
         self._window = []
         self.damage = self._judged() if was_hit else None
