@@ -14,7 +14,7 @@ from companion.detection.interface import Situation
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
-from companion.flight.detecting import collisions, follow_contact
+from companion.flight.detecting import collisions
 from companion.flight.envelope import Surroundings, bounded
 from companion.flight.machine import Machine, StateMachine
 from companion.flight.obstacle_map import known_surfaces
@@ -128,7 +128,8 @@ class Core(ABC, Generic[FlightT, MachineT]):
             moved = self._act(samples, Inputs(acks, positions, impacts, self.stop_reason, refusal), now_us)
             if flight.unconfirmed > unconfirmed:
                 self.monitor.reject()
-            follow_contact(flight, self.monitor)
+            if flight.collisions:
+                flight.collisions[-1].follow(monitor.state, monitor.estimator)
             note_motors(flight, samples, now_us)
         except Exception as error:
             return self.machine.fail(error, now_us)

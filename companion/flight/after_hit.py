@@ -5,16 +5,7 @@ from companion.flight.states import State, Trigger
 from companion.mission.items import GoToItem, OrbitItem, PathItem
 from companion.mission.policy import OnCollision
 
-_TRIGGERS = {
-    "hold": Trigger.RECOVERED_TO_HOLD,
-    "continue": Trigger.RECOVERED_TO_CONTINUE,
-    "retry": Trigger.RECOVERED_TO_RETRY,
-    "detour": Trigger.RECOVERED_TO_DETOUR,
-    "return": Trigger.RECOVERED_TO_RETURN,
-    "land": Trigger.RECOVERED_TO_LAND,
-    "abort": Trigger.RECOVERED_TO_ABORT,
-}
-# Of these the interrupted step is over.
+# After these the interrupted step is over.
 _STEP_LEFT = ("hold", "continue")
 # These have somewhere to be, to which there may be another way; of all others nothing is left after a detour's hit.
 _WITH_A_GOAL = (GoToItem, PathItem, OrbitItem)
@@ -33,7 +24,7 @@ def decide(flight: FlightContext, state: State, now_us: int) -> None:
     then, reason = _verdict(flight, policy, hits)
     if then == "retry" and state is State.MISSION:
         flight.tally.pace_factor *= policy.retry_speed_factor
-    flight.after_recovery = AfterRecovery(_TRIGGERS[then], policy.hold_s, reason)
+    flight.after_recovery = AfterRecovery(Trigger(f"settled, then: {then}"), policy.hold_s, reason)
     # What an interrupted flight resumes with.
     is_left = then in _STEP_LEFT or (then == "detour" and not isinstance(step.action, _WITH_A_GOAL))
     flight.step_index = flight.tally.index + (1 if is_left else 0)

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from itertools import takewhile
 
 from companion.detection.interface import DetectorState, Phase
-from companion.estimate.impact import ImpactEstimate
+from companion.estimate.impact import ImpactEstimator
 from companion.estimate.normal import Normal, unit, with_change
 from companion.flight.confirmation import DECIDED_US, Hypothesis
 from companion.messages import LocalPosition, Vector3
 from companion.motion.delay import LATEST_S
 from companion.motion.history import MotionHistory
-from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.motion.strapdown import VelocityFix
 from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
@@ -58,32 +58,25 @@ class CollisionRecord:
             after = (after[0], after[1], before[2])  # an upright surface does not lift
         return level(with_change(self.contact_normal, before, after))
 
-    def follow_motion(self, strapdown: Strapdown) -> None:
-        """Take the newest accelerometer and gyroscope sample."""
+    def follow(self, state: DetectorState, source: ImpactEstimator) -> None:
+        """Take the newest sample; the contact's largest force, its end and its normal while it lasts."""
+        strapdown, estimate, self.fixes = source.strapdown, source.estimate, source.strapdown.fixes
+        # In these phases the state still describes the contact.
+        is_in_contact = state.phase in (Phase.CONTACT, Phase.ARMED)
+        is_seen_again = is_in_contact and state.last_loud_boot_us > self.sample_time_boot_us
         if self.hypothesis is not None:
             self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
+            self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
+        if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
+            self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
+            self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
+            self.contact_normal = level(estimate.normal)
+            self.estimator.note_contact(estimate.is_fully_measured, self.contact_ended_boot_us)
         self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
         if self.fixes:
             fix = self.fixes[-1]
             self.estimated_down_m_s = fix.velocity_ned_m_s[2] + strapdown.sum_ned_m_s[2] - fix.sum_ned_m_s[2]
         self.estimator.imu(strapdown)
-
-    def follow_contact(
-        self, state: DetectorState, estimate: ImpactEstimate | None, fixes: Sequence[VelocityFix] = ()
-    ) -> None:
-        """Update the contact's largest force, its end and its normal while it lasts."""
-        self.fixes = fixes
-        # In these phases the state still describes the contact.
-        hypothesis, is_in_contact = self.hypothesis, state.phase in (Phase.CONTACT, Phase.ARMED)
-        is_seen_again = is_in_contact and state.last_loud_boot_us > self.sample_time_boot_us
-        if hypothesis is not None and (hypothesis.is_turned or is_seen_again):
-            self.hypothesis = None
-        if not is_in_contact or estimate is None or estimate.impact.sample_time_boot_us != self.sample_time_boot_us:
-            return
-        self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
-        self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
-        self.contact_normal = level(estimate.normal)
-        self.estimator.note_contact(estimate.is_fully_measured, self.contact_ended_boot_us)
 
     def is_rejected(self, now_boot_us: int, places: MotionHistory, position_noise_m: float) -> bool:
         """Whether the hit is rejected, once the time to the decision is over: only its first sample shows it."""

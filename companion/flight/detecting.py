@@ -94,14 +94,6 @@ def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample:
     flight.report(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
 
 
-def follow_contact(flight: FlightContext, collision_monitor: CollisionMonitor) -> None:
-    """Update the latest collision's record while the contact lasts."""
-    if flight.collisions:
-        record, strapdown = flight.collisions[-1], collision_monitor.estimator.strapdown
-        record.follow_contact(collision_monitor.state, collision_monitor.estimate, strapdown.fixes)
-        record.follow_motion(strapdown)
-
-
 def _report_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
     """Report a contact that is no collision."""
     kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2

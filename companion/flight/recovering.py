@@ -14,7 +14,7 @@ from companion.messages import LocalPosition, Vector3
 from companion.motion.rotation import body_to_ned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.reflex import config as reflex
-from companion.reflex.halfspace import FenceBounds, Surface, clear_goal, limited, plus, split
+from companion.reflex.halfspace import Surface, clear_goal, inside_fence, limited, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.planner import (
@@ -310,7 +310,7 @@ def _setpoint(flight: FlightContext, contact: Contact, motion: MotionState, surf
     assert flight.origin_ned_m is not None, "hits are detected only in flight"
     goal = _law(flight).goal_ned_m(flight.mission.recovery, contact, motion)
     goal = clear_goal(surfaces[1:], contact.position_ned_m, contact.normal_ned, goal)
-    return FenceBounds(flight.origin_ned_m, flight.mission.fence).clamp(contact.position_ned_m, goal)
+    return inside_fence(flight.mission.fence, flight.origin_ned_m, contact.position_ned_m, goal)
 
 
 def _surfaces(flight: FlightContext, contact: Contact) -> list[Surface]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from companion.detection.classify import STEEP
+from companion.estimate.normal import unit
 from companion.fence import Fence
 from companion.messages import Vector3
 from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS
@@ -13,12 +14,7 @@ from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS
 def away_from(normal_ned: Vector3) -> Vector3:
     """Unit normal out of the obstacle: horizontal unless it is steeper than STEEP; zero for a zero vector."""
     n, e, d = normal_ned
-    flat, size = math.hypot(n, e), math.sqrt(n * n + e * e + d * d)
-    if size == 0.0:
-        return (0.0, 0.0, 0.0)
-    if abs(d) > STEEP * size:
-        return (n / size, e / size, d / size)
-    return (n / flat, e / flat, 0.0)
+    return unit((n, e, d if abs(d) > STEEP * math.hypot(n, e, d) else 0.0))
 
 
 def split(vector: Vector3, normal: Vector3) -> tuple[float, Vector3]:
@@ -57,24 +53,18 @@ class Surface:
         return a * (x - u) + b * (y - v) + c * (z - w)
 
 
-@dataclass(frozen=True, slots=True)
-class FenceBounds:
-    """The mission's fence, placed at the arming position; local NED, metres."""
+def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
+    """The setpoint inside a fence at that origin: where the line from the contact leaves it; local NED, metres.
 
-    origin_ned_m: Vector3
-    fence: Fence
-
-    def clamp(self, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
-        """Shorten the line from the contact to the setpoint so that it ends inside the fence.
-
-        For a contact outside the fence the setpoint is the nearest position inside.
-        """
-        north_m, east_m, down_m = self.origin_ned_m
-        start = (contact_ned_m[0] - north_m, contact_ned_m[1] - east_m)
-        end = (setpoint_ned_m[0] - north_m, setpoint_ned_m[1] - east_m)
-        end = self.fence.shortened(start, end) if self.fence.contains(*start) else self.fence.nearest_inside(*end)
-        top_m, floor_m = down_m - self.fence.max_height_m, down_m - self.fence.min_height_m
-        return (north_m + end[0], east_m + end[1], min(max(setpoint_ned_m[2], top_m), floor_m))
+    For a contact outside the fence it is the nearest position inside.
+    """
+    (start_n, start_e, _), (end_n, end_e, end_d) = (
+        plus(place, -1.0, origin_ned_m) for place in (contact_ned_m, setpoint_ned_m)
+    )
+    n, e = fence.nearest_inside(end_n, end_e)
+    if fence.contains(start_n, start_e):
+        n, e = fence.shortened((start_n, start_e), (end_n, end_e))
+    return plus((n, e, min(max(end_d, -fence.max_height_m), -fence.min_height_m)), 1.0, origin_ned_m)
 
 
 def clear_goal(

@@ -57,7 +57,7 @@ class Notice:
 
     kind: str  # of the event
     text: str
-    data: Mapping[str, float]
+    data: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -72,7 +72,6 @@ class CollisionMonitor:
     no_data_reason: str | None = None
     """Why an armed detector could miss a hit; None while the streams are healthy."""
     gate: SampleGate = field(default_factory=SampleGate)
-    last_imu_boot_us: int = 0
     imu_fault: str | None = None  # what was wrong with the newest IMU message
     is_introduced: bool = False  # threshold and losses have been reported
     invalidity_reported: bool = False
@@ -81,8 +80,8 @@ class CollisionMonitor:
     @property
     def is_attitude_old(self) -> bool:
         """Whether the attitude is too old to integrate the accelerometer."""
-        latest = self.gate.latest
-        return latest is not None and self.last_imu_boot_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
+        latest, newest_us = self.gate.latest, self.estimator.strapdown.time_boot_us
+        return latest is not None and newest_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
 
     @property
     def estimate_valid(self) -> bool:
@@ -137,9 +136,8 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
                 continue
             monitor.imu_fault = None
             imu_samples += 1
-            if 0 <= monitor.last_imu_boot_us - sample.time_boot_us < KEPT_US:
+            if 0 <= monitor.estimator.strapdown.time_boot_us - sample.time_boot_us < KEPT_US:
                 continue
-            monitor.last_imu_boot_us = sample.time_boot_us
         elif type(sample) is Attitude:
             if not monitor.gate.attitude(sample):
                 continue
@@ -184,7 +182,7 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
     was, reason = monitor.no_data_reason, _stream_fault(monitor, now_us) if is_on else None
     monitor.no_data_reason = reason
     if (reason is None) != (was is None) and is_on:
-        notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}", {}))
+        notices.append(Notice("link", "the detector sees again" if reason is None else f"detector blind: {reason}"))
     has_waited = now_us - monitor.stream_health.started_us >= KEPT_US
     if has_waited and monitor.state.phase is Phase.ARMED and not monitor.is_introduced:
         monitor.is_introduced = True
@@ -192,10 +190,10 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
         text = f"detector '{monitor.detector.name}' armed: a hit is {threshold_m_s2:.1f} m/s^2 or more"
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
         losses = monitor.detector.losses.items()
-        notices += [Notice("loss", f"no {name.name}: {loss}", {}) for name, loss in losses if name not in monitor.heard]
+        notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
     is_invalid = not monitor.estimate_valid and monitor.state.phase is not Phase.CONTACT
     if is_invalid != monitor.invalidity_reported:
         monitor.invalidity_reported = is_invalid
         text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"
-        notices.append(Notice("estimate", text, {}))
+        notices.append(Notice("estimate", text))
     return notices

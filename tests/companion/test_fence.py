@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from companion.fence import Fence
-from companion.reflex.halfspace import FenceBounds
+from companion.reflex.halfspace import inside_fence
 
 # An L: the room to the north-east is not ours.
 ROOM = Fence(polygon_ne_m=[[-2, -2], [6, -2], [6, 1], [2, 1], [2, 6], [-2, 6]], max_height_m=3)
@@ -68,11 +68,10 @@ def test_outside_by_how_much():
 
 def test_a_recovery_stays_in_the_room():
     """From the inner corner of the L straight towards the other room."""
-    bounds = FenceBounds((10.0, 0.0, 0.0), ROOM)
-    setpoint = bounds.clamp((10.0, 0.0, -1.0), (14.0, 4.0, -9.0))
+    setpoint = inside_fence(ROOM, (10.0, 0.0, 0.0), (10.0, 0.0, -1.0), (14.0, 4.0, -9.0))
     assert setpoint[2] == -3.0
     assert math.isclose(setpoint[0] - 10.0, setpoint[1]) and setpoint[0] == pytest.approx(12.0)
 
 
 def test_a_recovery_stays_above_the_floor():
-    assert FenceBounds((0.0, 0.0, 1.0), ROUND).clamp((0.0, 0.0, 0.0), (0.0, 0.0, 5.0))[2] == pytest.approx(0.8)
+    assert inside_fence(ROUND, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 5.0))[2] == pytest.approx(0.8)

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from companion.detection.interface import DetectorState
 from companion.estimate.config import EstimateConfig
+from companion.estimate.impact import ImpactEstimator
 from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
@@ -435,13 +437,14 @@ def test_a_whole_hit_is_followed_by_what_is_told_even_while_it_pushes():
 def test_a_lean_is_meant_for_the_tilt_that_the_gyroscopes_show():
     # Given a vehicle that takes itself for pitched up by 8 degrees since a hit, which its gyroscopes deny
     up_rad = math.radians(8.0)
-    strapdown = Strapdown()
+    source = ImpactEstimator(EstimateConfig())
+    strapdown = source.strapdown
     strapdown.attitude(HIT_US + 140_000, LEVEL)
     strapdown.imu(HIT_US + 150_000, (0.0, 0.0, -9.80665), ZERO)
     strapdown.attitude(HIT_US + 160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), is_valid=False)
     _, record, recover = recovering()
     # When the recovery asks for a lean
-    record.follow_motion(strapdown)
+    record.follow(DetectorState(), source)
     target = recover.target(160_000)
     # Then it is known to what that is added
     assert target.acceleration_only

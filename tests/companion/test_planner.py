@@ -10,7 +10,7 @@ import pytest
 from companion.estimate.normal import Normal
 from companion.fence import Fence
 from companion.reflex.config import HARD_BRAKING, LEAD_S, SHORTEST_S, RecoveryConfig
-from companion.reflex.halfspace import FenceBounds, Surface, away_from, clear_goal, plus, split
+from companion.reflex.halfspace import Surface, away_from, clear_goal, inside_fence, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact
 from companion.reflex.planner import REST, MotionState, Plan, height_feedback, kept_off, shortest
 
@@ -324,11 +324,11 @@ def test_away_is_level_from_a_wall_and_straight_from_what_is_steep(normal, away)
     assert away_from(normal) == pytest.approx(away, abs=1e-3)
 
 
-ROOM = FenceBounds((0.0, 0.0, 0.0), Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4))
+ROOM = Fence(radius_m=6.0, max_height_m=3.0, min_height_m=0.4)
 
 
 def in_room(surfaces, contact_m, normal, goal_m):
-    return ROOM.clamp(contact_m, clear_goal(surfaces, contact_m, normal, goal_m))
+    return inside_fence(ROOM, REST, contact_m, clear_goal(surfaces, contact_m, normal, goal_m))
 
 
 def test_from_a_ceiling_the_way_leads_down_but_never_into_the_floor():
@@ -346,25 +346,25 @@ def test_the_fence_stops_a_recovery():
     assert goal[0] == pytest.approx(6.0)
 
 
-FENCE = FenceBounds((10.0, 0.0, 2.0), Fence(radius_m=5.0, max_height_m=6.0))
+FENCE, FENCE_AT = Fence(radius_m=5.0, max_height_m=6.0), (10.0, 0.0, 2.0)
 
 
 def test_a_setpoint_inside_the_fence_is_left_alone():
-    assert FENCE.clamp((12.0, 0.0, 0.0), (11.0, 1.0, 0.0)) == (11.0, 1.0, 0.0)
+    assert inside_fence(FENCE, FENCE_AT, (12.0, 0.0, 0.0), (11.0, 1.0, 0.0)) == (11.0, 1.0, 0.0)
 
 
 def test_the_way_back_is_shortened_at_the_fence_not_bent():
-    clamped = FENCE.clamp((10.0, 3.0, 0.0), (18.0, 3.0, 0.0))
+    clamped = inside_fence(FENCE, FENCE_AT, (10.0, 3.0, 0.0), (18.0, 3.0, 0.0))
     assert math.hypot(clamped[0] - 10.0, clamped[1]) == pytest.approx(5.0)
     assert clamped == pytest.approx((14.0, 3.0, 0.0)), "still on the line from the contact to the wish"
 
 
 def test_a_contact_outside_the_fence_is_answered_with_the_nearest_place_inside():
-    assert FENCE.clamp((17.0, 0.0, 0.0), (19.0, 0.0, 0.0)) == pytest.approx((15.0, 0.0, 0.0))
+    assert inside_fence(FENCE, FENCE_AT, (17.0, 0.0, 0.0), (19.0, 0.0, 0.0)) == pytest.approx((15.0, 0.0, 0.0))
 
 
 def test_height_is_limited_from_the_arming_position():
-    assert FENCE.clamp((10.0, 0.0, -5.0), (10.0, 0.0, -5.0))[2] == -4.0
+    assert inside_fence(FENCE, FENCE_AT, (10.0, 0.0, -5.0), (10.0, 0.0, -5.0))[2] == -4.0
 
 
 NORTH_WALL = Surface((3.0, 2.0, -1.5), SOUTH, 0.5)
