@@ -22,7 +22,7 @@ APPROACH_M_S = 0.5
 # Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
 # behind, and the direction of flight says nothing of it.
 FROM_BEHIND = -0.5
-# Nothing is known of a direction, rad: a recovery's clearance then counts all of the motion along the surface.
+# Nothing is known of a direction, rad.
 UNKNOWN_RAD = 0.5 * math.pi
 
 

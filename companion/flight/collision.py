@@ -36,7 +36,6 @@ class CollisionRecord:
     setpoint_ned_m: Vector3
     contact_normal: Normal  # by the contact's force; level unless the obstacle is steep
     peak_specific_force_m_s2: float
-    contact_ended_boot_us: int
     estimator: MotionEstimator
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     after_ned_m_s: Vector3 | None = None  # the velocity after the contact
@@ -68,10 +67,9 @@ class CollisionRecord:
             self.hypothesis.follow(strapdown.time_boot_us, strapdown.rates_frd_rad_s)
             self.hypothesis = None if self.hypothesis.is_turned or is_seen_again else self.hypothesis
         if is_in_contact and estimate is not None and estimate.impact.sample_time_boot_us == self.sample_time_boot_us:
-            self.contact_ended_boot_us = max(self.contact_ended_boot_us, state.last_loud_boot_us)
             self.peak_specific_force_m_s2 = max(self.peak_specific_force_m_s2, state.peak_specific_force_m_s2)
             self.contact_normal = level(estimate.normal)
-            self.estimator.note_contact(estimate.is_fully_measured, self.contact_ended_boot_us)
+            self.estimator.note_contact(estimate.is_fully_measured, state.last_loud_boot_us)
         self.level_acceleration_m_s2 = strapdown.level_acceleration_m_s2
         if self.fixes:
             fix = self.fixes[-1]
@@ -87,7 +85,7 @@ class CollisionRecord:
 
     def is_rebound(self, time_boot_us: int) -> bool:
         """Whether a velocity, which may be late, shows the rebound. Later the vehicle's own controller makes it."""
-        return time_boot_us - self.contact_ended_boot_us <= LATEST_S * 1e6
+        return time_boot_us - self.estimator.pushed_boot_us <= LATEST_S * 1e6
 
     def follow_recovery(self, sample: LocalPosition) -> None:
         """Update overshoot and rebound speed while the vehicle recovers."""

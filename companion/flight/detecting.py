@@ -2,14 +2,11 @@
 
 from collections.abc import Sequence
 
-from companion.detection.interface import Impact, ImpactKind, Situation
+from companion.detection.interface import Situation
 from companion.estimate.impact import ImpactEstimate
-from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.flight.context import FlightContext
-from companion.flight.sustained_force import SustainedForce
-from companion.messages import Attitude, AttitudeTarget, ImuSample, LocalPosition, Sample
+from companion.messages import AttitudeTarget, ImuSample, LocalPosition, Sample
 from companion.motion.history import KEPT_US
-from companion.motion.rotation import ned_to_body
 from companion.reflex import monitor
 from companion.reflex.monitor import CollisionMonitor
 
@@ -59,39 +56,16 @@ def _sustained_force(
                 continue
             held = force.step(sample, attitude.attitude_wxyz, flown_to)
             if held is not None:
-                _report_sustained_force(flight, held, sample, now_us)
-                return _estimate_of(held, sample, attitude)
+                _report_sustained_force(flight, held, now_us)
+                return held
     return None
 
 
-def _estimate_of(held: SustainedForce, sample: LocalPosition, attitude: Attitude) -> ImpactEstimate:
-    """The same as an impact estimate, of a vehicle that hardly moves."""
-    n, e, d = held.normal_ned
-    force_ned = (held.force_m_s2 * n, held.force_m_s2 * e, held.force_m_s2 * d)
-    force = ned_to_body(attitude.attitude_wxyz, force_ned)
-    lasted_us = sample.time_boot_us - held.since_boot_us
-    return ImpactEstimate(
-        impact=Impact(sample.time_boot_us, held.since_boot_us, force, ImpactKind.STRUCK),
-        time_boot_us=sample.time_boot_us,
-        time_error_us=lasted_us,
-        position_ned_m=sample.position_ned_m,
-        velocity_ned_m_s=sample.velocity_ned_m_s,
-        velocity_error_m_s=0.0,
-        normal=Normal(held.normal_ned, IMPULSE_RAD),
-        peak_specific_force_m_s2=held.force_m_s2,
-        impulse_m_s=0.5 * held.force_m_s2 * lasted_us * 1e-6,
-        is_fully_measured=True,
-        is_lower_bound=False,
-        is_final=True,
-    )
-
-
-def _report_sustained_force(flight: FlightContext, held: SustainedForce, sample: LocalPosition, now_us: int) -> None:
-    lasted_s = (sample.time_boot_us - held.since_boot_us) * 1e-6
-    down = held.normal_ned[2]
-    side = "horizontal" if down == 0.0 else "downward" if down > 0.0 else "upward"
-    text = f"something is in the way: {side} external force of {held.force_m_s2:.1f} m/s^2 for {lasted_s:.1f} s"
-    flight.report(now_us, "in_the_way", text, normal_ned=held.normal_ned, push_m_s2=held.force_m_s2, lasted_s=lasted_s)
+def _report_sustained_force(flight: FlightContext, held: ImpactEstimate, now_us: int) -> None:
+    normal, force_m_s2, lasted_s = held.normal.direction_ned, held.peak_specific_force_m_s2, held.time_error_us * 1e-6
+    side = "horizontal" if normal[2] == 0.0 else "downward" if normal[2] > 0.0 else "upward"
+    text = f"something is in the way: {side} external force of {force_m_s2:.1f} m/s^2 for {lasted_s:.1f} s"
+    flight.report(now_us, "in_the_way", text, normal_ned=normal, push_m_s2=force_m_s2, lasted_s=lasted_s)
 
 
 def _report_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -43,7 +43,6 @@ class Recover:
         if flight.target is not None and len(together) == 1:
             flight.yaw_rad = flight.target.yaw_rad
         self._surfaces = _surfaces(flight, self._contact)
-        self._is_known = not self._law.follows  # whether the motion after the hit is known
         self._has_left = False
         self._has_hung = False  # was pressed on the obstacle, and has not left it since
         self._planned_for: object = None  # the state of the contact that the plan was made for
@@ -83,6 +82,11 @@ class Recover:
         velocity = (0.0, 0.0, record.estimated_down_m_s) if is_free else REST
         expected = MotionState(state.position_ned_m, state.velocity_ned_m_s, record.level_acceleration_m_s2)
         return Target(goal, self._yaw_rad, velocity, (a, b, c), True, is_free, None if self._is_known else expected)
+
+    @property
+    def _is_known(self) -> bool:
+        """Whether the motion after the hit is known, as far as the law asks for it."""
+        return self._record.estimator.has_converged or not self._law.follows
 
     @property
     def _yaw_rad(self) -> float | None:
@@ -162,12 +166,11 @@ class Recover:
 
     def _learn(self, sample: LocalPosition) -> None:
         """Take the velocity after the hit once the vehicle's estimate shows it. Until then the estimated one counts."""
-        estimator, was_known = self._record.estimator, self._is_known
-        self._is_known = was_known or estimator.has_converged
+        record, estimator = self._record, self._record.estimator
+        is_shown = record.after_ned_m_s is None or record.is_rebound(sample.time_boot_us)
         # Of a hit that follows another the velocity before it is an estimate, and turns a good normal round.
-        is_shown = not was_known or self._record.is_rebound(sample.time_boot_us)
-        if self._is_known and is_shown and not estimator.is_second:
-            self._record.after_ned_m_s = estimator.corrected(sample).velocity_ned_m_s
+        if estimator.has_converged and is_shown and not estimator.is_second:
+            record.after_ned_m_s = estimator.corrected(sample).velocity_ned_m_s
 
     def _state(self) -> MotionState:
         """The present motion as the start of a plan.
@@ -213,7 +216,7 @@ class Recover:
 
     def _touch(self, sample: LocalPosition) -> None:
         """Update the surface. One that pushes the vehicle along, or that it hangs on, is where the vehicle is."""
-        is_touched = sample.time_boot_us - self._record.contact_ended_boot_us < 1e6 * reflex.SMOOTHED_S
+        is_touched = sample.time_boot_us - self._record.estimator.pushed_boot_us < 1e6 * reflex.SMOOTHED_S
         estimator, contact = self._record.estimator, self._contact
         if self._record.after_ned_m_s is not None:
             known = self._record.normal
@@ -255,7 +258,11 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
     mission, impact, normal = flight.mission, estimate.impact, level(estimate.normal)
     place, velocity, attitude = estimate.position_ned_m, estimate.velocity_ned_m_s, flight.vehicle.attitude
     before = next(iter(in_one_recovery(flight.collisions)), None)
-    is_second = _law(flight).follows and before is not None and not before.estimator.knows_motion
+    is_second = (
+        _law(flight).follows
+        and before is not None
+        and not (before.estimator.has_converged or before.estimator.is_fully_measured)
+    )
     if before is not None and is_second:
         # The vehicle's estimate is still wrong from the hit before.
         place, velocity = before.estimator.motion.position_ned_m, before.estimator.motion.velocity_ned_m_s
@@ -269,7 +276,6 @@ def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: in
         setpoint_ned_m=_setpoint(flight, contact, expected, _surfaces(flight, contact)),
         contact_normal=normal,
         peak_specific_force_m_s2=math.hypot(*impact.specific_force_frd_m_s2),
-        contact_ended_boot_us=first_us,
         estimator=MotionEstimator(contact, first_us, expected, mission.companion.estimate, is_second),
     )
     if before is None and attitude is not None:

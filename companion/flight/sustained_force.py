@@ -10,9 +10,12 @@ that message the thrust is what the accelerometer shows along body z.
 import math
 from dataclasses import dataclass, field
 
+from companion.detection.interface import Impact, ImpactKind
 from companion.detection.thrust import ThrustGain
+from companion.estimate.impact import ImpactEstimate
+from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.messages import LocalPosition, Quaternion, Vector3
-from companion.motion.rotation import body_to_ned
+from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import GRAVITY_M_S2, ZERO
 from companion.reflex.halfspace import away_from, plus, split
 
@@ -32,18 +35,6 @@ LEAST_US = 300_000
 # 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
 HELD_M_S2 = 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class SustainedForce:
-    """Something is in the way; local NED.
-
-    `normal_ned` is away from it, `force_m_s2` what it takes of the acceleration, since `since_boot_us`.
-    """
-
-    normal_ned: Vector3
-    force_m_s2: float
-    since_boot_us: int
 
 
 @dataclass(slots=True)
@@ -75,8 +66,11 @@ class SustainedForceMonitor:
 
     def step(
         self, sample: LocalPosition, attitude_wxyz: Quaternion, goal_ned_m: Vector3 | None
-    ) -> SustainedForce | None:
-        """Take one sample, the attitude and the setpoint as last sent; None while none is flown to."""
+    ) -> ImpactEstimate | None:
+        """Take one sample, the attitude and the setpoint as last sent; None while none is flown to.
+
+        What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
+        """
         now_us, elapsed_s = sample.time_boot_us, self._smooth(sample, attitude_wxyz)
         short = ZERO if goal_ned_m is None else plus(goal_ned_m, -1.0, sample.position_ned_m)
         error_m, since_us = math.hypot(*short), self.steady_since_us
@@ -97,7 +91,22 @@ class SustainedForceMonitor:
             return None
         # What it was in free air stays known.
         self.steady_since_us, self.steady_m_s = now_us, self.velocity_m_s
-        return SustainedForce(away_from(plus(ZERO, -1.0, grown)), force_m_s2, since_us)
+        normal = away_from(plus(ZERO, -1.0, grown))
+        force = ned_to_body(attitude_wxyz, plus(ZERO, force_m_s2, normal))
+        return ImpactEstimate(
+            impact=Impact(now_us, since_us, force, ImpactKind.STRUCK),
+            time_boot_us=now_us,
+            time_error_us=now_us - since_us,
+            position_ned_m=sample.position_ned_m,
+            velocity_ned_m_s=sample.velocity_ned_m_s,
+            velocity_error_m_s=0.0,
+            normal=Normal(normal, IMPULSE_RAD),
+            peak_specific_force_m_s2=force_m_s2,
+            impulse_m_s=0.5e-6 * force_m_s2 * (now_us - since_us),
+            is_fully_measured=True,
+            is_lower_bound=False,
+            is_final=True,
+        )
 
     def _smooth(self, sample: LocalPosition, attitude_wxyz: Quaternion) -> float:
         """Low-pass velocity and thrust; missing: the thrust less the velocity's change. Returns the time step in s."""

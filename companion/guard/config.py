@@ -6,7 +6,7 @@ from pydantic import Field, field_validator
 
 from companion.fence import Fence
 from companion.mission.config import CompanionConfig
-from companion.mission.model import KnownRecovery, Mission
+from companion.mission.model import Mission
 from companion.mission.policy import SetpointLimits
 from companion.px4_mode import MODE_NAMES
 from companion.reflex.config import RecoveryConfig
@@ -45,7 +45,7 @@ class GuardConfig(StrictModel):
     until it is given."""
     limits: SetpointLimits = SetpointLimits()
     """What no setpoint exceeds."""
-    recovery: KnownRecovery = RecoveryConfig()
+    recovery: RecoveryConfig = RecoveryConfig()
     """How a recovery is planned."""
     companion: CompanionConfig = CompanionConfig()
     """Detection, estimate, streams and link."""

@@ -129,7 +129,7 @@ def _is_free(guard: GuardContext) -> bool:
     latest = guard.vehicle.history.latest()
     if latest is None or not guard.collisions:
         return True
-    return latest.time_boot_us - guard.collisions[-1].contact_ended_boot_us >= CONTACT_OVER_US
+    return latest.time_boot_us - guard.collisions[-1].estimator.pushed_boot_us >= CONTACT_OVER_US
 
 
 def place_of(here: GlobalPosition, here_ned_m: Vector3, goal_ned_m: Vector3) -> Reposition:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from companion.fence import Fence
 from companion.memory.patch import Patch
@@ -22,16 +22,7 @@ from companion.mission.items import MissionItem
 from companion.mission.policy import AbortWhen, Handover, OnCollision, OnDamage, Resume, SetpointLimits
 from companion.mission.trajectory import Chain, LineProfile, Trajectory
 from companion.reflex.config import RecoveryConfig
-from companion.reflex.laws import RECOVERY_LAWS, check_known_law
 from companion.strict_model import StrictModel
-
-
-def _known_law(recovery: RecoveryConfig) -> RecoveryConfig:
-    check_known_law(recovery.law, RECOVERY_LAWS)
-    return recovery
-
-
-KnownRecovery = Annotated[RecoveryConfig, AfterValidator(_known_law)]
 
 
 class Mission(StrictModel):
@@ -47,7 +38,7 @@ class Mission(StrictModel):
     """Flown in order; take-off first, land or return last."""
     on_collision: OnCollision = OnCollision()
     """What follows a hit, where the item says nothing else."""
-    recovery: KnownRecovery = RecoveryConfig()
+    recovery: RecoveryConfig = RecoveryConfig()
     obstacles: ObstaclesConfig = ObstaclesConfig()
     abort_when: AbortWhen = AbortWhen()
     on_damage: OnDamage = "tell"

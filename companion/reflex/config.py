@@ -81,8 +81,8 @@ SPREAD = 0.3
 class RecoveryConfig(StrictModel):
     """The mission's `recovery:` part; `gamma` in seconds, one number or one for each horizontal axis."""
 
-    law: str = "adaptive"
-    """adaptive, normal or paper."""
+    law: Literal["adaptive", "normal", "paper"] = "adaptive"
+    """What sets the recovery setpoint."""
     gamma: Positive | tuple[Positive, Positive] = 0.5
     """Law `paper`. Law `normal`, and `tangential: kept` of any law, use the first number only. The paper's flights have
     0.5 s."""

@@ -8,16 +8,14 @@ positive axes; read for any approach, gamma_i |v_ci| back along each horizontal 
 `adaptive`, as near as is safe. From the motion x, v, a that follows the contact, with v_t the part of v along it:
 
     r   = v T / 2 + a T^2 / 12,  r_t what of it is along the obstacle
-    D   = max(d_0 + sin(e) |v_t| T / 2,  t_0 |v_c . n|,  (x - x(t_c) + r) . n)
+    D   = max(d_0,  t_0 |v_c . n|,  (x - x(t_c) + r) . n)
     x_d = x + (D - (x - x(t_c)) . n) n + r_t,  height x_3(t_c) unless the obstacle is steep
 
-that is d_0 (clearance_m), and what a normal with the error e may take of it along the obstacle, or t_0 |v_c . n|
-(clearance_s) off the obstacle, further where the rebound would carry the vehicle further before it could stop, and
-along the obstacle where it comes to rest.
+that is d_0 (clearance_m) or t_0 |v_c . n| (clearance_s) off the obstacle, further where the rebound would carry the
+vehicle further before it could stop, and along the obstacle where it comes to rest.
 """
 
-import math
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from companion.messages import Vector3
@@ -73,14 +71,12 @@ def _adaptive(config: RecoveryConfig, contact: Contact, motion: MotionState) -> 
     normal, x = contact.normal_ned, motion.position_ned_m
     off_m_s, tangential = split(motion.velocity_ned_m_s, normal)
     off_m = split(plus(x, -1.0, contact.position_ned_m), normal)[0]
-    harder_m = -config.clearance_s * split(contact.velocity_ned_m_s, normal)[0]
-    along_m_s, error = math.hypot(*tangential), math.sin(contact.normal_error_rad)
+    clear_m = max(config.clearance_m, -config.clearance_s * split(contact.velocity_ned_m_s, normal)[0])
     if normal[2] == 0.0:
         tangential = (tangential[0], tangential[1], 0.0)
     leant_m_s2, leant_along = split(motion.acceleration_ned_m_s2, normal)
 
     def goal_after(duration_s: float) -> Vector3:
-        clear_m = max(config.clearance_m + 0.5 * error * along_m_s * duration_s, harder_m)
         stops_m = 0.5 * off_m_s * duration_s + leant_m_s2 * duration_s**2 / 12.0
         goal = plus(x, max(clear_m - off_m, stops_m), normal)
         return plus(plus(goal, 0.5 * duration_s, tangential), duration_s**2 / 12.0, leant_along)
@@ -96,9 +92,3 @@ RECOVERY_LAWS: Mapping[str, Law] = {
     "normal": Law(_normal, follows=True, plans=False),
     "adaptive": Law(_adaptive, follows=True, plans=True),
 }
-
-
-def check_known_law(name: str, known: Container[str]) -> None:
-    """Raise ValueError, naming the choices, for a law that does not exist."""
-    if name not in known:
-        raise ValueError(f"there is no recovery law '{name}'; the laws are: {', '.join(sorted(RECOVERY_LAWS))}")

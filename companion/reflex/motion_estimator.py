@@ -124,6 +124,7 @@ class MotionEstimator:
     config: EstimateConfig
     is_second: bool = False  # the error of an earlier hit was still being corrected
     motion: MotionState = field(init=False)
+    pushed_boot_us: int = field(init=False)  # the contact's last sample
     is_fully_measured: bool = False  # nothing was clipped: the vehicle's estimate contains the whole hit
     has_converged: bool = False  # the vehicle's estimate is right again
     tilt_m_s2: Vector3 = REST  # horizontal acceleration of the thrust, LEAD_S ahead
@@ -138,10 +139,9 @@ class MotionEstimator:
     _hidden_error_m_s: Vector3 = REST  # remaining error of the reported velocity
     _rate_error_m_s: Vector3 = REST  # its difference from the positions' rate
     _newest: LocalPosition | None = None  # newest report since convergence, corrected
-    _pushed_boot_us: int = 0
 
     def __post_init__(self) -> None:
-        self.motion = self.start
+        self.motion, self.pushed_boot_us = self.start, self.hit_boot_us
         self._begin()
 
     def _begin(self) -> None:
@@ -150,16 +150,11 @@ class MotionEstimator:
         self.spread_m_s = reflex.SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
 
-    @property
-    def knows_motion(self) -> bool:
-        """Whether the vehicle's own estimate is right."""
-        return self.has_converged or self.is_fully_measured
-
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
         """Take what is known of the contact by now: whether it was measured whole, and the time of its last sample."""
         self.is_fully_measured = is_fully_measured and not self.is_second
-        if pushed_boot_us != self._pushed_boot_us:
-            self._pushed_boot_us = pushed_boot_us
+        if pushed_boot_us > self.pushed_boot_us:
+            self.pushed_boot_us = pushed_boot_us
             if not self.is_fully_measured:
                 self._begin()
 
@@ -191,7 +186,7 @@ class MotionEstimator:
             return
         if self.is_fully_measured:
             self.has_converged = True
-        elif self.has_converged or sample.time_boot_us > self._pushed_boot_us:
+        elif self.has_converged or sample.time_boot_us > self.pushed_boot_us:
             self._filter(sample, at_us)
         if self.has_converged:
             self._correct(sample)

@@ -13,7 +13,6 @@ from pydantic_core.core_schema import ModelSchema
 
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
-from companion.reflex.laws import RECOVERY_LAWS
 from sim_vehicle.scene import Scene
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -61,7 +60,6 @@ def mission_schema() -> dict[str, Any]:
     definitions["Scene"] = scene
     schema["properties"]["sim"] = {"anyOf": [{"$ref": "#/$defs/Scene"}, {"type": "null"}], "default": None}
     schema["properties"]["items"]["prefixItems"] = [{"$ref": "#/$defs/MissionItem", "required": ["takeoff"]}]
-    definitions["RecoveryConfig"]["properties"]["law"]["enum"] = sorted(RECOVERY_LAWS)
     definitions["CompanionConfig"]["properties"]["detector"]["enum"] = sorted(CompanionConfig.detectors)
     for part in (schema, *definitions.values()):
         for written in part.get("properties", {}).values():

@@ -85,7 +85,7 @@ def test_the_least_mission_has_defaults_for_the_rest():
             ("on_collision", "then"),
         ),
         (["on_interrupt"], "dance", "'hold' or 'land'", ("on_interrupt",)),
-        (["recovery", "law"], "magic", "no recovery law 'magic'", ("recovery",)),
+        (["recovery", "law"], "magic", "'adaptive', 'normal' or 'paper'", ("recovery", "law")),
         (["companion", "detector"], "magic", "no detector 'magic'", ("companion", "detector")),
         (
             ["companion", "flight"],

@@ -237,7 +237,7 @@ def recovering(**hit):
     flight.origin_ned_m = ZERO
     estimator = reckoned(**hit)
     record = CollisionRecord(
-        0, HIT_US, "fused", estimator.contact, (2.6, 0.0, -2.0), Normal(SOUTH, 0.2), 20.0, HIT_US, estimator
+        0, HIT_US, "fused", estimator.contact, (2.6, 0.0, -2.0), Normal(SOUTH, 0.2), 20.0, estimator
     )
     flight.collisions.append(record)
     return flight, record, Recover(flight, 0)
@@ -343,7 +343,7 @@ def test_a_push_that_its_sensor_shows_one_axis_of_is_turned_back_by_the_velocity
     # Given a slanted wall met at 1.2 m/s, of whose push the accelerometer shows the part along the east alone
     flight, record, recover = recovering(velocity=(1.2, 0.0, 0.0))
     record.estimator.note_contact(True, HIT_US)
-    record.contact_normal, record.contact_ended_boot_us = Normal((0.0, -1.0, 0.0), IMPULSE_RAD), HIT_US + 80_000
+    record.contact_normal, record.estimator.pushed_boot_us = Normal((0.0, -1.0, 0.0), IMPULSE_RAD), HIT_US + 80_000
     # When the velocity goes on changing after the last sample that showed a push
     north_m, east_m, before_us = 3.05, 0.0, 60_000
     for at_us, (n, e) in ((84, (0.6, -0.47)), (124, (0.4, -0.55)), (164, (0.2, -0.6)), (260, (0.6, 0.4))):
@@ -408,7 +408,7 @@ def test_what_shakes_a_vehicle_that_leaves_as_it_is_asked_to_moves_no_surface():
     record.estimator.note_contact(True, HIT_US)
     north_m, north_m_s, goal_m = 3.0, -0.2, None
     for at_us in range(100_000, 2_500_000, 20_000):
-        record.contact_ended_boot_us = HIT_US + at_us
+        record.estimator.pushed_boot_us = HIT_US + at_us
         sample = LocalPosition(HIT_US + at_us, (north_m, 0.0, -2.0), (north_m_s, 0.0, 0.0))
         if recover.step(flight, Inputs(positions=[sample]), at_us) is not None:
             break

@@ -35,7 +35,7 @@ def begun(height_m: float, attitude: Attitude | None) -> tuple[Recover, FlightCo
     estimator = MotionEstimator(contact, HIT_US, contact.rebound(0.0), EstimateConfig())
     goal = (2.6, 0.0, -height_m)
     flight.collisions.append(
-        CollisionRecord(0, HIT_US, "fused", contact, goal, Normal(contact.normal_ned, 0.2), 20.0, HIT_US, estimator)
+        CollisionRecord(0, HIT_US, "fused", contact, goal, Normal(contact.normal_ned, 0.2), 20.0, estimator)
     )
     flight.vehicle.attitude = attitude
     return Recover(flight, 0), flight, estimator

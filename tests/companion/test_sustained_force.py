@@ -45,7 +45,7 @@ def test_a_vehicle_that_stands_still_and_leans_more_and_more_is_kept_off_its_goa
     at_s, held = watched(5.0, lambda t: 0.0, lambda t: 0.0, lambda t: 1.0 + 0.8 * max(0.0, t - 1.0))
     # Then it is told as soon as that much has had no effect, with the way out
     assert 0.8 * (at_s - 1.3) == pytest.approx(HELD_M_S2, abs=0.2)
-    assert held.normal_ned == pytest.approx((-1.0, 0.0, 0.0))
+    assert held.normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0))
 
 
 def test_a_lean_that_moves_the_vehicle_is_kept_from_nothing():
@@ -227,7 +227,9 @@ def test_more_and_more_thrust_that_nothing_shows_of_presses_on_what_is_above():
     at_s, held = watched_below(5.0, pressing)
     # Then it is told with the low-pass filter's delay
     assert at_s == pytest.approx(HELD_M_S2 + SMOOTHING_S, abs=0.1)
-    assert held.normal_ned == (0.0, 0.0, 1.0) and held.force_m_s2 == pytest.approx(HELD_M_S2, abs=0.1)
+    assert held.normal.direction_ned == (0.0, 0.0, 1.0) and held.peak_specific_force_m_s2 == pytest.approx(
+        HELD_M_S2, abs=0.1
+    )
 
 
 @pytest.mark.parametrize(
