@@ -98,7 +98,7 @@ class CollisionMonitor:
 
     def reject(self) -> None:
         """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
-        self.estimator.validity.assess(True, self.last_imu_boot_us)
+        self.estimator.validity.assess(True, self.estimator.strapdown.time_boot_us)
 
     def describe(self) -> str:
         """For the live line."""
