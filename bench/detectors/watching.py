@@ -95,6 +95,6 @@ def watch_all(
                 if entry.first.impact is final.impact:
                     entry.final = final
         blind += sum("blind" in notice.text for notice in seen.notices)
-    if found and monitor.estimate is not None and monitor.estimate.impact is found[-1].first.impact:
-        found[-1].final = monitor.estimate
+    if found and monitor.estimator.estimate is not None and monitor.estimator.estimate.impact is found[-1].first.impact:
+        found[-1].final = monitor.estimator.estimate
     return found, touches, blind

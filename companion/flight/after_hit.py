@@ -71,10 +71,8 @@ _GOES_ON = {
 def note_before(flight: FlightContext, state: State) -> None:
     """Save the state before a hit is recorded. Within a recovery there is nothing to restore."""
     tally = flight.tally
-    if state is State.RECOVERING:
-        flight.before_hit = None
-    else:
-        flight.before_hit = BeforeHit(state, flight.step_index, tally.hits, tally.pace_factor, flight.after_recovery)
+    before = BeforeHit(state, flight.step_index, tally.hits, tally.pace_factor, flight.after_recovery)
+    flight.before_hit = None if state is State.RECOVERING else before
 
 
 def take_back(flight: FlightContext, now_us: int) -> Transition | None:

@@ -40,7 +40,7 @@ class CollisionRecord:
     fixes: Sequence[VelocityFix] = ()  # the estimate's velocities beside the accelerometer's sum, oldest first
     after_ned_m_s: Vector3 | None = None  # the velocity after the contact
     hypothesis: Hypothesis | None = None  # until it is confirmed or rejected
-    settled_at_boot_us: int | None = None
+    settled_after_s: float | None = None  # from its first sample to the beginning of its rest
     is_over: bool = False  # settled, or given up on
     overshoot_m: float = 0.0
     rebound_speed_m_s: float | None = None  # the largest along the normal, until the rebound is over
@@ -96,20 +96,6 @@ class CollisionRecord:
         if self.is_rebound(sample.time_boot_us):
             self.rebound_speed_m_s = max(self.rebound_speed_m_s or 0.0, split(sample.velocity_ned_m_s, normal)[0])
 
-    def settled_after_s(self) -> float | None:
-        if self.settled_at_boot_us is None:
-            return None
-        return max(0.0, (self.settled_at_boot_us - self.sample_time_boot_us) * 1e-6)
-
-    def recovered_text(self) -> str:
-        """Of one that has settled, for people."""
-        settled_after_s = self.settled_after_s()
-        assert settled_after_s is not None
-        speed_m_s = self.rebound_speed_m_s
-        rebound = "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
-        past_cm = self.overshoot_m * 100
-        return f"recovered: settled {settled_after_s:.2f} s after the hit, overshoot {past_cm:.1f} cm{rebound}"
-
     def report(self) -> CollisionReport:
         velocity = self.contact.velocity_ned_m_s
         return CollisionReport(
@@ -122,7 +108,7 @@ class CollisionRecord:
             normal_ned=self.normal.direction_ned,
             peak_specific_force_m_s2=self.peak_specific_force_m_s2,
             recovery_setpoint_ned_m=self.setpoint_ned_m,
-            settled_after_s=self.settled_after_s(),
+            settled_after_s=self.settled_after_s,
             overshoot_m=self.overshoot_m,
             rebound_speed_m_s=self.rebound_speed_m_s,
         )

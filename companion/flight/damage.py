@@ -20,7 +20,7 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
     hits = len(flight.collisions) - flight.motors.earlier_hits
     flies = flight.has_climbed and vehicle.landed in (LandedState.IN_AIR, LandedState.LANDING)
     # A vehicle not yet at rest may hang on the obstacle, or lie on the ground: that also loads a motor more.
-    rests = hits == 0 or flight.collisions[-1].settled_at_boot_us is not None
+    rests = hits == 0 or flight.collisions[-1].settled_after_s is not None
     was_hit = hits > 0 if flies and rests else None
     for sample in samples:
         if isinstance(sample, MotorOutputs):

@@ -38,9 +38,9 @@ class Recover:
         self._flight, self._record = flight, flight.collisions[-1]
         self._law, self._config = _law(flight), flight.mission.recovery
         self._contact = self._record.contact  # as known now, at the vehicle's place while the obstacle goes along
-        together = in_one_recovery(flight.collisions)
-        self._first_hit_us = together[-1].detected_at_us
-        if flight.target is not None and len(together) == 1:
+        *_, first = in_one_recovery(flight.collisions)
+        self._first_hit_us = first.detected_at_us
+        if flight.target is not None and first is self._record:
             flight.yaw_rad = flight.target.yaw_rad
         self._surfaces = _surfaces(flight, self._contact)
         self._has_left = False
@@ -100,8 +100,13 @@ class Recover:
 
     @property
     def _lets_go(self) -> bool:
-        """Whether it lets go of an upright obstacle that it hung on: no more thrust than in hover until it leaves."""
-        return self._has_hung and self._is_level and _has_room_below(self._flight)
+        """Whether it lets go of an upright obstacle that it hung on: no more thrust than in hover until it leaves.
+
+        Only as long as a fall can still be stopped above the ground.
+        """
+        height_m, down_m_s = self._flight.height_m, max(0.0, self._record.estimator.motion.velocity_ned_m_s[2])
+        least_m = self._config.clearance_m + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
+        return self._has_hung and self._is_level and height_m is not None and height_m > least_m
 
     def _height_m_s2(self, loops: float) -> float:
         record, most_m_s2 = self._record, self._config.vertical_acceleration_m_s2
@@ -137,9 +142,12 @@ class Recover:
             self._learn(sample)
             if self._law.follows:
                 self._follow(sample, now_us)
-            if self._is_known and self._has_settled(sample):
-                figures = {"settled_after_s": record.settled_after_s(), "overshoot_m": record.overshoot_m}
-                flight.report(now_us, "recovered", record.recovered_text(), **figures)
+            settled_s = self._settled_after_s(sample) if self._is_known else None
+            if settled_s is not None:
+                past_m, speed_m_s, record.settled_after_s = record.overshoot_m, record.rebound_speed_m_s, settled_s
+                text = f"recovered: settled {settled_s:.2f} s after the hit, overshoot {past_m * 100:.1f} cm"
+                text += "" if speed_m_s is None else f", rebound {speed_m_s:.2f} m/s"
+                flight.report(now_us, "recovered", text, settled_after_s=settled_s, overshoot_m=past_m)
                 return self._leave(flight)
         off_m_s = split(record.estimator.motion.velocity_ned_m_s, self._contact.normal_ned)[0]
         self._has_hung = self._tilts_into_surface() or (self._has_hung and off_m_s < 0.0)
@@ -156,13 +164,13 @@ class Recover:
         flight.target = Target(self._record.setpoint_ned_m, flight.yaw_rad)
         return afterwards(flight)
 
-    def _has_settled(self, sample: LocalPosition) -> bool:
+    def _settled_after_s(self, sample: LocalPosition) -> float | None:
+        """Time from the hit to the beginning of the present rest, s; None as long as that has not lasted."""
         record, right = self._record, self._record.estimator.corrected(sample)
         record.follow_recovery(right)
         distance_m = math.dist(right.position_ned_m, record.setpoint_ned_m)
         since_us = self._monitor.settled_since(sample.time_boot_us, distance_m, right.velocity_ned_m_s)
-        record.settled_at_boot_us = since_us or record.settled_at_boot_us
-        return since_us is not None
+        return None if since_us is None else max(0.0, 1e-6 * (since_us - record.sample_time_boot_us))
 
     def _learn(self, sample: LocalPosition) -> None:
         """Take the velocity after the hit once the vehicle's estimate shows it. Until then the estimated one counts."""
@@ -242,15 +250,6 @@ def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | Non
     short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
     lead_rad = reflex.YAW_LEAD_RAD
     return wanted_rad if abs(short_rad) <= lead_rad else heading_rad + math.copysign(lead_rad, short_rad)
-
-
-def _has_room_below(flight: FlightContext) -> bool:
-    """Whether a fall can still be stopped above the ground."""
-    latest, height_m = flight.vehicle.history.latest(), flight.height_m
-    if latest is None or height_m is None:
-        return False
-    down_m_s = max(0.0, latest.velocity_ned_m_s[2])
-    return height_m > reflex.LEFT_BELOW_M + 0.5 * down_m_s**2 / reflex.STOPPING_M_S2
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

@@ -17,11 +17,10 @@ from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import GRAVITY_M_S2, ZERO
+from companion.reflex.config import LEAD_S, PLACE_SPREAD_M
 from companion.reflex.halfspace import away_from, plus, split
 
-# A setpoint nearer than this is reached: three times a good estimate's noise.
-BESIDE_M = 0.1
-# While it is, drag and wind are learnt: the mean of so long.
+# While the setpoint is reached, drag and wind are learnt: the mean of so long.
 FOLLOWED_S = 1.0
 # Four times a good estimate's noise. The motion is not steady where the velocity has changed by more. A vehicle that
 # approaches its setpoint faster is not held back. With 0.15 a slow gust counted as steady.
@@ -30,7 +29,7 @@ STEADY_M_S = 0.12
 SMOOTHING_S = 0.2
 # An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet, and a
 # motor that fails has not let the vehicle down yet.
-LEAST_US = 300_000
+LEAST_US = round(2e6 * LEAD_S)
 # What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
 # 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
@@ -76,10 +75,10 @@ class SustainedForceMonitor:
         error_m, since_us = math.hypot(*short), self.steady_since_us
         if goal_ned_m is None:
             self.gain.known_s = 0.0
-        elif error_m < BESIDE_M or not self.gain.is_known:
+        elif error_m < PLACE_SPREAD_M or not self.gain.is_known:
             self.gain.learn(now_us, self.measured_m_s2, elapsed_s)
         is_new = since_us is None or math.dist(self.velocity_m_s, self.steady_m_s) > STEADY_M_S
-        if since_us is None or is_new or error_m < BESIDE_M:
+        if since_us is None or is_new or error_m < PLACE_SPREAD_M:
             share, self.steady_since_us = 1.0 if is_new else elapsed_s / (FOLLOWED_S + elapsed_s), now_us
             self.steady_m_s = plus(self.steady_m_s, share, plus(self.velocity_m_s, -1.0, self.steady_m_s))
             self.wind_m_s2 = plus(self.wind_m_s2, share, plus(self.missing_m_s2, -1.0, self.wind_m_s2))

@@ -29,8 +29,8 @@ HEIGHT_PER_S, PLACE_PER_S, VELOCITY_PER_S = 1.0, 0.95, 1.8
 PRESSING_TILT_M_S2 = 2.5
 # Half of gravity, down. The other half is thrust to steer with.
 DESCENT_M_S2 = 0.5 * GRAVITY_M_S2
-# Acceleration that stops a descent (hover at 78 % of the thrust, not yet level), and the least height after it.
-STOPPING_M_S2, LEFT_BELOW_M = 2.0, 0.3
+# Acceleration that stops a descent: hover at 78 % of the thrust, not yet level.
+STOPPING_M_S2 = 2.0
 # Largest heading error asked for after a hit: PX4's MPC_YAWRAUTO_MAX, 45 degrees a second, over its MC_YAW_P, 2.8 1/s.
 # A slanted wall turned a real PX4 by 120 degrees. Its motors then spent 0.4 s of thrust on turning back at full rate.
 YAW_LEAD_RAD = 0.28

@@ -83,19 +83,6 @@ class CollisionMonitor:
         latest, newest_us = self.gate.latest, self.estimator.strapdown.time_boot_us
         return latest is not None and newest_us - latest.time_boot_us > self.config.sight.silence_s * 1e6
 
-    @property
-    def estimate_valid(self) -> bool:
-        """False while the vehicle's velocity and position estimate is not valid: part of a hit was not measured.
-
-        For the detector and the timeline. A recovery uses `reflex.motion_estimator`.
-        """
-        return self.estimator.validity.is_valid
-
-    @property
-    def estimate(self) -> ImpactEstimate | None:
-        """The present estimate of the latest impact."""
-        return self.estimator.estimate
-
     def reject(self) -> None:
         """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
         self.estimator.validity.assess(True, self.estimator.strapdown.time_boot_us)
@@ -150,7 +137,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         monitor.estimator.update(sample)
         if monitor.is_attitude_old:
             monitor.estimator.strapdown.fixes.clear()
-        known = situation if monitor.estimate_valid else situation._replace(estimate_valid=False)
+        known = situation if monitor.estimator.validity.is_valid else situation._replace(estimate_valid=False)
         monitor.state, impact = monitor.detector.step(monitor.state, sample, known)
         if impact is not None:
             impacts.append(monitor.estimator.begin(impact))
@@ -191,7 +178,7 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
         losses = monitor.detector.losses.items()
         notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
-    is_invalid = not monitor.estimate_valid and monitor.state.phase is not Phase.CONTACT
+    is_invalid = not monitor.estimator.validity.is_valid and monitor.state.phase is not Phase.CONTACT
     if is_invalid != monitor.invalidity_reported:
         monitor.invalidity_reported = is_invalid
         text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"

@@ -50,25 +50,19 @@ def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
     return g, way_s - np.maximum(_LATE_S - since_s, 0.0), np.exp(-0.5 * _SWING * x)
 
 
-@dataclass(slots=True)
 class FilterBank:
     """Kalman filters of x, v, e: states (models, axes, 3), covariances of each axis (models, 3, 3); in the last e = 0.
 
-    Local NED, SI. Changed only by its methods.
+    Local NED, SI. Changed only by its methods. `log_likelihoods` are twice the logarithm of each model's likelihood.
     """
 
-    start: MotionState
-    spread_m_s: float  # standard deviation of its velocity
-    error_m_s: Vector3
-    state: Floats = field(init=False)
-    covariance: Floats = field(init=False)
-    log_likelihoods: Floats = field(init=False)  # twice the logarithm of each model's likelihood
+    __slots__ = ("covariance", "log_likelihoods", "state")
 
-    def __post_init__(self) -> None:
-        models = len(_POLES)
-        state = np.stack([self.start.position_ned_m, self.start.velocity_ned_m_s, self.error_m_s], axis=1)
+    def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
+        """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
+        models, state = len(_POLES), np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
+        spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
-        spreads = (reflex.PLACE_SPREAD_M, self.spread_m_s, math.hypot(*self.error_m_s) + self.spread_m_s)
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))
         self.log_likelihoods = np.zeros(models)
         self.state[-1, :, 2] = self.covariance[-1, 2, 2] = 0.0
@@ -210,7 +204,7 @@ class MotionEstimator:
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
         colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-3))
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
-        off_m_s = math.hypot(*bank.error_m_s) * reflex.MODEL_ERROR
+        off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))

@@ -166,7 +166,7 @@ class Findings:
 
     def note(self, monitor: CollisionMonitor, situation: Situation, at_us: int) -> None:
         """After each step: what the watch knows of the latest impact, and whether it sees."""
-        estimate, off = monitor.estimate, situation.off_reason
+        estimate, off = monitor.estimator.estimate, situation.off_reason
         if estimate is not None:
             if not self.impacts or self.impacts[-1].first.impact is not estimate.impact:
                 self.impacts.append(Finding(at_us, monitor.state.threshold_m_s2, situation, estimate, estimate))

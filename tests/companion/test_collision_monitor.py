@@ -48,7 +48,7 @@ def test_an_impact_comes_at_its_first_sample_and_its_final_estimate_when_the_con
     assert impacts[0].velocity_ned_m_s == pytest.approx((2.0, 0.0, 0.0), abs=0.01)
     assert len(finished) == 1 and finished[0].is_final
     assert finished[0].normal.direction_ned == pytest.approx((-1.0, 0.0, 0.0), abs=0.01)
-    assert monitor.estimate == finished[0]
+    assert monitor.estimator.estimate == finished[0]
 
 
 def test_a_watch_survives_pickling_in_mid_flight():

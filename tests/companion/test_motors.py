@@ -138,7 +138,7 @@ def test_a_vehicle_that_did_not_come_to_rest_hangs_or_lies_and_its_motors_say_no
         return len(context.motors._after)
 
     assert moments_after() > 5
-    context.collisions[-1].settled_at_boot_us = None
+    context.collisions[-1].settled_after_s = None
     assert moments_after() == 0
 
 

@@ -1,6 +1,7 @@
 """What a recovery asks of a vehicle that hangs on what it hit, beside its plan."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -58,6 +59,7 @@ def asked(
     sample = LocalPosition(HIT_US + SINCE_US, (3.0, 0.0, -height_m), (-off_m_s, 0.0, down_m_s))
     flight.vehicle.history.add(sample)
     recover.step(flight, Inputs(positions=[sample]), SINCE_US)
+    estimator.motion = replace(estimator.motion, velocity_ned_m_s=sample.velocity_ned_m_s)
     if told_off:
         estimator.position_error_m, estimator._hidden_error_m_s = OFF_M, OFF_M_S
         flight.collisions[0].level_acceleration_m_s2 = LEVEL_LEANS_M_S2

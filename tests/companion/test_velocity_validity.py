@@ -27,7 +27,7 @@ def test_a_push_across_the_way_gives_way_a_little_to_where_the_vehicle_came_from
             samples.append(Attitude(t_us, LEVEL, STILL))
         impacts += advance(monitor, samples, situation, t_us).impacts
     (impact,) = impacts
-    for estimate in (impact, monitor.estimate):
+    for estimate in (impact, monitor.estimator.estimate):
         n, e, _ = estimate.normal.direction_ned
         assert math.degrees(math.atan2(-n, -e)) == pytest.approx(19.0, abs=2.0)
 
@@ -60,7 +60,7 @@ def after_a_hit(
         seen = advance(monitor, samples, situation, t_us)
         impacts += seen.impacts
         told += [(t_us, notice.text) for notice in seen.notices if notice.kind == "estimate"]
-        trusted.append(monitor.estimate_valid)
+        trusted.append(monitor.estimator.validity.is_valid)
     return impacts, told, trusted
 
 
@@ -138,5 +138,5 @@ def test_a_tilt_that_the_gyroscopes_do_not_show_is_the_filters(turns, leans_m_s2
         if t_us < 2_140_000:
             assert monitor.estimator.strapdown.level_acceleration_m_s2 == STILL
     # Then it is the filter's in the one case and the vehicle's in the other
-    assert not monitor.estimate_valid
+    assert not monitor.estimator.validity.is_valid
     assert monitor.estimator.strapdown.level_acceleration_m_s2 == pytest.approx((leans_m_s2, 0.0, 0.0), abs=0.02)
