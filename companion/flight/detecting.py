@@ -26,7 +26,9 @@ def collisions(
         flight.report(now_us, notice.kind, notice.text, **notice.data)
     for estimate in result.impacts:
         if not estimate.impact.is_collision:
-            _report_contact(flight, estimate, now_us)
+            kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
+            text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
+            flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
     found = [estimate for estimate in result.impacts if estimate.impact.is_collision]
     held = None if found else _sustained_force(flight, samples, situation, now_us)
     return found if held is None else [held]
@@ -66,10 +68,3 @@ def _report_sustained_force(flight: FlightContext, held: ImpactEstimate, now_us:
     side = "horizontal" if normal[2] == 0.0 else "downward" if normal[2] > 0.0 else "upward"
     text = f"something is in the way: {side} external force of {force_m_s2:.1f} m/s^2 for {lasted_s:.1f} s"
     flight.report(now_us, "in_the_way", text, normal_ned=normal, push_m_s2=force_m_s2, lasted_s=lasted_s)
-
-
-def _report_contact(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:
-    """Report a contact that is no collision."""
-    kind, force_m_s2 = estimate.impact.kind.value, estimate.peak_specific_force_m_s2
-    text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
-    flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)

@@ -90,8 +90,17 @@ class Recover:
 
     @property
     def _yaw_rad(self) -> float | None:
+        """The heading to ask for on the way back to the wanted one: it leads the vehicle's own by YAW_LEAD_RAD at most.
+
+        Motors that turn a vehicle as fast as they can have no thrust left to climb with.
+        """
         attitude, wanted_rad = self._flight.vehicle.attitude, self._flight.yaw_rad
-        return wanted_rad if attitude is None else heading_towards(yaw_rad(attitude.attitude_wxyz), wanted_rad)
+        if attitude is None or wanted_rad is None:
+            return wanted_rad
+        heading_rad = yaw_rad(attitude.attitude_wxyz)
+        short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
+        is_near = abs(short_rad) <= reflex.YAW_LEAD_RAD
+        return wanted_rad if is_near else heading_rad + math.copysign(reflex.YAW_LEAD_RAD, short_rad)
 
     @property
     def _is_level(self) -> bool:
@@ -238,18 +247,6 @@ class Recover:
         goes_along = self._has_hung or is_carried or (is_touched and not self._is_known)
         place = estimator.motion.position_ned_m if goes_along else contact.position_ned_m
         self._contact = replace(contact, position_ned_m=place)
-
-
-def heading_towards(heading_rad: float, wanted_rad: float | None) -> float | None:
-    """The heading to ask for on the way back to a wanted one: it leads the vehicle's own by `YAW_LEAD_RAD` at most.
-
-    Motors that turn a vehicle as fast as they can have no thrust left to climb with.
-    """
-    if wanted_rad is None:
-        return None
-    short_rad = math.remainder(wanted_rad - heading_rad, math.tau)
-    lead_rad = reflex.YAW_LEAD_RAD
-    return wanted_rad if abs(short_rad) <= lead_rad else heading_rad + math.copysign(lead_rad, short_rad)
 
 
 def record_collision(flight: FlightContext, estimate: ImpactEstimate, now_us: int) -> None:

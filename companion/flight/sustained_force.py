@@ -27,9 +27,6 @@ FOLLOWED_S = 1.0
 STEADY_M_S = 0.12
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
-# An attitude loop of 12 rad/s and a velocity that is late by 20 ms: a lean that began just now moves nothing yet, and a
-# motor that fails has not let the vehicle down yet.
-LEAST_US = round(2e6 * LEAD_S)
 # What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
 # 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
@@ -85,7 +82,8 @@ class SustainedForceMonitor:
             return None
         towards, grown = plus(ZERO, 1.0 / error_m, short), plus(self.missing_m_s2, -1.0, self.wind_m_s2)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
-        is_early = now_us - since_us < LEAST_US
+        # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
+        is_early = now_us - since_us < 2e6 * LEAD_S
         if force_m_s2 < HELD_M_S2 or split(self.velocity_m_s, towards)[0] > STEADY_M_S or is_early:
             return None
         # What it was in free air stays known.

@@ -49,8 +49,7 @@ class Surface:
 
     def off_m(self, place_ned_m: Vector3) -> float:
         """Distance of a position from touching, m; negative behind the surface."""
-        (a, b, c), (x, y, z), (u, v, w) = self.normal_ned, place_ned_m, self.point_ned_m
-        return a * (x - u) + b * (y - v) + c * (z - w)
+        return split(plus(place_ned_m, -1.0, self.point_ned_m), self.normal_ned)[0]
 
 
 def inside_fence(fence: Fence, origin_ned_m: Vector3, contact_ned_m: Vector3, setpoint_ned_m: Vector3) -> Vector3:
