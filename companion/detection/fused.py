@@ -29,10 +29,9 @@ from companion.motion.history import SHOWN_US
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import LEVEL, LONGEST_DELAY_US, LONGEST_GAP_US
 
-# A contact longer than springs take to bottom out, whose force then exceeds its peak by half, is another hit: a vehicle
+# A contact longer than springs take to bottom out, whose force then exceeds twice its peak, is another hit: a vehicle
 # scrapes along the ground and then strikes it.
 WORSE_AFTER_US = 100_000
-WORSE = 1.5
 
 
 class FusedDetector:
@@ -114,7 +113,7 @@ class FusedDetector:
             s.last_loud_boot_us = max(now_us, s.last_loud_boot_us)
             if s.phase is Phase.CONTACT:
                 is_another = has_jumped if s.is_hand else now_us - s.contact_began_boot_us > WORSE_AFTER_US
-                if is_another and size > WORSE * s.peak_specific_force_m_s2:
+                if is_another and size > 2.0 * s.peak_specific_force_m_s2:
                     return self._fire(s, situation, impact)
                 s.peak_specific_force_m_s2 = max(s.peak_specific_force_m_s2, size)
             return None
