@@ -10,10 +10,9 @@ from companion.motion.strapdown import ZERO
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
 # is a third of the range in the mean.
 CLIPPED_SHARE = 1.0 / 3.0
-# A contact of no more samples than this is too short to exclude clipping of its raw peak. Ringing below a third of the
+# A contact of no more samples than this is too short to exclude clipping of its raw peak. Ringing below half of the
 # peak, or in another direction, does not count.
 SHORT = 2
-LASTING_SHARE = 1.0 / 3.0
 
 
 @dataclass(slots=True)
@@ -60,6 +59,6 @@ class ContactForce:
     def is_fully_measured(self) -> bool:
         """Whether the force so far was measured without clipping, as far as the samples show."""
         x, y, z = max(self.forces_ned_m_s2, key=lambda force: math.hypot(*force))
-        least = LASTING_SHARE * (x * x + y * y + z * z)
+        least = 0.5 * (x * x + y * y + z * z)
         lasting = sum(a * x + b * y + c * z >= least for a, b, c in self.forces_ned_m_s2)
         return not self.is_clipped and lasting > SHORT
