@@ -13,7 +13,7 @@ from itertools import pairwise
 from companion.detection.fused_config import FusedConfig
 from companion.messages import Vector3
 from companion.motion.delay import Delay
-from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO, VelocityFix, less_sum
+from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO, VelocityFix
 
 # Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
 COMPARED = 3
@@ -82,7 +82,7 @@ class VelocityJump:
         if times[0] < self.since_us or min(apart_us) <= 0 or max(apart_us) > LONGEST_SLOW_STEP_US:
             return None
         self.is_slow = max(apart_us) > LONGEST_STEP_US
-        step = _newest_less_mean(less_sum(fix) for fix in recent[1:])
+        step = _newest_less_mean(fix.less_sum_m_s for fix in recent[1:])
         # Mean accelerations between velocities, without vibration.
         pairs = zip(pairwise(recent), apart_us, strict=True)
         change = _newest_less_mean(_less(b.sum_ned_m_s, a.sum_ned_m_s, 1e-6 * us) for (a, b), us in pairs)

@@ -77,8 +77,14 @@ class ImpactEstimator:
         place, velocity, error_m_s = self._motion(free_until_us)
         force_ned = body_to_ned(self.strapdown.valid_wxyz, impact.specific_force_frd_m_s2)
         size = math.hypot(*force_ned)
+        self.contact = None
         # A velocity that alone shows a contact has no force of its own.
-        self.contact = self._begun(impact, self.imu) if self.imu and impact.evidence is Evidence.FORCE else None
+        if self.imu is not None and impact.evidence is Evidence.FORCE:
+            f, contact = self.imu.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
+            free = (f[0] - contact[0], f[1] - contact[1], f[2] - contact[2])
+            averaging_us = round(self.config.imu_averaging_interval_s * 1e6)
+            self.contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2)
+            self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
         self.validity.invalidate(sample_us)
         self.estimate = estimate = ImpactEstimate(
@@ -97,17 +103,6 @@ class ImpactEstimator:
             earlier=self.earlier_imu,
         )
         return estimate
-
-    def _begun(self, impact: Impact, sample: ImuSample) -> ContactForce:
-        """The contact force with its first sample."""
-        f, force = sample.specific_force_frd_m_s2, impact.specific_force_frd_m_s2
-        contact = ContactForce(
-            free_frd_m_s2=(f[0] - force[0], f[1] - force[1], f[2] - force[2]),
-            averaging_us=round(self.config.imu_averaging_interval_s * 1e6),
-            range_m_s2=self.config.accelerometer_range_m_s2,
-        )
-        contact.add(sample, sample.time_boot_us - impact.contact_free_until_boot_us, self.strapdown.valid_wxyz)
-        return contact
 
     def follow(self, sample: ImuSample, state: DetectorState) -> ImpactEstimate | None:
         """Take each IMU sample, and the detector's state after it.

@@ -14,7 +14,7 @@ from companion.detection.interface import Evidence
 from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
 from companion.motion.history import SAME_M_S, SHOWN_US, MotionHistory
-from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2, VelocityFix, less_sum
+from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2, VelocityFix
 from companion.reflex.halfspace import plus, split
 from companion.reflex.planner import REST
 
@@ -59,8 +59,8 @@ class Hypothesis:
         of the integral. After a true impulse the velocity is ahead of it by the whole impulse; otherwise both agree.
         """
         free_us, hit_us, in_sum_m_s, sure = self.free_until_boot_us, self.time_boot_us, 0.0, 0.0
-        was = [less_sum(fix) for fix in fixes if free_us - DECIDED_US <= fix.time_boot_us <= free_us]
-        came = [less_sum(fix) for fix in fixes if LONGEST_DELAY_US <= fix.time_boot_us - hit_us <= DECIDED_US]
+        was = [fix.less_sum_m_s for fix in fixes if free_us - DECIDED_US <= fix.time_boot_us <= free_us]
+        came = [fix.less_sum_m_s for fix in fixes if LONGEST_DELAY_US <= fix.time_boot_us - hit_us <= DECIDED_US]
         if len(was) < 2 or len(came) < 2:
             return False
         if self.earlier is not None:

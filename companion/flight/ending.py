@@ -110,11 +110,13 @@ def silent_position(flight: FlightContext) -> str | None:
 
 
 def _abort_reason(flight: FlightContext, state: State, place_ned_m: Vector3, now_us: int) -> str | None:
-    when, newest = flight.mission.abort_when, flight.vehicle.history.newest(2)
+    when, history = flight.mission.abort_when, flight.vehicle.history
+    latest = history.latest()
+    earlier = None if latest is None else history.before(latest.time_boot_us)
     # Two positions in a row have to say so: one forged or broken packet ends no flight.
-    if when.outside_fence_by_m is not None and len(newest) == 2:
+    if when.outside_fence_by_m is not None and latest is not None and earlier is not None:
         fence = flight.mission.fence
-        outside_m = min(fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in newest)
+        outside_m = min(fence.outside_by_m(flight.mission_ned_m(one.position_ned_m)) for one in (latest, earlier))
         if outside_m > when.outside_fence_by_m:
             return f"the vehicle is {outside_m:.2f} m outside the fence"
     flown_s = (now_us - (flight.armed_at_us or now_us)) * 1e-6

@@ -2,7 +2,6 @@
 
 from collections import deque
 from dataclasses import dataclass, field
-from itertools import islice
 
 from companion.messages import LocalPosition
 
@@ -41,10 +40,6 @@ class MotionHistory:
         while samples[0].time_boot_us < time_us - KEPT_US:
             samples.popleft()
         return True
-
-    def newest(self, count: int) -> list[LocalPosition]:
-        """The newest of all, the very newest first."""
-        return list(islice(reversed(self._samples), count))
 
     def latest(self) -> LocalPosition | None:
         return self._samples[-1] if self._samples else None

@@ -51,12 +51,9 @@ class Resets:
         n, e, d = self.shift_ned_m
         if self.shift_ned_m == ZERO:
             return sample
-        if isinstance(sample, LocalPosition | Odometry):
+        if isinstance(sample, LocalPosition | Odometry | PositionTarget) and sample.position_ned_m is not None:
             x, y, z = sample.position_ned_m
             return replace(sample, position_ned_m=(x - n, y - e, z - d))
-        if isinstance(sample, PositionTarget) and sample.position_ned_m is not None:
-            x, y, z = sample.position_ned_m
-            return PositionTarget((x - n, y - e, z - d))
         return sample
 
     def _jumps(self, sample: LocalPosition) -> bool:

@@ -33,11 +33,11 @@ class VelocityFix:
     velocity_ned_m_s: Vector3
     sum_ned_m_s: Vector3
 
-
-def less_sum(fix: VelocityFix) -> Vector3:
-    """Velocity minus integral, m/s: constant while the two agree."""
-    v, u = fix.velocity_ned_m_s, fix.sum_ned_m_s
-    return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
+    @property
+    def less_sum_m_s(self) -> Vector3:
+        """Velocity minus integral: constant while the two agree."""
+        v, u = self.velocity_ned_m_s, self.sum_ned_m_s
+        return (v[0] - u[0], v[1] - u[1], v[2] - u[2])
 
 
 @dataclass(slots=True)
