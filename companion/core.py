@@ -260,7 +260,7 @@ class FlightCore(Core[FlightContext, Machine]):
     def _hear(self, samples: Sequence[Sample], now_us: int) -> tuple[Sequence[Sample], str | None]:
         """The samples in a local frame that does not jump when the estimator resets its position."""
         before = self.resets.shift_ned_m
-        samples = self.resets.follow(samples, self.flight.mission.limits.max_step_m)
+        samples = [self.resets.follow(sample, self.flight.mission.limits.max_step_m) for sample in samples]
         jump_m = math.dist(self.resets.shift_ned_m, before)
         if jump_m > 0.0:
             text = f"the vehicle's position was reset by {jump_m:.2f} m: setpoints and obstacles go along"

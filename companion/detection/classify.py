@@ -13,10 +13,7 @@ GROUND_M = 1.0
 
 
 def hovers(velocity_ned_m_s: Vector3 | None) -> bool:
-    """Whether this velocity is too small to have run into anything; False where it is unknown.
-
-    Then the obstacle came to the vehicle.
-    """
+    """Whether the velocity is known, and too small to have run into anything: the obstacle came to the vehicle."""
     return velocity_ned_m_s is not None and math.hypot(*velocity_ned_m_s) < SAME_M_S
 
 

@@ -12,8 +12,7 @@ def note_motors(flight: FlightContext, samples: Sequence[Sample], now_us: int) -
     """What the motors are asked for, before the first hit and after each recovery."""
     vehicle = flight.vehicle
     if not vehicle.armed:
-        if flight.motors.is_begun:
-            flight.motors = MotorWatch(len(flight.collisions))
+        flight.motors = MotorWatch(len(flight.collisions))
         return
     if vehicle.identity is None or vehicle.identity.vehicle_type != "quadrotor":
         return

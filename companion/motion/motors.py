@@ -64,10 +64,6 @@ class MotorWatch:
     _most: float = -math.inf
     _was_hit: bool | None = None
 
-    @property
-    def is_begun(self) -> bool:
-        return self._most > -math.inf
-
     def take(self, outputs: Outputs, was_hit: bool | None, now_us: int) -> Damage | None:
         """Of a vehicle that is armed. `was_hit`: None where its flight says nothing, as in a recovery."""
         self._least, self._most = min(self._least, *outputs), max(self._most, *outputs)

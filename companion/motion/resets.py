@@ -6,7 +6,6 @@ position after a reset and the position to which its velocity led.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from companion.messages import (
@@ -37,11 +36,8 @@ class Resets:
     _place: LocalPosition | None = None
     """The latest one accepted; None after a reset."""
 
-    def follow(self, samples: Sequence[Sample], most_m: float) -> Sequence[Sample]:
-        """The samples in this frame. A jump of more than `most_m` does not shift it."""
-        return [self._moved(sample, most_m) for sample in samples]
-
-    def _moved(self, sample: Sample, most_m: float) -> Sample:
+    def follow(self, sample: Sample, most_m: float) -> Sample:
+        """The sample in this frame. A jump of more than `most_m` does not shift it."""
         if type(sample) is Odometry:
             self._hear(sample, most_m)
         elif type(sample) is LocalPosition:

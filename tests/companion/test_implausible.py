@@ -38,42 +38,46 @@ def place(at_ms, north_m):
 # --- the estimator's resets
 
 
+def followed(resets, samples):
+    return [resets.follow(sample, 5.0) for sample in samples]
+
+
 def test_a_reset_moves_what_is_heard_and_what_is_sent_and_the_vehicle_stays_where_it_is():
     resets = Resets()
     # Given a vehicle that flies north at 1 m/s
-    resets.follow([told(0, 0.0, 0, 1.0), place(0, 0.0)], 5.0)
+    followed(resets, [told(0, 0.0, 0, 1.0), place(0, 0.0)])
     # When its estimate jumps by 3 m within 20 ms, and says so twice
-    resets.follow([told(20, 3.02, 1, 1.0)], 5.0)
+    followed(resets, [told(20, 3.02, 1, 1.0)])
     assert resets.shift_ned_m == STILL, "one message may be forged"
-    heard = resets.follow([told(40, 3.04, 1, 1.0), place(40, 3.04)], 5.0)
+    heard = followed(resets, [told(40, 3.04, 1, 1.0), place(40, 3.04)])
     # Then the flight goes on where it was, and the setpoint is sent where the vehicle now thinks that this is
     assert [sample.position_ned_m[0] for sample in heard] == pytest.approx([0.04, 0.04])
     assert resets.sent(PositionSetpoint(0, (1.0, 0.0, -1.0), None)).position_ned_m == pytest.approx((4.0, 0.0, -1.0))
-    (echo,) = resets.follow([PositionTarget((4.0, 0.0, -1.0))], 5.0)
+    (echo,) = followed(resets, [PositionTarget((4.0, 0.0, -1.0))])
     assert echo.position_ned_m == pytest.approx((1.0, 0.0, -1.0)), "a setpoint comes back as it was meant"
 
 
 def test_one_forged_reset_moves_nothing_and_two_only_until_the_vehicle_speaks_again():
     resets = Resets()
-    resets.follow([told(0, 0.0)], 5.0)
-    resets.follow([told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9, 50.0)], 5.0)
+    followed(resets, [told(0, 0.0)])
+    followed(resets, [told(10, 3.0, 9), told(20, 0.0), told(30, 4.0, 9), told(31, 4.0, 9, 50.0)])
     assert resets.shift_ned_m == pytest.approx((4.0, 0.0, 0.0))
-    resets.follow([told(40, 0.0), told(50, 0.0)], 5.0)
+    followed(resets, [told(40, 0.0), told(50, 0.0)])
     assert resets.shift_ned_m == STILL
-    resets.follow([told(60, 40.0, 7), told(70, 40.0, 7)], 5.0)
+    followed(resets, [told(60, 40.0, 7), told(70, 40.0, 7)])
     assert resets.shift_ned_m == STILL, "so far no setpoint goes"
 
 
 def test_a_place_that_jumps_is_believed_only_where_the_vehicle_has_counted_a_reset():
     resets = Resets()
-    resets.follow([told(0, 0.0), place(0, 0.0)], 5.0)
-    (jumped,) = resets.follow([place(20, 50.0)], 5.0)
+    followed(resets, [told(0, 0.0), place(0, 0.0)])
+    (jumped,) = followed(resets, [place(20, 50.0)])
     assert isinstance(jumped, Refused) and "no reset" in jumped.reason
-    assert resets.follow([place(40, 0.1)], 5.0) == [place(40, 0.1)]
-    resets.follow([told(60, 50.0, 1), told(70, 50.0, 1)], 5.0)
-    assert resets.follow([place(80, 50.0)], 5.0) == [place(80, 50.0)]
+    assert followed(resets, [place(40, 0.1)]) == [place(40, 0.1)]
+    followed(resets, [told(60, 50.0, 1), told(70, 50.0, 1)])
+    assert followed(resets, [place(80, 50.0)]) == [place(80, 50.0)]
     # A vehicle that counts none has to be believed
-    assert [Resets().follow([place(at_ms, north_m)], 5.0) for at_ms, north_m in ((0, 0.0), (20, 50.0))][1][0] == place(
+    assert [followed(Resets(), [place(at_ms, north_m)]) for at_ms, north_m in ((0, 0.0), (20, 50.0))][1][0] == place(
         20, 50.0
     )
 

@@ -123,7 +123,7 @@ def test_each_flight_of_a_vehicle_begins_anew_and_only_quadrotors_in_the_air_are
     assert watched(5.0) == before
     context.vehicle.armed = False
     note_motors(context, [], f.now_us)
-    assert not context.motors.is_begun
+    assert not context.motors._before
 
 
 def test_a_vehicle_that_did_not_come_to_rest_hangs_or_lies_and_its_motors_say_nothing():
