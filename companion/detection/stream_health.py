@@ -4,7 +4,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, field
 
-from companion.messages import Attitude, ImuSample, Vector3
+from companion.messages import Attitude, ImuSample, Quaternion, Vector3
 from companion.motion.history import STAMP_RESOLUTION_US
 from companion.motion.strapdown import MOTORS_RAD_S2
 from companion.strict_model import Positive, StrictModel
@@ -73,18 +73,15 @@ class SampleGate:
     """The largest rate since the latest attitude."""
     values: tuple[Vector3, Vector3] | None = None
     """Of the newest IMU sample."""
-    values_attitude: Attitude | None = None
-    """The latest at the first of the samples that are equal to it."""
+    still_wxyz: Quaternion | None = None
+    """The first attitude since the first of the samples that are equal to it."""
     is_stuck: bool = False
 
     def imu(self, sample: ImuSample) -> bool:
         """Take one sample; whether it is accepted."""
         values = (sample.specific_force_frd_m_s2, sample.angular_velocity_frd_rad_s)
-        first, latest = self.values_attitude, self.latest
-        if values != self.values or first is None or latest is None:
-            self.values, self.values_attitude, self.is_stuck = values, latest, False
-        elif latest.attitude_wxyz != first.attitude_wxyz:
-            self.is_stuck = True
+        if values != self.values:
+            self.values, self.still_wxyz, self.is_stuck = values, None, False
         self.most_rad_s = max(self.most_rad_s, math.hypot(*sample.angular_velocity_frd_rad_s))
         return not self.is_stuck
 
@@ -95,6 +92,8 @@ class SampleGate:
             self.rejected = sample
             return False
         self.latest, self.rejected, self.most_rad_s = sample, None, 0.0
+        self.is_stuck |= self.still_wxyz not in (None, sample.attitude_wxyz)
+        self.still_wxyz = self.still_wxyz or sample.attitude_wxyz
         return True
 
     def _leads_to(self, before: Attitude, sample: Attitude) -> bool:

@@ -127,6 +127,15 @@ def test_a_vehicle_that_is_struck_turns_as_its_rates_say():
     assert turning.attitude(Attitude(20_000, (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0)))
 
 
+def test_a_sample_that_is_sent_twice_is_no_stuck_sensor():
+    gate, sample = SampleGate(), ImuSample(4_000, (0.0, 0.0, -9.8), (0.0, 0.0, 0.0))
+    # Given a vehicle that turns, whose attitudes come between the two
+    assert gate.attitude(Attitude(0, (1.0, 0.0, 0.0, 0.0))) and gate.imu(sample)
+    assert gate.attitude(Attitude(20_000, (1.0, 1e-4, 0.0, 0.0))) and gate.imu(sample)
+    # When the attitude changes while the sample stays, it is stuck
+    assert gate.attitude(Attitude(40_000, (1.0, 2e-4, 0.0, 0.0))) and not gate.imu(sample)
+
+
 # --- hits that nothing else shows
 
 
