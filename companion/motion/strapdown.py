@@ -18,9 +18,9 @@ ZERO: Vector3 = (0.0, 0.0, 0.0)
 LONGEST_GAP_US = 100_000
 # Largest lag of a velocity that is compared with the integral (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
-# Cosine of 15 degrees: about the tilt error of a real PX4 after 7.8 m/s were clipped (bench/notes/px4.md). Beyond it
-# the gyroscopes are wrong.
-MOST_WRONG = 0.966
+# Cosine of 22 degrees: the tilt of a real PX4 is wrong by up to 17 degrees after 8 m/s were clipped, as in a hit at 4.2
+# m/s (bench/notes/px4.md), and gyroscopes drift by 3 degrees in two seconds. Beyond it the gyroscopes are wrong.
+MOST_WRONG = 0.927
 # Largest angular acceleration by motors, rad/s^2, and its share about yaw, where only their drag turns the vehicle.
 MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
 

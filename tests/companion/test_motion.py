@@ -7,6 +7,7 @@ import pytest
 from companion.messages import LocalPosition
 from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned, yaw_rad
+from companion.motion.strapdown import Strapdown
 
 CONTACT_US = 10_000_000
 
@@ -46,3 +47,16 @@ def test_rotation_on_attitudes_everyone_knows(attitude, nose_ned, right_ned, yaw
     assert body_to_ned(attitude, (0.0, 1.0, 0.0)) == pytest.approx(right_ned, abs=1e-12)
     if yaw is not None:
         assert yaw_rad(attitude) == pytest.approx(yaw)
+
+
+@pytest.mark.parametrize(("told_deg", "kept_deg"), [(18.0, 0.0), (26.0, 26.0)])
+def test_after_a_clipped_hit_the_reported_tilt_counts_only_where_the_gyroscopes_must_be_wrong(told_deg, kept_deg):
+    # Given gyroscopes that show no turn since the last valid attitude
+    strapdown = Strapdown()
+    strapdown.imu(1_000_000, (0.0, 0.0, -9.81), (0.0, 0.0, 0.0))
+    # When the estimator, which corrects itself, tells a tilt
+    half_rad = 0.5 * math.radians(told_deg)
+    strapdown.attitude(1_000_000, (math.cos(half_rad), math.sin(half_rad), 0.0, 0.0), is_valid=False)
+    # Then an error that clipping makes of it (17 degrees on a real PX4) is left out, and a larger one is not
+    _, _, down = body_to_ned(strapdown.valid_wxyz, (0.0, 0.0, 1.0))
+    assert math.degrees(math.acos(min(1.0, down))) == pytest.approx(kept_deg, abs=0.01)
