@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from companion.detection.interface import Situation
 from companion.flight.connecting import Connect
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.damage import note_motors
@@ -27,6 +26,7 @@ from companion.messages import CommandAck, LocalPosition, OnboardHeartbeat, Outg
 from companion.mission.model import Mission
 from companion.motion.resets import Resets
 from companion.px4_mode import mode_name
+from companion.reflex.detector import Situation
 from companion.reflex.monitor import CollisionMonitor, start_monitor
 from companion.report import CollisionReport, Event, Status
 

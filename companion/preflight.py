@@ -18,7 +18,7 @@ from companion.mavlink.delivery import Delivery
 from companion.mavlink.encode import Encoder
 from companion.messages import MessageId, Sample, SendCommand, Vector3
 from companion.mission.config import CompanionConfig
-from companion.motion.strapdown import GRAVITY_M_S2
+from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.config import HELD_S
 
 # The streams need a second to settle at their new rates; what comes then counts.

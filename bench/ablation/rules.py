@@ -32,51 +32,49 @@ def _argument(number: int) -> Callable[[Arguments, Any], Any]:
     return lambda arguments, found: arguments[number]
 
 
-_DETECTION, _ESTIMATE, _REFLEX, _FLIGHT = (
-    f"companion.{room}." for room in ("detection", "estimate", "reflex", "flight")
-)
+_REFLEX, _FLIGHT = "companion.reflex.", "companion.flight."
 
 RULES = (
     Rule(
         "velocity jump",
         "a velocity that the accelerometer does not explain is a hit",
-        _DETECTION + "velocity_jump:VelocityJump.step_m_s",
+        _REFLEX + "velocity_jump:VelocityJump.step_m_s",
         _says(None),
     ),
     Rule(
         "hand",
         "a soft force on a hovering vehicle waits",
-        _DETECTION + "force_signs:FusedState.may_be_hand",
+        _REFLEX + "force_signs:FusedState.may_be_hand",
         _says(False),
     ),
     Rule(
         "turning drag",
         "a turning vehicle needs more force for a hit",
-        _DETECTION + "force_signs:FusedState.side_threshold_m_s2",
+        _REFLEX + "force_signs:FusedState.side_threshold_m_s2",
         lambda arguments, found: arguments[0].threshold_m_s2,
     ),
     Rule(
         "second sample",
         "a weak force shows in two samples together",
-        _DETECTION + "force_signs:FusedState._together_m_s2",
+        _REFLEX + "force_signs:FusedState._together_m_s2",
         _says(0.0),
     ),
     Rule(
         "leaning",
         "thrust that moves nothing is a hit",
-        _FLIGHT + "sustained_force:SustainedForceMonitor.step",
+        _REFLEX + "sustained_force:SustainedForceMonitor.step",
         _says(None),
     ),
     Rule(
         "attitude by rates",
         "no clipped attitude",
-        _ESTIMATE + "validity:VelocityValidity.is_attitude_valid",
+        _REFLEX + "validity:VelocityValidity.is_attitude_valid",
         _says(True),
     ),
     Rule(
         "trust",
         "no velocity jump while an estimate swings",
-        _ESTIMATE + "validity:VelocityValidity.is_valid",
+        _REFLEX + "validity:VelocityValidity.is_valid",
         _says(True),
     ),
     Rule("change", "the normal by the change of velocity", _FLIGHT + "collision:with_change", _argument(0)),

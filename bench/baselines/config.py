@@ -9,9 +9,9 @@ from bench.baselines.lateral import LateralConfig, LateralDetector
 from bench.baselines.momentum import MomentumConfig, MomentumDetector
 from bench.baselines.threshold import ThresholdConfig, ThresholdDetector
 from bench.baselines.tracking import TrackingConfig, TrackingDetector
-from companion.detection.interface import Detector
 from companion.mission.config import CompanionConfig
 from companion.mission.model import Mission
+from companion.reflex.detector import Detector
 
 
 class BaselineConfig(CompanionConfig):

@@ -1,7 +1,7 @@
 """One contact, one impact: the phases of a detector that has a loudness and a threshold, whatever they are made of."""
 
-from companion.detection.interface import DetectorState, Impact, Phase
 from companion.messages import Vector3
+from companion.reflex.detector import DetectorState, Impact, Phase
 
 # A contact lasts 20 to 120 ms with its sign present all through; this long without it, it is over.
 REARM_US = 40_000

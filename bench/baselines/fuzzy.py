@@ -30,10 +30,11 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.baselines.contact import judge
-from companion.detection.interface import DetectorState, Impact, Situation
 from companion.messages import Attitude, ImuSample, MessageId, Quaternion, Sample, Vector3
+from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned
-from companion.motion.strapdown import GRAVITY_M_S2, LEVEL
+from companion.motion.strapdown import LEVEL
+from companion.reflex.detector import DetectorState, Impact, Situation
 from companion.strict_model import Positive, StrictModel
 
 # Trapezoids: where each begins to rise, is whole, begins to fall, is nothing again.

@@ -25,10 +25,10 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from bench.baselines.contact import judge
-from companion.detection.interface import DetectorState, Impact, Situation
-from companion.detection.thrust import ThrustGain
 from companion.messages import AttitudeTarget, ImuSample, MessageId, Sample, Vector3
 from companion.motion.strapdown import ZERO
+from companion.reflex.detector import DetectorState, Impact, Situation
+from companion.reflex.thrust import ThrustGain
 from companion.strict_model import Positive, StrictModel
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from bench.baselines.noise import NoiseFloor
-from companion.detection.interface import DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample, Vector3
+from companion.reflex.detector import DetectorState, Impact, Phase, Situation
 from companion.strict_model import Positive, StrictModel
 from rebound_cli.logs.shaking import MEMORY_US
 

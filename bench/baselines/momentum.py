@@ -22,8 +22,6 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from bench.baselines.contact import judge
-from companion.detection.interface import DetectorState, Impact, Situation
-from companion.detection.thrust import ThrustGain
 from companion.messages import (
     Attitude,
     AttitudeTarget,
@@ -34,8 +32,11 @@ from companion.messages import (
     Sample,
     Vector3,
 )
+from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import GRAVITY_M_S2, LEVEL, ZERO
+from companion.motion.strapdown import LEVEL, ZERO
+from companion.reflex.detector import DetectorState, Impact, Situation
+from companion.reflex.thrust import ThrustGain
 from companion.strict_model import Positive, StrictModel
 
 # Drag changes within a second; the model's error in seconds.

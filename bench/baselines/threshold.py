@@ -17,9 +17,10 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from bench.baselines.contact import judge
-from companion.detection.interface import DetectorState, Impact, Situation
 from companion.messages import ImuSample, MessageId, Sample, Vector3
-from companion.motion.strapdown import GRAVITY_M_S2, ZERO
+from companion.motion.config import GRAVITY_M_S2
+from companion.motion.strapdown import ZERO
+from companion.reflex.detector import DetectorState, Impact, Situation
 from companion.strict_model import Positive, StrictModel
 
 

@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from bench.baselines.contact import judge
-from companion.detection.interface import DetectorState, Impact, Situation
 from companion.messages import Attitude, LocalPosition, MessageId, Quaternion, Sample
 from companion.motion.rotation import ned_to_body
 from companion.motion.strapdown import LEVEL
+from companion.reflex.detector import DetectorState, Impact, Situation
 from companion.strict_model import Positive, StrictModel
 
 # The lag follows the speed within a second; velocities before that belong to another part of the path.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.detectors.scoring import angle_deg
-from companion.estimate.impact import ImpactEstimate
+from companion.reflex.impact import ImpactEstimate
 from rebound_cli.documents import load_document
 from rebound_cli.inputs import mission_from
 from rebound_cli.logs.reader import read_log

@@ -18,7 +18,7 @@ from bench.detectors.watching import (
     watch_all,
 )
 from bench.detectors.wire import Wire
-from companion.detection.interface import Situation
+from companion.reflex.detector import Situation
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.plant.plant import Plant
 from sim_vehicle.scene import Scene

@@ -11,8 +11,8 @@ from bench.detectors.recording import VehicleRecording
 from bench.detectors.vehicles import AIRFRAMES, vehicle_of
 from bench.detectors.watching import ASKED_HZ, configuration, streams_asked_hz, watch_all
 from bench.detectors.wire import Wire
-from companion.detection.interface import Situation
 from companion.messages import LandedState
+from companion.reflex.detector import Situation
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.cruise import Cruise
 from sim_vehicle.scene import Scene

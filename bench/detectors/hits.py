@@ -12,8 +12,8 @@ from bench.detectors.recording import VehicleRecording
 from bench.detectors.scoring import score_hit
 from bench.detectors.vehicles import AIRFRAMES, BenchVehicle, vehicle_of
 from bench.detectors.watching import detector_names
-from companion.detection.interface import Situation
 from companion.messages import LandedState
+from companion.reflex.detector import Situation
 from sim_vehicle.airframe import Airframe
 from sim_vehicle.cruise import Cruise
 from sim_vehicle.physics.layout import HIT_ACTIVE

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.interface import Situation
+from companion.reflex.detector import Situation
 from sim_vehicle.autopilot.autopilot import POSITION_PERIOD_US
 from sim_vehicle.physics.layout import HIT_IMPULSE, HIT_START_US
 from sim_vehicle.plant.plant import Plant, PlantOutput

@@ -18,8 +18,8 @@ from bench.detectors.watching import (
     watch_all,
 )
 from bench.detectors.wire import HeardStep, Wire
-from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample
+from companion.reflex.impact import ImpactEstimate
 from sim_vehicle.truth import Hit
 
 Vector3 = tuple[float, float, float]

@@ -7,11 +7,11 @@ from typing import Any
 
 from bench.baselines.config import BaselineConfig
 from bench.detectors.wire import BUILDERS, HeardStep
-from companion.detection.interface import Situation
-from companion.estimate.impact import ImpactEstimate
 from companion.link.streams import wanted_streams
 from companion.messages import MessageId
 from companion.mission.config import CompanionConfig
+from companion.reflex.detector import Situation
+from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import advance, start_monitor
 
 # HIGHRES_IMU asked for, and what a client of PX4 receives of it.

@@ -23,7 +23,7 @@ from bench.detectors_report.numbers import (
     text_of,
 )
 from bench.paper.table import markdown
-from companion.detection.interface import ImpactKind
+from companion.reflex.detector import ImpactKind
 
 
 def _over_link(airframe: str) -> Callable[[HitCase], bool]:

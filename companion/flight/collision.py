@@ -5,17 +5,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 
-from companion.detection.interface import DetectorState, Phase
-from companion.estimate.impact import ImpactEstimator
-from companion.estimate.normal import Normal, unit, with_change
-from companion.flight.confirmation import DECIDED_US, Hypothesis
 from companion.messages import LocalPosition, Vector3
-from companion.motion.delay import LATEST_S
+from companion.motion.config import LATEST_S
 from companion.motion.history import MotionHistory
 from companion.motion.strapdown import VelocityFix
+from companion.reflex.config import DECIDED_US
+from companion.reflex.confirmation import Hypothesis
+from companion.reflex.detector import DetectorState, Phase
 from companion.reflex.halfspace import away_from, plus, split
+from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
+from companion.reflex.normal import Normal, unit, with_change
 from companion.reflex.planner import REST
 from companion.report import CollisionReport
 

@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
-from companion.estimate.impact import ImpactEstimate
 from companion.flight.collision import CollisionRecord
 from companion.flight.states import State, Trigger
-from companion.flight.sustained_force import SustainedForceMonitor
 from companion.link.commands import CommandClient, CommandOutcome
 from companion.link.refusals import Refusals
 from companion.link.round_trip import RoundTrip
@@ -19,7 +17,9 @@ from companion.mission.item_trajectory import SpeedLimits
 from companion.mission.items import ExpectItem, ReturnItem, Step
 from companion.mission.model import Mission, steps_to_fly
 from companion.motion.motors import MotorWatch
+from companion.reflex.impact import ImpactEstimate
 from companion.reflex.planner import MotionState
+from companion.reflex.sustained_force import SustainedForceMonitor
 from companion.report import Event, JsonValue, Outcome
 
 

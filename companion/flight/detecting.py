@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from companion.detection.interface import Situation
-from companion.estimate.impact import ImpactEstimate
 from companion.flight.context import FlightContext
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, Sample
-from companion.motion.history import KEPT_US
+from companion.motion.config import KEPT_US
 from companion.reflex import monitor
+from companion.reflex.detector import Situation
+from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor
 
 

@@ -17,7 +17,7 @@ from companion.memory.patch import Patch
 from companion.memory.surroundings import LEAST_FREE_M
 from companion.messages import Vector3
 from companion.mission.policy import SetpointLimits
-from companion.motion.strapdown import GRAVITY_M_S2
+from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.config import (
     BEHIND_M,
     CLIMB_GAIN_PER_S,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from companion.estimate.normal import Normal
 from companion.flight.collision import CollisionRecord, in_one_recovery
 from companion.flight.context import FlightContext
 from companion.flight.envelope import KnownSurface, touched
@@ -13,6 +12,7 @@ from companion.memory.surroundings import ObstacleMap
 from companion.messages import Vector3
 from companion.reflex.halfspace import Surface, plus
 from companion.reflex.laws import Contact
+from companion.reflex.normal import Normal
 
 
 def remember(flight: FlightContext, hits: int, now_us: int) -> None:

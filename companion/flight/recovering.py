@@ -4,17 +4,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from companion.estimate.impact import ImpactEstimate
 from companion.flight.after_hit import afterwards, take_back
 from companion.flight.collision import CollisionRecord, in_one_recovery, level
-from companion.flight.confirmation import hypothesis_of
 from companion.flight.context import FlightContext, Inputs, Target, Transition, as_text
 from companion.flight.obstacle_map import remembered_surfaces
 from companion.messages import LocalPosition, Vector3
+from companion.motion.config import SAME_M_S
 from companion.motion.rotation import body_to_ned, yaw_rad
 from companion.motion.settling import SettlingMonitor
 from companion.reflex import config as reflex
+from companion.reflex.confirmation import hypothesis_of
 from companion.reflex.halfspace import Surface, clear_goal, inside_fence, limited, plus, split
+from companion.reflex.impact import ImpactEstimate
 from companion.reflex.laws import RECOVERY_LAWS, Contact, Law
 from companion.reflex.motion_estimator import MotionEstimator
 from companion.reflex.planner import (
@@ -241,7 +242,7 @@ class Recover:
         normal = contact.normal_ned
         off_m_s = split(estimator.motion.velocity_ned_m_s, normal)[0]
         is_pushed = split(estimator.external_m_s2, normal)[0] > reflex.PRESSING_TILT_M_S2
-        is_carried = self._is_known and is_pushed and off_m_s > reflex.SAME_M_S
+        is_carried = self._is_known and is_pushed and off_m_s > SAME_M_S
         self._has_left = (self._has_left or off_m_s > 0.0) and not (is_touched or is_carried)
         # Before its motion is known, a touched surface is there too: frames and arms fold.
         goes_along = self._has_hung or is_carried or (is_touched and not self._is_known)

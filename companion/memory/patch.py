@@ -7,11 +7,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from companion.detection.classify import STEEP
-from companion.estimate.normal import FROM_BEHIND, Normal
 from companion.messages import Vector3
 from companion.motion.strapdown import ZERO
+from companion.reflex.config import FROM_BEHIND, STEEP
 from companion.reflex.halfspace import away_from
+from companion.reflex.normal import Normal
 
 # One touch shows one place. Half a metre to every side is assumed. A trajectory round it then passes a metre beside the
 # touch, clear of a pole or a door leaf. A surface that is longer costs one more hit.

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
-from companion.detection.classify import STEEP
 from companion.memory.patch import REACHES_M, Patch
+from companion.reflex.config import STEEP
 from companion.reflex.halfspace import away_from
 from companion.strict_model import NotNegative, PositionNed, Positive, StrictModel
 

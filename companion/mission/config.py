@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from companion.motion.settling import SettledConfig
+from companion.motion.config import SettledConfig
 from companion.reflex.monitor import CollisionMonitorConfig
 from companion.strict_model import NotNegative, Positive, StrictModel
 
@@ -18,13 +18,13 @@ class StreamsConfig(StrictModel):
     highres_imu_hz: Rate = 250.0
     """PX4 rounds the interval to whole IMU samples: 200 gives 124, 250 gives all of them (measured on SITL)."""
     local_position_hz: Rate = 50.0
-    """A velocity at most 20 ms before a contact: v_c is the last one (see estimate.impact)."""
+    """A velocity at most 20 ms before a contact: v_c is the last one (see reflex.impact)."""
     attitude_hz: Rate = 50.0
     """Which way the thrust points, and how the vehicle turns."""
     extended_sys_state_hz: Rate = 5.0
     """Take-off and touchdown last longer than a second."""
     attitude_target_hz: Rate = 30.0
-    """The thrust asked for changes by less than a third of the greatest within 33 ms (see detection.thrust). Asked for
+    """The thrust asked for changes by less than a third of the greatest within 33 ms (see reflex.thrust). Asked for
     only by a detector that uses it."""
     odometry_hz: Rate = 30.0
     """PX4's own rate on an onboard link; only its reset counter and microsecond stamps are made use of."""

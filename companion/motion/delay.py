@@ -7,11 +7,7 @@ step of velocity minus integral: s = -d a + noise. d is the least-squares estima
 from dataclasses import dataclass
 
 from companion.messages import Vector3
-
-# Prior, and its own standard deviation: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
-DELAY_S = 0.01
-# Longest delay that is estimated: compared velocities lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY).
-LATEST_S = 0.1
+from companion.motion.config import DELAY_S, LATEST_S
 
 
 @dataclass(slots=True)

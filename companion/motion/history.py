@@ -4,22 +4,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from companion.messages import LocalPosition
-
-# Evidence for or against a hit lies within 0.3 s of it; the origin is the mean of a second. A time further back than
-# this is not that of a reordered packet but of a rebooted vehicle. By then each stream has sent a message: those that a
-# detector uses come ten times a second and more.
-KEPT_US = 2_000_000
-# PX4 cuts time_boot_ms to whole milliseconds: a stamp may be this much before its sample.
-STAMP_RESOLUTION_US = 1_000
-# A message counts as current for this time: 15 of PX4's ODOMETRY at 30 Hz, whose velocities and reset counter are used
-# until then, as are those of ATTITUDE_TARGET.
-CURRENT_US = 500_000
-# The vehicle's estimate shows a hit by this time: all but the longest contacts are over (0.12 s at 1 m/s), it is 20 to
-# 40 ms late, and a filter's switching makes it swing.
-SHOWN_US = 150_000
-# A velocity that differs by less does not differ: four times the noise of a good estimate, which reaches 0.1 m/s now
-# and then. An estimate has converged when its known error stays below that.
-SAME_M_S = 0.15
+from companion.motion.config import KEPT_US
 
 
 @dataclass(slots=True)

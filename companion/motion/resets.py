@@ -18,7 +18,7 @@ from companion.messages import (
     Sample,
     Vector3,
 )
-from companion.motion.history import CURRENT_US, STAMP_RESOLUTION_US
+from companion.motion.config import CURRENT_US, STAMP_RESOLUTION_US
 from companion.motion.strapdown import ZERO
 
 

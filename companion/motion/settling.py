@@ -3,24 +3,8 @@
 import math
 
 from companion.messages import Vector3
+from companion.motion.config import SettledConfig
 from companion.motion.strapdown import ZERO
-from companion.strict_model import NotNegative, Positive, StrictModel
-
-
-class SettledConfig(StrictModel):
-    """When a recovery has ended."""
-
-    distance_m: Positive = 0.10
-    """Largest distance to the recovery setpoint."""
-    speed_m_s: Positive = 0.10
-    """Largest speed."""
-    duration_s: Positive = 0.5
-    """How long both must hold."""
-    timeout_s: Positive = 10.0
-    """A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it."""
-    smoothing_s: NotNegative = 0.1
-    """Mean over about five samples at 50 Hz: brings a 0.03 m/s RMS velocity noise per axis to 0.01 m/s, so that
-    the speed of a vehicle at rest stays clear of `speed_m_s` for the whole of `duration_s`."""
 
 
 class SettlingMonitor:

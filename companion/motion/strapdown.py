@@ -7,22 +7,11 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
-from companion.motion.history import CURRENT_US, KEPT_US
+from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US, MOST_WRONG
 from companion.motion.rotation import body_to_ned, ned_to_body, turned
 
-GRAVITY_M_S2 = 9.80665
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector3 = (0.0, 0.0, 0.0)
-# A longer gap restarts the integral: two samples of 20 Hz, the least rate of HIGHRES_IMU. An attitude further from a
-# sample is not carried on to it.
-LONGEST_GAP_US = 100_000
-# Largest lag of a velocity that is compared with the integral (optical flow with an output predictor: 20 ms).
-LONGEST_DELAY_US = 40_000
-# Cosine of 22 degrees: the tilt of a real PX4 is wrong by up to 17 degrees after 8 m/s were clipped, as in a hit at 4.2
-# m/s (bench/notes/px4.md), and gyroscopes drift by 3 degrees in two seconds. Beyond it the gyroscopes are wrong.
-MOST_WRONG = 0.927
-# Largest angular acceleration by motors, rad/s^2, and its share about yaw, where only their drag turns the vehicle.
-MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
 
 
 @dataclass(frozen=True, slots=True)

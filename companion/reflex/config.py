@@ -1,13 +1,137 @@
-"""The settings of a recovery, and every other number of the planner, with unit and source."""
+"""Every number of the reflex, with unit and source; the settings last."""
 
+import math
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from companion.motion.history import SAME_M_S as SAME_M_S
-from companion.motion.strapdown import GRAVITY_M_S2
+from companion.motion.config import GRAVITY_M_S2, MOTORS_RAD_S2, SHOWN_US
 from companion.strict_model import NotNegative, Positive, StrictModel
+
+# --- the specific force's noise
+# Memory of the mean. It follows drag as the speed changes, and a gust that builds up in a few tenths of a second.
+MEAN_MEMORY_S = 0.25
+# Memory of the standard deviation: good to 5 % with 200 samples, to 12 % at the slowest useful rates.
+SPREAD_MEMORY_S = 2.0
+# The noise is known after this time: 50 samples at 50 Hz make a standard deviation good to a tenth.
+LEARNT_S = 1.0
+# After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
+SETTLED_US = 300_000
+# The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt.
+EXCESS = 1.5
+
+# --- a sample's force
+# A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times. On
+# any other the least threshold is that of a force that lasts, as of a gust, and two samples together are no more.
+SHAKING = 2.0
+# On a vibrating vehicle one sample below this many thresholds may be noise (once in four public logs, with 1.2).
+CLEAR = 1.3
+# Least jump, in thresholds of at least 1.75 m/s^2. A grip of 30 N s/m stops a kilogram that drifts at 0.1 m/s with
+# 2.7 m/s^2, plus noise.
+JUMP = 2.4
+
+# --- thrust
+# A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
+# the maximum of the strongest vehicle.
+STRONGEST_M_S2 = 5.0 * GRAVITY_M_S2
+# Memory of the gain, which is known when it is full: it follows a sagging battery (minutes) and not a climb (its thrust
+# is in the message).
+GAIN_MEMORY_S = 2.0
+# Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
+LEAST_FRACTION = 0.1
+# Error of the gain from the battery, ground effect and a mean that has not converged.
+MARGIN = 1.15
+
+# --- a contact that gets worse
+# A contact longer than springs take to bottom out, whose force then exceeds twice its peak, is another hit: a vehicle
+# scrapes along the ground and then strikes it.
+WORSE_AFTER_US = 100_000
+
+# --- velocity jumps
+# Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
+COMPARED = 3
+# Velocities further apart are slow: samples cover a quarter of the time, and the filter corrects itself in between. At
+# 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
+LONGEST_STEP_US = 75_000
+# 10 Hz with the jitter of a log. Velocities further apart are not compared. A rate jump belongs to a velocity jump
+# within this time, too: the velocity's interval and its delay.
+LONGEST_SLOW_STEP_US = 130_000
+# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz.
+MEMORY, RISE = 100, 10
+# Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
+# samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
+# deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
+# STAMP_S: without unsampled time, the velocity's stamp of a millisecond and a lost sample.
+SHAKEN_S, STAMP_S = 0.15, 0.008
+# An output predictor's lag.
+LAG_S = 0.02
+# Four times what motors do, with room for a nimbler vehicle's flips. A rigid vehicle that hits an inclined wall at 2
+# m/s has a rate jump of 15 rad/s and more.
+NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
+
+# --- the kind of an impact
+# Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
+STEEP = 0.7
+# An estimate of the height drifts by this much in a flight by barometer or satellites.
+GROUND_M = 1.0
+
+# --- the contact's force
+# The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
+# is a third of the range in the mean.
+CLIPPED_SHARE = 1.0 / 3.0
+# A contact of no more samples than this is too short to exclude clipping of its raw peak. Ringing below half of the
+# peak, or in another direction, does not count.
+SHORT = 2
+
+# --- the normal
+# Standard deviations of the directions from the normal, rad, on drawn walls, slanted and leaning walls and poles
+# (bench/notes/ablation.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
+# less often head-on than a quarter, as in the draws.
+IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
+# Standard deviation of a change of velocity, m/s: that of both velocities, and what a controller adds in 0.1 s.
+CHANGE_M_S = 0.3
+# A slower vehicle may have been struck from any side.
+APPROACH_M_S = 0.5
+# Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
+# behind, and the direction of flight says nothing of it.
+FROM_BEHIND = -0.5
+# Nothing is known of a direction, rad.
+UNKNOWN_RAD = 0.5 * math.pi
+
+# --- validity of the vehicle's velocity
+# PX4's estimator begins to correct itself after 0.14 s.
+UNCORRECTED_US = 140_000
+# By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5
+# per second, bench/notes/px4.md).
+CORRECTED_US = 4_500_000
+
+# --- a sustained force
+# While the setpoint is reached, drag and wind are learnt: the mean of so long.
+FOLLOWED_S = 1.0
+# Four times a good estimate's noise. The motion is not steady where the velocity has changed by more. A vehicle that
+# approaches its setpoint faster is not held back. With 0.15 a slow gust counted as steady.
+STEADY_M_S = 0.12
+# Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
+SMOOTHING_S = 0.2
+# What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
+# 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
+# degrees; from 22 on it is tipped over.
+HELD_M_S2 = 1.5
+
+# --- confirmation of a hit
+# A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
+STRUCK_M_S = 0.5
+# Time to the decision. A tilt of 17 degrees for this time moves a vehicle by 3 cm. Velocities before the hit are
+# averaged over the same time; the shorter it is, the smaller are the slow errors.
+DECIDED_US = SHOWN_US
+# Standard deviations of the noise that a rejection needs.
+SURE = 3.0
+
+# --- parts of a plan
+# A plan's acceleration is looked at between so many equal parts: its first part's is largest at 1/2, the last's at 0.21
+# and 0.79.
+PLAN_PARTS = 8
 
 # --- the plan
 # The thrust's direction lags behind the acceleration setpoint: two time constants of a critically damped attitude loop
@@ -76,6 +200,98 @@ COMPARED_S = 0.5
 # Standard deviation of the velocity after a hit about the expected one: SAME_M_S, and this share of the speed. Frames
 # return 0.2 to 0.9 of it, and the normal is good to 20 degrees.
 SPREAD = 0.3
+
+
+class StreamHealthConfig(StrictModel):
+    """When a detector counts as blind."""
+
+    silence_s: Positive = 0.25
+    """Without IMU or position for so long there is no data. Ten samples of PX4's default 50 Hz, with reserve: whoever
+    waits longer for one sees no hit in time."""
+    min_rate_hz: Positive = 20.0
+    """Least rate of HIGHRES_IMU. 20 Hz is one sample in 50 ms: the longest contacts, about 100 ms, would show in two,
+    most in none."""
+    max_threshold_m_s2: Positive = 30.0
+    """Largest threshold: vibration above it hides hits. By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a
+    vehicle that shakes so much that less cannot be told from its shaking does not see the slower half of its hits."""
+
+
+class FusedConfig(StrictModel):
+    """Settings of the detector `fused`."""
+
+    retired = frozenset(
+        {"jolt_rad_s", "jolt_rad_s2", "kick_rad_s", "kick_rad_s2", "kick_push", "spin_rad_s", "spin_rad_s2"}
+        | {"velocity_step_turned_m_s", "velocity_per_rate_m", "velocity_rest_s"}
+    )
+
+    side_threshold_m_s2: Positive = 1.75
+    """Least lateral external force that is a hit. A good vehicle's 0.25 m/s^2 gives 4.2 times 0.4 (see `floor`: its
+    spread reads half too much, to be safe); a gust of 5 m/s adds 1.1 m/s^2 of drag at most. Eq. 2 begins with b_s v_c =
+    15 m/s^2 at 0.5 m/s."""
+    vertical_threshold_m_s2: Positive = 4.0
+    """Least vertical external force that is a hit. Beyond nothing and beyond the propellers' most: those bounds are
+    themselves uncertain by a tenth of hover."""
+    noise_factor: Positive = 4.2
+    """Threshold over the spread of the specific force learnt in flight, which reads at least 1.5 times the true
+    one: 6.3 standard deviations, which sideways two of 10^9 normal samples exceed, one in half a
+    thousand hours at 250 Hz."""
+    drag_per_s: NotNegative = 0.3
+    """Room for drag: per mass it is 0.2 to 0.4 /s times the speed, and turns with the vehicle."""
+    velocity_step_m_s: Positive = 0.12
+    """Least velocity jump that is a hit. A good velocity estimate's 0.03 m/s makes steps of 0.02 (RMS) in 40 ms; six
+    times that. A foldable vehicle's hit at 0.5 m/s changes its velocity by 0.7 m/s; of a rigid one's, 1 ms long,
+    clipping leaves the estimate 0.16."""
+    velocity_step_slow_m_s: Positive = 0.7
+    """The same of velocities at 8 to 13 Hz: more than twice what healthy vehicles' steps reach at 10 Hz."""
+    rate_step_rad_s: Positive = 2.0
+    """Least rate jump that counts beside a velocity jump, more than motors make in the same time. A push at 0.15 m from
+    the centre that turns the vehicle by 2 rad/s changes its velocity by 0.06 m/s, half of `velocity_step_m_s`."""
+    rearm_quiet_s: Positive = 0.04
+    """A contact is over after this long without force. It lasts 20 to 120 ms, with the force present all through."""
+    longest_contact_s: Positive = 0.5
+    """Longest contact. Longer loud than this is no contact but a new way to shake, and is learnt."""
+    soft_m_s2: Positive = 8.0
+    """Below this, on a hovering vehicle, a force may be a hand. A hand is slower than an obstacle: below `soft_m_s2` on
+    a hovering vehicle wait for the force to show itself, for so long at most; a force that jumps is no hand's (see
+    `force_signs`)."""
+    soft_wait_s: Positive = 0.02
+    """How long such a force is looked at."""
+
+
+class GuardsConfig(StrictModel):
+    """How far the vehicle's guards reach. The defaults are the paper's vehicle's."""
+
+    retired = frozenset({"stiffness_per_s2", "damping_per_s", "travel_m", "gyration_frd_m"})
+
+    centre_m: Positive = 0.145
+    """From the vehicle's middle to each guard's, a quad-x."""
+    radius_m: Positive = 0.08
+    """Of a guard, seen from above."""
+    height_m: NotNegative = 0.03
+    """Of a guard's rim, as the report draws it."""
+
+
+class EstimateConfig(StrictModel):
+    """Numbers of the estimate of a collision."""
+
+    retired = frozenset({"fits_normal", "inertial", "jerk_density_m2_s5"})
+
+    imu_averaging_interval_s: Annotated[Positive, Field(le=0.1)] = 0.005
+    """IMU_INTEG_RATE is 200 Hz by default; SITL's 4 ms is inside this."""
+    guards: GuardsConfig = GuardsConfig()
+    velocity_noise_m_s: Positive = 0.04
+    """Somewhat above a good flow or motion-capture estimate's 0.03 m/s, as its errors are correlated."""
+    velocity_correlation_s: Positive = 0.3
+    """How long its errors last: those of optical flow and of a filter behind it change within a third of a second."""
+    accelerometer_range_m_s2: Positive = 156.9
+    """+-16 g: ICM-20602, IIM-42652. BMI088 reaches 24 g, ICM-45686 32 g."""
+    position_noise_m: Positive = 0.03
+    """Of a good flow or motion-capture estimate, over a second."""
+
+    @property
+    def reach_m(self) -> float:
+        """From the vehicle's middle to the farthest place on a guard's rim."""
+        return self.guards.centre_m + self.guards.radius_m
 
 
 class RecoveryConfig(StrictModel):

@@ -4,11 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from companion.detection.classify import STEEP
-from companion.estimate.normal import unit
 from companion.fence import Fence
 from companion.messages import Vector3
-from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS
+from companion.reflex.config import BEHIND_M, FACING_COSINE, ROUNDS, STEEP
+from companion.reflex.normal import unit
 
 
 def away_from(normal_ned: Vector3) -> Vector3:

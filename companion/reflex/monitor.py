@@ -10,14 +10,13 @@ from typing import Any, ClassVar
 
 from pydantic import field_validator
 
-from companion.detection.fused import FusedDetector
-from companion.detection.fused_config import FusedConfig
-from companion.detection.interface import Detector, DetectorState, Phase, Situation
-from companion.detection.stream_health import SampleGate, StreamHealth, StreamHealthConfig
-from companion.estimate.config import EstimateConfig
-from companion.estimate.impact import ImpactEstimate, ImpactEstimator
 from companion.messages import Attitude, AttitudeTarget, ImuSample, MessageId, Odometry, Refused, Sample
-from companion.motion.history import KEPT_US
+from companion.motion.config import KEPT_US
+from companion.reflex.config import EstimateConfig, FusedConfig, StreamHealthConfig
+from companion.reflex.detector import Detector, DetectorState, Phase, Situation
+from companion.reflex.fused import FusedDetector
+from companion.reflex.impact import ImpactEstimate, ImpactEstimator
+from companion.reflex.stream_health import SampleGate, StreamHealth
 from companion.strict_model import StrictModel
 
 # Optional streams besides HIGHRES_IMU.

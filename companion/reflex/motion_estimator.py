@@ -18,12 +18,12 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from companion.estimate.config import EstimateConfig
 from companion.messages import LocalPosition, Vector3
-from companion.motion.delay import DELAY_S, LATEST_S
+from companion.motion.config import DELAY_S, GRAVITY_M_S2, LATEST_S, LONGEST_GAP_US, SAME_M_S, STAMP_RESOLUTION_US
 from companion.motion.rotation import body_to_ned, turned
-from companion.motion.strapdown import GRAVITY_M_S2, LONGEST_GAP_US, Strapdown
+from companion.motion.strapdown import Strapdown
 from companion.reflex import config as reflex
+from companion.reflex.config import EstimateConfig
 from companion.reflex.halfspace import limited, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.planner import REST, MotionState
@@ -141,7 +141,7 @@ class MotionEstimator:
     def _begin(self) -> None:
         self._at_boot_us, self._moved_m_s, self._bank = self.hit_boot_us, REST, None
         self._newest, self.has_converged = None, False
-        self.spread_m_s = reflex.SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
+        self.spread_m_s = SAME_M_S + reflex.SPREAD * math.hypot(*self.contact.velocity_ned_m_s)
         self.position_error_m = self._hidden_error_m_s = self._rate_error_m_s = REST
 
     def note_contact(self, is_fully_measured: bool, pushed_boot_us: int) -> None:
@@ -175,7 +175,7 @@ class MotionEstimator:
         """Take the vehicle's reported position and velocity."""
         at_us, since_us = sample.time_boot_us - round(1e6 * DELAY_S), sample.time_boot_us - self.hit_boot_us
         changed_m_s = math.dist(sample.velocity_ned_m_s, self.contact.velocity_ned_m_s)
-        is_late = since_us < 1e6 * LATEST_S and changed_m_s <= reflex.SAME_M_S and not self.is_second
+        is_late = since_us < 1e6 * LATEST_S and changed_m_s <= SAME_M_S and not self.is_second
         if at_us <= self.hit_boot_us or is_late:
             return
         if self.is_fully_measured:
@@ -202,14 +202,14 @@ class MotionEstimator:
         place = plus(sample.position_ned_m, behind_s, sample.velocity_ned_m_s)
         velocity = plus(sample.velocity_ned_m_s, behind_s, self.motion.acceleration_ned_m_s2)
         # An error with correlation time tau repeats in 2 tau / spacing samples: their variance is increased by that.
-        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-3))
+        colour = max(1.0, 2.0 * config.velocity_correlation_s / max(elapsed_s, 1e-6 * STAMP_RESOLUTION_US))
         # No estimator follows one of the models exactly; the difference is a share of the hidden velocity.
         off_m_s = math.hypot(*half) * reflex.MODEL_ERROR
         off_m = off_m_s * min(1e-6 * (at_us - self.hit_boot_us), 1.0)
         bank.update(0, way_s + behind_s * g, place, colour * (config.position_noise_m**2 + off_m**2))
         bank.update(1, g, velocity, colour * (config.velocity_noise_m_s**2 + off_m_s**2))
         estimate, spread_m_s, left_m_s = bank.estimate(left)
-        self.has_converged = self.has_converged or left_m_s <= reflex.SAME_M_S
+        self.has_converged = self.has_converged or left_m_s <= SAME_M_S
         if self.has_converged:
             self.position_error_m, self._hidden_error_m_s = bank.mean_error(way_s), bank.mean_error(g)
             return
@@ -250,7 +250,7 @@ def _rate_error(was_m_s: Vector3, before: LocalPosition, measured: LocalPosition
     half_s = 0.5 * elapsed_s
     led = plus(plus(before.position_ned_m, half_s, before.velocity_ned_m_s), half_s, measured.velocity_ned_m_s)
     further_m = plus(led, -1.0, measured.position_ned_m)
-    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * reflex.SAME_M_S)
+    return limited(plus(was_m_s, 1.0 / (reflex.COMPARED_S + elapsed_s), further_m), 2.0 * SAME_M_S)
 
 
 def tilt_ahead(strapdown: Strapdown, lead_s: float) -> Vector3:

@@ -13,12 +13,10 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.reflex import config as reflex
+from companion.reflex.config import PLAN_PARTS
 from companion.reflex.halfspace import Surface, limited, plus, split
 
 REST: Vector3 = (0.0, 0.0, 0.0)
-# A plan's acceleration is looked at between so many equal parts: its first part's is largest at 1/2, the last's at 0.21
-# and 0.79.
-_PARTS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +52,7 @@ class Plan:
 
     def most_m_s2(self) -> float:
         """The plan's largest acceleration, m/s^2."""
-        return max(math.hypot(*self._acceleration(part / _PARTS)) for part in range(1, _PARTS))
+        return max(math.hypot(*self._acceleration(part / PLAN_PARTS)) for part in range(1, PLAN_PARTS))
 
     def _acceleration(self, s: float) -> Vector3:
         bends = self._sum(6.0 * (s**2 - s), 1.0 - 4.0 * s + 3.0 * s**2, 60.0 * s - 180.0 * s**2 + 120.0 * s**3)

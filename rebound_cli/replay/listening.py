@@ -12,9 +12,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.force_signs import FusedState
-from companion.detection.interface import Detector, DetectorState, Impact, Phase, Situation
 from companion.messages import ImuSample, MessageId, Sample
+from companion.reflex.detector import Detector, DetectorState, Impact, Phase, Situation
+from companion.reflex.force_signs import FusedState
 from companion.reflex.monitor import CollisionMonitor
 
 # Of one sample, or of many.

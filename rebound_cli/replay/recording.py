@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from companion.companion import Companion, StepResult
-from companion.detection.interface import Situation
 from companion.guard.config import GuardConfig
 from companion.guard.guard import Guard
 from companion.mavlink.encode import COMPONENT_ID
 from companion.mavlink.packet import source_of
 from companion.messages import ComputerStatus
 from companion.mission.model import Mission
+from companion.reflex.detector import Situation
 from companion.reflex.monitor import CollisionMonitor
 from companion.shell.tlog import read_tlog
 from rebound_cli.documents import load_document, validated

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from companion.detection.interface import Evidence, ImpactKind
 from companion.messages import LandedState
 from companion.mission.config import CompanionConfig
+from companion.reflex.detector import Evidence, ImpactKind
 from companion.reflex.monitor import CollisionMonitor
 from rebound_cli.logs.log import WANTED, Log, LogError
 from rebound_cli.logs.shaking import Shaking, clipped, shaking

@@ -6,11 +6,11 @@ from itertools import groupby
 
 from companion import messages
 from companion.core import POLL_INTERVAL_US
-from companion.detection.interface import Situation
-from companion.estimate.impact import ImpactEstimate
 from companion.link.vehicle import OLD_NEWS_US
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND, mode_name
+from companion.reflex.detector import Situation
+from companion.reflex.impact import ImpactEstimate
 from companion.reflex.monitor import CollisionMonitor, advance, start_monitor
 from rebound_cli.logs.log import Demand, Log, LoggedSample
 from sim_vehicle.mavlink.streams.streams import KINDS, Stream, interval_from_request

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from companion.detection.interface import Evidence, ImpactKind, Phase
-from companion.estimate.normal import Normal
 from companion.messages import Vector3
+from companion.reflex.detector import Evidence, ImpactKind, Phase
+from companion.reflex.normal import Normal
 from rebound_cli.replay.listening import PHASES, Shown, Tested
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from companion.detection.interface import ImpactKind
+from companion.reflex.detector import ImpactKind
 from rebound_cli.replay.watching import Finding
 from rebound_cli.report.shown_flight import ShownFlight
 from rebound_cli.results.ending import ending_text

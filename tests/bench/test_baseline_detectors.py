@@ -6,9 +6,9 @@ import pytest
 
 from bench.baselines.config import BaselineConfig
 from bench.baselines.fuzzy import flip_deg, inclination_deg, intensity
-from companion.detection.interface import Situation
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Sample
 from companion.mission.config import CompanionConfig
+from companion.reflex.detector import Situation
 from companion.reflex.halfspace import plus
 from companion.reflex.monitor import advance, start_monitor
 

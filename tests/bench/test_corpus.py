@@ -12,7 +12,7 @@ from bench.corpus.recording import record
 from bench.corpus.verdict import verdict
 from bench.main import main
 from bench.random_missions.generator import MissionCase
-from companion.estimate.normal import Normal
+from companion.reflex.normal import Normal
 from rebound_cli.replay.watching import Findings
 from rebound_cli.results.run_folder import TLOG_NAME, TRUTH_NAME
 from sim_vehicle.shell.truth_file import load_truth

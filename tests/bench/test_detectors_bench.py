@@ -8,9 +8,9 @@ from bench.detectors.recording import VehicleRecording
 from bench.detectors.scoring import first_possible
 from bench.detectors.watching import ASKED_HZ, configuration, streams_asked_hz
 from bench.detectors.wire import BUILDERS, Wire
-from companion.detection.interface import Situation
 from companion.mavlink.decode import Decoder
 from companion.messages import ExtendedState, MessageId
+from companion.reflex.detector import Situation
 from sim_vehicle.plant.plant import Plant
 from tests.sim_vehicle.vehicle_client import ARM_DISARM, SET_INTERVAL, TAKEOFF, Client
 

@@ -6,8 +6,8 @@ import random
 import pytest
 
 from bench.baselines.lateral import LateralConfig, LateralDetector
-from companion.detection.interface import Phase, Situation
 from companion.messages import ImuSample
+from companion.reflex.detector import Phase, Situation
 
 B_S, K_S = 30.0, 500.0
 STEP_US = 10

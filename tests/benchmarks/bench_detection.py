@@ -11,8 +11,8 @@ import statistics
 import time
 
 from bench.baselines.config import BaselineConfig
-from companion.detection.interface import Situation
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry, Sample
+from companion.reflex.detector import Situation
 from companion.reflex.monitor import advance, start_monitor
 
 INTERVAL_US = 4_000

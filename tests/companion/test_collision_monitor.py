@@ -6,11 +6,12 @@ import pickle
 import pytest
 
 from bench.baselines.config import BaselineConfig
-from companion.detection.interface import Phase, Situation
-from companion.detection.stream_health import StreamHealth, StreamHealthConfig
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
+from companion.reflex.config import StreamHealthConfig
+from companion.reflex.detector import Phase, Situation
 from companion.reflex.monitor import advance, start_monitor
+from companion.reflex.stream_health import StreamHealth
 
 INTERVAL_US = 4_000
 WANTED = Situation()

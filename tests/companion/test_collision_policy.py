@@ -2,9 +2,9 @@
 
 import pytest
 
-from companion.estimate.config import EstimateConfig
 from companion.flight.operator import status_text
 from companion.memory.stored import ObstaclesConfig
+from companion.reflex.config import EstimateConfig
 from tests.companion.fake_vehicle import LAND as LAND_MODE
 from tests.companion.fake_vehicle import LOITER, FakeVehicle, Flight, flight
 

@@ -18,7 +18,8 @@ from companion.messages import (
     SetMode,
 )
 from companion.mission.trajectory import LineProfile
-from companion.motion.settling import SettledConfig, SettlingMonitor
+from companion.motion.config import SettledConfig
+from companion.motion.settling import SettlingMonitor
 from companion.px4_mode import AUTO_LAND, AUTO_LOITER, OFFBOARD, mode_name
 
 # --- trajectory

@@ -4,7 +4,8 @@ import random
 
 import pytest
 
-from companion.motion.delay import DELAY_S, LATEST_S, Delay
+from companion.motion.config import DELAY_S, LATEST_S
+from companion.motion.delay import Delay
 
 NOISE_M_S = 0.05
 

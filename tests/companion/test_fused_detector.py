@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from companion.detection.force_signs import CLEAR, FusedState
-from companion.detection.fused import FusedDetector
-from companion.detection.fused_config import FusedConfig
-from companion.detection.interface import Evidence, ImpactKind, Phase, Situation
-from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Attitude, AttitudeTarget, ImuSample, LandedState, LocalPosition, Odometry
 from companion.motion.strapdown import Strapdown
+from companion.reflex.config import CLEAR, FusedConfig
+from companion.reflex.detector import Evidence, ImpactKind, Phase, Situation
+from companion.reflex.force_signs import FusedState
+from companion.reflex.fused import FusedDetector
+from companion.reflex.velocity_jump import VelocityJump
 
 TICK_US = 1_000
 WINDOW_US = 4_000

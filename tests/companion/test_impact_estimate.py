@@ -5,12 +5,12 @@ import random
 
 import pytest
 
-from companion.detection.interface import Impact, ImpactKind, Situation
-from companion.estimate.config import EstimateConfig
-from companion.estimate.contact_force import ContactForce
-from companion.estimate.impact import ImpactEstimator
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
+from companion.reflex.config import EstimateConfig
+from companion.reflex.contact_force import ContactForce
+from companion.reflex.detector import Impact, ImpactKind, Situation
+from companion.reflex.impact import ImpactEstimator
 from companion.reflex.monitor import advance, start_monitor
 
 CONFIG = EstimateConfig()

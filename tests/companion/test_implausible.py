@@ -6,8 +6,6 @@ import pytest
 from pymavlink.dialects.v20 import development as mav
 
 from bench.faults.packets import made
-from companion.detection.stream_health import SampleGate
-from companion.flight.confirmation import Hypothesis
 from companion.messages import (
     Attitude,
     ImuSample,
@@ -20,6 +18,8 @@ from companion.messages import (
 from companion.motion.history import MotionHistory
 from companion.motion.resets import Resets
 from companion.motion.strapdown import Strapdown, VelocityFix
+from companion.reflex.confirmation import Hypothesis
+from companion.reflex.stream_health import SampleGate
 from tests.companion.fake_vehicle import LOITER, flight
 from tests.companion.hostile import Attacker, attacked, flight_in
 

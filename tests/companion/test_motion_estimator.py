@@ -6,10 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from companion.detection.interface import DetectorState
-from companion.estimate.config import EstimateConfig
-from companion.estimate.impact import ImpactEstimator
-from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.recovering import Recover
@@ -17,10 +13,14 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition
 from companion.mission.model import Mission
+from companion.motion.config import SAME_M_S
 from companion.motion.strapdown import Strapdown
-from companion.reflex.config import SAME_M_S, TILT_PER_S
+from companion.reflex.config import IMPULSE_RAD, TILT_PER_S, EstimateConfig
+from companion.reflex.detector import DetectorState
+from companion.reflex.impact import ImpactEstimator
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator, tilt_ahead
+from companion.reflex.normal import Normal
 from companion.reflex.planner import MotionState
 
 NORTH, SOUTH = (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)

@@ -5,14 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from companion.estimate.normal import (
-    APPROACH_RAD,
-    IMPULSE_RAD,
-    UNKNOWN_RAD,
-    Normal,
-    normal_of,
-    with_change,
-)
+from companion.reflex.config import APPROACH_RAD, IMPULSE_RAD, UNKNOWN_RAD
+from companion.reflex.normal import Normal, normal_of, with_change
 
 SOUTH = (-1.0, 0.0, 0.0)
 

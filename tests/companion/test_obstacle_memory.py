@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from companion.estimate.normal import Normal
 from companion.memory.patch import (
     GOES_ON_MOST_M,
     LEAST_SPEED_M_S,
@@ -15,6 +14,7 @@ from companion.memory.patch import (
     touch_of,
 )
 from companion.memory.stored import KnownPatch, ObstacleFile, as_data, describe, file_data
+from companion.reflex.normal import Normal
 
 CLEARANCE_M = 0.55
 SOUTH, NORTH = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from companion.estimate.normal import Normal
 from companion.fence import Fence
 from companion.reflex.config import HARD_BRAKING, LEAD_S, SHORTEST_S, RecoveryConfig
 from companion.reflex.halfspace import Surface, away_from, clear_goal, inside_fence, plus, split
 from companion.reflex.laws import RECOVERY_LAWS, Contact
+from companion.reflex.normal import Normal
 from companion.reflex.planner import REST, MotionState, Plan, height_feedback, kept_off, shortest
 
 AT, SOUTH = (4.0, -2.0, -1.5), (-1.0, 0.0, 0.0)

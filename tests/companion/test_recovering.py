@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-from companion.estimate.config import EstimateConfig
-from companion.estimate.normal import Normal
 from companion.flight.collision import CollisionRecord
 from companion.flight.context import FlightContext, Inputs, Target
 from companion.flight.recovering import Recover
@@ -14,10 +12,11 @@ from companion.link.streams import StreamMonitor
 from companion.link.vehicle import Vehicle
 from companion.messages import Attitude, LocalPosition, Vector3
 from companion.mission.model import Mission
-from companion.motion.strapdown import GRAVITY_M_S2
-from companion.reflex.config import DESCENT_M_S2
+from companion.motion.config import GRAVITY_M_S2
+from companion.reflex.config import DESCENT_M_S2, EstimateConfig
 from companion.reflex.laws import Contact
 from companion.reflex.motion_estimator import MotionEstimator
+from companion.reflex.normal import Normal
 
 HIT_US, SINCE_US = 1_000_000, 100_000
 OFF_M, OFF_M_S, LEVEL_LEANS_M_S2 = (0.3, -0.2, 0.1), (-0.1, 0.05, 0.0), (0.5, 0.4, 0.0)

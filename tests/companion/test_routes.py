@@ -6,7 +6,6 @@ from itertools import pairwise
 import pytest
 from shapely import LineString, Point
 
-from companion.estimate.normal import Normal
 from companion.fence import Fence
 from companion.memory.patch import REACHES_M, Patch, remembered, touch_of
 from companion.memory.route import route
@@ -14,6 +13,7 @@ from companion.memory.surroundings import LEAST_FREE_M, SLACK_M, ObstacleMap, as
 from companion.mission.item_trajectory import SpeedLimits, home_around, passed, trajectory_around
 from companion.mission.items import GoToItem, OrbitItem, PathItem, ReturnItem, VelocityItem
 from companion.mission.trajectory import CurveProfile
+from companion.reflex.normal import Normal
 
 REACH_M, MARGIN_M = 0.2, 0.35
 CLEARANCE_M = REACH_M + MARGIN_M

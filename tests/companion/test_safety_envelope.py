@@ -15,7 +15,7 @@ from companion.flight.context import Target
 from companion.flight.envelope import KnownSurface, SetpointError, Surroundings, bounded
 from companion.mission.policy import SetpointLimits
 from companion.mission.trajectory import LineProfile
-from companion.motion.strapdown import GRAVITY_M_S2
+from companion.motion.config import GRAVITY_M_S2
 from companion.reflex.halfspace import Surface, plus
 from tests.companion.fake_vehicle import LAND, LOITER, FakeVehicle, flight
 from tests.companion.hostile import attacked

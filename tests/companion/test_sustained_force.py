@@ -8,9 +8,10 @@ import math
 
 import pytest
 
-from companion.flight.sustained_force import HELD_M_S2, SMOOTHING_S, SustainedForceMonitor
 from companion.messages import LocalPosition
 from companion.mission.model import Mission
+from companion.reflex.config import HELD_M_S2, SMOOTHING_S
+from companion.reflex.sustained_force import SustainedForceMonitor
 from rebound_cli.inputs import SimulatedWorld, with_guards
 from rebound_cli.live.interrupts import Interrupts
 from rebound_cli.results.run_folder import FlightRecorder

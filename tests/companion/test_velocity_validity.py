@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from companion.detection.interface import Situation
 from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, Odometry, Sample
 from companion.mission.config import CompanionConfig
+from companion.reflex.detector import Situation
 from companion.reflex.monitor import advance, start_monitor
 
 STILL = (0.0, 0.0, 0.0)

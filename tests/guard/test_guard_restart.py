@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from companion.detection.interface import Phase
 from companion.guard.config import GuardConfig
 from companion.guard.states import State
 from companion.link.streams import StreamMonitor
+from companion.reflex.detector import Phase
 from tests.guard.attached_air import AttachedAir
 from tests.guard.flying import EPOCH_US, Air
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from companion.estimate.config import GuardsConfig
 from companion.mission.model import Mission
+from companion.reflex.config import GuardsConfig
 from rebound_cli.documents import DocumentError, apply_overrides, load_document, parse_document, validated
 from rebound_cli.inputs import mission_from, resolved, world_from
 

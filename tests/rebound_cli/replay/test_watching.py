@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from companion.detection.interface import Situation
 from companion.messages import ExtendedState, LandedState, LocalPosition
 from companion.mission.config import CompanionConfig
 from companion.px4_mode import AUTO_LAND
+from companion.reflex.detector import Situation
 from rebound_cli.logs.log import Demand, LoggedSample
 from rebound_cli.logs.shaking import Stage, shaking
 from rebound_cli.replay.watching import DESCENT_M_S, Circumstances, thinned, watch_log

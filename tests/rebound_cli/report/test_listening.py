@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from companion.detection.interface import Phase
 from companion.mission.config import CompanionConfig
+from companion.reflex.detector import Phase
 from rebound_cli.replay.listening import PHASES, Listener
 from rebound_cli.replay.recording import Followed, read_recording, reproduce
 from rebound_cli.replay.report import replay_log

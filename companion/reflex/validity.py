@@ -10,11 +10,7 @@ knows the normal and the expected rebound: it uses `reflex.motion_estimator`.
 
 from dataclasses import dataclass
 
-# PX4's estimator begins to correct itself after 0.14 s.
-UNCORRECTED_US = 140_000
-# By then a wrong tilt has decayed from 15 degrees, after 4.2 m/s, to two (0.5
-# per second, bench/notes/px4.md).
-CORRECTED_US = 4_500_000
+from companion.reflex.config import CORRECTED_US, UNCORRECTED_US
 
 
 @dataclass(slots=True)

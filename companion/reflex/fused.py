@@ -18,20 +18,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-from companion.detection.classify import hovers, kind_of
-from companion.detection.force_noise import LEARNT_S, SETTLED_US
-from companion.detection.force_signs import FusedState
-from companion.detection.fused_config import FusedConfig
-from companion.detection.interface import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
-from companion.detection.velocity_jump import VelocityJump
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
-from companion.motion.history import SHOWN_US
+from companion.motion.config import LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import LEVEL, LONGEST_DELAY_US, LONGEST_GAP_US
-
-# A contact longer than springs take to bottom out, whose force then exceeds twice its peak, is another hit: a vehicle
-# scrapes along the ground and then strikes it.
-WORSE_AFTER_US = 100_000
+from companion.motion.strapdown import LEVEL
+from companion.reflex.classify import hovers, kind_of
+from companion.reflex.config import LEARNT_S, SETTLED_US, WORSE_AFTER_US, FusedConfig
+from companion.reflex.detector import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
+from companion.reflex.force_signs import FusedState
+from companion.reflex.velocity_jump import VelocityJump
 
 
 class FusedDetector:

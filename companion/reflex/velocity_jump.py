@@ -10,31 +10,22 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from companion.detection.fused_config import FusedConfig
 from companion.messages import Vector3
+from companion.motion.config import LONGEST_GAP_US, YAW_SHARE
 from companion.motion.delay import Delay
-from companion.motion.strapdown import LONGEST_GAP_US, MOTORS_RAD_S2, YAW_SHARE, ZERO, VelocityFix
-
-# Number of earlier velocities that the newest is compared with: enough to halve their noise, few enough to be recent.
-COMPARED = 3
-# Velocities further apart are slow: samples cover a quarter of the time, and the filter corrects itself in between. At
-# 10 Hz healthy vehicles' steps reach 0.3 m/s (four public logs). 30 Hz with a packet lost is inside.
-LONGEST_STEP_US = 75_000
-# 10 Hz with the jitter of a log. Velocities further apart are not compared. A rate jump belongs to a velocity jump
-# within this time, too: the velocity's interval and its delay.
-LONGEST_SLOW_STEP_US = 130_000
-# Memory of the standard deviation in steps, and while it rises: 3 s and a third of a second at 30 Hz.
-MEMORY, RISE = 100, 10
-# Vibration between the samples is missing in their integral. Vibration that beats with the stream (a rotor's 87 Hz,
-# samples 8 and 12 ms apart) has one sign there for tenths of a second. Its amplitude is 1.4 times the standard
-# deviation of both axes. SHAKEN_S: the unsampled part of the 0.1 s between the compared velocities, with some reserve.
-# STAMP_S: without unsampled time, the velocity's stamp of a millisecond and a lost sample.
-SHAKEN_S, STAMP_S = 0.15, 0.008
-# An output predictor's lag.
-LAG_S = 0.02
-# Four times what motors do, with room for a nimbler vehicle's flips. A rigid vehicle that hits an inclined wall at 2
-# m/s has a rate jump of 15 rad/s and more.
-NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
+from companion.motion.strapdown import ZERO, VelocityFix
+from companion.reflex.config import (
+    COMPARED,
+    LAG_S,
+    LONGEST_SLOW_STEP_US,
+    LONGEST_STEP_US,
+    MEMORY,
+    NO_MOTORS_RAD_S2,
+    RISE,
+    SHAKEN_S,
+    STAMP_S,
+    FusedConfig,
+)
 
 
 @dataclass(slots=True)

@@ -2,14 +2,10 @@
 
 import math
 
-from companion.detection.interface import ImpactKind, Situation
 from companion.messages import Vector3
-from companion.motion.history import SAME_M_S
-
-# Sine of 45 degrees: a force nearer to the vertical is that of a ceiling or a floor.
-STEEP = 0.7
-# An estimate of the height drifts by this much in a flight by barometer or satellites.
-GROUND_M = 1.0
+from companion.motion.config import SAME_M_S
+from companion.reflex.config import GROUND_M, STEEP
+from companion.reflex.detector import ImpactKind, Situation
 
 
 def hovers(velocity_ned_m_s: Vector3 | None) -> bool:

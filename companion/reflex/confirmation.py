@@ -10,21 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median, stdev
 
-from companion.detection.interface import Evidence
-from companion.estimate.impact import ImpactEstimate
 from companion.messages import ImuSample, LocalPosition, Vector3
-from companion.motion.history import SAME_M_S, SHOWN_US, MotionHistory
-from companion.motion.strapdown import LONGEST_DELAY_US, MOTORS_RAD_S2, VelocityFix
+from companion.motion.config import LONGEST_DELAY_US, MOTORS_RAD_S2, SAME_M_S
+from companion.motion.history import MotionHistory
+from companion.motion.strapdown import VelocityFix
+from companion.reflex.config import DECIDED_US, STRUCK_M_S, SURE
+from companion.reflex.detector import Evidence
 from companion.reflex.halfspace import plus, split
+from companion.reflex.impact import ImpactEstimate
 from companion.reflex.planner import REST
-
-# A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.
-STRUCK_M_S = 0.5
-# Time to the decision. A tilt of 17 degrees for this time moves a vehicle by 3 cm. Velocities before the hit are
-# averaged over the same time; the shorter it is, the smaller are the slow errors.
-DECIDED_US = SHOWN_US
-# Standard deviations of the noise that a rejection needs.
-SURE = 3.0
 
 
 @dataclass(slots=True)

@@ -3,15 +3,16 @@
 import math
 from dataclasses import dataclass, field, replace
 
-from companion.detection.interface import DetectorState, Evidence, Impact, Phase
-from companion.estimate.config import EstimateConfig
-from companion.estimate.contact_force import ContactForce
-from companion.estimate.normal import Normal, normal_of
-from companion.estimate.validity import VelocityValidity
 from companion.messages import Attitude, ImuSample, LocalPosition, Odometry, Sample, Vector3
-from companion.motion.history import STAMP_RESOLUTION_US, MotionHistory
+from companion.motion.config import STAMP_RESOLUTION_US
+from companion.motion.history import MotionHistory
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO, Strapdown
+from companion.reflex.config import EstimateConfig
+from companion.reflex.contact_force import ContactForce
+from companion.reflex.detector import DetectorState, Evidence, Impact, Phase
+from companion.reflex.normal import Normal, normal_of
+from companion.reflex.validity import VelocityValidity
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,27 +10,16 @@ that message the thrust is what the accelerometer shows along body z.
 import math
 from dataclasses import dataclass, field
 
-from companion.detection.interface import Impact, ImpactKind
-from companion.detection.thrust import ThrustGain
-from companion.estimate.impact import ImpactEstimate
-from companion.estimate.normal import IMPULSE_RAD, Normal
 from companion.messages import LocalPosition, Quaternion, Vector3
+from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import GRAVITY_M_S2, ZERO
-from companion.reflex.config import LEAD_S, PLACE_SPREAD_M
+from companion.motion.strapdown import ZERO
+from companion.reflex.config import FOLLOWED_S, HELD_M_S2, IMPULSE_RAD, LEAD_S, PLACE_SPREAD_M, SMOOTHING_S, STEADY_M_S
+from companion.reflex.detector import Impact, ImpactKind
 from companion.reflex.halfspace import away_from, plus, split
-
-# While the setpoint is reached, drag and wind are learnt: the mean of so long.
-FOLLOWED_S = 1.0
-# Four times a good estimate's noise. The motion is not steady where the velocity has changed by more. A vehicle that
-# approaches its setpoint faster is not held back. With 0.15 a slow gust counted as steady.
-STEADY_M_S = 0.12
-# Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
-SMOOTHING_S = 0.2
-# What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
-# 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
-# degrees; from 22 on it is tipped over.
-HELD_M_S2 = 1.5
+from companion.reflex.impact import ImpactEstimate
+from companion.reflex.normal import Normal
+from companion.reflex.thrust import ThrustGain
 
 
 @dataclass(slots=True)
@@ -83,7 +72,7 @@ class SustainedForceMonitor:
         towards, grown = plus(ZERO, 1.0 / error_m, short), plus(self.missing_m_s2, -1.0, self.wind_m_s2)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
-        is_early = now_us - since_us < 2e6 * LEAD_S
+        is_early = now_us - since_us < 2.0 * 1e6 * LEAD_S
         if force_m_s2 < HELD_M_S2 or split(self.velocity_m_s, towards)[0] > STEADY_M_S or is_early:
             return None
         # What it was in free air stays known.

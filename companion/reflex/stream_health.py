@@ -5,23 +5,8 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from companion.messages import Attitude, ImuSample, Quaternion, Vector3
-from companion.motion.history import STAMP_RESOLUTION_US
-from companion.motion.strapdown import MOTORS_RAD_S2
-from companion.strict_model import Positive, StrictModel
-
-
-class StreamHealthConfig(StrictModel):
-    """When a detector counts as blind."""
-
-    silence_s: Positive = 0.25
-    """Without IMU or position for so long there is no data. Ten samples of PX4's default 50 Hz, with reserve: whoever
-    waits longer for one sees no hit in time."""
-    min_rate_hz: Positive = 20.0
-    """Least rate of HIGHRES_IMU. 20 Hz is one sample in 50 ms: the longest contacts, about 100 ms, would show in two,
-    most in none."""
-    max_threshold_m_s2: Positive = 30.0
-    """Largest threshold: vibration above it hides hits. By eq. 2 a hit at 1 m/s begins with b_s v_c = 30 m/s^2: a
-    vehicle that shakes so much that less cannot be told from its shaking does not see the slower half of its hits."""
+from companion.motion.config import MOTORS_RAD_S2, STAMP_RESOLUTION_US
+from companion.reflex.config import StreamHealthConfig
 
 
 @dataclass(slots=True)

@@ -10,20 +10,15 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.motion.strapdown import ZERO
-
-# Standard deviations of the directions from the normal, rad, on drawn walls, slanted and leaning walls and poles
-# (bench/notes/ablation.md): friction turns a force by 17 degrees. Walls are met at up to 60 degrees, and
-# less often head-on than a quarter, as in the draws.
-IMPULSE_RAD, APPROACH_RAD, CHANGE_RAD = 0.35, 0.6, 0.25
-# Standard deviation of a change of velocity, m/s: that of both velocities, and what a controller adds in 0.1 s.
-CHANGE_M_S = 0.3
-# A slower vehicle may have been struck from any side.
-APPROACH_M_S = 0.5
-# Cosine of 120 degrees: no obstacle at rest pushes within 60 degrees of the direction of flight. What does came from
-# behind, and the direction of flight says nothing of it.
-FROM_BEHIND = -0.5
-# Nothing is known of a direction, rad.
-UNKNOWN_RAD = 0.5 * math.pi
+from companion.reflex.config import (
+    APPROACH_M_S,
+    APPROACH_RAD,
+    CHANGE_M_S,
+    CHANGE_RAD,
+    FROM_BEHIND,
+    IMPULSE_RAD,
+    UNKNOWN_RAD,
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,23 +10,14 @@ from one sample to the next. So a force is observed for a moment, and is a strik
 import math
 from dataclasses import dataclass, field
 
-from companion.detection.force_noise import ForceNoise
-from companion.detection.fused_config import FusedConfig
-from companion.detection.interface import DetectorState, Impact, Phase
-from companion.detection.thrust import ThrustGain
-from companion.detection.velocity_jump import VelocityJump
 from companion.messages import Vector3
-from companion.motion.history import CURRENT_US
+from companion.motion.config import CURRENT_US
 from companion.motion.strapdown import ZERO
-
-# A vehicle vibrates when its threshold is this many times the least one: four public logs have four to nine times. On
-# any other the least threshold is that of a force that lasts, as of a gust, and two samples together are no more.
-SHAKING = 2.0
-# On a vibrating vehicle one sample below this many thresholds may be noise (once in four public logs, with 1.2).
-CLEAR = 1.3
-# Least jump, in thresholds of at least 1.75 m/s^2. A grip of 30 N s/m stops a kilogram that drifts at 0.1 m/s with
-# 2.7 m/s^2, plus noise.
-JUMP = 2.4
+from companion.reflex.config import CLEAR, JUMP, MEAN_MEMORY_S, SHAKING, FusedConfig
+from companion.reflex.detector import DetectorState, Impact, Phase
+from companion.reflex.force_noise import ForceNoise
+from companion.reflex.thrust import ThrustGain
+from companion.reflex.velocity_jump import VelocityJump
 
 
 @dataclass(slots=True)
@@ -54,7 +45,7 @@ class FusedState(DetectorState):
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""
         speed_m_s = math.hypot(*self.velocity_ned_m_s or ZERO)
         turning_rad_s = sum(map(abs, rates_frd_rad_s))
-        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, 0.25 * turning_rad_s)
+        return self.threshold_m_s2 + config.drag_per_s * speed_m_s * min(2.0, MEAN_MEMORY_S * turning_rad_s)
 
     def vertical_threshold_m_s2(self, config: FusedConfig) -> float:
         """Vertical threshold, m/s^2, beyond the force that propellers can make."""

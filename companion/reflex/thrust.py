@@ -2,19 +2,8 @@
 
 from dataclasses import dataclass
 
-from companion.motion.history import CURRENT_US
-from companion.motion.strapdown import GRAVITY_M_S2
-
-# A quadrotor lifts between 1.3 and 5 times its weight. Without ATTITUDE_TARGET a force from below counts only beyond
-# the maximum of the strongest vehicle.
-STRONGEST_M_S2 = 5.0 * GRAVITY_M_S2
-# Memory of the gain, which is known when it is full: it follows a sagging battery (minutes) and not a climb (its thrust
-# is in the message).
-GAIN_MEMORY_S = 2.0
-# Below this commanded thrust the gain is a quotient of small numbers, and is not learnt.
-LEAST_FRACTION = 0.1
-# Error of the gain from the battery, ground effect and a mean that has not converged.
-MARGIN = 1.15
+from companion.motion.config import CURRENT_US
+from companion.reflex.config import GAIN_MEMORY_S, LEAST_FRACTION, MARGIN, STRONGEST_M_S2
 
 
 @dataclass(slots=True)

@@ -5,17 +5,7 @@ from dataclasses import dataclass
 
 from companion.messages import Vector3
 from companion.motion.strapdown import ZERO
-
-# Memory of the mean. It follows drag as the speed changes, and a gust that builds up in a few tenths of a second.
-MEAN_MEMORY_S = 0.25
-# Memory of the standard deviation: good to 5 % with 200 samples, to 12 % at the slowest useful rates.
-SPREAD_MEMORY_S = 2.0
-# The noise is known after this time: 50 samples at 50 Hz make a standard deviation good to a tenth.
-LEARNT_S = 1.0
-# After take-off the rotors' vibration is not learnt yet: the time that a rising standard deviation needs.
-SETTLED_US = 300_000
-# The standard deviation is told larger by this factor: vibration grows with the throttle, sooner than it is learnt.
-EXCESS = 1.5
+from companion.reflex.config import EXCESS, MEAN_MEMORY_S, SPREAD_MEMORY_S
 
 
 @dataclass(slots=True)

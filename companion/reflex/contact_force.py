@@ -6,13 +6,7 @@ from dataclasses import dataclass, field
 from companion.messages import ImuSample, Quaternion, Vector3
 from companion.motion.rotation import body_to_ned
 from companion.motion.strapdown import ZERO
-
-# The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range
-# is a third of the range in the mean.
-CLIPPED_SHARE = 1.0 / 3.0
-# A contact of no more samples than this is too short to exclude clipping of its raw peak. Ringing below half of the
-# peak, or in another direction, does not count.
-SHORT = 2
+from companion.reflex.config import CLIPPED_SHARE, SHORT
 
 
 @dataclass(slots=True)

@@ -1,1 +1,0 @@
-"""Collision detectors, one file each, behind one interface and selected by name."""

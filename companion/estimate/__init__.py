@@ -1,1 +1,0 @@
-"""What an impact was: when, how fast, against which normal, how hard."""

@@ -1,0 +1,55 @@
+"""Numbers of streams, of the integrated accelerometer and of rest, with unit and source."""
+
+from companion.strict_model import NotNegative, Positive, StrictModel
+
+# --- time
+# Evidence for or against a hit lies within 0.3 s of it; the origin is the mean of a second. A time further back than
+# this is not that of a reordered packet but of a rebooted vehicle. By then each stream has sent a message: those that a
+# detector uses come ten times a second and more.
+KEPT_US = 2_000_000
+# PX4 cuts time_boot_ms to whole milliseconds: a stamp may be this much before its sample.
+STAMP_RESOLUTION_US = 1_000
+# A message counts as current for this time: 15 of PX4's ODOMETRY at 30 Hz, whose velocities and reset counter are used
+# until then, as are those of ATTITUDE_TARGET.
+CURRENT_US = 500_000
+# The vehicle's estimate shows a hit by this time: all but the longest contacts are over (0.12 s at 1 m/s), it is 20 to
+# 40 ms late, and a filter's switching makes it swing.
+SHOWN_US = 150_000
+# A velocity that differs by less does not differ: four times the noise of a good estimate, which reaches 0.1 m/s now
+# and then. An estimate has converged when its known error stays below that.
+SAME_M_S = 0.15
+
+# --- the integrated accelerometer
+GRAVITY_M_S2 = 9.80665
+# A longer gap restarts the integral: two samples of 20 Hz, the least rate of HIGHRES_IMU. An attitude further from a
+# sample is not carried on to it.
+LONGEST_GAP_US = 100_000
+# Largest lag of a velocity that is compared with the integral (optical flow with an output predictor: 20 ms).
+LONGEST_DELAY_US = 40_000
+# Cosine of 22 degrees: the tilt of a real PX4 is wrong by up to 17 degrees after 8 m/s were clipped, as in a hit at 4.2
+# m/s (bench/notes/px4.md), and gyroscopes drift by 3 degrees in two seconds. Beyond it the gyroscopes are wrong.
+MOST_WRONG = 0.927
+# Largest angular acceleration by motors, rad/s^2, and its share about yaw, where only their drag turns the vehicle.
+MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
+
+# --- the velocity's delay
+# Prior, and its own standard deviation: PX4's output predictor leaves no delay, optical flow behind it up to 20 ms.
+DELAY_S = 0.01
+# Longest delay that is estimated: compared velocities lie 0.1 s apart (four at PX4's 30 Hz of ODOMETRY).
+LATEST_S = 0.1
+
+
+class SettledConfig(StrictModel):
+    """When a recovery has ended."""
+
+    distance_m: Positive = 0.10
+    """Largest distance to the recovery setpoint."""
+    speed_m_s: Positive = 0.10
+    """Largest speed."""
+    duration_s: Positive = 0.5
+    """How long both must hold."""
+    timeout_s: Positive = 10.0
+    """A healthy recovery takes 2 to 4 s; after three times that the mission goes on without it."""
+    smoothing_s: NotNegative = 0.1
+    """Mean over about five samples at 50 Hz: brings a 0.03 m/s RMS velocity noise per axis to 0.01 m/s, so that
+    the speed of a vehicle at rest stays clear of `speed_m_s` for the whole of `duration_s`."""
