@@ -68,8 +68,8 @@ RULES = (
     Rule(
         "attitude by rates",
         "no clipped attitude",
-        _REFLEX + "validity:VelocityValidity.is_attitude_valid",
-        _says(True),
+        _REFLEX + "validity:VelocityValidity.tilt_error_rad",
+        _says(0.0),
     ),
     Rule(
         "trust",

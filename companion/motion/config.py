@@ -26,9 +26,10 @@ GRAVITY_M_S2 = 9.80665
 LONGEST_GAP_US = 100_000
 # Largest lag of a velocity that is compared with the integral (optical flow with an output predictor: 20 ms).
 LONGEST_DELAY_US = 40_000
-# Cosine of 22 degrees: the tilt of a real PX4 is wrong by up to 17 degrees after 8 m/s were clipped, as in a hit at 4.2
-# m/s (bench/notes/px4.md), and gyroscopes drift by 3 degrees in two seconds. Beyond it the gyroscopes are wrong.
-MOST_WRONG = 0.927
+# Tilt error of a PX4 estimate after a clipped hit, for each m/s of its speed: of what is hidden, twice that at most, a
+# real PX4 takes 0.037 rad for each m/s with motion capture and 0.056 with GPS (bench/notes/px4.md). The same again for
+# a speed of 1 m/s: the obstacle may move. Where attitude and gyroscopes differ by more, the gyroscopes are wrong.
+TILT_RAD_PER_M_S = 0.11
 # Largest angular acceleration by motors, rad/s^2, and its share about yaw, where only their drag turns the vehicle.
 MOTORS_RAD_S2, YAW_SHARE = 100.0, 0.3
 

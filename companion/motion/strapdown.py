@@ -3,11 +3,12 @@
 The vehicle's velocities stand beside it. While the two agree, velocity minus integral is constant.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 
 from companion.messages import LocalPosition, Odometry, Quaternion, Vector3
-from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US, MOST_WRONG
+from companion.motion.config import CURRENT_US, GRAVITY_M_S2, KEPT_US, LONGEST_GAP_US
 from companion.motion.rotation import body_to_ned, ned_to_body, turned
 
 LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -54,12 +55,13 @@ class Strapdown:
     _odometry_boot_us: int | None = None
     _reset_counter: int = 0
 
-    def attitude(self, time_us: int, attitude_wxyz: Quaternion, is_valid: bool = True) -> None:
+    def attitude(self, time_us: int, attitude_wxyz: Quaternion, most_wrong_rad: float = 0.0) -> None:
+        """Take one reported attitude, whose tilt may be wrong by so much; one that is further off has its reason."""
         behind_us, self.attitude_wxyz = self.time_boot_us - time_us, attitude_wxyz
         if abs(behind_us) < LONGEST_GAP_US:
             attitude_wxyz = turned(attitude_wxyz, self.rates_frd_rad_s, 1e-6 * behind_us)
         n, e, d = body_to_ned(self.valid_wxyz, ned_to_body(attitude_wxyz, (0.0, 0.0, -1.0)))
-        if is_valid or -d < MOST_WRONG:
+        if not most_wrong_rad or -d < math.cos(most_wrong_rad):
             self.valid_wxyz, self.level_acceleration_m_s2 = attitude_wxyz, ZERO
         else:
             self.level_acceleration_m_s2 = (-GRAVITY_M_S2 * n / d, -GRAVITY_M_S2 * e / d, 0.0)

@@ -70,7 +70,7 @@ class ImpactEstimator:
             self.validity.update(sample.time_boot_us)
         elif isinstance(sample, Attitude):
             time_us = sample.time_boot_us
-            self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.is_attitude_valid(time_us))
+            self.strapdown.attitude(time_us, sample.attitude_wxyz, self.validity.tilt_error_rad(time_us))
 
     def begin(self, impact: Impact) -> ImpactEstimate:
         """The first estimate of a new impact: the motion before it, and the force of its first sample or velocity."""
@@ -87,7 +87,7 @@ class ImpactEstimator:
             self.contact = ContactForce(free, averaging_us, self.config.accelerometer_range_m_s2)
             self.contact.add(self.imu, self.imu.time_boot_us - free_until_us, self.strapdown.valid_wxyz)
         self.came_ned_m_s = velocity if self.validity.is_valid else ZERO
-        self.validity.invalidate(sample_us)
+        self.validity.invalidate(sample_us, math.hypot(*velocity))
         self.estimate = estimate = ImpactEstimate(
             impact=impact,
             time_boot_us=(free_until_us + sample_us) // 2,

@@ -10,6 +10,7 @@ knows the normal and the expected rebound: it uses `reflex.motion_estimator`.
 
 from dataclasses import dataclass
 
+from companion.motion.config import TILT_RAD_PER_M_S
 from companion.reflex.config import CORRECTED_US, UNCORRECTED_US
 
 
@@ -21,19 +22,24 @@ class VelocityValidity:
     """Time of the latest hit that was not measured whole."""
     _is_again: bool = False
     """Whether the velocity was invalid already when the latest hit came: an earlier hit's part stays hidden."""
+    _speed_m_s: float = 0.0
+    """Of the latest hit, or of the hardest of those."""
 
     @property
     def is_valid(self) -> bool:
         return self.invalid_since_boot_us is None
 
-    def is_attitude_valid(self, time_us: int) -> bool:
-        """Whether the attitude is valid: no hit is being corrected, or the correction cannot have begun."""
+    def tilt_error_rad(self, time_us: int) -> float:
+        """By how much the reported tilt may be wrong: 0 if no hit is being corrected, or the correction cannot have
+        begun."""
         since_us = self.invalid_since_boot_us
-        return since_us is None or (not self._is_again and time_us - since_us < UNCORRECTED_US)
+        is_right = since_us is None or (not self._is_again and time_us - since_us < UNCORRECTED_US)
+        return 0.0 if is_right else TILT_RAD_PER_M_S * (1.0 + self._speed_m_s)
 
-    def invalidate(self, time_us: int) -> None:
-        """A new hit: the velocity is not valid until the hit is known to be measured whole."""
+    def invalidate(self, time_us: int, speed_m_s: float) -> None:
+        """A new hit, at this speed: the velocity is not valid until the hit is known to be measured whole."""
         self._is_again, self.invalid_since_boot_us = not self.is_valid, time_us
+        self._speed_m_s = max(speed_m_s, self._speed_m_s) if self._is_again else speed_m_s
 
     def assess(self, is_fully_measured: bool, time_us: int) -> None:
         """Take whether the latest hit was measured whole, as known by now."""

@@ -79,7 +79,7 @@ def test_a_vehicle_that_slides_along_a_wall_is_not_sent_along_it_by_the_second_h
             estimator.update(Odometry(t_us, (0.0, 0.0, 0.0), (0.0, -1.5, 0.0), 0))
             estimator.update(LocalPosition(t_us, (0.0, 0.0, 0.0), (0.0, -1.5, 0.0)))
     if is_second:
-        estimator.validity.invalidate(CONTACT_US - 300_000)
+        estimator.validity.invalidate(CONTACT_US - 300_000, 2.0)
     # When something pushes it south
     estimate = estimator.begin(Impact(CONTACT_US, CONTACT_US - 4_000, (-20.0, 0.0, 0.0)))
     # Then the way that it came from says where off is in a first hit alone

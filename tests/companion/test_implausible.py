@@ -309,6 +309,6 @@ def test_an_attitude_after_a_silence_makes_no_lean_of_what_the_rates_were_in_one
         turning_rad_s = 5.0 if at_ms > 490 else 0.0
         strapdown.imu(at_ms * 1000, (0.0, 0.0, -9.8), (0.0, turning_rad_s, 0.0))
     # When it tells one again, which is not to be believed
-    strapdown.attitude(500_000, (1.0, 0.0, 0.0, 0.0), is_valid=False)
+    strapdown.attitude(500_000, (1.0, 0.0, 0.0, 0.0), most_wrong_rad=0.4)
     # Then the lean is that of the moment, not of half a second of such rates
     assert math.hypot(*strapdown.level_acceleration_m_s2) < 9.80665 * math.tan(5.0 * 0.015)

@@ -441,7 +441,7 @@ def test_a_lean_is_meant_for_the_tilt_that_the_gyroscopes_show():
     strapdown = source.strapdown
     strapdown.attitude(HIT_US + 140_000, LEVEL)
     strapdown.imu(HIT_US + 150_000, (0.0, 0.0, -9.80665), ZERO)
-    strapdown.attitude(HIT_US + 160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), is_valid=False)
+    strapdown.attitude(HIT_US + 160_000, (math.cos(0.5 * up_rad), 0.0, math.sin(0.5 * up_rad), 0.0), most_wrong_rad=0.4)
     _, record, recover = recovering()
     # When the recovery asks for a lean
     record.follow(DetectorState(), source)
@@ -458,10 +458,10 @@ def test_gyroscopes_that_deny_more_tilt_than_a_hit_can_hide_are_wrong_themselves
     for since_us in range(4_000, 1_500_001, 4_000):
         strapdown.imu(HIT_US + since_us, (0.0, 0.0, -9.80665), (0.0, 0.5, 0.0))
         if since_us % 20_000 == 0:
-            strapdown.attitude(HIT_US + since_us, LEVEL, is_valid=False)
+            strapdown.attitude(HIT_US + since_us, LEVEL, most_wrong_rad=0.4)
         leans_m_s2.append(math.hypot(*strapdown.level_acceleration_m_s2))
-    # Then the lean is never corrected by more than 22 degrees, and the vehicle's own attitude counts again
-    assert max(leans_m_s2) < 9.80665 * math.tan(math.radians(22.5))
+    # Then the lean is never corrected by more than the hit can have spoilt it, and the reported attitude counts again
+    assert max(leans_m_s2) < 9.80665 * math.tan(0.41)
     assert 0.0 in leans_m_s2[140:], "told anew, not held"
 
 
