@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple, Protocol, TypeVar
 
 from companion.messages import LandedState, MessageId, Sample, Vector3
 from companion.motion.strapdown import Strapdown
+from companion.reflex.validity import VelocityValidity
 
 
 class Phase(Enum):
@@ -57,7 +58,7 @@ class Situation(NamedTuple):
     height_m: float | None = None
     descent_commanded: bool = False
     setpoint_position_ned_m: Vector3 | None = None
-    estimate_valid: bool = True
+    validity: VelocityValidity | None = None
     strapdown: Strapdown | None = None
 
     @property
@@ -106,6 +107,9 @@ class DetectorState:
     last_loud_boot_us: int = 0
     peak_specific_force_m_s2: float = 0.0
     threshold_m_s2: float = 0.0
+
+    def reject(self) -> None:
+        """Take that the newest impact was none."""
 
     def describe(self) -> str:
         if self.phase is Phase.OFF:

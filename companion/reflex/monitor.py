@@ -85,6 +85,7 @@ class CollisionMonitor:
     def reject(self) -> None:
         """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
         self.estimator.validity.assess(True, self.estimator.strapdown.time_boot_us)
+        self.state.reject()
 
     def describe(self) -> str:
         """For the live line."""
@@ -114,7 +115,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
     imu_samples = 0
-    situation = situation._replace(strapdown=monitor.estimator.strapdown)
+    situation = situation._replace(strapdown=monitor.estimator.strapdown, validity=monitor.estimator.validity)
     for sample in samples:
         if type(sample) is ImuSample:
             if not monitor.gate.imu(sample):
@@ -136,8 +137,7 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
         monitor.estimator.update(sample)
         if monitor.is_attitude_old:
             monitor.estimator.strapdown.fixes.clear()
-        known = situation if monitor.estimator.validity.is_valid else situation._replace(estimate_valid=False)
-        monitor.state, impact = monitor.detector.step(monitor.state, sample, known)
+        monitor.state, impact = monitor.detector.step(monitor.state, sample, situation)
         if impact is not None:
             impacts.append(monitor.estimator.begin(impact))
         elif type(sample) is ImuSample:

@@ -13,10 +13,8 @@ innovations (Magill 1965). Before the first report v is the expected rebound, wi
 
 import math
 from dataclasses import dataclass, field, replace
-from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
 from companion.messages import LocalPosition, Vector3
 from companion.motion.config import DELAY_S, GRAVITY_M_S2, LATEST_S, LONGEST_GAP_US, SAME_M_S, STAMP_RESOLUTION_US
@@ -24,30 +22,10 @@ from companion.motion.rotation import body_to_ned, turned
 from companion.motion.strapdown import Strapdown
 from companion.reflex import config as reflex
 from companion.reflex.config import EstimateConfig
+from companion.reflex.correction import MODELS, Floats, error_response
 from companion.reflex.halfspace import limited, plus, split
 from companion.reflex.laws import Contact
 from companion.reflex.planner import REST, MotionState
-
-Floats = npt.NDArray[np.float64]
-
-# Hypotheses of the estimator's correction: delay in s, frequency in rad/s, damping. The last: nothing is missing.
-_SOME = np.array([*product(reflex.CORRECTION_DELAY_S, reflex.CORRECTION_RAD_S, reflex.CORRECTION_DAMPING)])
-_LATE_S, _RAD_S, _DAMPING = np.append(_SOME, _SOME[-1:], axis=0).T
-_SWING, _SLOW, _ONE, _ZERO = 2.0 * _DAMPING * _RAD_S, reflex.TILT_PER_S, np.ones_like(_RAD_S), np.zeros_like(_RAD_S)
-# The errors p of the position, u of the velocity and a of the tilt: p' = u - k p, u' = a - h p, a' = -m p, from
-# p = delay, u = 1, a = 0. The poles are a swing of frequency f and damping d, and a slow decay c:
-# s^3 + k s^2 + h s + m = (s^2 + 2 d f s + f^2) (s + c).
-_K, _H, _M = _SWING + _SLOW, _RAD_S**2 + _SWING * _SLOW, _RAD_S**2 * _SLOW
-_RATES = np.array([[-_K, _ONE, _ZERO], [-_H, _ZERO, _ONE], [-_M, _ZERO, _ZERO]])
-_POLES, _SHAPES = np.linalg.eig(np.moveaxis(_RATES, 2, 0))
-_MODES = _SHAPES * np.linalg.solve(_SHAPES, np.array([_LATE_S, _ONE, _ZERO]).T[..., None]).swapaxes(1, 2)
-
-
-def error_response(since_s: float) -> tuple[Floats, Floats, Floats]:
-    """g, G in seconds, and the swing's remaining amplitude, of each model at a time after the hit."""
-    x = np.maximum(since_s - _LATE_S, 0.0)
-    way_s, g, _ = np.einsum("wim,wm->iw", _MODES, np.exp(_POLES * x[:, None])).real
-    return g, way_s - np.maximum(_LATE_S - since_s, 0.0), np.exp(-0.5 * _SWING * x)
 
 
 class FilterBank:
@@ -60,7 +38,7 @@ class FilterBank:
 
     def __init__(self, start: MotionState, spread_m_s: float, error_m_s: Vector3) -> None:
         """`spread_m_s` is the standard deviation of the velocity at the start, `error_m_s` the first estimate of e."""
-        models, state = len(_POLES), np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
+        models, state = MODELS, np.stack([start.position_ned_m, start.velocity_ned_m_s, error_m_s], axis=1)
         spreads = (reflex.PLACE_SPREAD_M, spread_m_s, math.hypot(*error_m_s) + spread_m_s)
         self.state = np.tile(state, (models, 1, 1))
         self.covariance = np.tile(np.diag(np.square(spreads)), (models, 1, 1))

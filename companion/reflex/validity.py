@@ -8,10 +8,15 @@ The detector uses this validity: it must not take that swing for a second hit. A
 knows the normal and the expected rebound: it uses `reflex.motion_estimator`.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from companion.motion.config import TILT_RAD_PER_M_S
-from companion.reflex.config import CORRECTED_US, UNCORRECTED_US
+from companion.reflex.config import APPROACH_M_S, CORRECTED_US, UNCORRECTED_US
+from companion.reflex.correction import error_response
 
 
 @dataclass(slots=True)
@@ -35,6 +40,17 @@ class VelocityValidity:
         since_us = self.invalid_since_boot_us
         is_right = since_us is None or (not self._is_again and time_us - since_us < UNCORRECTED_US)
         return 0.0 if is_right else TILT_RAD_PER_M_S * (1.0 + self._speed_m_s)
+
+    def correction_m_s(self, times_us: Sequence[int]) -> float:
+        """By how much the newest of these velocities may differ from the mean of the others, because a hit is being
+        corrected: an elastic one that was hidden whole, by the worst model of an estimator. What struck a vehicle that
+        stood still may have done so at any speed."""
+        if self.invalid_since_boot_us is None:
+            return 0.0
+        if self._speed_m_s < APPROACH_M_S:
+            return math.inf
+        *before, newest = (error_response(1e-6 * (each - self.invalid_since_boot_us))[0] for each in times_us)
+        return 2.0 * self._speed_m_s * float(np.abs(newest - sum(before) / len(before)).max())
 
     def invalidate(self, time_us: int, speed_m_s: float) -> None:
         """A new hit, at this speed: the velocity is not valid until the hit is known to be measured whole."""

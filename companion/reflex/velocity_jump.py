@@ -81,13 +81,14 @@ class VelocityJump:
         late_s = self.delay.delay_s(self.variance_m2_s2)
         return (step[0] + late_s * change[0], step[1] + late_s * change[1], step[2] + late_s * change[2])
 
-    def learn(self, step: Vector3) -> None:
-        """Learn delay and standard deviation from the newest step.
+    def compared(self, fixes: Sequence[VelocityFix]) -> Sequence[VelocityFix]:
+        """The velocities that make the newest step, the newest last."""
+        return [fixes[place] for place in range(-COMPARED - 1, 0)]
 
-        Hits are learnt, too: an estimate that jumps repeatedly gets a larger standard deviation. It rises fast and
-        falls slowly (see `force_noise`).
+    def learn(self, step: Vector3) -> None:
+        """Learn the standard deviation from a step that was no hit. It rises fast and falls slowly (see `force_noise`):
+        an estimate that jumps repeatedly gets a larger one.
         """
-        self.delay.learn(*self.newest)
         square = (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / 3.0
         self.known = min(self.known + 1, MEMORY)
         change = square - self.variance_m2_s2
