@@ -108,9 +108,6 @@ class DetectorState:
     peak_specific_force_m_s2: float = 0.0
     threshold_m_s2: float = 0.0
 
-    def reject(self) -> None:
-        """Take that the newest impact was none."""
-
     def describe(self) -> str:
         if self.phase is Phase.OFF:
             return f"off ({self.off_reason})"

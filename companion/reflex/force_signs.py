@@ -29,8 +29,6 @@ class FusedState(DetectorState):
     floor: ForceNoise = field(default_factory=ForceNoise)
     thrust: ThrustGain = field(default_factory=ThrustGain)
     jump: VelocityJump = field(default_factory=lambda: VelocityJump(0))
-    jump_m_s: Vector3 = ZERO
-    """The velocity jump that the newest hit is; zero for one that a force shows."""
     velocity_ned_m_s: Vector3 | None = None
     hovered_boot_us: int | None = None
     contact_began_boot_us: int = 0
@@ -42,9 +40,6 @@ class FusedState(DetectorState):
     before_frd_m_s2: Vector3 = ZERO
     """Of the sample before the last."""
     before_boot_us: int = 0
-
-    def reject(self) -> None:
-        self.jump.learn(self.jump_m_s)
 
     def side_threshold_m_s2(self, config: FusedConfig, rates_frd_rad_s: Vector3) -> float:
         """Horizontal threshold, m/s^2. On a turning vehicle drag changes direction faster than its mean follows."""

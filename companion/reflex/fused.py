@@ -21,11 +21,13 @@ from typing import ClassVar
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, MessageId, Odometry, Sample, Vector3
 from companion.motion.config import LONGEST_DELAY_US, LONGEST_GAP_US, SHOWN_US
 from companion.motion.rotation import body_to_ned, ned_to_body
-from companion.motion.strapdown import LEVEL, ZERO
+from companion.motion.strapdown import LEVEL
 from companion.reflex.classify import hovers, kind_of
 from companion.reflex.config import LEARNT_S, SETTLED_US, WORSE_AFTER_US, FusedConfig
 from companion.reflex.detector import ON_THE_GROUND, Evidence, Impact, ImpactKind, Phase, Situation
 from companion.reflex.force_signs import FusedState
+from companion.reflex.halfspace import limited
+from companion.reflex.validity import VelocityValidity
 from companion.reflex.velocity_jump import VelocityJump
 
 
@@ -129,7 +131,6 @@ class FusedDetector:
         s.phase, s.off_reason = Phase.CONTACT, ""
         s.last_loud_boot_us = s.contact_began_boot_us = impact.sample_time_boot_us
         s.peak_specific_force_m_s2 = math.hypot(*force)
-        s.jump_m_s = s.jump_m_s if impact.evidence is Evidence.VELOCITY_JUMP else ZERO
         s.observed, s.is_hand = None, impact.kind is ImpactKind.CONTACT
         return impact
 
@@ -150,19 +151,15 @@ class FusedDetector:
             return None
         shaking_m_s2 = (s.threshold_m_s2 - config.side_threshold_m_s2) / config.noise_factor
         change_m_s2 = abs(s.last_frd_m_s2[2] - s.floor.mean_frd_m_s2[2])
-        # ODOMETRY alone counts the estimator's resets.
-        caution = 1.0 if type(sample) is Odometry else 2.0
+        validity = situation.validity or VelocityValidity()
+        # ODOMETRY alone counts the estimator's resets. An estimator that corrects a hit may jump.
+        caution = 1.0 if type(sample) is Odometry and validity.is_valid else 2.0
         size, least = math.hypot(*step), jump.least_m_s(config, time_us, caution, shaking_m_s2, change_m_s2)
-        validity = situation.validity
-        is_corrected = validity is not None and not validity.is_valid
-        if validity is not None and is_corrected:
-            least += validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
-        if s.phase is not Phase.ARMED or size < least:
-            if not is_corrected:
-                jump.delay.learn(*jump.newest)
-                jump.learn(step)
+        is_jump = size > least + validity.correction_m_s([fix.time_boot_us for fix in jump.compared(strapdown.fixes)])
+        if is_jump or validity.is_valid:
+            jump.learn(limited(step, least))
+        if s.phase is not Phase.ARMED or not is_jump:
             return None
-        s.jump_m_s = step
         jump.since_us = time_us
         now_us = max(time_us, s.last_sample_boot_us)
         free_until_us = strapdown.fixes[-2].time_boot_us - LONGEST_DELAY_US

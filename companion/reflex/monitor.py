@@ -85,7 +85,6 @@ class CollisionMonitor:
     def reject(self) -> None:
         """Take that the newest impact was none: it hides nothing of the vehicle's velocity."""
         self.estimator.validity.assess(True, self.estimator.strapdown.time_boot_us)
-        self.state.reject()
 
     def describe(self) -> str:
         """For the live line."""

@@ -86,9 +86,12 @@ class VelocityJump:
         return [fixes[place] for place in range(-COMPARED - 1, 0)]
 
     def learn(self, step: Vector3) -> None:
-        """Learn the standard deviation from a step that was no hit. It rises fast and falls slowly (see `force_noise`):
-        an estimate that jumps repeatedly gets a larger one.
+        """Learn delay and standard deviation from the newest step, limited to what is no hit.
+
+        An estimate that jumps repeatedly gets a larger standard deviation. It rises fast and falls slowly (see
+        `force_noise`).
         """
+        self.delay.learn(*self.newest)
         square = (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]) / 3.0
         self.known = min(self.known + 1, MEMORY)
         change = square - self.variance_m2_s2
