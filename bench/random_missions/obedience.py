@@ -27,6 +27,9 @@ class _Course:
     due: str | None = None
     """What the latest hit's policy says follows the recovery, or the mission of a goal out of reach."""
     held: bool = False
+    was_due: str | None = None
+    was_held: bool = False
+    """Both before the latest hit."""
     complaints: list[str] = field(default_factory=list)
 
     def policy(self) -> tuple[OnCollision, int]:
@@ -37,6 +40,8 @@ class _Course:
         match event.kind:
             case "detection":
                 self._hit()
+            case "unconfirmed":
+                self._take_back()
             case "unreachable":
                 # Home has no item to go on with: the vehicle lands where it is.
                 is_home = "then" not in event.data
@@ -58,7 +63,16 @@ class _Course:
                 self._expect(self.due == "land" or (self.due is None and is_item), "landed")
                 self.due, self.is_landing = None, True
 
+    def _take_back(self) -> None:
+        """A detection that nothing confirms is no hit: the flight goes on where it was."""
+        self.hits -= 1
+        self.hits_of_step -= 1
+        self.held = self.was_held
+        on_way = "return" if self.going_home else "continue" if self.index == 0 else "retry"
+        self.due = "land" if self.is_landing else self.was_due or ("hold" if self.held else on_way)
+
     def _hit(self) -> None:
+        self.was_due, self.was_held = self.due, self.held
         self.hits += 1
         self.hits_of_step += 1
         self.held = False

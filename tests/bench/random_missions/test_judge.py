@@ -146,6 +146,28 @@ def test_after_a_hit_on_the_way_down_there_is_nothing_but_the_landing(policy):
     assert disobediences(flight([*begun, *hit_there, event(12, "return"), event(13, "landing"), done], **settings))
 
 
+@pytest.mark.parametrize("policy", [{"then": "land", "max_hits": 1, "after_max_hits": "return"}, DETOUR])
+def test_after_a_detection_that_nothing_confirms_the_flight_goes_on_where_it_was(policy):
+    up, there = [event(5, "armed"), event(8, "item", step=1)], [event(12, "item", step=2), event(12.1, "landing")]
+    taken_back, done = [event(10.004, "detection"), event(10.15, "unconfirmed")], event(DONE_S, "done")
+    on_way_down = [event(12.5, "detection"), event(12.65, "unconfirmed"), event(12.65, "landing")]
+    again = event(10.15, "item", step=1)
+    assert disobediences(flight([*up, *taken_back, again, *there, *on_way_down, done], on_collision=policy)) == []
+    assert disobediences(flight([*up, *taken_back, event(10.15, "item", step=2), *there, done], on_collision=policy))
+    # What was taken back does not count among the hits
+    hit_then = [event(11.0, "detection"), event(11.9, "recovered"), event(11.9, "landing"), done]
+    two = {"on_collision": {"then": "land", "max_hits": 2, "after_max_hits": "return"}}
+    assert disobediences(flight([*up, *taken_back, again, *hit_then], **two)) == []
+    # The take-off is over with it
+    early = [event(5, "armed"), event(6, "detection"), event(6.15, "unconfirmed"), event(6.15, "item", step=1)]
+    assert disobediences(flight([*early, *there, done], on_collision=policy)) == []
+    # Home goes on home
+    home = [event(9, "detection"), event(9.9, "recovered"), event(9.9, "return")]
+    away = [event(10.15, "return"), event(12.1, "landing"), done]
+    returns = {"on_collision": {"then": "return", "max_hits": 9}}
+    assert disobediences(flight([*up, *home, *taken_back, *away], **returns)) == []
+
+
 def test_an_item_left_out_is_a_failure():
     left_out = [event(5, "armed"), event(8, "item", step=2), event(8, "landing"), event(DONE_S, "done")]
     assert "not as the mission says" in causes(flight(left_out))
