@@ -117,7 +117,7 @@ SMOOTHING_S = 0.2
 # What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
 # 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
-HELD_M_S2 = 1.5
+HELD_M_S2 = 2.0
 
 # --- confirmation of a hit
 # A velocity change of this size from any direction is a hit: twice what an estimate shows of a hit that it missed.

@@ -18,7 +18,7 @@ from companion.reflex.config import FOLLOWED_S, HELD_M_S2, IMPULSE_RAD, LEAD_S, 
 from companion.reflex.detector import Impact, ImpactKind
 from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.impact import ImpactEstimate
-from companion.reflex.normal import Normal
+from companion.reflex.normal import Normal, unit
 from companion.reflex.thrust import ThrustGain
 
 
@@ -35,14 +35,15 @@ class SustainedForceMonitor:
     velocity_m_s: Vector3 = ZERO
     thrust_ned_m_s2: Vector3 = ZERO
     missing_m_s2: Vector3 = ZERO
-    steady_since_us: int | None = None
-    steady_m_s: Vector3 = ZERO
-    """Velocity at the start of the steady motion away from the setpoint."""
     wind_m_s2: Vector3 = ZERO
-    """Missing acceleration at that start: it balances drag and wind."""
+    """Mean of the missing acceleration: it balances drag and wind."""
+    pushed_since_us: int = 0
+    """Time since which half of a sustained force has been missing, towards the setpoint, and nothing moves there."""
+    along_m_s: float = 0.0
+    """Speed towards the force at that time."""
 
     def forget(self) -> None:
-        self.steady_since_us, self.time_us = None, 0
+        self.time_us = 0
 
     def add_imu(self, specific_force_frd_m_s2: Vector3) -> None:
         """Take one sample of the accelerometer; the mean of those between two positions counts."""
@@ -56,27 +57,31 @@ class SustainedForceMonitor:
 
         What is in the way, as an impact of a vehicle that hardly moves: its force is what it takes of the acceleration.
         """
-        now_us, elapsed_s = sample.time_boot_us, self._smooth(sample, attitude_wxyz)
+        is_first, now_us, elapsed_s = self.time_us == 0, sample.time_boot_us, self._smooth(sample, attitude_wxyz)
         short = ZERO if goal_ned_m is None else plus(goal_ned_m, -1.0, sample.position_ned_m)
-        error_m, since_us = math.hypot(*short), self.steady_since_us
+        is_there = math.hypot(*short) < PLACE_SPREAD_M
         if goal_ned_m is None:
             self.gain.known_s = 0.0
-        elif error_m < PLACE_SPREAD_M or not self.gain.is_known:
+        elif is_there or not self.gain.is_known:
             self.gain.learn(now_us, self.measured_m_s2, elapsed_s)
-        is_new = since_us is None or math.dist(self.velocity_m_s, self.steady_m_s) > STEADY_M_S
-        if since_us is None or is_new or error_m < PLACE_SPREAD_M:
-            share, self.steady_since_us = 1.0 if is_new else elapsed_s / (FOLLOWED_S + elapsed_s), now_us
-            self.steady_m_s = plus(self.steady_m_s, share, plus(self.velocity_m_s, -1.0, self.steady_m_s))
-            self.wind_m_s2 = plus(self.wind_m_s2, share, plus(self.missing_m_s2, -1.0, self.wind_m_s2))
-            return None
-        towards, grown = plus(ZERO, 1.0 / error_m, short), plus(self.missing_m_s2, -1.0, self.wind_m_s2)
+        if is_first:
+            self.wind_m_s2 = self.missing_m_s2
+        grown = plus(self.missing_m_s2, -1.0, self.wind_m_s2)
+        towards = unit(grown)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
+        # What moves with the thrust is free; a gust moves it against the thrust. What a wall holds slides along it.
+        along_m_s = split(self.velocity_m_s, towards)[0]
+        is_free = abs(along_m_s) > max(STEADY_M_S, 0.5 * math.hypot(*self.velocity_m_s))
+        if is_there or is_free:
+            self.wind_m_s2 = plus(self.wind_m_s2, elapsed_s / (FOLLOWED_S + elapsed_s), grown)
+        is_pushed = force_m_s2 > 0.5 * HELD_M_S2 and split(short, towards)[0] > 0.0
+        if is_free or not is_pushed or abs(along_m_s - self.along_m_s) > STEADY_M_S:
+            self.pushed_since_us, self.along_m_s = now_us, along_m_s
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
-        is_early = now_us - since_us < 2.0 * 1e6 * LEAD_S
-        if force_m_s2 < HELD_M_S2 or split(self.velocity_m_s, towards)[0] > STEADY_M_S or is_early:
+        since_us = self.pushed_since_us
+        if force_m_s2 < HELD_M_S2 or now_us - since_us < 2.0 * 1e6 * LEAD_S:
             return None
-        # What it was in free air stays known.
-        self.steady_since_us, self.steady_m_s = now_us, self.velocity_m_s
+        self.pushed_since_us = now_us
         normal = away_from(plus(ZERO, -1.0, grown))
         force = ned_to_body(attitude_wxyz, plus(ZERO, force_m_s2, normal))
         return ImpactEstimate(

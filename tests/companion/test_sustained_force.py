@@ -92,7 +92,7 @@ def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new
     monitor, found = SustainedForceMonitor(), []
     for step in range(200):
         t = step * EVERY_S
-        lean = min(0.8 * max(0.0, t - 0.6), 1.8) if not found else max(0.0, 1.8 - 2.0 * (t - found[0]))
+        lean = min(0.8 * max(0.0, t - 0.6), 2.4) if not found else max(0.0, 2.4 - 2.0 * (t - found[0]))
         sample = LocalPosition(1_000_000 + round(t * 1e6), (0.0, 0.0, -1.5), (0.0, 0.0, 0.0))
         monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, lean)))
         goal = (-0.35 if found else 1.0, 0.0, -1.5)
