@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from companion.flight.context import FlightContext
 from companion.messages import AttitudeTarget, ImuSample, LocalPosition, Sample
 from companion.motion.config import KEPT_US
+from companion.motion.strapdown import Strapdown
 from companion.reflex import monitor
 from companion.reflex.detector import Situation
 from companion.reflex.impact import ImpactEstimate
@@ -30,15 +31,16 @@ def collisions(
             text = f"{kind}: {force_m_s2:.1f} m/s^2, no collision"
             flight.report(now_us, "contact", text, touched=kind, specific_force_m_s2=force_m_s2)
     found = [estimate for estimate in result.impacts if estimate.impact.is_collision]
-    held = None if found else _sustained_force(flight, samples, situation, now_us)
+    strapdown = collision_monitor.estimator.strapdown
+    held = None if found else _sustained_force(flight, samples, situation, strapdown, now_us)
     return found if held is None else [held]
 
 
 def _sustained_force(
-    flight: FlightContext, samples: Sequence[Sample], situation: Situation, now_us: int
+    flight: FlightContext, samples: Sequence[Sample], situation: Situation, strapdown: Strapdown, now_us: int
 ) -> ImpactEstimate | None:
     """A sustained external force that no detector shows: only while the vehicle flies to a position."""
-    target, attitude, force = flight.target, flight.vehicle.attitude, flight.sustained_force
+    target, force = flight.target, flight.sustained_force
     flown_to = situation.setpoint_position_ned_m
     if not flight.has_position:
         force.forget()  # half a second without a position is no tilt that lasted half a second
@@ -50,13 +52,13 @@ def _sustained_force(
             force.add_imu(sample.specific_force_frd_m_s2)
         elif type(sample) is AttitudeTarget:
             force.gain.set_fraction(sample.time_boot_us, sample.thrust_fraction)
-        elif isinstance(sample, LocalPosition) and attitude is not None:
+        elif isinstance(sample, LocalPosition) and flight.vehicle.attitude is not None:
             late_us = force.time_us - sample.time_boot_us
             if late_us >= KEPT_US:
                 force.forget()
             elif late_us >= 0:
                 continue
-            held = force.step(sample, attitude.attitude_wxyz, flown_to)
+            held = force.step(sample, strapdown.valid_wxyz, flown_to)
             if held is not None:
                 _report_sustained_force(flight, held, now_us)
                 return held

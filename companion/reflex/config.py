@@ -107,15 +107,15 @@ UNCORRECTED_US = 140_000
 CORRECTED_US = 4_500_000
 
 # --- a sustained force
-# While the setpoint is reached, drag and wind are learnt: the mean of so long.
+# Drag and wind are learnt at the setpoint and in free motion: the mean of so long.
 FOLLOWED_S = 1.0
-# Four times a good estimate's noise. The motion is not steady where the velocity has changed by more. A vehicle that
-# approaches its setpoint faster is not held back. With 0.15 a slow gust counted as steady.
+# Four times a good estimate's noise. A vehicle that moves faster along the force, or whose speed there has changed by
+# more, moves freely. With 0.15 a slow gust counted as steady.
 STEADY_M_S = 0.12
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
-# What an external force takes of the acceleration, besides what drag and wind took before: 9 degrees of tilt. A gust of
-# 5 m/s takes 1.1 m/s^2 of the paper's vehicle, and moves it. Arms that press on a wall carry a vehicle that leans by 15
+# What an external force takes of the acceleration, besides what drag and wind took before: 12 degrees of tilt. A gust
+# of 5 m/s takes 1.5 m/s^2 of a light vehicle with much drag. Arms that press on a wall carry a vehicle that leans by 15
 # degrees; from 22 on it is tipped over.
 HELD_M_S2 = 2.0
 

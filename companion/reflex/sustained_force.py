@@ -1,8 +1,9 @@
-"""A sustained external force: thrust towards the setpoint, more and more, does not bring the vehicle there.
+"""A sustained external force: more and more thrust does not move the vehicle in the thrust's direction.
 
 A vehicle that meets an obstacle slowly shows no hit. Its loops tilt it and raise its thrust by the position error and
-by its integral, until it slips off or its own thrust pins it. A wall met at 0.2 m/s had it on the ground three
-seconds later. In free air thrust is an acceleration, except for drag and wind. The missing one is the external force.
+by its integral, until it slips off or its own thrust tips it over. A wall met at 0.2 m/s had it on the ground three
+seconds later, whether it stood there or slid along. In free air thrust is an acceleration, except for drag and wind.
+The missing one is the external force, when nothing moves along it: a gust moves the vehicle against the thrust first.
 The thrust is the commanded one (ATTITUDE_TARGET): a ceiling cancels what the accelerometer would show of it. Without
 that message the thrust is what the accelerometer shows along body z.
 """
@@ -36,11 +37,11 @@ class SustainedForceMonitor:
     thrust_ned_m_s2: Vector3 = ZERO
     missing_m_s2: Vector3 = ZERO
     wind_m_s2: Vector3 = ZERO
-    """Mean of the missing acceleration: it balances drag and wind."""
+    """Mean of the missing acceleration at the setpoint and in free motion: it balances drag and wind."""
     pushed_since_us: int = 0
-    """Time since which half of a sustained force has been missing, towards the setpoint, and nothing moves there."""
+    """Time since which half of a sustained force has been missing."""
     along_m_s: float = 0.0
-    """Speed towards the force at that time."""
+    """Speed along that force, at that time."""
 
     def forget(self) -> None:
         self.time_us = 0
@@ -69,9 +70,9 @@ class SustainedForceMonitor:
         grown = plus(self.missing_m_s2, -1.0, self.wind_m_s2)
         towards = unit(grown)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
-        # What moves with the thrust is free; a gust moves it against the thrust. What a wall holds slides along it.
-        along_m_s = split(self.velocity_m_s, towards)[0]
-        is_free = abs(along_m_s) > max(STEADY_M_S, 0.5 * math.hypot(*self.velocity_m_s))
+        # A vehicle that slides along a surface moves a little along the force, too: friction turns it.
+        along_m_s, speed_m_s = split(self.velocity_m_s, towards)[0], math.hypot(*self.velocity_m_s)
+        is_free = abs(along_m_s) > min(max(STEADY_M_S, 0.5 * speed_m_s), 2.0 * STEADY_M_S)
         if is_there or is_free:
             self.wind_m_s2 = plus(self.wind_m_s2, elapsed_s / (FOLLOWED_S + elapsed_s), grown)
         is_pushed = force_m_s2 > 0.5 * HELD_M_S2 and split(short, towards)[0] > 0.0

@@ -87,6 +87,35 @@ def test_a_vehicle_that_comes_nearer_is_not_kept_off():
     assert watched(4.0, lambda t: 0.2 * t, lambda t: 0.2, lambda t: 0.8 * t) is None
 
 
+def slid(seconds, velocity_m_s, tilt_m_s2):
+    """The first time at which something is in the way of a vehicle that leans north; its goal stays ahead of it."""
+    monitor, north_m, east_m = SustainedForceMonitor(), 0.0, 0.0
+    for step in range(round(seconds / EVERY_S)):
+        t = step * EVERY_S
+        n, e = velocity_m_s(t)
+        north_m, east_m = north_m + n * EVERY_S, east_m + e * EVERY_S
+        sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m, east_m, -1.5), (n, e, 0.0))
+        monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
+        if monitor.step(sample, leaning_north(tilt_m_s2(t)), (0.3, east_m + 0.3, -1.5)) is not None:
+            return t
+    return None
+
+
+def test_a_vehicle_that_slides_along_a_wall_and_leans_on_it_more_and_more_is_kept_off():
+    """Given a wall to the north, when the vehicle slides east at 0.4 to 0.7 m/s, it is told as where it stands."""
+    found_s = slid(5.0, lambda t: (0.05, 0.4 + 0.1 * t), lambda t: 1.2 * max(0.0, t - 1.0))
+    assert 1.2 * (found_s - 1.3) == pytest.approx(HELD_M_S2, abs=0.2)
+
+
+def test_a_gust_across_the_way_of_a_fast_vehicle_is_no_wall():
+    """Given 3 m/s east, when a gust of 8 m/s moves it by up to 0.4 m/s before it leans against that with 2.4 m/s^2."""
+
+    def velocity_m_s(t):
+        return (-0.4 * math.sin(math.pi * t / 1.6) if t < 1.6 else 0.0), 3.0
+
+    assert slid(6.0, velocity_m_s, lambda t: min(2.4, 1.6 * t)) is None
+
+
 def test_when_the_way_turns_round_the_lean_on_the_old_side_is_nothing_on_the_new():
     """Given a vehicle found pressing north, when it is sent back south and its lean returns to level."""
     monitor, found = SustainedForceMonitor(), []
@@ -238,7 +267,7 @@ def test_more_and_more_thrust_that_nothing_shows_of_presses_on_what_is_above():
     [
         (lambda t: HOVER + 0.1, lambda t: 0.05 * FULL_M_S2 * t * t, 20.0),
         (pressing, lambda t: 0.15 * t, 2.0),
-        (lambda t: HOVER + 0.2, lambda t: -0.1 * math.sin(math.pi * min(t, 1.0)), 0.2),
+        (lambda t: HOVER + 0.15, lambda t: -0.1 * math.sin(math.pi * min(t, 1.0)), 0.2),
         (pressing, lambda t: 0.15, 0.2),
     ],
     ids=["thrust that is there", "rises, if weakly", "let down by a motor, and back", "is where it is to be"],
