@@ -112,6 +112,8 @@ FOLLOWED_S = 1.0
 # Four times a good estimate's noise. A vehicle that moves faster along the force, or whose speed there has changed by
 # more, moves freely. With 0.15 a slow gust counted as steady.
 STEADY_M_S = 0.12
+# Faster along the force is no contact's bounce. Drag and wind are then what is missing now: they change with the speed.
+FREE_M_S = 0.5
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2
 # What an external force takes of the acceleration, besides what drag and wind took before: 12 degrees of tilt. A gust

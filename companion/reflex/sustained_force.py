@@ -15,7 +15,16 @@ from companion.messages import LocalPosition, Quaternion, Vector3
 from companion.motion.config import GRAVITY_M_S2
 from companion.motion.rotation import body_to_ned, ned_to_body
 from companion.motion.strapdown import ZERO
-from companion.reflex.config import FOLLOWED_S, HELD_M_S2, IMPULSE_RAD, LEAD_S, PLACE_SPREAD_M, SMOOTHING_S, STEADY_M_S
+from companion.reflex.config import (
+    FOLLOWED_S,
+    FREE_M_S,
+    HELD_M_S2,
+    IMPULSE_RAD,
+    LEAD_S,
+    PLACE_SPREAD_M,
+    SMOOTHING_S,
+    STEADY_M_S,
+)
 from companion.reflex.detector import Impact, ImpactKind
 from companion.reflex.halfspace import away_from, plus, split
 from companion.reflex.impact import ImpactEstimate
@@ -74,7 +83,8 @@ class SustainedForceMonitor:
         along_m_s, speed_m_s = split(self.velocity_m_s, towards)[0], math.hypot(*self.velocity_m_s)
         is_free = abs(along_m_s) > min(max(STEADY_M_S, 0.5 * speed_m_s), 2.0 * STEADY_M_S)
         if is_there or is_free:
-            self.wind_m_s2 = plus(self.wind_m_s2, elapsed_s / (FOLLOWED_S + elapsed_s), grown)
+            share = 1.0 if abs(along_m_s) > FREE_M_S else elapsed_s / (FOLLOWED_S + elapsed_s)
+            self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
         is_pushed = force_m_s2 > 0.5 * HELD_M_S2 and split(short, towards)[0] > 0.0
         if is_free or not is_pushed or abs(along_m_s - self.along_m_s) > STEADY_M_S:
             self.pushed_since_us, self.along_m_s = now_us, along_m_s
