@@ -109,8 +109,8 @@ CORRECTED_US = 4_500_000
 # --- a sustained force
 # Drag and wind are learnt at the setpoint and in free motion: the mean of so long.
 FOLLOWED_S = 1.0
-# Four times a good estimate's noise. A vehicle that moves faster along the force, or whose speed there has changed by
-# more, moves freely. With 0.15 a slow gust counted as steady.
+# Four times a good estimate's noise. A vehicle that moves faster along the force moves freely. With 0.15 a slow gust
+# counted as a wall.
 STEADY_M_S = 0.12
 # Faster along the force is no contact's bounce. Drag and wind are then what is missing now: they change with the speed.
 FREE_M_S = 0.5

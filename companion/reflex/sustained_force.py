@@ -49,8 +49,6 @@ class SustainedForceMonitor:
     """Mean of the missing acceleration at the setpoint and in free motion: it balances drag and wind."""
     pushed_since_us: int = 0
     """Time since which half of a sustained force has been missing."""
-    along_m_s: float = 0.0
-    """Speed along that force, at that time."""
 
     def forget(self) -> None:
         self.time_us = 0
@@ -85,9 +83,8 @@ class SustainedForceMonitor:
         if is_there or is_free:
             share = 1.0 if abs(along_m_s) > FREE_M_S else elapsed_s / (FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)
-        is_pushed = force_m_s2 > 0.5 * HELD_M_S2 and split(short, towards)[0] > 0.0
-        if is_free or not is_pushed or abs(along_m_s - self.along_m_s) > STEADY_M_S:
-            self.pushed_since_us, self.along_m_s = now_us, along_m_s
+        if is_free or force_m_s2 < 0.5 * HELD_M_S2 or split(short, towards)[0] <= 0.0:
+            self.pushed_since_us = now_us
         # A lean that began just now moves nothing yet, and a motor that fails has not let the vehicle down yet.
         since_us = self.pushed_since_us
         if force_m_s2 < HELD_M_S2 or now_us - since_us < 2.0 * 1e6 * LEAD_S:

@@ -8,6 +8,7 @@ from companion.messages import Attitude, ImuSample, LandedState, LocalPosition, 
 from companion.mission.config import CompanionConfig
 from companion.reflex.detector import Situation
 from companion.reflex.monitor import advance, start_monitor
+from companion.reflex.validity import VelocityValidity
 
 STILL = (0.0, 0.0, 0.0)
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -33,9 +34,17 @@ def test_a_push_across_the_way_gives_way_a_little_to_where_the_vehicle_came_from
 
 
 def after_a_hit(
-    seconds, peak_m_s2, lasts, error_m_s, stop_m_s2=0.0, first_m_s2=0.0, again_m_s2=0.0, other_guard_m_s2=0.0
+    seconds,
+    peak_m_s2,
+    lasts,
+    error_m_s,
+    stop_m_s2=0.0,
+    first_m_s2=0.0,
+    again_m_s2=0.0,
+    other_guard_m_s2=0.0,
+    speed=0.0,
 ):
-    """Hovering still; a push at 2.0 s; from then on velocities that are off by what `error_m_s` of the time says.
+    """Flying north, or still; a push at 2.0 s; then velocities that are off by what `error_m_s` of the time says.
 
     With `stop_m_s2` the push's last sample is that much harder: arms that meet their stop; with `first_m_s2` its first.
     `again_m_s2` is what a touch at 2.12 s shows for 40 ms, `other_guard_m_s2` what one sample shows at 2.04 s.
@@ -43,7 +52,6 @@ def after_a_hit(
     monitor = start_monitor(CompanionConfig(detector="fused"), 0)
     situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
     impacts, told, trusted = [], [], []
-    speed = 0.0
     for t_us in range(4_000, round(seconds * 1e6), 4_000):
         push = -peak_m_s2 if 2_000_000 <= t_us < 2_000_000 + 4_000 * lasts else 0.0
         push -= stop_m_s2 if t_us == 2_000_000 + 4_000 * (lasts - 1) else 0.0
@@ -55,7 +63,8 @@ def after_a_hit(
         if t_us % 32_000 == 0:
             error = error_m_s(t_us * 1e-6 - 2.0) if t_us > 2_000_000 else 0.0
             # A hair's breadth of noise: velocities that stand still to the last digit are no estimate.
-            samples.append(Odometry(t_us, STILL, (speed + error + 1e-3 * (t_us // 32_000 % 2), 0.0, 0.0), 0))
+            velocity = (speed + error + 1e-3 * (t_us // 32_000 % 2), 0.0, 0.0)
+            samples += [Odometry(t_us, STILL, velocity, 0), LocalPosition(t_us, STILL, velocity)]
             samples.append(Attitude(t_us, LEVEL, STILL))
         seen = advance(monitor, samples, situation, t_us)
         impacts += seen.impacts
@@ -79,6 +88,51 @@ def test_an_estimator_that_finds_back_after_a_clipped_hit_is_no_second_hit():
     ]
     assert told[1][0] == pytest.approx(6_500_000, abs=50_000)
     assert trusted[-1]
+
+
+def test_nor_is_it_one_where_the_vehicle_flew_into_what_it_hit():
+    impacts, _, _ = after_a_hit(7.0, 120.0, 3, swing, speed=2.0)
+    assert len(impacts) == 1
+
+
+@pytest.mark.parametrize(("jump_m_s", "later_s", "hits"), [(1.0, 1.5, 2), (0.3, 3.0, 2), (0.3, 0.6, 1)])
+def test_a_hit_that_only_the_velocity_shows_is_found_while_another_is_corrected(jump_m_s, later_s, hits):
+    """Given a clipped hit at 2 m/s, a contact between the samples is one where no correction makes such a jump."""
+    impacts, _, _ = after_a_hit(7.0, 120.0, 3, lambda s: swing(s) + jump_m_s * (s >= later_s), speed=2.0)
+    assert len(impacts) == hits
+
+
+def test_a_hit_does_not_hide_the_next_one_as_noise():
+    """Given a steady flight, when contacts between the samples jump by 1.5 m/s, and by 0.5 m/s six seconds later."""
+    monitor = start_monitor(CompanionConfig(detector="fused"), 0)
+    situation = Situation(armed=True, landed_state=LandedState.IN_AIR, height_m=3.0)
+    found_us = []
+    for t_us in range(4_000, 10_000_000, 4_000):
+        speed = 2.0 - 1.5 * (t_us >= 3_000_000) + 0.5 * (t_us >= 9_000_000)
+        samples: list[Sample] = [ImuSample(t_us, (0.0, 0.0, -9.80665), STILL)]
+        if t_us % 32_000 == 0:
+            samples.append(Odometry(t_us, STILL, (speed + 1e-3 * (t_us // 32_000 % 2), 0.0, 0.0), 0))
+            samples.append(Attitude(t_us, LEVEL, STILL))
+        found_us += [t_us for _ in advance(monitor, samples, situation, t_us).impacts]
+    assert found_us == pytest.approx([3_000_000, 9_000_000], abs=40_000)
+
+
+def test_how_far_a_correction_may_jump():
+    """It is nothing without a hit, anything after what struck a vehicle that stood, and fades after any other."""
+    validity = VelocityValidity()
+
+    def correction_m_s(since_us):
+        return validity.correction_m_s([1_000_000 + since_us + 33_000 * k for k in range(-3, 1)])
+
+    assert correction_m_s(0) == 0.0
+    validity.invalidate(1_000_000, 0.2)
+    assert math.isinf(correction_m_s(300_000))
+    validity.assess(True, 1_000_000)
+    validity.invalidate(1_000_000, 2.0)
+    # An elastic hit that was hidden whole, and an estimator of 9 rad/s: half of 4 m/s within the next tenth of a second
+    assert 1.0 < correction_m_s(300_000) < 4.0
+    assert correction_m_s(1_500_000) < 0.25
+    assert correction_m_s(4_000_000) < 0.1
 
 
 def test_arms_that_meet_their_stop_late_in_a_hit_leave_the_velocity_in_doubt_all_the_same():
