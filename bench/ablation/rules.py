@@ -73,9 +73,9 @@ RULES = (
     ),
     Rule(
         "trust",
-        "no velocity jump while an estimate swings",
-        _REFLEX + "validity:VelocityValidity.is_valid",
-        _says(True),
+        "a larger velocity jump while a hit is corrected",
+        _REFLEX + "validity:VelocityValidity.correction_m_s",
+        _says(0.0),
     ),
     Rule("change", "the normal by the change of velocity", _FLIGHT + "collision:with_change", _argument(0)),
     Rule(

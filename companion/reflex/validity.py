@@ -4,8 +4,8 @@ A clipped accelerometer hides a part of the hit from PX4's velocity. PX4's estim
 like another hit. On a real PX4 the velocity was wrong by up to 7.8 m/s. It stayed so for 0.1 s, overshot by a fifth
 after 0.7 s, and the tilt was wrong for seconds.
 
-The detector uses this validity: it must not take that swing for a second hit. A recovery needs a velocity sooner, and
-knows the normal and the expected rebound: it uses `reflex.motion_estimator`.
+The detector uses this validity: it must not take that swing for a second hit. A second hit jumps further than the swing
+of the first one's speed. A recovery knows the normal and the expected rebound, too: it uses `reflex.motion_estimator`.
 """
 
 import math
