@@ -109,10 +109,11 @@ CORRECTED_US = 4_500_000
 # --- a sustained force
 # Drag and wind are learnt at the setpoint and in free motion: the mean of so long.
 FOLLOWED_S = 1.0
-# Four times a good estimate's noise. A vehicle that moves faster along the force moves freely. With 0.15 a slow gust
-# counted as a wall.
+# Four times a good estimate's noise. A vehicle that moves faster with its thrust, or against it, as a gust has it, is
+# free. With 0.15 a slow gust counted as a wall.
 STEADY_M_S = 0.12
-# Faster along the force is no contact's bounce. Drag and wind are then what is missing now: they change with the speed.
+# A vehicle that slides along a surface moves with its thrust, too, but no faster. Above it drag and wind are what is
+# missing now: they change with the speed.
 FREE_M_S = 0.5
 # Thrust and velocity alike: leaves 0.15 m/s^2 of what a good velocity's noise makes of an acceleration.
 SMOOTHING_S = 0.2

@@ -3,7 +3,7 @@
 A vehicle that meets an obstacle slowly shows no hit. Its loops tilt it and raise its thrust by the position error and
 by its integral, until it slips off or its own thrust tips it over. A wall met at 0.2 m/s had it on the ground three
 seconds later, whether it stood there or slid along. In free air thrust is an acceleration, except for drag and wind.
-The missing one is the external force, when nothing moves along it: a gust moves the vehicle against the thrust first.
+The missing one is the external force, unless the vehicle moves: with the thrust, or against it, as a gust has it.
 The thrust is the commanded one (ATTITUDE_TARGET): a ceiling cancels what the accelerometer would show of it. Without
 that message the thrust is what the accelerometer shows along body z.
 """
@@ -77,9 +77,11 @@ class SustainedForceMonitor:
         grown = plus(self.missing_m_s2, -1.0, self.wind_m_s2)
         towards = unit(grown)
         force_m_s2 = min(split(grown, towards)[0], split(self.missing_m_s2, towards)[0])
-        # A vehicle that slides along a surface moves a little along the force, too: friction turns it.
-        along_m_s, speed_m_s = split(self.velocity_m_s, towards)[0], math.hypot(*self.velocity_m_s)
-        is_free = abs(along_m_s) > min(max(STEADY_M_S, 0.5 * speed_m_s), 2.0 * STEADY_M_S)
+        # Friction turns the force of a surface that the vehicle slides along, by 60 degrees with a wind, and brakes it.
+        along_m_s, across = split(self.velocity_m_s, towards)
+        across_m_s = math.hypot(*across)
+        back_m_s, on_m_s = min(across_m_s, 2.0 * STEADY_M_S), min(2.0 * across_m_s, FREE_M_S)
+        is_free = not -max(STEADY_M_S, back_m_s) < along_m_s < max(STEADY_M_S, on_m_s)
         if is_there or is_free:
             share = 1.0 if abs(along_m_s) > FREE_M_S else elapsed_s / (FOLLOWED_S + elapsed_s)
             self.wind_m_s2 = plus(self.wind_m_s2, share, grown)

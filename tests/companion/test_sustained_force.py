@@ -96,7 +96,7 @@ def slid(seconds, velocity_m_s, tilt_m_s2):
         north_m, east_m = north_m + n * EVERY_S, east_m + e * EVERY_S
         sample = LocalPosition(1_000_000 + round(t * 1e6), (north_m, east_m, -1.5), (n, e, 0.0))
         monitor.add_imu((0.0, 0.0, -math.hypot(9.80665, tilt_m_s2(t))))
-        if monitor.step(sample, leaning_north(tilt_m_s2(t)), (0.3, east_m + 0.3, -1.5)) is not None:
+        if monitor.step(sample, leaning_north(tilt_m_s2(t)), (north_m + 0.3, east_m + 0.3, -1.5)) is not None:
             return t
     return None
 
@@ -104,6 +104,12 @@ def slid(seconds, velocity_m_s, tilt_m_s2):
 def test_a_vehicle_that_slides_along_a_wall_and_leans_on_it_more_and_more_is_kept_off():
     """Given a wall to the north, when the vehicle slides east at 0.4 to 0.7 m/s, it is told as where it stands."""
     found_s = slid(5.0, lambda t: (0.05, 0.4 + 0.1 * t), lambda t: 1.2 * max(0.0, t - 1.0))
+    assert 1.2 * (found_s - 1.3) == pytest.approx(HELD_M_S2, abs=0.2)
+
+
+def test_friction_that_brakes_the_slide_does_not_hide_the_wall():
+    """Given a wall to the north east, when the vehicle slides along it and friction turns its force by 45 degrees."""
+    found_s = slid(5.0, lambda t: (0.25, 0.25), lambda t: 1.2 * max(0.0, t - 1.0))
     assert 1.2 * (found_s - 1.3) == pytest.approx(HELD_M_S2, abs=0.2)
 
 
