@@ -89,7 +89,8 @@ after the detection.
 - A **contact** lasts from the first touch of any part until all parts have been clear for 20 ms. The ground does not
   count.
 - A **detection** belongs to a contact that had begun when its sample's averaging window ended, and that had been over
-  for no more than 20 ms. Each contact explains one detection. Any other is a **false detection**.
+  for no more than 100 ms: velocities show a contact between two samples so late. Each contact explains one detection.
+  Any other is a **false detection**.
 - A **missed contact** explains no detection.
 - A **recontact** is a new contact before the collision before it was recovered from.
 """

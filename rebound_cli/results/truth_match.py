@@ -12,9 +12,9 @@ from companion.report import CollisionReport
 if TYPE_CHECKING:  # a flight with a real vehicle must not wait for the simulator's compiled kernels
     from sim_vehicle.truth import FaultSpan, Hit
 
-# An IMU sample seen after a contact's end can still cover part of it: samples of PX4's default
-# 50 Hz stream are 20 ms apart.
-LATE_SAMPLE_US = 20_000
+# A contact that falls between the IMU samples shows in the velocities after it: two intervals of ODOMETRY's 30 Hz, and
+# the estimate's delay of 20 to 40 ms.
+LATE_SAMPLE_US = 100_000
 
 Time = TypeVar("Time", float, npt.NDArray[np.float64])
 Series = dict[str, npt.NDArray[np.float64]]

@@ -58,8 +58,8 @@ def counts(collisions, hits):
     [
         pytest.param([collision(10_004)], [hit(10_000)], (0, 0, 0), id="seen"),
         pytest.param([collision(9_996)], [hit(10_000)], (1, 1, 0), id="a sample that ends before contact is false"),
-        pytest.param([collision(10_048)], [hit(10_000, 10_030)], (0, 0, 0), id="a sample just after may cover it"),
-        pytest.param([collision(10_060)], [hit(10_000, 10_030)], (1, 1, 0), id="a sample long after is false"),
+        pytest.param([collision(10_128)], [hit(10_000, 10_030)], (0, 0, 0), id="velocities just after may show it"),
+        pytest.param([collision(10_132)], [hit(10_000, 10_030)], (1, 1, 0), id="a sample long after is false"),
         pytest.param([collision(10_004), collision(10_020)], [hit(10_000)], (1, 0, 0), id="one contact, one detection"),
         pytest.param([], [hit(10_000)], (0, 1, 0), id="missed"),
         pytest.param([], [hit(10_000), hit(10_500)], (0, 2, 1), id="after a missed contact the next is a recontact"),
