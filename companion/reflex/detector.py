@@ -47,9 +47,8 @@ class Situation(NamedTuple):
 
     `off_reason` says why no hit may be reported now. `height_m` is above the place of arming. The setpoint is the
     one last sent, local NED. `descent_commanded`: the vehicle is on its way down to the ground because it was told
-    to, so that touching it is no surprise. The watch fills in the last two. `estimate_valid`: False while the
-    vehicle's velocity cannot be believed, because its accelerometer did not show the whole of a hit. `strapdown` has
-    heard the sample already.
+    to, so that touching it is no surprise. The monitor fills in the last two: `validity` of the vehicle's velocity,
+    which lacks a part of a hit that was clipped, and `strapdown`. Both have heard the sample already.
     """
 
     off_reason: str | None = None
