@@ -75,6 +75,8 @@ NO_MOTORS_RAD_S2 = 4.0 * MOTORS_RAD_S2
 STEEP = 0.7
 # An estimate of the height drifts by this much in a flight by barometer or satellites.
 GROUND_M = 1.0
+# The feet are 0.1 m below the centre: a vehicle at this height stands on the ground, or scrapes along it.
+SCRAPING_M = 0.1
 
 # --- the contact's force
 # The sensor clips raw samples before they are averaged: a pulse that fills a third of the window and reaches the range

@@ -113,8 +113,12 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
     """Take the samples received since the last call, in order. Call it without samples, too: that shows a silence."""
     impacts: list[ImpactEstimate] = []
     finished: list[ImpactEstimate] = []
-    imu_samples = 0
-    situation = situation._replace(strapdown=monitor.estimator.strapdown, validity=monitor.estimator.validity)
+    imu_samples, is_on = 0, situation.off_reason is None
+    situation = situation._replace(
+        off_reason=situation.off_reason or _vibration(monitor),
+        strapdown=monitor.estimator.strapdown,
+        validity=monitor.estimator.validity,
+    )
     for sample in samples:
         if type(sample) is ImuSample:
             if not monitor.gate.imu(sample):
@@ -144,17 +148,24 @@ def advance(monitor: CollisionMonitor, samples: Sequence[Sample], situation: Sit
             if final is not None:
                 finished.append(final)
     monitor.stream_health.imu(imu_samples, monitor.config.sight, now_us)
-    return MonitorResult(impacts, finished, _notices(monitor, situation.off_reason is None, now_us))
+    return MonitorResult(impacts, finished, _notices(monitor, is_on, now_us))
+
+
+def _vibration(monitor: CollisionMonitor) -> str | None:
+    """Why nothing but a crash is reported now: vibration has grown until only a crash would exceed the threshold."""
+    threshold_m_s2 = monitor.state.threshold_m_s2
+    is_hidden = threshold_m_s2 > monitor.config.sight.max_threshold_m_s2
+    return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2" if is_hidden else None
 
 
 def _stream_fault(monitor: CollisionMonitor, now_us: int) -> str | None:
     """Why an armed detector could miss a hit, in one phrase, or None."""
-    config, threshold_m_s2 = monitor.config.sight, monitor.state.threshold_m_s2
+    config = monitor.config.sight
     fault = monitor.stream_health.fault(config, now_us)
     if fault is not None:
         return monitor.imu_fault or fault
-    if threshold_m_s2 > config.max_threshold_m_s2:
-        return f"vibration hides hits below {threshold_m_s2:.0f} m/s^2"
+    if (vibration := _vibration(monitor)) is not None:
+        return vibration
     return f"no ATTITUDE_QUATERNION for {round(config.silence_s * 1e3)} ms" if monitor.is_attitude_old else None
 
 
@@ -176,7 +187,9 @@ def _notices(monitor: CollisionMonitor, is_on: bool, now_us: int) -> list[Notice
         notices.append(Notice("detector", text, {"threshold_m_s2": round(threshold_m_s2, 3)}))
         losses = monitor.detector.losses.items()
         notices += [Notice("loss", f"no {name.name}: {loss}") for name, loss in losses if name not in monitor.heard]
-    is_invalid = not monitor.estimator.validity.is_valid and monitor.state.phase is not Phase.CONTACT
+    estimate = monitor.estimator.estimate
+    is_hit = estimate is not None and estimate.impact.is_collision
+    is_invalid = is_hit and not monitor.estimator.validity.is_valid and monitor.state.phase is not Phase.CONTACT
     if is_invalid != monitor.invalidity_reported:
         monitor.invalidity_reported = is_invalid
         text = "velocity not valid: part of the hit was not measured" if is_invalid else "velocity valid again"
