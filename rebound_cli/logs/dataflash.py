@@ -104,6 +104,9 @@ _TROUBLES = [
     *("terrain failsafe", "EKF primary", "thrust loss", "sensor failsafe", "leak", "pilot input"),
     *("vibration failsafe", "internal error", "dead reckoning failsafe"),
 ]
+# Two estimates of one climb rate that both work are nearer than this for more than half of the time: each is good to
+# 0.1 to 0.2 m/s by its barometer.
+_SAME_CLIMB_M_S = 0.3
 # GPS.Status
 _FIX_3D = 3
 # On the mean sphere, 6371 km.
@@ -244,11 +247,21 @@ def _vehicle(path: Path, texts: Sequence[str], parameters: _Parameters) -> str:
 def _estimate(topics: _Topics, parameters: _Parameters) -> tuple[str, Topic]:
     """Position and velocity by which the vehicle flies, and where they are from."""
     flies = _ESTIMATORS.get(int(parameters.get("AHRS_EKF_TYPE", 0)))
-    for name in (flies, "XKF", "NKF", "EKF"):
-        is_idle = name == "EKF" and parameters.get("AHRS_EKF_USE") == 0
-        if name is not None and not is_idle and topics[f"{name}1"]:
+    for name in (flies, "XKF", "NKF"):
+        if name is not None and topics[f"{name}1"]:
             return name, _of_primary(topics[f"{name}1"], topics[f"{name}4"])
+    if topics["EKF1"] and _is_flown_by(topics["EKF1"], topics["CTUN"]):
+        return "EKF", topics["EKF1"]
     return "CTUN", _inertial_navigation(topics["CTUN"], topics["GPS"])
+
+
+def _is_flown_by(estimate: Topic, throttle: Topic) -> bool:
+    """Until 3.2 the EKF ran without being used: not started, it gave zeros, and gone astray, hundreds of m/s."""
+    down, up = estimate.column("VD"), throttle.column("CRt")
+    if down is None or up is None:
+        return down is not None
+    apart_m_s = np.abs(down + throttle.held(up, estimate.time_us)[0])
+    return bool(down.any()) and float(np.median(apart_m_s)) < _SAME_CLIMB_M_S
 
 
 def _of_primary(topic: Topic, status: Topic) -> Topic:
