@@ -111,8 +111,8 @@ _SAME_CLIMB_M_S = 0.3
 _FIX_3D = 3
 # On the mean sphere, 6371 km.
 _METRES_PER_DEGREE = math.radians(6_371_000.0)
-# AHRS_EKF_TYPE to the first letters of that estimator's messages. EKF is the one of 2014.
-_ESTIMATORS = {2: "NKF", 3: "XKF"}
+# AHRS_EKF_TYPE to that estimator's message; EKF1 is of the one before them.
+_ESTIMATORS = {2: "NKF1", 3: "XKF1"}
 # MAV_STATE
 _STANDBY, _ACTIVE = 3, 4
 # The estimator's own word, SS (nav_filter_status): horizontal and vertical velocity are good.
@@ -247,12 +247,17 @@ def _vehicle(path: Path, texts: Sequence[str], parameters: _Parameters) -> str:
 def _estimate(topics: _Topics, parameters: _Parameters) -> tuple[str, Topic]:
     """Position and velocity by which the vehicle flies, and where they are from."""
     flies = _ESTIMATORS.get(int(parameters.get("AHRS_EKF_TYPE", 0)))
-    for name in (flies, "XKF", "NKF"):
-        if name is not None and topics[f"{name}1"]:
-            return name, _of_primary(topics[f"{name}1"], topics[f"{name}4"])
+    for name in (flies, "XKF1", "NKF1"):
+        if name is not None and topics[name]:
+            return name, _of_primary(topics[name], topics[_status_of(name)])
     if topics["EKF1"] and _is_flown_by(topics["EKF1"], topics["CTUN"]):
-        return "EKF", topics["EKF1"]
+        return "EKF1", topics["EKF1"]
     return "CTUN", _inertial_navigation(topics["CTUN"], topics["GPS"])
+
+
+def _status_of(name: str) -> str:
+    """XKF4 of XKF1; CTUN has none beside it."""
+    return name.replace("1", "4")
 
 
 def _is_flown_by(estimate: Topic, throttle: Topic) -> bool:
@@ -303,9 +308,8 @@ def _losses(topics: _Topics, estimator: str, estimate: Topic, window_us: float |
         )
     if not estimate:
         return
-    yield "resets of the estimate are not counted in these logs: one of them can look like a hit"
     yield from slow_velocity(estimator, estimate.rate_hz())
-    flags, fixes = topics[f"{estimator}4"].column("SS") if estimator != "CTUN" else None, topics["GPS"].column("Status")
+    flags, fixes = topics[_status_of(estimator)].column("SS"), topics["GPS"].column("Status")
     if flags is not None:
         for what, bit in _GOOD.items():
             if share := 100 * float(np.mean(flags.astype(np.int64) & bit == 0)):
@@ -385,8 +389,8 @@ def _heartbeats(events: Topic, modes: Topic) -> Iterator[LoggedSample]:
     armed, mode = not arming or arming[0][1] == _DISARMED, 0
     numbers = modes.column("ModeNum", "Mode")
     flown = modes.rows(None if numbers is None else numbers[:, None])
-    news: list[tuple[int, int | None, int]] = [(time_us, event, 0) for time_us, event in arming]
-    news += [(time_us, None, int(number)) for _, time_us, (number,) in flown]
+    news: list[tuple[int, int | None, int]] = [(time_us, None, int(number)) for _, time_us, (number,) in flown]
+    news += [(time_us, event, 0) for time_us, event in arming]
     for time_us, event, number in sorted(news, key=lambda item: item[0]):
         if event is None:
             mode = _MODES.get(number, ("", 0))[1]
